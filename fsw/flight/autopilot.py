@@ -69,7 +69,6 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     SensorFrame,
-    Severity,
     StateEstimate,
     StatusText,
     TickInputs,
@@ -321,13 +320,9 @@ class Autopilot:
 
     def _blind(self, state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
         """Before the first estimate: actuators off, commands refused."""
-        now_us = inputs.sensors.t_us
-        state, acks, refused = self._commander.handle_before_estimate(
-            state, inputs.commands, now_us
+        state, acks = self._commander.handle_before_estimate(
+            state, inputs.commands, inputs.sensors.t_us, texts
         )
-        if refused:
-            reason = "command refused: there is no valid state estimate yet"
-            texts.append(StatusText(Severity.CRITICAL, reason, prompt=True))
         texts += told(state, self._tick_us)
         answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
         return Controlled(answer, inputs, state, state.cascade)

@@ -11,6 +11,7 @@ from fsw.flight import arming
 from fsw.flight.modes.base import CommandContext, FlightMode
 from fsw.flight.offboard_setpoints import joints_refusal
 from fsw.flight.orbit_path import max_orbit_speed
+from fsw.flight.restart import RESTARTED
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.frozen import replace
 from fsw.model.body import hull_reach
@@ -334,9 +335,9 @@ def _restart(context: CommandContext, modes: Modes) -> Decision:
     if not context.rests:
         return Decision(LATER, "not restarted: the vehicle must have been at rest for a second")
     if context.mode is Mode.FAULT:
-        reason = "flight software restarted by {sender}; the termination is over"
+        reason = f"{RESTARTED} by {{sender}}; the termination is over"
         return Decision(ACCEPTED, reason, alarming=True, restart=True)
-    return Decision(ACCEPTED, "flight software restarted", restart=True)
+    return Decision(ACCEPTED, RESTARTED, restart=True)
 
 
 def _nothing(context: CommandContext, modes: Modes) -> Decision:

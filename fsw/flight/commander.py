@@ -5,9 +5,6 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
-import math
-from typing import Final
-
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming, failsafe
 from fsw.flight.arming_health import arming_health
@@ -23,6 +20,7 @@ from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.restart import RESTARTED, rests
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
@@ -51,9 +49,8 @@ from fsw.signals import (
 
 _ARMED = ArmingReport()  # nothing to check
 _DISARMED = Mode.DISARMED  # found in a tenth of the time
-_REST_US: Final = 1_000_000  # without thrust, for which what falls is fast or has come down
-_REST_SPEED: Final = 0.2  # m/s
-_REST_RATE: Final = 0.5  # rad/s
+_RESTARTS = "command refused: the flight software restarts; send it again"
+_NO_ESTIMATE = "command refused: there is no valid state estimate yet"
 
 
 class Commander:
@@ -84,6 +81,7 @@ class Commander:
         for command in commands:
             request, memory = command.request, state.vehicle.answered
             if state.vehicle.restarts:  # it would be undone
+                texts.append(StatusText(Severity.CRITICAL, _RESTARTS, prompt=True))
                 acks.append(acknowledgement(command, CommandResult.TEMPORARILY_REJECTED))
                 continue
             before = answered_before(memory, request, estimate.t_us)
@@ -100,14 +98,17 @@ class Commander:
         return state, acks
 
     def handle_before_estimate(
-        self, state: FlightState, commands: tuple[Command, ...], now_us: int
-    ) -> tuple[FlightState, list[CommandAck], bool]:
-        """Refuse commands, but for a restart, while nothing is known; whether any was refused.
+        self,
+        state: FlightState,
+        commands: tuple[Command, ...],
+        now_us: int,
+        texts: list[StatusText],
+    ) -> tuple[FlightState, list[CommandAck]]:
+        """Refuse commands, but for a restart, while nothing is known.
 
         One that is sent again, from before, is acknowledged as it was.
         """
-        acks: list[CommandAck] = []
-        refused = False
+        acks, refused = [], False
         for command in commands:
             request, result = command.request, CommandResult.TEMPORARILY_REJECTED
             before = answered_before(state.vehicle.answered, request, now_us)
@@ -117,12 +118,15 @@ class Commander:
             if command.action is Order.RESTART:
                 result = CommandResult.ACCEPTED
                 memory = remember(state.vehicle.answered, request, result, now_us)
-                state = replace(
-                    state, vehicle=replace(state.vehicle, answered=memory, restarts=True)
-                )
-            refused = refused or result != CommandResult.ACCEPTED
+                vehicle = replace(state.vehicle, answered=memory, restarts=True)
+                state = replace(state, vehicle=vehicle)
+                texts.append(StatusText(Severity.INFO, RESTARTED, prompt=True))
+            else:
+                refused = True
             acks.append(acknowledgement(command, result))
-        return state, acks, refused
+        if refused:
+            texts.append(StatusText(Severity.CRITICAL, _NO_ESTIMATE, prompt=True))
+        return state, acks
 
     def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
         """The state that a decision may depend on."""
@@ -155,7 +159,7 @@ class Commander:
             yaw_rate=setpoint_limits.yaw_rate,
             acceleration=setpoint_limits.acceleration,
             failures_allowed=limits.failure_injection == 1,
-            rests=_rests(state, estimate),
+            rests=rests(state, estimate),
         )
 
     def arming_report(
@@ -450,17 +454,6 @@ def _changes_course(decision: Decision) -> bool:
         or decision.joints is not None
         or decision.restart
     )
-
-
-def _rests(state: FlightState, estimate: StateEstimate) -> bool:
-    """Whether a vehicle without thrust has come to rest, as far as is known.
-
-    Where it has come down, and how it lies, height and attitude say nothing.
-    """
-    if state.invalid_ticks:
-        return True
-    slow = math.hypot(*estimate.v_WB) < _REST_SPEED and math.hypot(*estimate.w_WB_B) < _REST_RATE
-    return slow and estimate.t_us - state.vehicle.mode_begin_us >= _REST_US
 
 
 def _without_answers(state: FlightState) -> FlightState:

@@ -1,4 +1,4 @@
-"""What a restart of the flight software on command leaves as it is.
+"""A restart of the flight software on command: when it is possible, and what it leaves as it is.
 
 It is how an operator says that what had failed is well again. As after a start of the process,
 nothing is known of actuators, estimate and modes, and a termination is over. What the ground has
@@ -9,6 +9,9 @@ setpoints do not.
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
 from fsw.flight.state import (
     FlightState,
     OffboardMemory,
@@ -17,6 +20,23 @@ from fsw.flight.state import (
     VehicleMemory,
 )
 from fsw.flight.uncertain_clearance import KeptSet
+from fsw.signals import StateEstimate
+
+RESTARTED: Final = "flight software restarted"
+_REST_US: Final = 1_000_000  # without thrust, for which what falls is fast or has come down
+_REST_SPEED: Final = 0.2  # m/s
+_REST_RATE: Final = 0.5  # rad/s
+
+
+def rests(state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether a vehicle without thrust has come to rest, as far as is known.
+
+    Where it has come down, and how it lies, height and attitude say nothing.
+    """
+    if state.invalid_ticks:
+        return True
+    slow = math.hypot(*estimate.v_WB) < _REST_SPEED and math.hypot(*estimate.w_WB_B) < _REST_RATE
+    return slow and estimate.t_us - state.vehicle.mode_begin_us >= _REST_US
 
 
 def restarted(state: FlightState) -> FlightState:

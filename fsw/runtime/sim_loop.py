@@ -117,7 +117,7 @@ class FlightRecord:
 
     @property
     def offboard(self) -> OffboardReport:
-        """Set-points of clients."""
+        """Setpoints of clients."""
         return OffboardReport() if self.snapshot is None else self.snapshot.offboard
 
 

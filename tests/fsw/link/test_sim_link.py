@@ -43,6 +43,7 @@ from sitl.sensors.measurements import ImuMeasurement, JointMeasurement, Pressure
 from sitl.shapes.box import Box
 from sitl.simulation import Controls, Simulation
 from studies.flight.mission import safe_set as safe_set_of
+from tests.fsw.link.ground import ManualClock
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.whole_tick import answer_of
 
@@ -65,16 +66,6 @@ def readings(t_us: int) -> SensorReadings:
     )
 
 
-class HandClock:
-    """A machine that is busy with something else changes nothing."""
-
-    def __init__(self) -> None:
-        self.now_us = 5_000_000
-
-    def __call__(self) -> int:
-        return self.now_us
-
-
 @dataclass
 class Wire:
     """A simulator's socket and the link under test."""
@@ -82,7 +73,7 @@ class Wire:
     simulator: socket.socket
     link: SimLink
     inbox: Inbox
-    clock: HandClock
+    clock: ManualClock  # a machine that is busy with something else changes nothing
 
     def send(self, datagram: bytes) -> None:
         self.simulator.send(datagram)
@@ -97,8 +88,8 @@ def wire() -> Iterator[Wire]:
     simulator.bind(("127.0.0.1", 0))
     simulator.settimeout(0.5)
     inbox = Inbox()
-    clock = HandClock()
-    link = SimLink(simulator.getsockname(), inbox, FACTS, clock)
+    clock = ManualClock(5_000_000)
+    link = SimLink(simulator.getsockname(), inbox, FACTS, lambda: clock.now_us)
     link.announce()
     hello, vehicle = simulator.recvfrom(2048)
     assert [frame.message_id for frame in split(hello)] == [ids.HEARTBEAT]
