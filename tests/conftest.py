@@ -14,7 +14,8 @@ settings.register_profile("thorough", max_examples=1500, deadline=None, print_bl
 settings.load_profile(os.environ.get("PROPERTIES", "reproducible"))
 
 # No test reads or writes what the user keeps, such as signing keys.
-os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="pandion-state-")
+_STATE_HOME = tempfile.TemporaryDirectory(prefix="pandion-state-")
+os.environ["XDG_STATE_HOME"] = _STATE_HOME.name
 
 # pymavlink asks once, when it is imported first: without this it speaks MAVLink 1.
 os.environ["MAVLINK20"] = "1"

@@ -6,11 +6,21 @@ Every function takes a state and returns one; almost every tick it is the same o
 from __future__ import annotations
 
 from fsw.control.cascade import at_rest, in_hover
-from fsw.flight import arming, failsafe
+from fsw.flight import arming
 from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember
 from fsw.flight.command_handlers import Decision, decide
-from fsw.flight.failsafe import SLOW_US, FailsafeContext
+from fsw.flight.failsafe import (
+    BLOCKING,
+    NOTHING_DONE,
+    SLOW_US,
+    Action,
+    FailsafeContext,
+    active,
+    quickly_active,
+    surely_none,
+)
+from fsw.flight.failsafe_response import overridden, respond
 from fsw.flight.land_detector import standing_unclear, stands
 from fsw.flight.mission_sequencer import refusal as mission_refusal
 from fsw.flight.modes import MODES
@@ -181,27 +191,27 @@ class Commander:
     ) -> FlightState:
         """Report each condition once, when it becomes active, and take its action."""
         slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
-        if not slowly and failsafe.surely_none(state, estimate, self._config):
+        if not slowly and surely_none(state, estimate, self._config):
             return state
         vehicle = state.vehicle
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
         context = FailsafeContext(state, estimate, self._config, self._contradiction)
-        rows = failsafe.active(context) if slowly else failsafe.quickly_active(context)
+        rows = active(context) if slowly else quickly_active(context)
         before = vehicle.conditions
         if not rows and not before:
             return state
         now = tuple([row.condition for row in rows])
         if now == before and not slowly:
             return state
-        response = failsafe.respond(context, rows)
+        response = respond(context, rows)
         texts += response.reports
         if now != before or response.memory != vehicle.failsafe:
             vehicle = replace(vehicle, conditions=now, failsafe=response.memory)
             state = replace(state, vehicle=vehicle)
         if response.action.mode is not None:
             state = self._fail_safe(state, response.action.mode, estimate, texts)
-        if response.action is failsafe.Action.RETREAT:
+        if response.action is Action.RETREAT:
             state = replace(state, setpoint=self._retreating(state, estimate))
         return state
 
@@ -292,14 +302,14 @@ class Commander:
         """The state after a command of the pilot: it ends a failsafe whose mode it changes."""
         vehicle, action = state.vehicle, state.vehicle.failsafe.action
         commands = decision.mode is not None or decision.stop or decision.goal is not None
-        if action is failsafe.Action.NONE or not commands or not vehicle.armed:
+        if action is Action.NONE or not commands or not vehicle.armed:
             return state
         cause = vehicle.failsafe.cause
         if cause in vehicle.conditions:
             assert cause is not None
             text = f"failsafe overridden: {cause.value}"
             texts.append(StatusText(Severity.WARNING, text))
-        memory = failsafe.overridden(vehicle.failsafe, vehicle.conditions)
+        memory = overridden(vehicle.failsafe, vehicle.conditions)
         return replace(state, vehicle=replace(vehicle, failsafe=memory, failsafe_from=None))
 
     def _remember(
@@ -380,7 +390,7 @@ class Commander:
             speed=None,
             intended_mode=Mode.HOLD,
             conditions=(),  # what is so is told again, and acted upon
-            failsafe=failsafe.NOTHING_DONE,
+            failsafe=NOTHING_DONE,
         )
         state = replace(
             _without_plan(state, estimate),
@@ -430,7 +440,7 @@ class Commander:
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
         if not vehicle.armed:
-            memory = failsafe.overridden(vehicle.failsafe, ())
+            memory = overridden(vehicle.failsafe, ())
             vehicle = replace(vehicle, failsafe_from=None, failsafe=memory)
             # On the ground another source may own the safe set from now on.
             state = replace(state, mission=replace(state.mission, owner_heard_us=-1))
@@ -466,7 +476,7 @@ def _blocked(vehicle: VehicleMemory) -> str:
     """Why nothing but Descend can be flown now; empty: other modes can be."""
     if not vehicle.flies or vehicle.mode is not Mode.DESCEND:
         return ""
-    reasons = [c.value for c in vehicle.conditions if c in failsafe.BLOCKING]
+    reasons = [c.value for c in vehicle.conditions if c in BLOCKING]
     return f"{reasons[0]}; the vehicle descends" if reasons else ""
 
 

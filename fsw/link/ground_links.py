@@ -23,7 +23,6 @@ _SENDS: Final = 3
 _ONE: Final = 1  # byte of budget: one datagram
 # What may have to be told at once, of a snapshot.
 _TOLD_AT_ONCE: Final = attrgetter("mode", "intended_mode", "armed", "landed", "failures", "mission")
-_NOTHING: Final = (False, False)
 _GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
 # Of files, a tick and link: some 3 MB/s in real time, if the client asks as fast.
 _BULK_DATAGRAMS: Final = 6
@@ -38,9 +37,8 @@ class GroundLinks:
         self._tick_us = tick_period_us
         self._slot_ticks = SLOT_US // tick_period_us
         self._tick = 0
-        self._seen: object = None
-        self._shown: object = None
-        self._mission: object = None
+        self._told: FlightSnapshot | None = None  # the last one that had something to tell at once
+        self._told_values: object = None
         self._t_us = 0  # of the last tick
         self._attends = False
 
@@ -89,9 +87,7 @@ class GroundLinks:
         self._tick += 1
         place, texts = tick % self._slot_ticks, bool(outputs.texts)
         encodes, sends = place == _ENCODES, place == _SENDS
-        seen = _TOLD_AT_ONCE(snapshot)
-        changed, steps = _NOTHING if seen == self._seen else self._changed(snapshot)
-        self._seen = seen
+        changed, steps = self._changes(snapshot)
         news = encodes or changed or texts
         for link in self.links:
             if link.talks:
@@ -110,15 +106,18 @@ class GroundLinks:
                 # Ticks without a pause between them must not make the vehicle deaf.
                 link.read(t_us, _ONE)
 
-    def _changed(self, snapshot: FlightSnapshot) -> tuple[bool, bool]:
+    def _changes(self, now: FlightSnapshot) -> tuple[bool, bool]:
         """Whether a heartbeat says something new at once, and whether a mission has gone on.
 
         One step of a mission may follow another by a tick, and each is told.
         """
-        shown = (shown_mode(snapshot), snapshot.armed, snapshot.landed, snapshot.failures)
-        changed, steps = shown != self._shown, snapshot.mission is not self._mission
-        self._shown, self._mission = shown, snapshot.mission
-        return changed, steps
+        values = _TOLD_AT_ONCE(now)
+        if values == self._told_values:
+            return False, False
+        before, self._told, self._told_values = self._told, now, values
+        if before is None:
+            return True, now.mission is not None
+        return _heartbeat(now) != _heartbeat(before), now.mission is not before.mission
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command on the link it came from; on all where that is not known."""
@@ -132,3 +131,7 @@ class GroundLinks:
         """Close all sockets."""
         for link in self.links:
             link.close()
+
+
+def _heartbeat(snapshot: FlightSnapshot) -> object:
+    return shown_mode(snapshot), snapshot.armed, snapshot.landed, snapshot.failures

@@ -18,9 +18,9 @@ from fsw.flight.failsafe import (
     FailsafeContext,
     active,
     quickly_active,
-    report,
     way_home_s,
 )
+from fsw.flight.failsafe_response import report
 from fsw.flight.state import (
     AIDED,
     Aiding,

@@ -20,9 +20,8 @@ from fsw.flight.failsafe import (
     Condition,
     Failsafe,
     FailsafeContext,
-    allowed,
-    respond,
 )
+from fsw.flight.failsafe_response import allowed, respond
 from fsw.flight.state import (
     Aiding,
     Damage,
