@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Final
 
 from command_line.parser import Parser
-from fsw.estimation.sensor_fusion import SensorFusion, at_start
+from fsw.estimation.fusion_memory import at_start
+from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.measurements import Sample

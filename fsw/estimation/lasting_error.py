@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 
+from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_checks import believable
 from fsw.estimation.sensor_fault import Sensor
-from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 

@@ -22,12 +22,17 @@ from fsw.estimation import attribution, kernels
 from fsw.estimation.attribution import Dispute
 from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
+from fsw.estimation.fusion_memory import (
+    NO_TURN,
+    EncoderWatch,
+    FusionMemory,
+    Waiting,
+    at_start,
+)
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
-from fsw.estimation.pace import Pace
 from fsw.estimation.sensor_checks import (
     SENSOR_OF,
     Aiding,
-    Health,
     arrived,
     believable,
 )
@@ -53,7 +58,6 @@ _FARTHEST_BEHIND: Final = 0.1  # s, that the filter stays behind while there is 
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
-_REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _WAITING_AT_START: Final = 16  # samples that are looked at
 _SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves between two poses
@@ -71,140 +75,9 @@ _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
-_NO_TURN: Vec4 = (1.0, 0.0, 0.0, 0.0)
 _USUAL_PARTS: Final = kernels.COPY | kernels.PUSH | kernels.JOINTS | kernels.READING
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
 _NO_READING: kernels.Reading = (0.0, _REST, _REST)
-
-
-class Waiting(NamedTuple):
-    """A sample, and when the filter reaches it; a tie is broken by the order of arrival."""
-
-    time: float  # s
-    number: int
-    sample: Aiding
-
-
-class Reset(NamedTuple):
-    """Jumps of the estimate, as PX4 reports them: how many there were, and the last one."""
-
-    number: int = 0
-    position: Vec3 = _REST  # m, NED, new minus old
-    velocity: Vec3 = _REST  # m/s, NED, new minus old
-    turn: Vec4 = _NO_TURN  # new attitude times the inverse of the old one, NED
-
-
-class EncoderWatch(NamedTuple):
-    """Whether the joints' encoders still follow the joints."""
-
-    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
-    asked: Vec2 = (0.0, 0.0)  # rad, of the joints when it came first
-    repeats: int = 0  # readings in a row that were the same
-    stuck: bool = False
-
-    @property
-    def repeating(self) -> bool:
-        """Whether they have said the same for long enough to ask whether they are stuck."""
-        return self.repeats >= _REPEATS
-
-
-class FusionMemory(NamedTuple):
-    """What the estimator carries from tick to tick."""
-
-    # What every tick renews, what a sample does, what fusing one does, and the rest: in this order,
-    # because they are renewed by position. Names cost two microseconds.
-    numbers: Filter
-    now: float = -1.0  # s, of the last tick; negative: there was none
-    imu_came: float = -1.0  # s, when a reading came last; negative: never
-    joints_came: float = -1.0
-    encoders: EncoderWatch = EncoderWatch()
-    waiting: tuple[Waiting, ...] = ()
-    health: tuple[Health, ...] = ()  # of each sensor heard so far
-    arrivals: int = 0
-    delay: float = 0.0  # s, that measurements have lately taken
-    gnss: GnssSample | None = None  # the newest one
-    pose: PoseSample | None = None  # the last one that the filter has reached
-    reset_counter: int | None = None  # of the last pose
-    refused: tuple[Aiding, ...] = ()  # of each kind the last one that was
-    started: bool = False
-    field: Vec3 | None = None  # Gauss, body, the last one
-    frame: FrameDrift = FrameDrift()  # of poses that drift
-    reset: Reset = Reset()
-    delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
-    paces: tuple[Pace, ...] = ()  # how often sensors are heard
-    restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
-    began: float = -math.inf  # s, the filter's own time when it began
-    without_fix: GnssSample | None = None  # the newest one that has none
-    dispute: Dispute | None = None  # between pose and IMU
-
-    def of(self, sensor: Sensor) -> Health:
-        """What is known of a sensor."""
-        for one in self.health:
-            if one.sensor is sensor:
-                return one
-        return Health(sensor)
-
-    def fault_at(self, sensor: Sensor) -> float:
-        """When a fault of a sensor was seen last [s]; minus infinity: never."""
-        for one in self.health:
-            if one.sensor is sensor:
-                return one.fault_at
-        return -math.inf
-
-    def came(self, sensor: Sensor) -> float:
-        """When a reading of a sensor came last [s]; negative: never."""
-        if sensor is Sensor.IMU:
-            return self.imu_came
-        return self.joints_came if sensor is Sensor.ENCODERS else self.of(sensor).came
-
-    def noting(self, health: Health) -> FusionMemory:
-        """The memory with the health of one sensor renewed."""
-        return self._replace(health=(*self.without(health.sensor), health))
-
-    def noting_fault(self, sensor: Sensor, fault: SensorFault, now: float) -> FusionMemory:
-        """The memory with a ``fault`` of a sensor that was seen at ``now`` [s]."""
-        return self.noting(self.of(sensor).with_fault(fault, now))
-
-    def noting_faults(self, of_imu: int, of_encoders: int, now: float) -> FusionMemory:
-        """The memory with faults that the filter has seen at ``now`` [s]; 0: none."""
-        memory = self
-        if of_imu:
-            memory = memory.noting_fault(Sensor.IMU, SensorFault(of_imu), now)
-        if of_encoders:
-            memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
-        return memory
-
-    def in_dispute(self, now: float, *, turned: bool) -> FusionMemory:
-        """The memory after a pose was refused by little at ``now`` [s]: see ``Dispute``."""
-        dispute = attribution.contradicted(self.dispute, now, self.numbers[0], turned=turned)
-        return self._replace(dispute=dispute)
-
-    def after(self, one: Waiting, health: Health, refused: tuple[Aiding, ...]) -> FusionMemory:
-        """The memory after the first of the waiting samples was fused, or ``refused`` [SI]."""
-        sample, pose, counter = one.sample, self.pose, self.reset_counter
-        if isinstance(sample, PoseSample):
-            pose, counter = sample, sample.reset_counter
-        known = self.waiting[1:], (*self.without(health.sensor), health)
-        seen = pose, counter, refused
-        return FusionMemory._make((*self[:5], *known, *self[7:10], *seen, *self[13:]))
-
-    def without(self, sensor: Sensor) -> list[Health]:
-        """What is known of the other sensors."""
-        return [one for one in self.health if one.sensor is not sensor]
-
-    def jumped(
-        self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = _NO_TURN
-    ) -> FusionMemory:
-        """The memory after the estimate's ``position`` [m, NED] and all else have jumped.
-
-        ``velocity`` [m/s, NED] and ``turn`` [1] as in ``Reset``.
-        """
-        return self._replace(reset=Reset(self.reset.number + 1, position, velocity, turn))
-
-
-def at_start() -> FusionMemory:
-    """Memory before the first sample."""
-    return FusionMemory(np.zeros(1, dtype=FILTER))
 
 
 class Asked(NamedTuple):
@@ -230,7 +103,7 @@ class SensorFusion:
         self._least_pose = self._least_p, self._least_q
         x, none = at_start().numbers, (0.0, 0.0)
         asked = Asked(x, kernels.COPY, none, none)
-        pose = (0.0, 0.0, _REST, _NO_TURN, _REST, _REST)
+        pose = (0.0, 0.0, _REST, NO_TURN, _REST, _REST)
         self._tick = machine_code(kernels.tick, x, self.law, 0, 0.0, *asked)
         self._tick_with_pose = machine_code(
             kernels.tick_with_pose, x, self.law, 0.0, *asked, pose, self._least_pose
@@ -255,7 +128,7 @@ class SensorFusion:
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._reset(memory, Waiting(t, 0, sample), (math.inf, math.inf))
         kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
-        kernels.judge_by_attitude(memory.numbers, self.law, t, _NO_TURN, 1.0)
+        kernels.judge_by_attitude(memory.numbers, self.law, t, NO_TURN, 1.0)
         kernels.judge_by_field(memory.numbers, self.law, t, (0.2, 0.0, 0.4))
         self.covariance(memory, t)
         return estimate
@@ -803,7 +676,7 @@ class SensorFusion:
     def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """Take what the gate refused for long as it is."""
         x, law, sample = memory.numbers, self.law, one.sample
-        place, velocity, turn = _REST, _REST, _NO_TURN
+        place, velocity, turn = _REST, _REST, NO_TURN
         if isinstance(sample, PoseSample):
             stated, about = self._noise(memory, sample)
             if ratio[0] > 1.0:

@@ -23,7 +23,7 @@ from fsw.control.cascade import (
 from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
-from fsw.estimation.sensor_fusion import FusionMemory
+from fsw.estimation.fusion_memory import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, told
 from fsw.flight.commander import Commander

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.arming import NO_ESTIMATE, joined
 from fsw.flight.estimator_report import AIDS_PLACE
 from fsw.flight.failsafe import ROWS, Action, Condition

@@ -7,9 +7,9 @@ from operator import itemgetter
 from typing import Final
 
 from fsw.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
+from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, fault_name
-from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.frozen import replace
 from fsw.signals import (

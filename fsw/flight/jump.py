@@ -6,7 +6,7 @@ from typing import Final
 
 from fsw.control.cascade import CascadeMemory
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.estimation.sensor_fusion import Reset
+from fsw.estimation.fusion_memory import Reset
 from fsw.flight.state import FlightState
 from fsw.frozen import replace
 from fsw.geometry.quaternion import conjugate, multiply

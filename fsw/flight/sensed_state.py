@@ -9,20 +9,14 @@ from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import Array, P
+from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.estimation.sensor_fusion import (
-    UNKNOWN,
-    EncoderWatch,
-    FusionMemory,
-    Reset,
-    SensorFusion,
-    at_start,
-)
+from fsw.estimation.sensor_fusion import UNKNOWN, SensorFusion
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report

@@ -9,8 +9,8 @@ from fsw.control.actuator_watch import Watch
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import FrameTrust
+from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.estimation.sensor_fusion import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition, FailsafeMemory

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fsw.estimation.sensor_fusion import SensorFusion, at_start
+from fsw.estimation.fusion_memory import at_start
+from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.measurements import ImuSample, PoseSample
 from tests.fsw.estimation.sensor_runs import VIO, PoseSensor, Run, rotations, run
 

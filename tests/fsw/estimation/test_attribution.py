@@ -22,8 +22,9 @@ from fsw.estimation.attribution import (
     wrong,
 )
 from fsw.estimation.error_state import FILTER, FORCE, LOST, NO_FORCE, TIME
+from fsw.estimation.fusion_memory import at_start
 from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.estimation.sensor_fusion import SensorFusion, at_start
+from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.signals import Vec3

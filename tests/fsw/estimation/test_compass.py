@@ -14,8 +14,9 @@ from fsw.compiled import packed
 from fsw.estimation import fusion
 from fsw.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
+from fsw.estimation.fusion_memory import at_start
 from fsw.estimation.sensor_fault import Sensor
-from fsw.estimation.sensor_fusion import SensorFusion, at_start
+from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.quaternion import turned
 from fsw.geometry.rotation import matrix_from_quaternion

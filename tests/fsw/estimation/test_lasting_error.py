@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from fsw.estimation.drift import FrameDrift
 from fsw.estimation.error_state import ERRORS
+from fsw.estimation.fusion_memory import FusionMemory, at_start
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor
-from fsw.estimation.sensor_fusion import FusionMemory, at_start
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.uncertain_clearance import pose_covariance

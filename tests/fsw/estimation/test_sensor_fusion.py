@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from fsw.estimation.fusion_memory import FusionMemory, at_start
 from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.estimation.sensor_fusion import FusionMemory, SensorFusion, at_start
+from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.estimation.tuning import EstimatorTuning, chi_square
 from fsw.flight.estimator_report import estimator_report
 from fsw.geometry.rotation import quaternion_from_matrix
