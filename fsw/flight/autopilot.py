@@ -25,7 +25,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.flight.accuracy_watch import AccuracyWatch
-from fsw.flight.before_estimate import nothing_known, told
+from fsw.flight.before_estimate import nothing_known, nowhere, told
 from fsw.flight.commander import Commander
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
@@ -319,9 +319,9 @@ class Autopilot:
         return state, TickOutputs(answer.actuators, snapshot, request, answer.acks, texts, taken)
 
     def _blind(self, state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
-        """Before the first estimate: actuators off, commands refused."""
-        state, acks = self._commander.handle_before_estimate(
-            state, inputs.commands, inputs.sensors.t_us, texts
+        """Before the first estimate: actuators off, and no command that needs one."""
+        state, acks = self._commander.handle_commands(
+            state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
         )
         texts += told(state, self._tick_us)
         answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))

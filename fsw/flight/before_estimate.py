@@ -59,16 +59,11 @@ def _reason(memory: FusionMemory | None) -> str:
     return "; ".join(faults) or "readings come, and none is good enough to begin with"
 
 
-def nothing_known(
-    answer: Answer, state: FlightState, t_us: int, texts: tuple[StatusText, ...]
-) -> TickOutputs:
-    """The outputs at ``t_us``, with the ``texts`` of the whole tick.
-
-    Telemetry goes on, and shows what is known all the same.
-    """
+def nowhere(t_us: int) -> StateEstimate:
+    """The estimate that telemetry shows and commands are looked at with, which says nothing."""
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    nowhere = StateEstimate(
+    return StateEstimate(
         t_us=t_us,
         p_WB=zero,
         v_WB=zero,
@@ -78,12 +73,21 @@ def nothing_known(
         q_arm=(0.0, 0.0),
         qd_arm=(0.0, 0.0),
     )
+
+
+def nothing_known(
+    answer: Answer, state: FlightState, t_us: int, texts: tuple[StatusText, ...]
+) -> TickOutputs:
+    """The outputs at ``t_us``, with the ``texts`` of the whole tick.
+
+    Telemetry goes on, and shows what is known all the same.
+    """
     empty = FlightState()
     snapshot = FlightSnapshot(
         t_us=t_us,
         mode=answer.mode,
         armed=answer.armed,
-        estimate=nowhere,
+        estimate=nowhere(t_us),
         reference=None,
         plan_state=None,
         plan_input=None,

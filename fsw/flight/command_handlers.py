@@ -94,6 +94,14 @@ def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
     return decision
 
 
+def decide_without_estimate(command: Command, context: CommandContext, modes: Modes) -> Decision:
+    """The same before the first estimate: what needs one is put off."""
+    action = command.action
+    if isinstance(action, _NEED_NO_ESTIMATE) or action in _ORDERS_WITHOUT_ESTIMATE:
+        return decide(command, replace(context, estimate_valid=False, rests=True), modes)
+    return Decision(LATER, "command refused: there is no valid state estimate yet")
+
+
 def _reject(action: Rejected, context: CommandContext, modes: Modes) -> Decision:
     """Refuse a command that the link could not decode.
 
@@ -371,6 +379,11 @@ COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
     Order: _order,
     Rejected: _reject,
 }
+# The vehicle cannot be armed then, and so is not.
+_NEED_NO_ESTIMATE: Final = (Arm, Disarm, InjectFailure, Rejected)
+_ORDERS_WITHOUT_ESTIMATE: Final = frozenset(
+    {Order.TERMINATE, Order.CHECK_ARMING, Order.RESTART, Order.NOTHING}
+)
 
 
 def _is_armed(context: CommandContext) -> bool:

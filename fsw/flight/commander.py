@@ -9,7 +9,7 @@ from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming
 from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember
-from fsw.flight.command_handlers import Decision, decide
+from fsw.flight.command_handlers import Decision, decide, decide_without_estimate
 from fsw.flight.failsafe import (
     BLOCKING,
     NOTHING_DONE,
@@ -30,7 +30,7 @@ from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
-from fsw.flight.restart import RESTARTED, rests
+from fsw.flight.restart import rests
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
@@ -50,7 +50,6 @@ from fsw.signals import (
     MissionUpdate,
     Mode,
     MotionSetpoint,
-    Order,
     Severity,
     StateEstimate,
     StatusText,
@@ -60,7 +59,6 @@ from fsw.signals import (
 _ARMED = ArmingReport()  # nothing to check
 _DISARMED = Mode.DISARMED  # found in a tenth of the time
 _RESTARTS = "command refused: the flight software restarts; send it again"
-_NO_ESTIMATE = "command refused: there is no valid state estimate yet"
 
 
 class Commander:
@@ -85,9 +83,14 @@ class Commander:
         estimate: StateEstimate,
         commands: tuple[Command, ...],
         texts: list[StatusText],
+        *,
+        known: bool = True,
     ) -> tuple[FlightState, list[CommandAck]]:
-        """Carry out commands in the order they came; a repeated one is acknowledged again only."""
-        acks = []
+        """Carry out commands in the order they came; a repeated one is acknowledged again only.
+
+        Before the first estimate nothing of it is ``known``, and what needs one is put off.
+        """
+        acks, judge = [], decide if known else decide_without_estimate
         for command in commands:
             request, memory = command.request, state.vehicle.answered
             if state.vehicle.restarts:  # it would be undone
@@ -98,44 +101,13 @@ class Commander:
             if before is not None:
                 result = before.result
             else:
-                decision = decide(command, self.context(state, estimate), self._modes)
+                decision = judge(command, self.context(state, estimate), self._modes)
                 result = decision.result
                 texts += _reason(decision)
                 state = self._carry_out(state, decision, estimate, texts)
                 memory = remember(state.vehicle.answered, request, result, estimate.t_us)
                 state = replace(state, vehicle=replace(state.vehicle, answered=memory))
             acks.append(acknowledgement(command, result))
-        return state, acks
-
-    def handle_before_estimate(
-        self,
-        state: FlightState,
-        commands: tuple[Command, ...],
-        now_us: int,
-        texts: list[StatusText],
-    ) -> tuple[FlightState, list[CommandAck]]:
-        """Refuse commands, but for a restart, while nothing is known.
-
-        One that is sent again, from before, is acknowledged as it was.
-        """
-        acks, refused = [], False
-        for command in commands:
-            request, result = command.request, CommandResult.TEMPORARILY_REJECTED
-            before = answered_before(state.vehicle.answered, request, now_us)
-            if before is not None:
-                acks.append(acknowledgement(command, before.result))
-                continue
-            if command.action is Order.RESTART:
-                result = CommandResult.ACCEPTED
-                memory = remember(state.vehicle.answered, request, result, now_us)
-                vehicle = replace(state.vehicle, answered=memory, restarts=True)
-                state = replace(state, vehicle=vehicle)
-                texts.append(StatusText(Severity.INFO, RESTARTED, prompt=True))
-            else:
-                refused = True
-            acks.append(acknowledgement(command, result))
-        if refused:
-            texts.append(StatusText(Severity.CRITICAL, _NO_ESTIMATE, prompt=True))
         return state, acks
 
     def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
@@ -169,7 +141,7 @@ class Commander:
             yaw_rate=setpoint_limits.yaw_rate,
             acceleration=setpoint_limits.acceleration,
             failures_allowed=limits.failure_injection == 1,
-            rests=rests(state, estimate),
+            rests=rests(state, estimate, limits.aiding_loss_us),
         )
 
     def arming_report(

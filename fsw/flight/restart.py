@@ -24,19 +24,23 @@ from fsw.signals import StateEstimate
 
 RESTARTED: Final = "flight software restarted"
 _REST_US: Final = 1_000_000  # without thrust, for which what falls is fast or has come down
+_FALLEN_US: Final = 10_000_000  # without thrust: from 490 m
 _REST_SPEED: Final = 0.2  # m/s
 _REST_RATE: Final = 0.5  # rad/s
 
 
-def rests(state: FlightState, estimate: StateEstimate) -> bool:
+def rests(state: FlightState, estimate: StateEstimate, unaided_us: int) -> bool:
     """Whether a vehicle without thrust has come to rest, as far as is known.
 
-    Where it has come down, and how it lies, height and attitude say nothing.
+    Where it has come down, and how it lies, height and attitude say nothing. One that knows nothing
+    of its motion, or has not measured its position for ``unaided_us`` [us], has come down after a
+    while.
     """
-    if state.invalid_ticks:
-        return True
+    for_us = estimate.t_us - state.vehicle.mode_begin_us
+    if state.invalid_ticks or state.aiding.unaided_us >= unaided_us:
+        return for_us >= _FALLEN_US
     slow = math.hypot(*estimate.v_WB) < _REST_SPEED and math.hypot(*estimate.w_WB_B) < _REST_RATE
-    return slow and estimate.t_us - state.vehicle.mode_begin_us >= _REST_US
+    return slow and for_us >= _REST_US
 
 
 def restarted(state: FlightState) -> FlightState:

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from fsw.flight.restart import restarted
-from fsw.flight.state import FlightState, OffboardMemory, PlanMemory, SafetyMemory, VehicleMemory
+from fsw.flight.before_estimate import nowhere
+from fsw.flight.restart import restarted, rests
+from fsw.flight.state import (
+    Aiding,
+    FlightState,
+    OffboardMemory,
+    PlanMemory,
+    SafetyMemory,
+    VehicleMemory,
+)
+from fsw.measurements import PoseSample, Sample
 from fsw.shapes.half_space import wall
 from fsw.signals import (
     CommandResult,
@@ -50,6 +60,9 @@ share = 0.7
 start_s = 3.5
 duration_s = 5.0
 """
+
+
+UNAIDED = Aiding(unaided_us=400_000)
 
 
 def results_of(flight: Flight, number: int) -> list[int]:
@@ -159,6 +172,46 @@ def test_what_falls_is_not_restarted(ended_by: tuple[float, ...]) -> None:
 
 
 @pytest.mark.requirement("REQ-MODE-12")
+@pytest.mark.parametrize("lost", ["all", "pose"])
+def test_what_does_not_know_its_motion_is_restarted_when_it_must_have_come_down(lost: str) -> None:
+    """It drifts in its estimate though it stands, and seems to stand though it falls."""
+    silent = [False]
+
+    def spoilt(samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
+        kept = () if lost == "all" else tuple(s for s in samples if not isinstance(s, PoseSample))
+        return kept if silent[0] else samples
+
+    flight = Flight(parse_scenario(SCENARIO, "restart", "mocap"), spoil_samples=spoilt)
+    flight.run(1.0)
+    take_off(flight)
+    flight.run(0.1)
+    silent[0] = True
+    flight.run(0.1)
+    flight.step(command(TERMINATE, 1.0))
+    begun_us = flight.sim.t_us
+    flight.run(1.1)
+    while flight.results[-1] != (REBOOT, ACCEPTED) and flight.sim.t_us - begun_us < 12_000_000:
+        flight.step(command(REBOOT, 1.0))
+        flight.run(0.1)
+    assert 10_000_000 <= flight.sim.t_us - begun_us < 10_300_000
+
+
+@pytest.mark.requirement("REQ-MODE-12")
+@pytest.mark.parametrize(
+    ("known", "from_us"),
+    [({}, 1_000_000), ({"invalid_ticks": 1}, 10_000_000), ({"aiding": UNAIDED}, 10_000_000)],
+)
+def test_an_estimate_that_is_not_to_be_relied_upon_says_nothing_of_rest(
+    known: dict[str, Any], from_us: int
+) -> None:
+    begun_us = 5_000_000
+    state = FlightState(vehicle=VehicleMemory(mode=Mode.FAULT, mode_begin_us=begun_us), **known)
+    for after_us in range(0, 12_000_000, 200_000):
+        expected = after_us >= from_us
+        assert rests(state, nowhere(begun_us + after_us), 400_000) is expected, after_us
+
+
+@pytest.mark.requirement("REQ-MODE-12")
 def test_what_follows_in_the_same_tick_is_not_carried_out_and_can_be_sent_again() -> None:
     flight = Flight(parse_scenario(SCENARIO, "restart", "mocap"))
     flight.run(0.5)
@@ -197,6 +250,7 @@ def test_while_nothing_is_known_it_is_answered_again_and_may_be_asked_for() -> N
     assert results_of(flight, REBOOT) == [ACCEPTED, ACCEPTED]
     flight.run(4.0)
     flight.step(command(ARM, 1.0), command(REBOOT, 1.0))
+    assert flight.texts[-2] == "not armed: the state estimate is invalid"
     assert flight.results[-2:] == [(ARM, LATER), (REBOOT, ACCEPTED)]
     assert flight.texts.count("flight software restarted") == 2
     silent[0] = False

@@ -80,6 +80,9 @@ def _parameters(stack: ExitStack) -> Try:
     return attempt
 
 
+_LATEST: Final = 1 << 47  # of a signing time
+
+
 def _key(stack: ExitStack) -> Try:
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "key.json"
 
@@ -88,7 +91,7 @@ def _key(stack: ExitStack) -> Try:
         path.chmod(0o600)
         file = KeyFile(path)
         with suppress(LinkError):
-            file.read()
+            file.read(_LATEST)
         file.close()
 
     return attempt

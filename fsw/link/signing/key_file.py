@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
+import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,22 +28,24 @@ class SigningKey:
 
 
 class KeyFile:
-    """Reads and replaces the file in one step, so that a reader never sees half of it.
+    """Replaces the file in one step, so that a reader never sees half of it.
 
     The newest time is changed in place, and nothing waits for the disk: the next process finds it
-    however this one ends, and after a loss of power it is half a minute old at most.
+    however this one ends, and after a loss of power it is half a minute old at most. Several
+    processes may have the file open: the time in it never goes back.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._open: tuple[int, int] | None = None  # handle, and where the time ends
+        self._open: tuple[int, int] | None = None  # handle, and where the time begins
 
-    def read(self) -> SigningKey | None:
-        """The key, or None if there is none.
+    def read(self, latest: int) -> SigningKey | None:
+        """The key, or None if there is none; its newest time must not be after ``latest`` [10 us].
 
         Raises:
-            LinkError: Others may read the file, or it holds no key. Flying on without signatures
-                would open a link that its owner has closed.
+            LinkError: Others may read the file, it holds no key, or the newest time lies ahead, so
+                that every frame would be refused. Flying on without signatures would open a link
+                that its owner has closed.
         """
         try:
             if stat.S_IMODE(self._path.stat().st_mode) & 0o077:
@@ -58,9 +60,14 @@ class KeyFile:
             raise LinkError(
                 f"{self._path} holds no signing key; remove it to fly unsigned"
             ) from None
+        if newest > latest:
+            raise LinkError(
+                f"{self._path}: the newest signing time is {1e-5 * (newest - latest):.0f} s too far"
+                " ahead of the clock; set the clock, or remove the file to fly unsigned"
+            )
         found = SigningKey(key, newest)
         try:
-            self.write(found)  # as a file that ``keep`` can change in place
+            self.write(found)
         except OSError as error:
             raise LinkError(
                 f"{self._path} cannot be written, {error.strerror}: the newest signing time must be"
@@ -69,32 +76,41 @@ class KeyFile:
         return found
 
     def write(self, key: SigningKey) -> None:
-        """Replace the file; raises OSError if that is not possible."""
+        """Replace the file, or its time where it holds the key; raises OSError if it cannot be."""
+        with contextlib.suppress(OSError):
+            if self._take_up(key.key):
+                self.keep(key.key, key.newest)
+                return
         self._path.parent.mkdir(parents=True, exist_ok=True)
         beside = self._path.with_name(f"{self._path.name}.{os.getpid()}.new")
-        text = json.dumps({"key": key.key.hex()})[:-1] + f', "newest": {key.newest:>{_TIME_DIGITS}}'
+        head = _head(key.key)
         # Created with its mode, never readable by others even for a moment.
-        handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, _MODE)
+        handle = os.open(beside, os.O_RDWR | os.O_CREAT | os.O_TRUNC, _MODE)
         try:
             os.fchmod(handle, _MODE)
-            os.write(handle, f"{text}}}".encode("ascii"))
+            os.write(handle, head + _digits(key.newest) + b"}")
             os.fsync(handle)
             beside.replace(self._path)
         except BaseException:
             os.close(handle)
             raise
         self.close()
-        self._open = (handle, len(text))
+        self._open = (handle, len(head))
 
-    def keep(self, newest: int) -> None:
+    def keep(self, key: bytes, newest: int) -> None:
         """Keep the ``newest`` signing time [10 us] in the file, in place; a disk error is ignored.
 
-        The file must stay open since it was read or written: a tick may call this.
+        The file must stay open since it was read or written: a tick may call this. One that another
+        process has replaced is taken up if it holds the same ``key`` (32 bytes).
         """
-        if self._open is not None:
-            handle, end = self._open
-            with contextlib.suppress(OSError):
-                os.pwrite(handle, b"%*d" % (_TIME_DIGITS, newest), end - _TIME_DIGITS)
+        with contextlib.suppress(OSError, ValueError):
+            if self._open is not None and os.fstat(self._open[0]).st_nlink == 0:
+                self.close()
+                self._take_up(key)
+            if self._open is not None:
+                handle, begin = self._open
+                if newest > int(os.pread(handle, _TIME_DIGITS, begin)):
+                    os.pwrite(handle, _digits(newest), begin)
 
     def remove(self) -> None:
         """Delete the key; raises OSError if that is not possible."""
@@ -106,3 +122,32 @@ class KeyFile:
         if self._open is not None:
             os.close(self._open[0])
             self._open = None
+
+    def _take_up(self, key: bytes) -> bool:
+        """Open the file for :meth:`keep`, if :meth:`write` has made it and with this key.
+
+        Replaced, it would not be the file any more that another process keeps its time in.
+        """
+        head = _head(key)
+        handle = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
+        try:
+            content = os.read(handle, _MOST_BYTES)
+            others = os.fstat(handle).st_mode & 0o077
+            if others or re.fullmatch(re.escape(head) + rb" *\d+}", content) is None:
+                os.close(handle)
+                return False
+        except BaseException:
+            os.close(handle)
+            raise
+        self.close()
+        self._open = (handle, len(head))
+        return True
+
+
+def _head(key: bytes) -> bytes:
+    """What stands before the time."""
+    return b'{"key": "%s", "newest": ' % key.hex().encode("ascii")
+
+
+def _digits(newest: int) -> bytes:
+    return b"%*d" % (_TIME_DIGITS, newest)

@@ -21,10 +21,11 @@ Sender = tuple[int, int, int]
 class KeyTimes:
     """The times under one key; all are in units of 10 us since 2015."""
 
-    def __init__(self, oldest: int) -> None:
-        """Frames that are not newer than ``oldest`` are refused."""
+    def __init__(self, key: bytes, oldest: int) -> None:
+        """Frames under ``key`` (32 bytes) that are not newer than ``oldest`` are refused."""
         self.newest = oldest
         self.links = 0  # that have the key now
+        self._key = key
         self._oldest = oldest
         self._senders: dict[Sender, int] = {}
         self._files: list[KeyFile] = []
@@ -65,7 +66,7 @@ class KeyTimes:
         """Keep the newest time in the file of every link that has the key."""
         self.newest = max(self.newest, time)
         for file in self._files:
-            file.keep(self.newest)
+            file.keep(self._key, self.newest)
 
 
 class SignedTimes:
@@ -85,5 +86,5 @@ class SignedTimes:
             idle = [one for one, times in self._by_key.items() if not times.links]
             for one in idle[: max(len(idle) + 1 - _MAX_KEYS, 0)]:
                 self._forgotten = max(self._forgotten, self._by_key.pop(one).newest)
-            found = self._by_key[key] = KeyTimes(self._forgotten)
+            found = self._by_key[key] = KeyTimes(key, self._forgotten)
         return found

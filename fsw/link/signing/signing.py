@@ -26,6 +26,7 @@ _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
 _SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)
 _EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01 UTC, where signing time begins
 _UNIT_US: Final = 10  # of signing time
+_LAST: Final = (1 << 48) - 1  # of its six bytes: in the year 2104
 # A radio that puts its own status on the link has no key, and presence asks for nothing. MAVLink 1
 # cannot be signed, so nothing of it passes.
 _EXEMPT: Final = frozenset({HEARTBEAT, RADIO_STATUS})
@@ -71,7 +72,7 @@ class Signing:
         self._unix_us = unix_us
         self._file = file
         self._times = SignedTimes() if times is None else times
-        stored = None if file is None else file.read()
+        stored = None if file is None else file.read(self._now() + TOLERANCE)
         self._key = b"" if stored is None else stored.key
         self._sent = 0
         if stored is not None:
@@ -86,7 +87,7 @@ class Signing:
 
     def signed(self, frame: bytes) -> bytes:
         """Sign a frame of ours."""
-        self._sent = max(self._sent + 1, self._now())
+        self._sent = min(max(self._sent + 1, self._now()), _LAST)
         marked = announcing_signature(frame)
         stamp = bytes([self._link_id]) + self._sent.to_bytes(6, "little")
         return marked + stamp + self._hash(marked + stamp)

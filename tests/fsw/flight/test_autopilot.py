@@ -71,7 +71,7 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
     state, outputs = tick(FlightState(), 5000, sensors=blind, commands=asked)
     assert outputs.actuators == outputs.snapshot.actuators == STOPPED
     assert [ack.result for ack in outputs.acks] == [CommandResult.TEMPORARILY_REJECTED]
-    assert "no valid state estimate" in outputs.texts[-1].text
+    assert outputs.texts[-1].text == "not armed: the state estimate is invalid"
     snapshot, level = outputs.snapshot, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     assert (snapshot.mode, snapshot.armed, snapshot.t_us) == (Mode.DISARMED, False, 5000)
     reported = snapshot.estimate
@@ -86,6 +86,37 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
     assert (state.invalid_ticks, state.estimate) == (1, None)
     _, outputs = tick(state, 7000, sensors=blind)
     assert (outputs.acks, outputs.texts) == ((), ())
+
+
+RESULTS = CommandResult
+INJECT, RUN_CHECKS, SET_HOME, UNKNOWN = 420, 401, 179, 2000
+
+
+@pytest.mark.requirement("REQ-ARM-1", "REQ-LINK-8")
+@pytest.mark.parametrize(
+    ("number", "params", "result", "text"),
+    [
+        (INJECT, (6.0, 0.0), RESULTS.IN_PROGRESS, None),
+        (INJECT, (0.5, 0.0), RESULTS.DENIED, "no failure injected"),
+        (RUN_CHECKS, (), RESULTS.ACCEPTED, "not armed: the state estimate is invalid"),
+        (UNKNOWN, (), RESULTS.UNSUPPORTED, None),
+        (ARM, (7.0,), RESULTS.DENIED, "arm/disarm needs param1 = 1 or 0"),
+        (ARM, (1.0, 21196.0), RESULTS.TEMPORARILY_REJECTED, "the state estimate is invalid"),
+        (ARM, (0.0,), RESULTS.ACCEPTED, None),
+        (SET_HOME, (1.0,), RESULTS.TEMPORARILY_REJECTED, "there is no valid state estimate yet"),
+    ],
+)
+def test_before_the_first_estimate_what_needs_none_is_answered_as_always(
+    number: int, params: tuple[float, ...], result: int, text: str | None
+) -> None:
+    blind, state = frame(5000, p_WB=(math.nan, 0.0, 0.0)), FlightState()
+    allowed = replace(CONFIG, limits=replace(CONFIG.limits, failure_injection=1))
+    asked = (command(number, *params),)
+    state, outputs = Autopilot(allowed).tick(state, TickInputs(blind, commands=asked))
+    assert [ack.result for ack in outputs.acks] == [result]
+    texts = [one.text for one in outputs.texts]
+    assert (text in texts[0]) if text else texts == []
+    assert not outputs.snapshot.armed
 
 
 def started_blind(

@@ -27,6 +27,7 @@ KEY = bytes(range(1, 33))
 OTHER_KEY = bytes(range(2, 34))
 EPOCH_UNIX_US = 1_420_070_400_000_000
 MINUTE = 6_000_000  # in units of signing time
+LATEST = (1 << 48) - 1
 ARM = (1.0, *(0.0,) * 6, 400, 1, 1, 0)
 
 
@@ -281,7 +282,7 @@ def test_the_time_of_one_link_is_kept_in_the_file_of_each_that_has_the_key(tmp_p
             ground.polled(set_up())
         old = Client(gcs).arm()
         gcs.polled(old)  # and the process is killed: nothing is closed
-        kept = [KeyFile(file).read() for file in files]
+        kept = [KeyFile(file).read(LATEST) for file in files]
     assert kept == [SigningKey(KEY, int.from_bytes(old[-12:-6], "little"))] * 2
     # The programs' link alone, after a restart and without what the other one kept.
     with ground_station(key_file=KeyFile(files[1]), api=True) as restarted:
@@ -304,7 +305,7 @@ def test_after_a_restart_the_newest_time_in_any_file_of_the_key_counts(tmp_path:
         ground_station(times=times, key_file=KeyFile(tmp_path / "api.json")),
     ):
         assert times.of(KEY).newest == 500
-        assert KeyFile(tmp_path / "gcs.json").read() == SigningKey(KEY, 500)
+        assert KeyFile(tmp_path / "gcs.json").read(LATEST) == SigningKey(KEY, 500)
 
 
 def test_the_vehicle_has_one_record_for_its_links(tmp_path: Path) -> None:
@@ -451,15 +452,77 @@ def test_an_unsigned_link_takes_signed_frames_as_they_are() -> None:
         assert commands(ground) == 1
 
 
-def test_what_is_written_is_replaced_whole(file: Path) -> None:
-    from fsw.link.signing.key_file import SigningKey
+@pytest.mark.requirement("REQ-LINK-3")
+@pytest.mark.parametrize("sets_the_key", [False, True])
+def test_a_second_process_with_the_same_keys_does_not_make_the_time_go_back(
+    ground: Ground, file: Path, sets_the_key: bool
+) -> None:
+    with ground_station(key_file=KeyFile(file)) as second:
+        if sets_the_key:
+            second.fly(5, armed=False)
+            second.polled(Client(second).set_up(KEY))
+    old = Client(ground).at(Client(ground).now() + 5).arm()
+    ground.polled(old)  # after the second one has ended; and the first one is killed
+    assert commands(ground) == 1
+    with ground_station(key_file=KeyFile(file)) as restarted:
+        restarted.fly(5)
+        restarted.polled(old)
+        assert commands(restarted) == 0
 
+
+@pytest.mark.requirement("REQ-LINK-3")
+def test_a_file_that_another_process_has_replaced_is_taken_up(ground: Ground, file: Path) -> None:
+    content = file.read_bytes()
+    file.unlink()
+    file.write_bytes(content)
+    file.chmod(0o600)
+    old = Client(ground).at(Client(ground).now() + 5).arm()
+    ground.polled(old)
+    assert KeyFile(file).read(LATEST) == SigningKey(KEY, int.from_bytes(old[-12:-6], "little"))
+
+
+def test_the_time_in_a_file_never_goes_back_and_no_other_key_gets_it(file: Path) -> None:
+    one, other = KeyFile(file), KeyFile(file)
+    one.write(SigningKey(KEY, 500))
+    other.write(SigningKey(KEY, 300))
+    other.keep(KEY, 400)
+    assert KeyFile(file).read(LATEST) == SigningKey(KEY, 500)
+    other.write(SigningKey(OTHER_KEY, 5))
+    one.keep(KEY, 600)
+    assert KeyFile(file).read(LATEST) == SigningKey(OTHER_KEY, 5)
+
+
+@pytest.mark.requirement("REQ-LINK-9")
+def test_a_time_ahead_of_the_clock_is_refused_and_ends_nothing(ground: Ground, file: Path) -> None:
+    now = Client(ground).now()
+    for newest, refused in ((now + MINUTE, False), (now + 2 * MINUTE, True), (LATEST, True)):
+        file.unlink()
+        KeyFile(file).write(SigningKey(KEY, newest))
+        if refused:
+            with (
+                pytest.raises(LinkError, match="s too far ahead of the clock; set the clock, or"),
+                ground_station(key_file=KeyFile(file)),
+            ):
+                pass
+        else:
+            with ground_station(key_file=KeyFile(file)) as ahead:
+                ahead.fly(5)
+
+
+def test_signing_times_that_have_run_out_end_no_flight(ground: Ground) -> None:
+    ground.clock.pass_s(1e-5 * (1 << 48))  # a clock in the year 2104
+    ground.fly(100)
+    times = {int.from_bytes(raw[-12:-6], "little") for _, raw in ground.recorded[-10:]}
+    assert times == {LATEST}
+
+
+def test_what_is_written_is_replaced_whole(file: Path) -> None:
     keys = KeyFile(file)
     keys.write(SigningKey(KEY, 5))
     inode = file.stat().st_ino
     keys.write(SigningKey(OTHER_KEY, 6))
     assert file.stat().st_ino != inode
-    assert keys.read() == SigningKey(OTHER_KEY, 6)
+    assert keys.read(LATEST) == SigningKey(OTHER_KEY, 6)
 
 
 @pytest.mark.parametrize(
