@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from command_line.bounded_file import read_bounded
+from command_line.bounded_toml import TomlError, toml_table
 from sitl.scenario import Range, Scenario, ScenarioZone, Sensors
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
@@ -109,9 +110,9 @@ def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:
 
 def _parsed(text: str, name: str, suite: str | None) -> Scenario:
     try:
-        table = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
-        raise ScenarioError(f"scenario {name} is not TOML: {error}") from error
+        table = toml_table(text)
+    except TomlError as error:
+        raise ScenarioError(f"scenario {name} is {error}") from error
     if "name" in table:
         raise ScenarioError('unknown key "name": a scenario is named by its file')
     if suite is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias, cast
 
 from command_line.bounded_file import read_bounded
+from command_line.bounded_toml import TomlError, toml_table
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.parameters.float32 import nearest_decimal
@@ -254,11 +254,9 @@ def plan_of(table: dict[str, Any], name: str, folder: Path) -> CampaignPlan:
 
 def _table(text: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
-        raise CampaignError(f"not TOML: {error}") from None
-    except RecursionError:
-        raise CampaignError("nested too deeply") from None
+        return toml_table(text)
+    except TomlError as error:
+        raise CampaignError(str(error)) from None
 
 
 def _plan(

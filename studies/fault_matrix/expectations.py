@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 import typing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from command_line.bounded_file import read_bounded
+from command_line.bounded_toml import TomlError, toml_table
 from sitl.faults.keys import Fault, Kind, Unit, instances
 from sitl.scenario_file import SUITE_NAMES, build_table
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight
@@ -95,11 +95,11 @@ def _tables(path: Path) -> tuple[list[Any], NotFlown, dict[str, str]]:
     except OSError as error:
         raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
     try:
-        read = tomllib.loads(content.decode("utf-8"))
-    except ValueError as error:  # no UTF-8, no TOML, or an integer of thousands of digits
-        raise ExpectationError(f"{path} is not TOML: {error}") from error
-    except RecursionError:
-        raise ExpectationError(f"{path} is nested too deeply") from None
+        read = toml_table(content.decode("utf-8"))
+    except TomlError as error:
+        raise ExpectationError(f"{path} is {error}") from error
+    except UnicodeDecodeError as error:
+        raise ExpectationError(f"{path} is not UTF-8: {error}") from error
     tables, without = read.get("faults", []), read.get("not_flown", {})
     if not isinstance(tables, list):
         raise ExpectationError(f"{path}: faults must be an array of tables ([[faults]])")

@@ -13,6 +13,7 @@ import pytest
 
 from command_line.bounded_file import open_regular, read_bounded
 from command_line.bounded_json import MOST_DEPTH, JsonError, json_numbers, json_object, read_json
+from command_line.bounded_toml import MOST_PARTS, TomlError, toml_table
 from pandion.__main__ import main
 from tests.cli.command import one_sentence
 
@@ -153,3 +154,38 @@ def test_json_in_a_file_that_is_missing_or_too_long(tmp_path: Path) -> None:
     (tmp_path / "long.json").write_text('{"a": 123456}')
     with pytest.raises(JsonError, match="cannot be read: it is too long: must be at most 10 bytes"):
         read_json(tmp_path / "long.json", 10)
+
+
+LONG = 200_000  # bytes, as much as a scenario may have
+CHAIN = f"a{'.a' * (MOST_PARTS - 1)}"  # a key of as many parts as it may have
+
+
+@pytest.mark.requirement("REQ-LINK-9")
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("a" + ".a" * (LONG // 2) + " = 1", "nested too deeply"),
+        ("[a" + ".a" * (LONG // 2) + "]", "nested too deeply"),
+        ("x = {a" + " . a" * (LONG // 4) + " = 1}", "nested too deeply"),
+        ('"a b"' + "\t.'c.d'" * (LONG // 8) + " = 1", "nested too deeply"),
+        (f"{CHAIN}.a = 1", "nested too deeply"),
+        (f"{CHAIN} = 1", None),
+        ("a" * LONG + " = 1", None),
+        ("a" + " " * LONG + "= 1", None),
+        (f"a = [{'1.5, ' * (LONG // 5)}]", None),
+        (f"a = '{'.' * LONG}'", None),
+        (f"# {'and so on. ' * (LONG // 11)}", None),
+        ("".join(f"{CHAIN[:-1]}{k} = 1\n" for k in range(5000)), None),
+        ("[" * LONG, "not TOML|nested too deeply"),
+        ("'" * LONG, "not TOML"),
+        ('"' * LONG, "not TOML"),
+        ("a.'" * (LONG // 3), "not TOML"),
+    ],
+)
+def test_toml_is_read_or_refused_in_bounded_time(text: str, complaint: str | None) -> None:
+    signal.alarm(5)
+    if complaint is None:
+        toml_table(text)
+    else:
+        with pytest.raises(TomlError, match=complaint):
+            toml_table(text)

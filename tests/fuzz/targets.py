@@ -80,7 +80,7 @@ def _parameters(stack: ExitStack) -> Try:
     return attempt
 
 
-_LATEST: Final = 1 << 47  # of a signing time
+_LATEST = 1 << 47  # of a signing time
 
 
 def _key(stack: ExitStack) -> Try:
