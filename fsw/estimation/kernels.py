@@ -36,6 +36,7 @@ from fsw.estimation.error_state import (
     present,
     propagate,
     transition,
+    varies,
     vec3,
     vec4,
 )
@@ -155,14 +156,14 @@ def _taken_in(
 
 @compilable
 def _predicted(x: Filter, law: Law, now: float, until: float) -> tuple[bool, Present]:
-    """The present, with the filter at its horizon; whether all of it are numbers."""
+    """The present, with the filter at its horizon; whether it has numbers and variances."""
     advance(x[0], law[0].tuning, until)
     p, v, q, rate, force = present(x[0], now)
     angles, rates = joint_filter.present_joints(x[0], now)
     R = matrix_from_quaternion(q)
     total = p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + R[0] + rate[0] + rate[1] + rate[2] + force[2]
     finite = math.isfinite(total + angles[0] + angles[1] + rates[0] + rates[1])
-    return finite, (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
+    return finite and varies(x[0]), (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
 
 
 @compilable

@@ -62,7 +62,7 @@ class AccuracyWatch:
             return memory
         if memory.window_us < 0:
             return memory._replace(window_us=now_us)
-        known = np.sqrt(np.diagonal(covariance)).tolist()
+        known = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).tolist()
         p, v, tilt = memory.most
         most = max(p, position), max(v, *known[V : V + 3]), max(tilt, *known[TH : TH + 2])
         if now_us - memory.window_us < _WINDOW_US:

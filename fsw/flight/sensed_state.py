@@ -38,7 +38,7 @@ _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held 
 _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
-_ANEW = "estimate is not a number: the filter starts anew"
+_ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
 _QUIET = 10.0  # s without a fault until the same one is reported again
 
 
@@ -164,7 +164,7 @@ class SensedState:
             return replace(state, estimator=unknown)
         lasting = self.lasting_error(memory)
         report = estimator_report(memory, covariance, lasting, estimate, memory.now, self._stale)
-        drifted = math.sqrt(max(covariance.diagonal()[P : P + 3].tolist()))
+        drifted = math.sqrt(max(0.0, *covariance.diagonal()[P : P + 3].tolist()))
         return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
 
     def _model(self, state: FlightState) -> Vec3:
@@ -312,9 +312,9 @@ def _aiding(
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
         position_sigma=drifted,
-        velocity_sigma=math.sqrt(max(V[0], V[6], V[11])),
-        attitude_sigma=math.sqrt(max(pose[15], pose[18])),
-        height_sigma=math.sqrt(pose[11]),
+        velocity_sigma=math.sqrt(max(V[0], V[6], V[11], 0.0)),
+        attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
+        height_sigma=math.sqrt(max(pose[11], 0.0)),
         sensor=sensor,
         fault=fault,
         since_us=since_us,

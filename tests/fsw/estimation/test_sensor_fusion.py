@@ -641,13 +641,34 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
     assert held.w_WB_B == pytest.approx(before.w_WB_B, abs=0.03), "not known: as it was"
 
 
-def test_a_filter_without_numbers_starts_anew() -> None:
+@pytest.mark.requirement("REQ-EST-2")
+@pytest.mark.parametrize("lost", [ImuSample, PoseSample])
+def test_a_covariance_stays_one_after_a_sensor_was_lost_and_back_for_long(lost: type) -> None:
+    """Rounding makes halves that differ, which grew until a variance was negative."""
+    fusion, memory = SensorFusion(MOCAP.tuning), at_start()
+    for now, samples in run(MOCAP, 8, 20.0):
+        if 1.0 < now - START < 3.0:
+            samples = [one for one in samples if not isinstance(one, lost)]
+        memory, _ = fusion.step(memory, samples, now)
+        M = memory.numbers[0]["covariance"]
+        scale = np.sqrt(np.outer(np.diag(M), np.diag(M))) + 1e-30
+        # Between two measurements rounding may add up; each one makes them one again.
+        assert (abs(M - M.T) / scale).max() < 1e-9
+    ordered = np.linalg.eigvalsh(M / scale)
+    assert ordered[0] > -1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "value"),
+    [("joints", (0, 1), math.nan), ("covariance", (1, 1), -1e-9), ("covariance", (7, 7), math.nan)],
+)
+def test_a_filter_without_numbers_starts_anew(name: str, at: tuple[int, int], value: float) -> None:
     flown = run(MOCAP, 8, 2.0)
     fusion, memory, estimates = SensorFusion(MOCAP.tuning), at_start(), []
     for tick, (now, samples) in enumerate(flown):
         if tick == 700:
             numbers = memory.numbers.copy()
-            numbers["joints"][0][0, 1] = math.nan
+            numbers[name][0][at] = value
             memory = memory._replace(numbers=numbers)
         memory, estimate = fusion.step(memory, samples, now)
         estimates.append(estimate)

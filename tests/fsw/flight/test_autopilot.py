@@ -92,7 +92,7 @@ RESULTS = CommandResult
 INJECT, RUN_CHECKS, SET_HOME, UNKNOWN = 420, 401, 179, 2000
 
 
-@pytest.mark.requirement("REQ-ARM-1", "REQ-LINK-8")
+@pytest.mark.requirement("REQ-ARM-1")
 @pytest.mark.parametrize(
     ("number", "params", "result", "text"),
     [
