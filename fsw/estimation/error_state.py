@@ -414,9 +414,9 @@ def distance(x: Any, rows: int) -> float:
 def correct(x: Any, rows: int) -> None:
     """Take in the measurement that ``distance`` has judged. Solà, eq 275, 276 and 283.
 
-    P - K S K^T is P - W W^T with W = P H^T L^-T. Of P, one half is computed and the other one set:
-    a difference between them, which rounding makes, would not become smaller by any measurement, and
-    grow with the fourth power of time.
+    P - K S K^T is P - W W^T with W = P H^T L^-T. Of P, one half is computed and the other one set.
+    A difference between them, which rounding makes, would not become smaller by any measurement,
+    and grow with the fourth power of time.
     """
     M, L, W = x.covariance, x.factor, x.gain
     for i in range(ERRORS):
@@ -463,10 +463,11 @@ def _correct_considered(x: Any, X: Array, rows: int) -> None:
 @compilable
 def varies(x: Any) -> bool:
     """Whether every variance is one; NaN and less than nothing are none."""
+    found = 0
     for i in range(ERRORS):
-        if not x.covariance[i, i] >= 0.0:
-            return False
-    return True
+        if x.covariance[i, i] >= 0.0:
+            found += 1
+    return found == ERRORS
 
 
 @compilable
