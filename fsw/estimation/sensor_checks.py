@@ -38,9 +38,21 @@ _REPEATS: Final[dict[type, int]] = {
     RangeSample: 40,
 }
 _SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
+_QUIET: Final = 10.0  # s without a fault, until the same one is told again at once
+_LASTS: Final = 1.0  # s, for which one that came back sooner must last; gaps are no longer
 _LONGEST_APART: Final = 0.25  # s; farther apart, readings were lost
 _FARTHEST_RANGE: Final = 200.0  # m
 _STRONGEST_FIELD: Final = 5.0  # Gauss, ten times the Earth's
+
+
+class FaultSeen(NamedTuple):
+    """A fault of one kind, and the run of such faults that it belongs to; times are in seconds."""
+
+    fault: SensorFault
+    at: float
+    before: float  # the one before it in the run; the first: the same
+    since: float  # the first of the run
+    rested: float  # from the run before to this one; infinite: there was none
 
 
 class Health(NamedTuple):
@@ -58,8 +70,7 @@ class Health(NamedTuple):
     innovation: tuple[float, ...] = ()  # of each part: m, m/s, rad
     fault: SensorFault = SensorFault.NONE  # the last one
     fault_at: float = -math.inf  # s
-    # Every kind of fault so far, with the time before the last one of its kind [s].
-    known: tuple[tuple[SensorFault, float, float], ...] = ()
+    known: tuple[FaultSeen, ...] = ()  # of every kind of fault so far, the last one
 
     def fault_now(self, came: float, now: float, stale: float) -> SensorFault:
         """What is wrong at ``now`` [s] with a sensor that ``came`` [s] last.
@@ -70,12 +81,18 @@ class Health(NamedTuple):
             return SensorFault.STALE
         return self.fault if now - self.fault_at <= _SHOWN else SensorFault.NONE
 
-    def quiet(self) -> float:
-        """For how long the last fault had not been seen before [s]."""
-        for fault, at, before in self.known:
-            if fault is self.fault:
-                return at - before
-        return math.inf
+    def is_news(self) -> bool:
+        """Whether the last fault, when it was seen, was one to be told.
+
+        The first one after ten seconds without is, and so is one that came back before that and
+        then lasts.
+        """
+        for one in self.known:
+            if one.fault is self.fault:
+                if one.rested > _QUIET:
+                    return one.at == one.since
+                return one.before - one.since < _LASTS <= one.at - one.since
+        return True
 
     def with_fused(
         self, fused: tuple[float, ...], ratio: tuple[float, ...], innovation: tuple[float, ...]
@@ -86,13 +103,17 @@ class Health(NamedTuple):
 
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
-        others, last = [], -math.inf
+        others, seen = [], FaultSeen(fault, now, now, now, math.inf)
         for one in self.known:
-            if one[0] is fault:
-                last = one[1]
-            else:
+            if one.fault is not fault:
                 others.append(one)
-        return self._replace(fault=fault, fault_at=now, known=(*others, (fault, now, last)))
+            elif now == one.at:
+                seen = one
+            elif now - one.at <= _LASTS:
+                seen = one._replace(at=now, before=one.at)
+            else:
+                seen = FaultSeen(fault, now, now, now, now - one.at)
+        return self._replace(fault=fault, fault_at=now, known=(*others, seen))
 
 
 def arrived(

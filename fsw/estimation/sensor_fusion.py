@@ -616,7 +616,8 @@ class SensorFusion:
         """The memory after the first of the waiting samples was fused, or refused.
 
         Chi-square over gate and innovation are of each of its parts. The frame of a pose may have
-        jumped (``announced``), from the filter's ``previous`` state if it drifts.
+        jumped (``announced``), from the filter's ``previous`` state if it drifts. How far, two
+        poses must agree upon: the one that announces it may be wrong as well.
         """
         sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
@@ -641,15 +642,17 @@ class SensorFusion:
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
         health = health.with_fused(fused, ratio, shown)
-        memory = memory.after(one, health, latest)
-        long_refused = now - min(fused) > self.tuning.reset_time and confirmed
-        if max(ratio) > 1.0 and (announced or long_refused):
+        counter, memory = memory.reset_counter, memory.after(one, health, latest)
+        if announced and refused and not confirmed:
+            memory = memory._replace(reset_counter=counter)
+        long_refused = now - min(fused) > self.tuning.reset_time
+        if max(ratio) > 1.0 and confirmed and (announced or long_refused):
             memory = self._reset(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
                 kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
             memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
-        elif previous is not None:
+        elif previous is not None and not refused:
             memory = memory.jumped(*_jump(previous, memory.numbers[0]))
         return memory
 

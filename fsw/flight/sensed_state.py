@@ -39,7 +39,6 @@ _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
-_QUIET = 10.0  # s without a fault until the same one is reported again
 
 
 class CaughtUp(NamedTuple):
@@ -216,11 +215,11 @@ def _carried_on(state: FlightState, now_us: int) -> StateEstimate | None:
 def _report(
     before: FusionMemory, memory: FusionMemory, now: float, texts: list[StatusText]
 ) -> None:
-    """Report each fault once, and again after it was gone for a while."""
+    """Report each fault once, and again after it was gone for a while or where it lasts."""
     for new in memory.health:
         if new.fault_at != now or before.of(new.sensor).fault_at == now:
             continue
-        if new.quiet() > _QUIET:
+        if new.is_news():
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
 
 

@@ -448,16 +448,43 @@ def test_a_place_recognised_again_is_taken_at_once_and_reported_as_a_jump() -> N
         assert sigma[:3].max() < 0.025  # of 0.15 s, and not of 1.2 s
 
 
-def test_a_jump_that_the_sensor_announces_is_taken_at_once() -> None:
+@pytest.mark.parametrize("suite", [MOCAP, VIO], ids=["mocap", "vio"])
+@pytest.mark.parametrize("first", [0.5, 1000.0, math.inf])
+def test_a_jump_that_the_sensor_announces_is_taken_once_two_poses_agree(
+    suite: Suite, first: float
+) -> None:
+    """The ``first`` one may have jumped elsewhere [m]."""
+    jumped: list[PoseSample] = []
+
     def change(now: float, sample: Sample) -> Sample:
         if isinstance(sample, PoseSample) and sample.time > START + 1.0:
             x, y, z = sample.position
-            return replace(sample, position=(x, y + 0.5, z), reset_counter=1)
+            jumped.append(sample)
+            jump = first if len(jumped) == 1 else 0.5
+            return replace(sample, position=(x, y + jump, z), reset_counter=1)
         return sample
 
-    flown = Flown(run(MOCAP, 8, 1.1), change)
+    flown = Flown(run(suite, 8, 1.3), change)
     assert flown.memory.reset.number == 1
-    np.testing.assert_allclose(flown.error()[:3], (0.0, -0.5, 0.0), atol=5e-3)
+    assert abs(flown.memory.reset.position[1]) == pytest.approx(0.5, abs=0.03)
+    np.testing.assert_allclose(flown.error()[:3], (0.0, -0.5, 0.0), atol=0.03)
+
+
+@pytest.mark.requirement("REQ-EST-1")
+@pytest.mark.parametrize("suite", [MOCAP, VIO], ids=["mocap", "vio"])
+def test_garbage_that_announces_a_jump_is_not_believed(suite: Suite) -> None:
+    random = np.random.default_rng(3)
+
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, PoseSample) and sample.time > START + 1.0:
+            x, y, z = random.normal(0.0, 50.0, 3).tolist()
+            return replace(sample, position=(x, y, z), reset_counter=int(sample.time * 10.0))
+        return sample
+
+    flown = Flown(run(suite, 8, 1.5), change)
+    assert flown.memory.reset.number == 0
+    assert (Sensor.POSE, SensorFault.JUMP) in flown.found
+    assert abs(flown.error()[:3]).max() < 0.3
 
 
 def test_a_tick_leaves_the_memory_it_was_given_as_it_was() -> None:
