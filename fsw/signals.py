@@ -841,7 +841,7 @@ class FlightSnapshot:
     arming: ArmingReport = ArmingReport()
     safe_set: SafeSet = SafeSet()  # in force: announced and fence together
     actuators_found: ActuatorReport = ActuatorReport()
-    sensor_lost: str = ""  # that is of no use, beside the pose; empty: none
+    sensors_lost: tuple[str, ...] = ()  # that are of no use, beside the pose
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,6 +130,7 @@ WATCH: Final = np.dtype(
         ("disobeys", np.int64),
         ("quiet_for", float),  # s
         # Joints.
+        ("arm_seen", float),  # s, since encoders tell its angles
         ("momentum", float, (2,)),  # N m s
         ("undone", float, (2,)),  # N m, observed beside the model
         ("asked", float, (2,)),  # N m, as late as that
@@ -187,8 +188,11 @@ def watch(
     q_arm: Vec2,
     qd_arm: Vec2,
     specific_force: float,
+    angles_known: bool,
 ) -> bool:
     """Bring the memory ``dt`` [s] on, into ``after``; whether anything has failed by now.
+
+    Where the joints' angles are not known by encoders only rotors are judged.
 
     Commanded meanwhile were ``thrust`` [N] and ``torque`` [N m]; the joints' ``reference`` [rad].
     Body ``rate`` [rad/s, FRD], joints ``q_arm`` [rad], ``qd_arm`` [rad/s], ``specific_force``
@@ -201,7 +205,11 @@ def watch(
         for i in range(4):
             s.thrust[i] = s.slow[i] = thrust[i]
     _observe_base(s, airframe, decay, dt, thrust, torque[0], rate, q_arm, specific_force)
-    _observe_arm(s, airframe, dt, torque, reference, rate, q_arm, qd_arm, specific_force)
+    if angles_known:
+        _observe_arm(s, airframe, dt, torque, reference, rate, q_arm, qd_arm, specific_force)
+        s.arm_seen += dt
+    else:
+        _forget_arm(s)
     total = s.thrust[0] + s.thrust[1] + s.thrust[2] + s.thrust[3]
     weight = airframe.mass * GRAVITY
     if not total > AIRBORNE * weight or s.lift > CONTACT * airframe.mass:
@@ -210,7 +218,7 @@ def watch(
     settled = s.running > SETTLING
     _judge_rotors(s, dt, settled)
     for k in range(2):
-        _judge_joint(s, k, dt, settled, q_arm[k])
+        _judge_joint(s, k, dt, settled and s.arm_seen > SETTLING, q_arm[k])
     return bool(s.failed >= 0 or s.joint[0] != SOUND or s.joint[1] != SOUND)
 
 
@@ -417,7 +425,7 @@ def _observe_arm(
     share, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
     for k in range(2):
         gained = arm.momentum[k] - s.momentum[k]
-        if s.running == 0.0:
+        if s.running == 0.0 or s.arm_seen == 0.0:
             gained = dt * (torque[k] + arm.drift[k])
         s.momentum[k] = arm.momentum[k]
         s.undone[k] += OBSERVER * (gained - dt * (torque[k] + arm.drift[k] + s.undone[k]))
@@ -432,6 +440,16 @@ def _observe_arm(
     # that is wrong, are felt on one side alone.
     odd = s.torque[1] + s.undone[0]
     s.odd2 += forget * (odd * odd - s.odd2)
+
+
+@compilable
+def _forget_arm(s: Any) -> None:
+    """Begin anew when encoders are back."""
+    s.arm_seen, s.odd2 = 0.0, 0.0
+    for k in range(2):
+        s.undone[k], s.asked[k], s.joint_for[k] = 0.0, 0.0, 0.0
+        s.undone2[k], s.asked2[k], s.undoing[k] = 0.0, 0.0, 0.0
+        s.rate2[k], s.behind2[k] = 0.0, 0.0
 
 
 @compilable

@@ -65,8 +65,9 @@ def arming_health(
 def _failing_sensor(state: FlightState, since_us: int) -> str:
     """The first sensor that has been of no use ``since_us``, or was there and is silent."""
     aiding = state.aiding
-    if aiding.sensor is not None and aiding.since_us <= since_us:
-        return sentence(aiding.sensor, aiding.fault)
+    for lost in aiding.lost:
+        if lost.since_us <= since_us:
+            return sentence(lost.sensor, lost.fault)
     for one in state.estimator.sensors if state.estimator is not None else ():
         if one.silent_us > _SILENT_US:
             return f"{one.name} has been silent for {1e-6 * one.silent_us:.0f} s"

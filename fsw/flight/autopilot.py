@@ -24,6 +24,7 @@ from fsw.control.safety_gate import gate
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
+from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.accuracy_watch import AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, nowhere, told
 from fsw.flight.commander import Commander
@@ -281,9 +282,7 @@ class Autopilot:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
         if not margin >= 0.0:
             safety = self._breached(state, safety, estimate, margin)
-        damage, watch = self._see_damage(
-            state, memory, estimate, c.ticks, flown and not c.trust.doubted
-        )
+        damage, watch = self._see_damage(state, memory, estimate, c)
         state = FlightState(
             index,
             now_us,
@@ -545,16 +544,17 @@ class Autopilot:
         state: FlightState,
         memory: CascadeMemory,
         estimate: StateEstimate,
-        ticks: int,
-        known: bool,
+        controlled: Controlled,
     ) -> tuple[Damage, Watch | None]:
         """What is known of the actuators; ``memory`` is the loops' for the next tick.
 
-        Where the estimate is not ``known`` from every sensor, how the vehicle moves shows nothing,
-        nor after a jump of time: what was commanded has not been done meanwhile.
+        Without an inertial unit, how the vehicle moves shows nothing, and without encoders nothing
+        of the joints; nor does it after a jump of time: what was commanded has not been done
+        meanwhile.
         """
-        jumped = self._jumped(state, estimate.t_us)
-        if jumped or not (known and self._watches and state.aiding.sensor is None):
+        trust, aiding = controlled.trust, state.aiding
+        blind = trust.inertial.unused or (aiding.lost and aiding.has_lost(Sensor.IMU))
+        if blind or not (controlled.flown and self._watches) or self._jumped(state, estimate.t_us):
             return state.damage, paused(state.watch)
         return self._damage.see(
             state.damage,
@@ -562,8 +562,9 @@ class Autopilot:
             state.cascade,
             memory,
             estimate,
-            ticks,
+            controlled.ticks,
             angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
+            angles_known=not (trust.joints.unused or aiding.lost),
         )
 
     def zones_now(self, state: FlightState) -> Array:
@@ -608,7 +609,7 @@ def _snapshot(
     state: FlightState, estimate: StateEstimate, u: PlanInput, inputs: TickInputs
 ) -> FlightSnapshot:
     vehicle, plan, goal = state.vehicle, state.plan, state.setpoint.goal
-    lost = state.aiding.sensor
+    lost = state.aiding.lost
     flies = vehicle.flies and state.nominal is not None
     return FlightSnapshot(
         estimate.t_us,
@@ -640,7 +641,7 @@ def _snapshot(
         state.arming,
         state.mission.safe_set,
         state.damage.report,
-        "" if lost is None else lost.value,
+        tuple([one.sensor.value for one in lost]) if lost else (),
     )
 
 

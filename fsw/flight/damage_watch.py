@@ -38,7 +38,7 @@ class DamageWatch:
         self._reallocates = reallocates
         self._start = at_start()
         none4, none3, none2 = (0.0,) * 4, (0.0,) * 3, (0.0,) * 2
-        rest: tuple[Any, ...] = (none4, none2, none2, none3, none2, none2, 1.0)
+        rest: tuple[Any, ...] = (none4, none2, none2, none3, none2, none2, 1.0, True)
         self._watch = machine_code(watch, self._start, blank(), self.law, 1.0, 1.0, *rest)
 
     def see(
@@ -51,11 +51,13 @@ class DamageWatch:
         ticks: int,
         *,
         angles_repeat: bool = False,
+        angles_known: bool = True,
     ) -> tuple[Damage, Watch]:
         """What is known of actuators a tick, or some ``ticks``, later, and the memory for the next.
 
         The loops' memory ``sent`` holds what was commanded meanwhile, ``now`` their references.
         Where the encoders' ``angles_repeat``, a joint without torque may be one that is not seen.
+        Where the angles are not known by encoders, joints are not judged.
         """
         after = blank()
         thrust, torque = sent.commanded
@@ -75,6 +77,7 @@ class DamageWatch:
             estimate.q_arm,
             estimate.qd_arm,
             estimate.specific_force,
+            angles_known,
         )
         if failed or damage.rotor:
             back = memory is not None and memory[0]["failed"] != NONE and after[0]["failed"] == NONE

@@ -14,7 +14,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust, believed
 from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.jump import returned
-from fsw.flight.state import AIDED, Aiding, FlightState
+from fsw.flight.state import AIDED, Aiding, FlightState, LostSensor
 from fsw.frozen import replace
 from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
 
@@ -81,8 +81,7 @@ class ExactState:
 
 def _aiding(trust: FrameTrust, now_us: int) -> Aiding:
     """What is missing, as failsafes look at it."""
-    faults = trust.faults()
-    lost = [(name, part) for name, part in faults if name is not Sensor.POSE]
+    lost = [(name, part) for name, part in trust.faults() if name is not Sensor.POSE]
     pose = trust.pose
     return Aiding(
         unaided_us=now_us - pose.since_us if pose.unused else 0,
@@ -92,7 +91,5 @@ def _aiding(trust: FrameTrust, now_us: int) -> Aiding:
         velocity_sigma=trust.velocity_sigma(now_us),
         attitude_sigma=trust.attitude_sigma(now_us),
         height_sigma=trust.position_sigma(now_us),
-        sensor=lost[0][0] if lost else None,
-        fault=lost[0][1].fault if lost else faults[0][1].fault,
-        since_us=lost[0][1].since_us if lost else now_us,
+        lost=tuple([LostSensor(name, part.fault, part.since_us) for name, part in lost]),
     )

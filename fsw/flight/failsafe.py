@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from fsw.estimation.sensor_fault import sentence
+from fsw.estimation.sensor_fault import Sensor, sentence
 from fsw.flight.uncertain_clearance import LACKING
 from fsw.frozen import dataclass as value_dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
@@ -28,7 +28,7 @@ from fsw.signals import (
 )
 
 if TYPE_CHECKING:
-    from fsw.flight.state import FlightState  # which keeps the active conditions
+    from fsw.flight.state import FlightState, LostSensor  # which keeps the active conditions
 
 PLAN_STALE_PERIODS: Final = 3
 INVALID_TICKS: Final = 5  # 10 ms without an estimate
@@ -134,6 +134,7 @@ class FailsafeMemory(NamedTuple):
     overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside
     # As they were looked at last; another one is the same condition, and news.
     joint: str = ""  # which joints have failed
+    sensors: tuple[Sensor, ...] = ()  # that have been lost since one is
     contradiction: str = ""  # of parameters
 
 
@@ -262,10 +263,14 @@ def _position_is_off(context: FailsafeContext, most: float) -> bool:
     return _is_unaided(context) and not context.state.aiding.position_sigma <= most
 
 
+def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
+    """Those that have been of no use for COM_SENS_LOSS_T, but for those that give the position."""
+    since_us = context.estimate.t_us - context.limits.sensor_loss_us
+    return tuple([one for one in context.state.aiding.lost if one.since_us <= since_us])
+
+
 def _sensor_is_lost(context: FailsafeContext) -> bool:
-    aiding, flies = context.state.aiding, context.state.vehicle.flies
-    lost_us = context.estimate.t_us - aiding.since_us
-    return aiding.sensor is not None and flies and lost_us >= context.limits.sensor_loss_us
+    return bool(lost_sensors(context)) and context.state.vehicle.flies
 
 
 def _tilt_is_lost(context: FailsafeContext) -> bool:
@@ -393,11 +398,8 @@ def _unaided(context: FailsafeContext) -> str:
 
 
 def _lost_sensor(context: FailsafeContext) -> str:
-    aiding = context.state.aiding
-    if aiding.sensor is None:
-        return ""
-    seconds = 1e-6 * (context.estimate.t_us - aiding.since_us)
-    return f": {sentence(aiding.sensor, aiding.fault)}, for {seconds:.2f} s"
+    now_us = context.estimate.t_us
+    return f": {'; '.join([one.sentence(now_us) for one in lost_sensors(context)])}"
 
 
 def _charge_left(context: FailsafeContext) -> str:
@@ -950,7 +952,7 @@ def all_is_well(state: FlightState, estimate: StateEstimate, config: FlightConfi
     plan_age_us = estimate.t_us - plan.since_us
     return (
         aiding.unaided_us < limits.aiding_loss_us
-        and aiding.sensor is None
+        and not aiding.lost
         and aiding.attitude_sigma <= limits.attitude_loss
         and safety.rolled_us < 0
         and safety.pitched_us < 0

@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from fsw.flight.failsafe import Action, Condition, Failsafe, FailsafeContext, FailsafeMemory
+from fsw.flight.failsafe import (
+    Action,
+    Condition,
+    Failsafe,
+    FailsafeContext,
+    FailsafeMemory,
+    lost_sensors,
+)
 from fsw.signals import FailsafeEvent, Mode, Severity, StatusText
 
 _SHORT: Final = 1.0  # s
@@ -34,7 +41,16 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     before = vehicle.conditions
     now = tuple([row.condition for row in rows])
     known = dict(zip(before, memory.since_us, strict=False))
-    overridden = tuple([c for c in memory.overridden if c in now])
+    joint, contradiction = state.damage.joint, context.contradiction
+    lost = [one.sensor for one in lost_sensors(context)]
+    sensors = (*memory.sensors, *[one for one in lost if one not in memory.sensors])
+    # A second joint or sensor that fails is the same condition, and news: it acts as the first did.
+    changed = {
+        Condition.JOINT_FAILED: joint != memory.joint,
+        Condition.SENSOR_LOST: sensors != memory.sensors,
+        Condition.PARAMETERS_CONTRADICT: contradiction != memory.contradiction,
+    }
+    overridden = tuple([c for c in memory.overridden if c in now and not changed.get(c)])
     actions = {
         row.condition: allowed(row.action(context), vehicle.mode, vehicle.flies) for row in rows
     }
@@ -45,12 +61,7 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     )
     begun, acting, memory = _begun(context, memory, chosen, at_once)
     waits = memory.pending is not Action.NONE
-    joint, contradiction, reports = state.damage.joint, context.contradiction, []
-    # A second joint that fails is the same condition, and news.
-    changed = {
-        Condition.JOINT_FAILED: joint != memory.joint,
-        Condition.PARAMETERS_CONTRADICT: contradiction != memory.contradiction,
-    }
+    reports = []
     for row in rows:
         acts = row in acting
         if row.condition in before and not (acts or changed.get(row.condition)):
@@ -72,7 +83,11 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
         reports += _ended(before, known, now, now_us)
     since = tuple([known.get(condition, now_us) for condition in now])
     after = memory._replace(
-        since_us=since, overridden=overridden, joint=joint, contradiction=contradiction
+        since_us=since,
+        overridden=overridden,
+        joint=joint,
+        sensors=sensors if Condition.SENSOR_LOST in now else (),
+        contradiction=contradiction,
     )
     return Response(after, tuple(reports), begun)
 

@@ -166,6 +166,7 @@ def _tick(
         q_arm,
         qd_arm,
         -f[2],
+        True,
     )
     if failed:
         return False, no_thrust, no_torque

@@ -21,7 +21,7 @@ from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
 from fsw.flight.jump import on_return, told
-from fsw.flight.state import Aiding, FlightState
+from fsw.flight.state import Aiding, FlightState, LostSensor
 from fsw.frozen import made, replace
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2, Vec3
@@ -303,9 +303,7 @@ def _aiding(
     aid = memory.of(Sensor.POSE)
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
-    sensor, fault = _lost(memory)
     pose, V = report.pose_covariance, report.velocity_covariance
-    since_us = before.since_us if sensor is before.sensor else report.t_us
     return Aiding(
         unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
@@ -314,9 +312,7 @@ def _aiding(
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11], 0.0)),
         attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
         height_sigma=math.sqrt(max(pose[11], 0.0)),
-        sensor=sensor,
-        fault=fault,
-        since_us=since_us,
+        lost=_lost(memory, before.lost, report.t_us),
     )
 
 
@@ -349,15 +345,20 @@ def _overdue(memory: FusionMemory, now: float) -> float:
     return unaided(memory, now) - max(memory.of(one).apart for one in AIDS_PLACE)
 
 
-def _lost(memory: FusionMemory) -> tuple[Sensor | None, SensorFault]:
-    """A sensor that every tick needs and that is of no use now."""
-    now = memory.now
-    if memory.encoders.stuck:
-        return Sensor.ENCODERS, SensorFault.STUCK
+def _lost(
+    memory: FusionMemory, before: tuple[LostSensor, ...], now_us: int
+) -> tuple[LostSensor, ...]:
+    """The sensors that every tick needs and that are of no use now; those ``before`` as well."""
+    now, found = memory.now, []
     for sensor in _EVERY_TICK:
-        if now - memory.came(sensor) > _LATELY:
-            return sensor, SensorFault.STALE
-        health = memory.of(sensor)
-        if now - health.fault_at < _LATELY and health.fault not in _IN_USE:
-            return sensor, health.fault
-    return None, SensorFault.NONE
+        health, fault = memory.of(sensor), SensorFault.NONE
+        if sensor is Sensor.ENCODERS and memory.encoders.stuck:
+            fault = SensorFault.STUCK
+        elif now - memory.came(sensor) > _LATELY:
+            fault = SensorFault.STALE
+        elif now - health.fault_at < _LATELY and health.fault not in _IN_USE:
+            fault = health.fault
+        if fault is not SensorFault.NONE:
+            since = [one.since_us for one in before if one.sensor is sensor]
+            found.append(LostSensor(sensor, fault, since[0] if since else now_us))
+    return tuple(found)

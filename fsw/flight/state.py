@@ -10,7 +10,7 @@ from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
-from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.accuracy_watch import AccuracyMemory
 from fsw.flight.command_dedup import AnsweredCommand
 from fsw.flight.failsafe import Condition, FailsafeMemory
@@ -200,6 +200,19 @@ class Damage(NamedTuple):
         return self.report.disobeys or self.report.effect < _HEADING_KEPT
 
 
+class LostSensor(NamedTuple):
+    """A sensor that every tick needs and that is of no use."""
+
+    sensor: Sensor
+    fault: SensorFault
+    since_us: int
+
+    def sentence(self, now_us: int) -> str:
+        """What is wrong, and for how long at ``now_us`` [us]."""
+        seconds = 1e-6 * (now_us - self.since_us)
+        return f"{sentence(self.sensor, self.fault)}, for {seconds:.2f} s"
+
+
 class Aiding(NamedTuple):
     """What keeps the estimate from drifting, and what of it is missing."""
 
@@ -210,9 +223,11 @@ class Aiding(NamedTuple):
     velocity_sigma: float = 0.0  # m/s, the same
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
-    sensor: Sensor | None = None  # another one that is of no use
-    fault: SensorFault = SensorFault.NONE  # of that
-    since_us: int = 0
+    lost: tuple[LostSensor, ...] = ()  # others that are of no use
+
+    def has_lost(self, sensor: Sensor) -> bool:
+        """Whether a sensor that every tick needs is of no use."""
+        return any(one.sensor is sensor for one in self.lost)
 
 
 AIDED: Final = Aiding()

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.signals import Mode
-from sitl.faults.keys import Fault
+from sitl.faults.keys import Fault, Unit
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from studies.fault_matrix.flights import fly
@@ -51,6 +51,22 @@ def test_a_weak_rotor_is_named_once_and_the_vehicle_lands_with_it() -> None:
     assert flight.state.cascade.rotors[1] == pytest.approx(flight.state.cascade.rotors[3], abs=0.5)
     sent = flight.sent[-1].rotor_thrust
     assert sent[1] / sent[3] == pytest.approx(1.0 / 0.6, rel=0.15)
+
+
+@pytest.mark.requirement("REQ-ACT-1")
+@pytest.mark.parametrize("suite", ["perfect", "mocap"])
+@pytest.mark.parametrize("lost", ["encoder", "vio"])
+def test_a_weak_rotor_is_named_without_encoders_or_poses(suite: str, lost: Unit) -> None:
+    faults = (
+        Fault(lost, "off", start_s=FAULT_S - 0.2),
+        Fault("motor", "weak", instance=2.0, share=0.6, start_s=FAULT_S),
+    )
+    scenario = load_scenario("walls-calm", suite)
+    flight = Flight(replace(hover(), sensors=scenario.sensors, faults=faults))
+    flight.step(command(ARM, 1.0))
+    flight.run(FAULT_S + 0.7)
+    assert any("rotor 2 (left) gives" in text for text in told(flight)), flight.texts
+    assert not any("joint 1" in text or "joint 2" in text for text in told(flight))
 
 
 @pytest.mark.requirement("REQ-ACT-2")

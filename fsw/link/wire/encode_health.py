@@ -76,7 +76,8 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     for failure in snapshot.failures:
         health &= ~(_SUSPECT.get(failure, 0) | _PREARM)
     if Condition.SENSOR_LOST.value in snapshot.failures:
-        health &= ~_LOST.get(snapshot.sensor_lost, 0)
+        for sensor in snapshot.sensors_lost:
+            health &= ~_LOST.get(sensor, 0)
     if snapshot.arming_refusal:
         health &= ~_PREARM
     if battery.charge >= Charge.CRITICAL:

@@ -14,7 +14,7 @@ from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight import arming
 from fsw.flight.arming import Subject
 from fsw.flight.arming_health import ArmingHealth, arming_health
-from fsw.flight.state import Aiding, Damage, FlightState
+from fsw.flight.state import Aiding, Damage, FlightState, LostSensor
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import BatteryState, ConstraintReport, HostHealth, Mode, SensorReport
 from tests.fsw.flight.contexts import STANDING
@@ -147,9 +147,11 @@ def test_an_estimate_that_is_not_aided_or_not_known_is_no_estimate(
 
 @pytest.mark.requirement("REQ-SAFE-8", "REQ-ARM-4", "REQ-ACT-6")
 def test_sensors_margins_damage_and_the_log_are_looked_at() -> None:
-    lost = Aiding(sensor=Sensor.ENCODERS, fault=SensorFault.STUCK, since_us=NOW_US - 50_000)
-    assert "encoders are stuck" in healthy(aiding=lost).sensor
-    assert healthy(aiding=lost._replace(since_us=NOW_US - 49_999)).sensor == "", "for a moment"
+    lost = LostSensor(Sensor.ENCODERS, SensorFault.STUCK, NOW_US - 50_000)
+    soon = lost._replace(since_us=NOW_US - 49_999)
+    for found in ((lost,), (soon._replace(sensor=Sensor.IMU), lost)):
+        assert "encoders are stuck" in healthy(aiding=Aiding(lost=found)).sensor
+    assert healthy(aiding=Aiding(lost=(soon,))).sensor == "", "for a moment"
     for silent_us, words in ((2_400_000, "barometer has been silent for 2 s"), (10**6, "")):
         report = replace(REPORT, sensors=(SensorReport("barometer", silent_us),))
         assert healthy(estimator=report).sensor == words

@@ -26,6 +26,7 @@ from fsw.flight.state import (
     Aiding,
     Damage,
     FlightState,
+    LostSensor,
     MissionMemory,
     OffboardMemory,
     PlanMemory,
@@ -116,7 +117,7 @@ UNAIDED = Aiding(1_500_000, Sensor.POSE, SensorFault.STUCK)
 
 def replaced_sensor(for_us: int) -> Aiding:
     """Something stands in for the IMU."""
-    return Aiding(sensor=Sensor.IMU, fault=SensorFault.STUCK, since_us=NOW_US - for_us)
+    return Aiding(lost=(LostSensor(Sensor.IMU, SensorFault.STUCK, NOW_US - for_us),))
 
 
 OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_age_us=500_000)

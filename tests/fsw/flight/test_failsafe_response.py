@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fsw.estimation.sensor_fault import Sensor
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.commander import Commander
 from fsw.flight.failsafe import (
     FAILSAFES,
@@ -26,6 +26,7 @@ from fsw.flight.state import (
     Aiding,
     Damage,
     FlightState,
+    LostSensor,
     MissionMemory,
     OffboardMemory,
     PlanMemory,
@@ -122,6 +123,39 @@ COMMANDER = Commander(CONFIG)
 
 def charge(level: Charge) -> BatteryState:
     return BatteryState(remaining=0.04, charge=level)
+
+
+IMU_LOST = LostSensor(Sensor.IMU, SensorFault.STALE, 0)
+ENCODERS_LOST = LostSensor(Sensor.ENCODERS, SensorFault.STUCK, 4 * SECOND)
+
+
+@pytest.mark.requirement("REQ-EST-6", "REQ-MODE-4")
+@pytest.mark.parametrize("first", [IMU_LOST, ENCODERS_LOST._replace(since_us=0)])
+def test_a_second_sensor_that_is_lost_is_news_and_acts_though_the_first_was_put_aside(
+    first: LostSensor,
+) -> None:
+    watched = Watched().until(1.0, aiding=Aiding(lost=(first,)))
+    assert watched.flown == (Mode.HOLD, Mode.MISSION)
+    watched.told(SwitchMode(Mode.LAND))
+    watched.mode(Mode.MISSION).until(4.0)
+    assert watched.flown[0] is Mode.MISSION
+    second = ENCODERS_LOST if first is IMU_LOST else IMU_LOST._replace(since_us=4 * SECOND)
+    before = len(watched.texts)
+    watched.until(6.0, aiding=Aiding(lost=(first, second)))
+    assert watched.flown == (Mode.HOLD, Mode.MISSION)
+    (text, change) = watched.texts[before:]
+    assert "IMU is silent" in text
+    assert "joint encoders are stuck" in text
+    assert text.endswith("holding")
+    assert change == "mission to hold: failsafe"
+    # One that comes and goes beside the first is the same one.
+    watched.told(SwitchMode(Mode.LAND))
+    watched.mode(Mode.MISSION).until(7.0, aiding=Aiding(lost=(first,)))
+    watched.until(8.0, aiding=Aiding(lost=(first, second)))
+    assert watched.flown[0] is Mode.MISSION
+    # After all are well again, each counts anew.
+    watched.until(9.0, aiding=Aiding()).until(10.0, aiding=Aiding(lost=(first,)))
+    assert watched.flown[0] is Mode.HOLD
 
 
 @pytest.mark.requirement("REQ-LINK-1")
@@ -409,7 +443,7 @@ HAPPENS: dict[Condition, dict[str, Any]] = {
     Condition.ROTOR_FAILED: {"damage": Damage(rotor="rotor 2")},
     Condition.JOINT_FAILED: {"damage": Damage(joint="joint 1")},
     Condition.POSITION_LOW: {"aiding": ADRIFT},
-    Condition.SENSOR_LOST: {"aiding": Aiding(sensor=Sensor.IMU)},
+    Condition.SENSOR_LOST: {"aiding": Aiding(lost=(LostSensor(Sensor.IMU, SensorFault.STALE, 0),))},
     Condition.TUBE_LEFT: {"safety": SafetyMemory(off_plan_us=0)},
     Condition.FILTER_ACTIVE: {"safety": SafetyMemory(filter_us=0)},
     Condition.AIDING_LOST: {"aiding": ADRIFT},
