@@ -372,14 +372,17 @@ Reading = tuple[Vec3, Vec3, Vec4, Vec3, Vec3, Vec2, Vec2]
 def repeating(new: Reading, last: Reading) -> int:
     """Parts of a ``new`` [SI] reading that are the ``last`` [SI] one's, while others are not.
 
-    To the last bit.
+    To the last bit. Of a pose place and velocity suffice: what turns on the spot is never so still.
+    Of the joints one that moves does.
     """
-    pose = new[0] == last[0] and new[1] == last[1] and new[2] == last[2]
+    pose = new[0] == last[0] and new[1] == last[1]
     inertial = new[3] == last[3] and new[4] == last[4]
     if pose and inertial:
         return 0  # a frame that came twice, or a vehicle that lies still
-    moving = new[6] != (0.0, 0.0)
-    joints = moving and new[5] == last[5] and new[6] == last[6]
+    joints = False
+    for k in range(2):
+        if new[6][k] != 0.0 and new[5][k] == last[5][k] and new[6][k] == last[6][k]:
+            joints = True
     return (POSE if pose else 0) | (INERTIAL if inertial else 0) | (JOINTS if joints else 0)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from fsw.flight.failsafe import Condition
-from fsw.measurements import ImuSample, JointSample, PoseSample
+from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.signals import Mode, SensorFrame
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US
@@ -109,9 +109,9 @@ def test_telemetry_knows_which_sensor_is_lost(kind: type, name: str) -> None:
     )
     flight.follow()
     flight.run(0.4)
-    assert flight.snapshot.sensor_lost == ""
+    assert flight.snapshot.sensors_lost == ()
     flight.run(0.4)
-    assert flight.snapshot.sensor_lost == name
+    assert flight.snapshot.sensors_lost == (name,)
 
 
 BESIDE = 4000  # at 8 s, on the way along the walls
@@ -126,6 +126,19 @@ def without(kind: type) -> Spoil:
 def stuck(kind: type) -> Spoil:
     """A sensor says the same for two seconds, while time goes on."""
     return changed(kind, 8.0, 10.0, frozen())
+
+
+def stuck_encoder(joint: int) -> Spoil:
+    """The encoder of one joint says the same for two seconds."""
+    held: list[float] = []
+
+    def spoil(sample: Sample) -> Sample:
+        assert isinstance(sample, JointSample)
+        held.append(sample.angles[joint])
+        angles = [held[0] if k == joint else angle for k, angle in enumerate(sample.angles)]
+        return replace(sample, angles=(angles[0], angles[1]))
+
+    return changed(JointSample, 8.0, 10.0, spoil)
 
 
 def beside_walls(flight: Flight) -> None:
@@ -163,15 +176,32 @@ def test_two_seconds_without_a_sensor_beside_walls_touch_nothing(
 
 @pytest.mark.requirement("REQ-EST-7")
 @pytest.mark.long
+@pytest.mark.parametrize("joint", [0, 1])
+def test_one_encoder_that_is_stuck_beside_walls_is_told_and_touches_nothing(joint: int) -> None:
+    """Nothing tells one that stands still from a joint that does: the vehicle may land for it."""
+    flight = Flight(load_scenario("walls", "mocap"), spoil_samples=stuck_encoder(joint))
+    flight.follow()
+    while flight.sim.step < BESIDE + LONG + 750:
+        flight.step()
+        assert flight.sim.ended is None, (flight.sim.ended, flight.texts)
+    encoders = told(flight, "sensor lost: joint encoders are stuck")
+    assert encoders or told(flight, f"joint failed: joint {joint + 1} does not move")
+    assert flight.mode in (Mode.HOLD, Mode.LAND)
+    assert min(flight.sim.truth().margins_m) > 0.0
+
+
+@pytest.mark.requirement("REQ-EST-7")
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
         (lies(LONG, BESIDE, p_WB=NOTHING), ("no position is measured", "pose", "for 0.25 s")),
         (freezes(LONG, BESIDE, *POSE), ("no position is measured", "pose is stuck")),
+        (freezes(LONG, BESIDE, "p_WB", "v_WB"), ("no position is measured", "pose is stuck")),
         (freezes(LONG, BESIDE, *INERTIAL), ("sensor lost: IMU is stuck", "for 0.05 s")),
         (freezes(LONG, BESIDE, *ENCODERS), ("sensor lost: joint encoders are stuck",)),
     ],
-    ids=["no pose", "pose stuck", "IMU stuck", "encoders stuck"],
+    ids=["no pose", "pose stuck", "place stuck", "IMU stuck", "encoders stuck"],
 )
 def test_exact_states_that_fail_for_two_seconds_touch_nothing(
     spoil: Callable[[SensorFrame], SensorFrame], words: tuple[str, ...]

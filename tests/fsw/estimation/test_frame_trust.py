@@ -149,6 +149,49 @@ def test_without_an_inertial_unit_rates_follow_from_the_pose(what: str) -> None:
     assert apart(estimate, 299) == 0.0
 
 
+@pytest.mark.requirement("REQ-EST-1")
+@pytest.mark.parametrize(
+    ("held", "sensor"),
+    [
+        (("p_WB", "v_WB"), Sensor.POSE),
+        (("p_WB", "v_WB", "q_WB"), Sensor.POSE),
+        ((0,), Sensor.ENCODERS),
+        ((1,), Sensor.ENCODERS),
+        (("q_arm", "qd_arm"), Sensor.ENCODERS),
+    ],
+    ids=["place", "pose", "encoder 1", "encoder 2", "encoders"],
+)
+def test_a_part_of_a_sensor_that_is_stuck_is_not_believed(
+    held: tuple[str | int, ...], sensor: Sensor
+) -> None:
+    """An attitude that turns on, or the other joint, does not make a reading new."""
+
+    def moving(k: int, **changes: Any) -> SensorFrame:
+        t = TICK * k
+        return frame(k, q_arm=(0.1 * t, 0.2 - 0.2 * t), qd_arm=(0.1, -0.2), **changes)
+
+    def spoilt(k: int, _: SensorFrame) -> SensorFrame:
+        last, now = moving(min(k, 20)), moving(k)
+        changes: dict[str, Any] = {}
+        for part in held:
+            if isinstance(part, str):
+                changes[part] = getattr(last, part)
+            else:
+                for name in ("q_arm", "qd_arm"):
+                    new = list(changes.get(name, getattr(now, name)))
+                    new[part] = getattr(last, name)[part]
+                    changes[name] = tuple(new)
+        return replace(now, **changes)
+
+    _, estimate, history = flown(60, spoilt)
+    assert not any(trust.doubted for trust in history[:19])
+    for trust in history[26:]:
+        ((found, part),) = trust.faults()
+        assert (found, part.fault) == (sensor, SensorFault.STUCK)
+    assert apart(estimate, 59) < 1e-3
+    assert estimate.q_arm == pytest.approx(moving(59).q_arm, abs=0.03)
+
+
 def test_a_vehicle_that_lies_still_is_no_stuck_sensor() -> None:
     still = frame(3, qd_arm=(0.0, 0.0))
     estimate = estimate_state(still)

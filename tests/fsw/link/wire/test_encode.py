@@ -271,7 +271,7 @@ def test_the_sensor_that_is_lost_is_the_one_that_is_blamed(sensor: Sensor, bits:
     healthy = read_back(stream_of(ids.SYS_STATUS))
     lost = (Condition.SENSOR_LOST.value,)
     status = read_back(
-        stream_of(ids.SYS_STATUS), replace(SNAPSHOT, failures=lost, sensor_lost=sensor.value)
+        stream_of(ids.SYS_STATUS), replace(SNAPSHOT, failures=lost, sensors_lost=(sensor.value,))
     )
     blamed = healthy.onboard_control_sensors_health & ~status.onboard_control_sensors_health
     assert blamed == bits | dialect.MAV_SYS_STATUS_PREARM_CHECK
