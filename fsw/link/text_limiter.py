@@ -6,7 +6,7 @@ that flaps cannot flood the link.
 
 An operator reads a handful of texts, and a ground station speaks them. A program that repeats a
 command that cannot be carried out, twice a second, must not bury the texts that matter. Nor may its
-refusals use up the budget of a failsafe's text, which is as severe: see ``_has_room``.
+refusals use up the budget of a failsafe's text, which may be a warning only: see ``_has_room``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from fsw.signals import Severity, StatusText
+from fsw.signals import FailsafeEvent, Severity, StatusText
 
 REPEAT_US: Final = 5_000_000  # the same text is sent once in this time
 _MOST: Final = 32  # texts and budgets remembered
@@ -46,6 +46,8 @@ class TextLimiter:
     def __init__(self) -> None:
         self._sent: dict[str, _Sent] = {}  # oldest first
         self._budgets: dict[str, _Budget] = {}  # the same
+        # As many as the failsafe table has conditions and answers to them.
+        self._failsafes: dict[FailsafeEvent, _Budget] = {}
         self._dropped = 0
         self._dropped_us = 0
 
@@ -79,17 +81,29 @@ class TextLimiter:
     def _has_room(self, text: StatusText, t_us: int) -> bool:
         """Charge the text to its budget.
 
-        Emergencies have no limit: only the vehicle itself raises them. Critical texts share a
-        budget with those that differ in their numbers only, all others share one. So whatever a
-        client provokes, the first text of a failsafe is sent.
+        Emergencies have no limit: only the vehicle itself raises them. The text of a failsafe
+        shares a budget with those of the same condition and action, however severe it is. Other
+        critical texts share one with those that differ in their numbers only, all others share
+        one. So whatever a client provokes, the first text of a failsafe is sent.
         """
         if text.severity <= Severity.EMERGENCY:
             return True
+        if text.event is not None:
+            event = text.event._replace(delay_us=0)
+            budget, room = _charged(self._failsafes.get(event), t_us)
+            self._failsafes[event] = budget
+            return room
         key = _NUMBER.sub("#", text.text) if text.severity <= Severity.CRITICAL else ""
-        budget = self._budgets.get(key) or _Budget()
-        room = min(budget.room + 1e-6 * _RATE_PER_S * (t_us - budget.at_us), float(_BURST))
-        _renew(self._budgets, key, _Budget(room - 1.0 if room >= 1.0 else room, t_us))
-        return room >= 1.0
+        budget, room = _charged(self._budgets.get(key), t_us)
+        _renew(self._budgets, key, budget)
+        return room
+
+
+def _charged(before: _Budget | None, t_us: int) -> tuple[_Budget, bool]:
+    """The budget after one more text, and whether there was room for it."""
+    before = before or _Budget()
+    room = min(before.room + 1e-6 * _RATE_PER_S * (t_us - before.at_us), float(_BURST))
+    return _Budget(room - 1.0 if room >= 1.0 else room, t_us), room >= 1.0
 
 
 def _renew(kept: dict[str, Any], key: str, value: object) -> None:

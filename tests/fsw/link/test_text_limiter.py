@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
-from fsw.signals import Severity, StatusText
+from fsw.signals import FailsafeEvent, Severity, StatusText
 
 REFUSED = StatusText(Severity.CRITICAL, "no takeoff: the vehicle is in the air already")
 S = 1_000_000
@@ -63,6 +63,45 @@ def test_no_flood_keeps_a_failsafe_or_an_emergency_from_being_sent(severity: Sev
     assert limiter.admit(FAILSAFE, 1 * S) is FAILSAFE
     emergencies = [StatusText(Severity.EMERGENCY, f"tilt lost: {k}") for k in range(50)]
     assert [limiter.admit(text, 1 * S) for text in emergencies] == emergencies
+
+
+INVALID = StatusText(
+    Severity.WARNING,
+    "state estimate invalid: warn",
+    FailsafeEvent("state estimate invalid", "warn", Severity.WARNING),
+)
+VALID = StatusText(
+    Severity.INFO,
+    "over: state estimate invalid",
+    FailsafeEvent("state estimate invalid", "none", Severity.INFO, over=True),
+)
+
+
+@pytest.mark.requirement("REQ-LINK-7")
+@pytest.mark.parametrize("text", [INVALID, VALID])
+@pytest.mark.parametrize("severity", [Severity.WARNING, Severity.INFO])
+def test_no_flood_keeps_a_failsafe_that_only_warns_from_being_sent(
+    text: StatusText, severity: Severity
+) -> None:
+    """A client of one link sent refused failures to inject, each of another instance."""
+    limiter = TextLimiter()
+    for k in range(200):
+        limiter.admit(StatusText(severity, f"no failure injected: gyro {k}"), k * S // 16)
+    assert limiter.admit(text, 200 * S // 16) is text
+
+
+@pytest.mark.requirement("REQ-LINK-7")
+def test_warnings_of_one_condition_use_up_the_budget_of_no_other_and_of_no_action() -> None:
+    limiter = TextLimiter()
+    low = FailsafeEvent("battery low", "warn", Severity.WARNING)
+    sent = [
+        limiter.admit(StatusText(Severity.WARNING, f"battery low: {k} s left", low), k * S // 100)
+        for k in range(1000)
+    ]
+    assert 20 <= sum(text is not None for text in sent) <= 20 + 5 * 10 + 1, "it is bounded too"
+    assert limiter.admit(INVALID, 10 * S) is INVALID
+    lands = StatusText(Severity.CRITICAL, "battery low: landing", low._replace(action="land"))
+    assert limiter.admit(lands, 10 * S) is lands
 
 
 def test_a_flood_of_less_severe_sentences_is_cut() -> None:

@@ -94,6 +94,18 @@ def test_a_flood_of_different_texts_is_cut_and_says_how_many(reader: Reader) -> 
 
 
 @pytest.mark.requirement("REQ-LINK-10")
+def test_a_flood_keeps_no_warning_of_a_failsafe_from_the_console(reader: Reader) -> None:
+    event = FailsafeEvent(Condition.ESTIMATE_INVALID.value, "warn", Severity.WARNING)
+    invalid = StatusText(Severity.WARNING, "state estimate invalid: warn", event)
+    one = console(reader)
+    for number in range(100):
+        one.observe(SECOND, (StatusText(Severity.WARNING, f"text {number}"),))
+    one.observe(SECOND, (invalid,))
+    one.close()
+    assert f"fsw: 0.0 s: {invalid.text}" in reader.sentences
+
+
+@pytest.mark.requirement("REQ-LINK-10")
 def test_a_console_that_stands_still_delays_no_tick(reader: Reader) -> None:
     reader.reads.clear()
     one = console(reader)
