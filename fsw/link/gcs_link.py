@@ -184,7 +184,7 @@ class GcsLink:
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command that came over this link."""
-        self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        self._add_answer(ack)
         self._send(t_us)
 
     def as_json(self) -> dict[str, object]:
@@ -221,10 +221,7 @@ class GcsLink:
         if len(self._speakers) < _MAX_SPEAKERS:
             self._speakers.add((frame.system_id, frame.component_id))
         if frame.message_id == message_ids.SETUP_SIGNING:
-            armed = self._snapshot is not None and self._snapshot.armed
-            text = set_up_signing(self.signing, frame, sender, armed)
-            if text is not None:
-                self.outbox.add_text(text, t_us)
+            self._set_up_signing(t_us, frame, sender)
             return
         host, port = sender
         source = MessageSource(
@@ -232,7 +229,9 @@ class GcsLink:
         )
         answer = self._commands.handle(frame, t_us, self._snapshot)
         if answer is None:
-            self._inbox.accept(frame, source)
+            put_off = self._inbox.accept(frame, source)
+            if put_off is not None:
+                self._add_answer(put_off)
         else:
             messages, refusal = answer
             for message in messages:
@@ -240,6 +239,15 @@ class GcsLink:
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
         self.dispatch.handle(frame, t_us, source)
+
+    def _set_up_signing(self, t_us: int, frame: Frame, sender: Address) -> None:
+        armed = self._snapshot is not None and self._snapshot.armed
+        text = set_up_signing(self.signing, frame, sender, armed)
+        if text is not None:
+            self.outbox.add_text(text, t_us)
+
+    def _add_answer(self, ack: CommandAck) -> None:
+        self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

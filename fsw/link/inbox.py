@@ -21,7 +21,9 @@ from fsw.signals import (
     AttitudeSetpoint,
     BatteryReading,
     Command,
+    CommandAck,
     CommandRequest,
+    CommandResult,
     EndEffectorTarget,
     HostHealth,
     JointSetpoint,
@@ -41,6 +43,7 @@ from fsw.tuning import Tuning
 from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
+_MAX_PUT_OFF: Final = 64  # more of them a tick and link, which are answered and not carried out
 _MAX_TARGETS: Final = 64  # a tick
 _MAX_ANNOUNCEMENTS: Final = 4  # a tick
 _MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
@@ -79,7 +82,8 @@ class _Incomplete:
 class Inbox:
     """Collects commands, targets and safe sets until a tick takes them.
 
-    Bounded: what does not fit is dropped and counted, as a lost datagram would be.
+    Bounded: what does not fit is dropped and counted, as a lost datagram would be. A command is
+    answered all the same.
     """
 
     def __init__(self, origin: Origin = DEFAULT_ORIGIN) -> None:
@@ -88,10 +92,11 @@ class Inbox:
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._received = Received()
         self._is_news = False  # there is more in it than samples
+        self._put_off: dict[str, int] = {}  # commands answered since the last tick, by link
         # By source: the walls of two announcers must not mix.
         self._incomplete: dict[MessageSource, _Incomplete] = {}
         self._source = UNKNOWN_SOURCE  # of the frame that is read now
-        self._handlers: dict[int, Callable[[Frame], None]] = {
+        self._handlers: dict[int, Callable[[Frame], CommandAck | None]] = {
             message_ids.COMMAND_LONG: partial(self._command, decode.command_long),
             message_ids.COMMAND_INT: partial(self._command, decode.command_int),
             message_ids.SET_MODE: partial(self._command, decode.set_mode),
@@ -111,12 +116,16 @@ class Inbox:
         """What it keeps something of."""
         return frozenset(self._handlers)
 
-    def accept(self, frame: Frame, source: MessageSource = UNKNOWN_SOURCE) -> None:
-        """Keep what the frame says if it is for this vehicle and of use; never raises."""
+    def accept(self, frame: Frame, source: MessageSource = UNKNOWN_SOURCE) -> CommandAck | None:
+        """Keep what the frame says if it is for this vehicle and of use; never raises.
+
+        Returns what is to be answered at once: to a command for which there is no room.
+        """
         handler = self._handlers.get(frame.message_id)
-        if handler is not None:
-            self._source, self._is_news = source, True
-            handler(frame)
+        if handler is None:
+            return None
+        self._source, self._is_news = source, True
+        return handler(frame)
 
     def accept_samples(self, samples: list[Sample]) -> None:
         """Keep what sensors have measured; the oldest go where a tick has taken none for long."""
@@ -139,6 +148,7 @@ class Inbox:
     def take(self) -> Received:
         """Hand over what came."""
         taken, self._received, self._is_news = self._received, Received(), False
+        self._put_off.clear()
         return taken
 
     def take_inputs(
@@ -182,14 +192,28 @@ class Inbox:
             came.sensor_clock_jump_us,
         )
 
-    def _command(self, read: Callable[[Frame], CommandRequest | None], frame: Frame) -> None:
+    def _command(
+        self, read: Callable[[Frame], CommandRequest | None], frame: Frame
+    ) -> CommandAck | None:
         request = read(frame)
         if request is None:
-            return
+            return None
         if len(self._received.commands) >= _MAX_COMMANDS:
             self.refused += 1
-            return
+            return self._later(request)
         self._received.commands.append(decode_commands.command(request, self.locate))
+        return None
+
+    def _later(self, request: CommandRequest) -> CommandAck | None:
+        """The answer to a command that came too many; a flood of them is not answered."""
+        link = self._source.link
+        answered = self._put_off.get(link, 0)
+        if answered >= _MAX_PUT_OFF:
+            return None
+        self._put_off[link] = answered + 1
+        result = CommandResult.TEMPORARILY_REJECTED
+        sender = (request.source_system, request.source_component)
+        return CommandAck(request.command, result, *sender)
 
     def _target(self, frame: Frame) -> None:
         values = cast(Numbers, frame.payload_values)

@@ -77,6 +77,28 @@ def test_texts_and_acknowledgements_are_sent_as_they_happen(ground: Ground) -> N
     assert frames[ids.COMMAND_ACK] == (400, 1, 0, 0, 255, 190)
 
 
+@pytest.mark.parametrize(("sent", "answered"), [(16, 0), (30, 14), (200, 64)])
+def test_a_command_for_which_a_tick_has_no_room_is_answered_at_once(
+    ground: Ground, sent: int, answered: int
+) -> None:
+    """A client that waits for its answer would be left to guess what became of it."""
+    station = FrameWriter(255, 190)
+
+    def ask(numbers: range) -> list[tuple[object, ...]]:
+        for number in numbers:
+            command = (*(0.0,) * 7, number, 1, 1, 0)
+            ground.polled(station.frame(ids.COMMAND_LONG, *command))
+        frames = ground.heard()
+        assert {f.message_id for f in frames} <= {ids.COMMAND_ACK}, "and no text"
+        return [frame.payload_values for frame in frames]
+
+    later = [(number, 1, 0, 0, 255, 190) for number in range(1016, 1016 + answered)]
+    assert ask(range(1000, 1000 + sent)) == later
+    assert len(ground.inbox.take().commands) == 16
+    assert ground.inbox.refused == sent - 16
+    assert ask(range(2000, 2017)) == [(2016, 1, 0, 0, 255, 190)], "and so in the next tick"
+
+
 def test_a_number_that_does_not_fit_its_field_does_not_end_the_flight(ground: Ground) -> None:
     plan = SNAPSHOT.plan
     assert plan is not None
