@@ -29,7 +29,7 @@ RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
 
 _LEAST_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
-_MAX_SPEAKERS: Final = 32
+_MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
 _HOUSEKEEPING_US: Final = 1_000_000
 _MESSAGE_ID: Final = slice(7, 10)  # in a frame
 # Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
@@ -82,7 +82,7 @@ class GcsLink:
         self._record = record
         self._commands = LinkCommands(self.rates, context)
         self._snapshot: FlightSnapshot | None = None
-        self._speakers: set[tuple[int, int]] = set()
+        self._speakers: dict[tuple[int, int], None] = {}  # the one heard last is the last
         self._housekeeping_us = 0
 
     @property
@@ -115,7 +115,7 @@ class GcsLink:
         return self._endpoint.fileno()
 
     def hears(self, system: int, component: int) -> bool:
-        """Whether a component has spoken on this link."""
+        """Whether a component has spoken on this link, lately where many have."""
         return (system, component) in self._speakers
 
     def read(self, t_us: int, budget: int) -> int:
@@ -218,8 +218,7 @@ class GcsLink:
             return  # no sign of life either: anybody could start or stop a failsafe with it
         self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
         self.talks = True
-        if len(self._speakers) < _MAX_SPEAKERS:
-            self._speakers.add((frame.system_id, frame.component_id))
+        self._note_speaker((frame.system_id, frame.component_id))
         if frame.message_id == message_ids.SETUP_SIGNING:
             self._set_up_signing(t_us, frame, sender)
             return
@@ -239,6 +238,14 @@ class GcsLink:
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
         self.dispatch.handle(frame, t_us, source)
+
+    def _note_speaker(self, speaker: tuple[int, int]) -> None:
+        """Keep who is to be answered here, for every frame: not those who fell silent long ago."""
+        speakers = self._speakers
+        speakers.pop(speaker, None)
+        speakers[speaker] = None
+        if len(speakers) > _MAX_SPEAKERS:
+            del speakers[next(iter(speakers))]
 
     def _set_up_signing(self, t_us: int, frame: Frame, sender: Address) -> None:
         armed = self._snapshot is not None and self._snapshot.armed

@@ -87,6 +87,34 @@ def test_an_answer_goes_to_the_link_the_command_came_from(
     assert [len(ground.heard()) for ground in (gcs, api)] == [1, 1]
 
 
+def test_a_client_is_answered_though_many_others_spoke_on_its_link_before(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    """Its ids were heard on the other link too, so that link alone was answered."""
+    gcs, api, links = both
+    for system in range(1, 41):
+        speak(api, system=100 + system)
+    speak(gcs, system=7)
+    speak(api, system=7)
+    for ground in (gcs, api):
+        ground.heard()
+    links.acknowledge(1_000_000, CommandAck(401, 0, 7, 190))
+    assert [f.message_id for f in api.heard()] == [ids.COMMAND_ACK]
+    assert [f.message_id for f in gcs.heard()] == [ids.COMMAND_ACK]
+
+
+def test_who_speaks_often_is_not_forgotten_for_those_who_spoke_once(
+    both: tuple[Ground, Ground, GroundLinks],
+) -> None:
+    _, api, _ = both
+    for system in range(1, 101):
+        speak(api, system=100 + system)
+        speak(api, system=7)
+    assert api.link.hears(7, 190)
+    assert api.link.hears(200, 190)
+    assert not api.link.hears(101, 190)
+
+
 class Counting:
     """A service that says nothing, and counts how often it is asked whether it would."""
 
