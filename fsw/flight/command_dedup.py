@@ -1,19 +1,23 @@
 """A command that is sent again because its ACK was lost must not act twice.
 
-Answers are remembered for as long as nothing else has changed what the vehicle does: the commander
-forgets them when a failsafe or another command does.
+Answers are remembered for as long as they are true: the commander forgets them when a failsafe or
+another command changes what the vehicle does, and those about home, speed and the like when another
+command changes that.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from fsw.signals import CommandRequest, CommandResult
 
 _AT_ONCE_US = 500_000  # the same words within this are the same command
 _RESENT_US = 3_000_000  # a command that says it is a repetition: four sends half a second apart
 _SENDERS = 8  # remembered; a flood of senders must not grow the memory
+
+COURSE: Final = "course"  # among what changes: what the vehicle does, or will do once it is armed
 
 Words = tuple[int, int | None, tuple[float | None, ...]]
 """Command, frame and parameters; None for NaN, so that the same words are equal."""
@@ -27,6 +31,7 @@ class AnsweredCommand:
     words: Words
     result: int  # CommandResult
     t_us: int
+    changed: frozenset[str] = frozenset()  # by it
 
 
 def answered_before(
@@ -43,13 +48,36 @@ def answered_before(
     return None
 
 
-def remember(
-    memory: tuple[AnsweredCommand, ...], request: CommandRequest, result: int, t_us: int
+def still_true(
+    memory: tuple[AnsweredCommand, ...], changes: frozenset[str]
 ) -> tuple[AnsweredCommand, ...]:
-    """The memory with this command as its sender's last."""
+    """The answers that stay true when a new command makes these ``changes``.
+
+    A takeoff has still been done when somebody else has moved home: it must not be done again.
+    What was refused may be possible now.
+    """
+    if not changes:
+        return memory
+    if COURSE in changes:
+        return ()
+    accepted = CommandResult.ACCEPTED
+    return tuple(
+        [last for last in memory if last.result == accepted and not last.changed & changes]
+    )
+
+
+def remember(
+    memory: tuple[AnsweredCommand, ...],
+    request: CommandRequest,
+    result: int,
+    t_us: int,
+    changed: frozenset[str] = frozenset(),
+) -> tuple[AnsweredCommand, ...]:
+    """The memory with this command, and what it ``changed``, as its sender's last."""
     sender = _sender(request)
     others = [last for last in memory if last.sender != sender]
-    return (AnsweredCommand(sender, _words(request), result, t_us), *others[: _SENDERS - 1])
+    answered = AnsweredCommand(sender, _words(request), result, t_us, changed)
+    return (answered, *others[: _SENDERS - 1])
 
 
 def _sender(request: CommandRequest) -> tuple[int, int]:

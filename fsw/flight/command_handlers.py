@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.flight import arming
+from fsw.flight.command_dedup import COURSE
 from fsw.flight.modes.base import CommandContext, FlightMode
 from fsw.flight.offboard_setpoints import joints_refusal
 from fsw.flight.orbit_path import max_orbit_speed
@@ -50,6 +51,7 @@ LATER: Final = CommandResult.TEMPORARILY_REJECTED
 MIN_SPEED: Final = 0.01  # m/s
 _CIRCLE_PLACES: Final = 64  # looked at, before the nearest is sought
 _CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from its last altitude
+_SETTINGS: Final = ("home", "mission_step", "look_at", "speed")  # of a decision
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,15 @@ class Decision:
     look_at: NewHeading | None = None
     speed: ChangeSpeed | None = None
     restart: bool = False
+
+    @property
+    def changes(self) -> frozenset[str]:
+        """What another command may undo: COURSE, and the names of what stays set."""
+        named = {name for name in _SETTINGS if getattr(self, name) is not None}
+        ways = (self.mode, self.intended_mode, self.goal, self.joints)
+        if self.arm or self.stop or self.restart or any(way is not None for way in ways):
+            named.add(COURSE)
+        return frozenset(named)
 
 
 Modes = Mapping[Mode, FlightMode]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming
 from fsw.flight.arming_health import arming_health
-from fsw.flight.command_dedup import answered_before, remember
+from fsw.flight.command_dedup import answered_before, remember, still_true
 from fsw.flight.command_handlers import Decision, decide, decide_without_estimate
 from fsw.flight.failsafe import (
     BLOCKING,
@@ -105,7 +105,8 @@ class Commander:
                 result = decision.result
                 texts += _reason(decision)
                 state = self._carry_out(state, decision, estimate, texts)
-                memory = remember(state.vehicle.answered, request, result, estimate.t_us)
+                now_answered, changes = state.vehicle.answered, decision.changes
+                memory = remember(now_answered, request, result, estimate.t_us, changes)
                 state = replace(state, vehicle=replace(state.vehicle, answered=memory))
             acks.append(acknowledgement(command, result))
         return state, acks
@@ -252,9 +253,10 @@ class Commander:
     ) -> FlightState:
         if decision.result != CommandResult.ACCEPTED:
             return state
-        if _changes_course(decision):
+        answered = still_true(state.vehicle.answered, decision.changes)
+        if answered is not state.vehicle.answered:
             # Another sender's command is not done any more: it acts again if it is sent again.
-            state = _without_answers(state)
+            state = replace(state, vehicle=replace(state.vehicle, answered=answered))
         state = self._remember(state, decision, estimate)
         if decision.arm:
             state = self._arm(state, estimate, texts)
@@ -423,25 +425,6 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
-
-
-def _changes_course(decision: Decision) -> bool:
-    """Whether a decision changes what the vehicle does, or will do when it is armed."""
-    return (
-        decision.arm
-        or decision.stop
-        or decision.mode is not None
-        or decision.intended_mode is not None
-        or decision.goal is not None
-        or decision.joints is not None
-        or decision.restart
-    )
-
-
-def _without_answers(state: FlightState) -> FlightState:
-    if not state.vehicle.answered:
-        return state
-    return replace(state, vehicle=replace(state.vehicle, answered=()))
 
 
 def _blocked(vehicle: VehicleMemory) -> str:

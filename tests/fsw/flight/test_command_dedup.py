@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fsw.flight.command_dedup import answered_before, remember
+from fsw.flight.command_dedup import COURSE, answered_before, remember, still_true
 from fsw.signals import CommandRequest
 
 NAN = math.nan
@@ -66,3 +66,16 @@ def test_the_first_repetition_is_a_repetition() -> None:
     memory = remember((), asked(), 0, 1_000_000)
     assert answered_before(memory, asked(again=1), 3_999_999) is not None
     assert answered_before(memory, asked(again=0), 3_999_999) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "kept"),
+    [((), 3), (("look_at",), 2), (("home",), 1), (("home", "speed"), 1), ((COURSE,), 0)],
+)
+def test_answers_about_what_has_changed_since_are_forgotten(
+    changes: tuple[str, ...], kept: int
+) -> None:
+    memory = remember((), asked(179, sender=1), 0, 0, frozenset({"home"}))
+    memory = remember(memory, asked(22, sender=2), 0, 0, frozenset({COURSE}))
+    memory = remember(memory, asked(21, sender=3), 1, 0)  # refused; it may be possible now
+    assert len(still_true(memory, frozenset(changes))) == kept

@@ -180,6 +180,38 @@ def test_a_repeated_command_acts_again_where_another_sender_has_changed_the_mode
     assert goal.motion.p == (5.0, 2.0, -3.0), "a place counts as well"
 
 
+UNDONE: dict[str, tuple[CommandAction, CommandAction]] = {
+    "home": (SetHome(Place((5.0, 2.0), 3.0)), SetHome(Place((1.0, 2.0), 3.0))),
+    "look_at": (LookAt(Place((9.0, 2.0))), LookAt(None)),
+    "speed": (ChangeSpeed(0.3), ChangeSpeed(0.7)),
+}
+
+
+@pytest.mark.requirement("REQ-MODE-10")
+@pytest.mark.parametrize("again", [0, 1])
+@pytest.mark.parametrize("name", UNDONE)
+def test_a_repeated_command_acts_again_where_another_sender_has_undone_it(
+    name: str, again: int
+) -> None:
+    """It was acknowledged from memory, and what the other sender had set stayed."""
+    mine, other = UNDONE[name]
+    first = asked(flying(), mine, 1, sender=255)
+    second = asked(first, other, 2, sender=7)
+    assert getattr(second.vehicle, name) != getattr(first.vehicle, name)
+    third = asked(second, mine, 1, 255, again)
+    assert getattr(third.vehicle, name) == getattr(first.vehicle, name)
+
+
+@pytest.mark.requirement("REQ-MODE-10")
+@pytest.mark.parametrize("name", UNDONE)
+def test_a_command_that_another_sender_has_not_undone_does_not_act_twice(name: str) -> None:
+    """Its ACK was lost. Only another course undoes a flight to a place."""
+    there, (_, other) = GoTo(Place((5.0, 2.0), 3.0)), UNDONE[name]
+    state = asked(asked(flying(), there, 1, sender=255), other, 2, sender=7)
+    # The setpoint would be another object if the flight were begun again.
+    assert asked(state, there, 1, 255, again=1).setpoint is state.setpoint
+
+
 @pytest.mark.requirement("REQ-MODE-10")
 def test_a_repeated_command_acts_again_where_a_failsafe_has_changed_the_mode() -> None:
     planned = replace(flying(Mode.OFFBOARD), plan=PlanMemory(since_us=NOW_US))
