@@ -38,6 +38,7 @@ from fsw.signals import (
     TakeOff,
 )
 
+_CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
 _MAY_SWITCH_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
 _RADIUS_RANGE: Final = (0.5, 100.0)  # m
@@ -80,7 +81,10 @@ def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
 
 
 def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:
-    main, sub = request.params[1], request.params[2]
+    """Without its flag parameter 2 is of no known meaning; QGroundControl and MAVSDK set it."""
+    flags, main, sub = request.params[:3]
+    if not (math.isfinite(flags) and int(flags) & _CUSTOM_MODE):
+        raise _InvalidError(f"mode unchanged: param1 = {flags:g} has no custom-mode flag (1)")
     mode = MODE_BY_PX4.get((main, 0.0 if math.isnan(sub) else sub))
     if mode is None:
         raise _InvalidError(f"mode {main:g}/{sub:g} is not supported")

@@ -9,7 +9,7 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.wire import message_ids as ids
 from fsw.shapes import BY_NAME, KINDS
-from fsw.signals import Arm, SensorFrame
+from fsw.signals import Arm, Mode, Rejected, SensorFrame, SwitchMode
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
@@ -53,6 +53,20 @@ def test_nan_in_an_unused_parameter_of_a_command_is_normal() -> None:
     assert (request.source_system, request.source_component) == (255, 190)
     assert inbox.take().commands == []
     assert inbox.refused == 0
+
+
+@pytest.mark.parametrize(
+    ("base_mode", "is_obeyed"), [(0, False), (156, False), (1, True), (157, True)]
+)
+def test_a_mode_is_changed_only_with_the_flag_of_custom_modes(
+    base_mode: int, is_obeyed: bool
+) -> None:
+    """In the older form of the command as well; without it the number means nothing."""
+    inbox = Inbox()
+    inbox.accept(frame(ids.SET_MODE, base_mode=base_mode, custom_mode=4 << 16 | 6 << 24))
+    (command,) = inbox.take().commands
+    assert (command.action == SwitchMode(Mode.LAND)) is is_obeyed
+    assert is_obeyed or isinstance(command.action, Rejected)
 
 
 def test_a_command_for_another_system_is_not_ours() -> None:

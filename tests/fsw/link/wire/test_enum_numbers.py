@@ -62,6 +62,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (decode, "_ACCELERATION_IGNORED", _MASK, _A),
     (decode, "_YAW_IGNORED", _MASK, "YAW_IGNORE"),
     (decode, "_KEEP_IN", "PANDION_SHAPE_FLAGS", "KEEP_IN"),
+    (decode_commands, "_CUSTOM_MODE", "MAV_MODE_FLAG", "CUSTOM_MODE_ENABLED"),
     (decode_commands, "_MAY_SWITCH_MODE", "MAV_DO_REPOSITION_FLAGS", "CHANGE_MODE"),
     (decode_commands, "_UNCHANGED", "ORBIT_YAW_BEHAVIOUR", "UNCHANGED"),
     (decode_commands, "_SPEED_TYPES", "SPEED_TYPE", "AIRSPEED GROUNDSPEED"),
