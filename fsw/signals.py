@@ -793,9 +793,10 @@ class EstimatorReport:
 
 @dataclass(frozen=True, slots=True)
 class ArmingReport:
-    """The arming checks that fail, by their places in the table; none while armed."""
+    """What is wrong: of a disarmed vehicle the arming checks say it, of an armed one conditions."""
 
-    failed: tuple[int, ...] = ()
+    failed: tuple[int, ...] = ()  # checks, by their places in the table
+    ill: tuple[str, ...] = ()  # conditions that make a component ill, by name
 
 
 class ActuatorReport(NamedTuple):

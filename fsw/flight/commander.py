@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming
+from fsw.flight.ailments import ailments
 from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember, still_true
 from fsw.flight.command_handlers import Decision, decide, decide_without_estimate
@@ -56,7 +57,6 @@ from fsw.signals import (
     Vec2,
 )
 
-_ARMED = ArmingReport()  # nothing to check
 _DISARMED = Mode.DISARMED  # found in a tenth of the time
 _RESTARTS = "command refused: the flight software restarts; send it again"
 
@@ -150,13 +150,14 @@ class Commander:
     ) -> tuple[str, ArmingReport]:
         """Why the vehicle cannot be armed now, and which checks fail, for telemetry.
 
-        Empty if it could be armed, or is.
+        Empty if it could be armed, or is; of one that is armed, the report says what is ill.
         """
         if state.vehicle.armed:
-            return "", _ARMED
-        found = arming.failed(self.context(state, estimate))
-        report = ArmingReport(tuple([number for number, _ in found]))
-        sentence = arming.joined(found) if found else ""
+            sentence, report = "", ArmingReport(ill=ailments(state.vehicle.conditions))
+        else:
+            found = arming.failed(self.context(state, estimate))
+            report = ArmingReport(tuple([number for number, _ in found]))
+            sentence = arming.joined(found) if found else ""
         return sentence, state.arming if report == state.arming else report
 
     def check_failsafes(

@@ -43,7 +43,10 @@ class EventLog:
         for text in outputs.texts:
             if text.event is not None:
                 self._add_failsafe(failsafe_event(text.event), snapshot.t_us)
-        asked = any(one.action is Order.CHECK_ARMING for one in inputs.commands)
+        # A vehicle that is armed refuses to be checked.
+        asked = not snapshot.armed and any(
+            one.action is Order.CHECK_ARMING for one in inputs.commands
+        )
         waits = last_us is not None and snapshot.t_us - last_us < _BETWEEN_US
         if not asked and (waits or report == self._reported):
             return

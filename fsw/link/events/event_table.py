@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
+from fsw.flight.ailments import AILMENTS
 from fsw.flight.arming import CHECKS, Subject
 from fsw.flight.failsafe import ROWS, Action, Condition
 from fsw.link.wire.px4_mode import custom_mode
@@ -93,12 +94,22 @@ class Event:
 
 
 def arming_events(report: ArmingReport) -> tuple[Event, ...]:
-    """The arming checks and the health: a summary, the checks that fail, and another summary."""
-    errors = 0
+    """The arming checks and the health: a summary, the checks that fail, and another summary.
+
+    An armed vehicle has no checks that fail, but with an ill component it could not be armed again.
+    """
+    errors, warnings = 0, 0
     for number in report.failed:
         errors |= 1 << _BITS[CHECKS[number].subject]
-    can_arm = 0 if report.failed else _EVERY_MODE
-    summary = struct.pack("<BIIII", 0, errors, 0, can_arm, _EVERY_MODE)
+    for name in report.ill:
+        condition = Condition(name)
+        bit = 1 << _BITS[AILMENTS[condition]]
+        if ROWS[condition].severity <= Severity.CRITICAL:
+            errors |= bit
+        else:
+            warnings |= bit
+    can_arm = 0 if errors else _EVERY_MODE
+    summary = struct.pack("<BIIII", 0, errors, warnings, can_arm, _EVERY_MODE)
     checks = [
         _event(
             _CHECK + number,
@@ -107,7 +118,7 @@ def arming_events(report: ArmingReport) -> tuple[Event, ...]:
         )
         for number in report.failed
     ]
-    health = struct.pack("<BIII", 0, _PRESENT, errors, 0)
+    health = struct.pack("<BIII", 0, _PRESENT, errors, warnings)
     return (_event(_SUMMARY, _PROTOCOL, summary), *checks, _event(_HEALTH, _PROTOCOL, health))
 
 

@@ -124,6 +124,16 @@ def test_what_a_decision_depends_on_is_the_vehicle_s() -> None:
     assert (usual.speed, usual.estimate_valid) == (CONFIG.steering.cruise_speed, True)
 
 
+def test_what_is_ill_is_shown_while_the_vehicle_is_armed() -> None:
+    conditions = (Condition.ROTOR_FAILED, Condition.DATALINK_LOST, Condition.BATTERY_LOW)
+    state = flying(conditions=conditions)
+    sentence, report = COMMANDER.arming_report(state, HOVERING)
+    assert (sentence, report.failed) == ("", ()), "it is armed"
+    assert report.ill == (Condition.ROTOR_FAILED.value, Condition.BATTERY_LOW.value)
+    again = COMMANDER.arming_report(replace(state, arming=report), HOVERING)[1]
+    assert again is report, "what has not changed is the same value"
+
+
 def test_why_arming_is_refused_is_shown_while_it_matters() -> None:
     low = vehicle_at((0.0, 0.0, GROUND_Z - 0.2))
     assert COMMANDER.arming_report(DISARMED, STANDING) == ("", ArmingReport())

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import pytest
 
+from fsw.flight.ailments import AILMENTS
 from fsw.flight.arming import CHECKS, Subject
 from fsw.flight.failsafe import Action, Condition
 from fsw.link.events.event_log import EventLog
@@ -124,6 +125,39 @@ def test_nothing_that_fails_is_a_summary_that_allows_arming() -> None:
     assert explained(summary)[2]["error"] == explained(health)[2]["error"] == 0
 
 
+@pytest.mark.parametrize(
+    ("condition", "component", "is_error"),
+    [
+        (Condition.ROTOR_FAILED, "motors_escs", True),
+        (Condition.JOINT_FAILED, "motors_escs", True),
+        (Condition.SENSOR_LOST, "accel", True),
+        (Condition.AIDING_LOST, "local_position_estimate", False),
+        (Condition.LOG_STOPPED, "storage", True),
+        (Condition.BATTERY_LOW, "battery", False),
+        (Condition.BATTERY_EMERGENCY, "battery", True),
+    ],
+)
+def test_a_component_that_is_ill_in_flight_is_in_the_health(
+    condition: Condition, component: str, is_error: bool
+) -> None:
+    """An armed vehicle with a failed rotor said that it was healthy and could be armed."""
+    entries = DESCRIBED["enums"]["health_component_t"]["entries"]
+    (bit,) = [int(number) for number, one in entries.items() if one["name"] == component]
+    summary, health = arming_events(ArmingReport(ill=(condition.value,)))
+    for event in (summary, health):
+        arguments = explained(event)[2]
+        found = (arguments["error"], arguments["warning"])
+        assert found == ((bit, 0) if is_error else (0, bit))
+    assert explained(summary)[2]["can_arm"] == (0 if is_error else 0xFFFFFFFF)
+
+
+def test_every_ailment_is_one_of_a_component_that_the_document_knows() -> None:
+    components = DESCRIBED["enums"]["health_component_t"]["entries"]
+    for condition in AILMENTS:
+        health = explained(arming_events(ArmingReport(ill=(condition.value,)))[-1])[2]
+        assert str(health["error"] | health["warning"]) in components
+
+
 def test_every_check_has_an_event_and_a_component_that_the_document_knows() -> None:
     events = arming_events(ArmingReport(tuple(range(len(CHECKS)))))[1:-1]
     components = DESCRIBED["enums"]["health_component_t"]["entries"]
@@ -144,12 +178,14 @@ def ticked(
     report: ArmingReport,
     *,
     asked: bool = False,
+    armed: bool = False,
     event: FailsafeEvent | None = None,
 ) -> None:
     commands = (Command(Order.CHECK_ARMING, CommandRequest(401, (0.0,) * 7, 255, 190)),)
     outputs = outputs_at(t_us)
     texts = (StatusText(Severity.CRITICAL, "no ground station", event),)
-    outputs = replace(outputs, snapshot=replace(outputs.snapshot, arming=report), texts=texts)
+    snapshot = replace(outputs.snapshot, arming=report, armed=armed)
+    outputs = replace(outputs, snapshot=snapshot, texts=texts)
     log.observe(TickInputs(STILL, commands=commands if asked else ()), outputs)
 
 
@@ -167,6 +203,17 @@ def test_the_checks_are_reported_at_first_when_they_change_and_when_somebody_ask
     assert log.newest == 8
     ticked(log, 12 * SECOND, tilted, asked=True)
     assert log.newest == 11
+
+
+def test_the_health_is_reported_while_armed_and_a_refused_check_reports_nothing() -> None:
+    log, ill = EventLog(), ArmingReport(ill=(Condition.ROTOR_FAILED.value,))
+    ticked(log, 0, ArmingReport())
+    ticked(log, 2 * SECOND, ill, armed=True)
+    assert log.newest == 4
+    ticked(log, 3 * SECOND, ill, armed=True, asked=True)
+    assert log.newest == 4, "the vehicle is armed: the command was refused"
+    ticked(log, 4 * SECOND, ArmingReport(), armed=True)
+    assert log.newest == 6
 
 
 @pytest.mark.requirement("REQ-MODE-1")
