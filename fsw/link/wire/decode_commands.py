@@ -84,7 +84,7 @@ def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:
     """Without its flag parameter 2 is of no known meaning; QGroundControl and MAVSDK set it."""
     flags, main, sub = request.params[:3]
     if not (math.isfinite(flags) and int(flags) & _CUSTOM_MODE):
-        raise _InvalidError(f"mode unchanged: param1 = {flags:g} has no custom-mode flag (1)")
+        raise _InvalidError("mode unchanged: param1 lacks flag 1, custom mode")
     mode = MODE_BY_PX4.get((main, 0.0 if math.isnan(sub) else sub))
     if mode is None:
         raise _InvalidError(f"mode {main:g}/{sub:g} is not supported")
