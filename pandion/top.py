@@ -42,5 +42,6 @@ def main(argv: list[str]) -> int:
     if not sys.stdout.isatty():
         complain("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
         return COULD_NOT_START
-    TopApp(TelemetryPeer(vehicle)).run()
-    return LEFT
+    app = TopApp(TelemetryPeer(vehicle))
+    app.run()
+    return app.return_code or LEFT  # 1 after an exception, which it has printed and does not raise

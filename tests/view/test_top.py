@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
+import sys
 from typing import Any
 
 import pytest
@@ -169,6 +171,40 @@ async def drive() -> None:
         assert streams.row_count == 3
         await pilot.press("q")
     assert fed.closed
+
+
+def test_a_margin_that_is_not_finite_has_no_bar() -> None:
+    asyncio.run(show_margins_that_are_not_finite())
+
+
+async def show_margins_that_are_not_finite() -> None:
+    fed = Fed()
+    app = TopApp(fed, lambda: fed.now)
+    async with app.run_test(size=(140, 40)) as pilot:
+        fed.waiting = [margins(math.nan, math.inf, 0.25)]
+        app.refresh_all()
+        await pilot.pause()
+        table = app.query_one("#margins", DataTable)
+        shown = [cells(table, row)[1::2] for row in range(table.row_count)]
+        assert shown == [["nan", ""], ["inf", ""], ["250", 7 * "█"]]
+
+
+class Broken(Fed):
+    """A peer that no message comes from, but an error."""
+
+    def poll(self, now: float) -> list[Frame]:
+        raise RuntimeError("broken")
+
+
+def test_the_exit_code_tells_that_an_exception_ended_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = TopApp.run
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setattr("view.top.peer.TelemetryPeer", lambda vehicle: Broken())
+    monkeypatch.setattr(TopApp, "run", lambda self: run(self, headless=True))
+    assert main([]) == 1
+    assert "broken" in capsys.readouterr().err
 
 
 def test_without_a_terminal_or_with_a_bad_address_one_sentence(capsys: Any) -> None:

@@ -203,8 +203,7 @@ class TopApp(App[None]):
         for one in scene.margins:
             least = one.margin <= scene.minimum
             style = "bold red" if one.margin < 0.0 else "bold" if least else ""
-            bar = "█" * round(_BAR * min(max(one.margin / _BAR_M, 0.0), 1.0))
-            cells = (one.name, f"{1e3 * one.margin:.0f}", f"{one.barrier:+.2f}", bar)
+            cells = (one.name, f"{1e3 * one.margin:.0f}", f"{one.barrier:+.2f}", _bar(one.margin))
             table.add_row(*(Text(cell, style=style) for cell in cells))
 
     def _show_events(self) -> None:
@@ -238,6 +237,12 @@ def headline(scene: Scene) -> str:
         timed = "" if math.isnan(scene.solver.total) else f" in {1e3 * scene.solver.total:.1f} ms"
         parts.append(f"plan {scene.solver.status}{timed}")
     return "  ".join(parts)
+
+
+def _bar(margin: float) -> str:
+    """A ``margin`` [m] as a bar; none where it is not finite, which a vehicle may send."""
+    share = min(max(margin / _BAR_M, 0.0), 1.0) if math.isfinite(margin) else 0.0
+    return "█" * round(_BAR * share)
 
 
 def shown_value(value: Value) -> str:
