@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -200,8 +201,14 @@ def _export(options: _File, values: Values) -> int:
     from fsw.parameters.storage import save
 
     known = values.read_all()
-    save(options.path, known)
-    say(f"{len(known)} parameters written to {options.path}")
+    # A reader of the file would refuse such a line.
+    kept = {name: value for name, value in known.items() if math.isfinite(value)}
+    save(options.path, kept)
+    say(f"{len(kept)} parameters written to {options.path}")
+    if len(kept) < len(known):
+        names = ", ".join(sorted(known.keys() - kept.keys()))
+        complain("pandion param", f"left out, because the value is not a finite number: {names}")
+        return REFUSED
     return DONE
 
 

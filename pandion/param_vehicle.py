@@ -24,6 +24,7 @@ _TRIES: Final = 3
 _NAME: Final = re.compile(r"[A-Za-z0-9_]{1,16}")
 _MOST: Final = 4096  # parameters; PX4 has some 1,500
 _QUIET_S: Final = 0.3  # a list that pauses this long has lost something
+_LONGEST_S: Final = 60.0  # of one list; a slow radio needs about this time for the most parameters
 
 
 class NoAnswer(Exception):
@@ -65,16 +66,21 @@ class ParameterClient:
             else:
                 for index in set(range(count)) - set(values):
                     self._send(ids.PARAM_REQUEST_READ, index, *_VEHICLE, b"")
-            patience_s = self._patience_s
-            while len(values) < count and (frame := self._hear((ids.PARAM_VALUE,), patience_s)):
+            at_most = time.monotonic() + _LONGEST_S
+            until = time.monotonic() + self._patience_s
+            while len(values) < count and (left_s := until - time.monotonic()) > 0.0:
+                frame = self._hear((ids.PARAM_VALUE,), left_s)
+                if frame is None:
+                    break
                 value, count, index, name, _ = cast(
                     "tuple[float, int, int, bytes, int]", frame.payload_values
                 )
                 if index == _NO_INDEX:
                     continue  # a checksum of them all, which PX4 and Pandion send first
                 self._check(count, index, _text(name))
+                if index not in values:  # who repeats itself is not waited for again
+                    until = min(time.monotonic() + _QUIET_S, at_most)
                 values[index] = (_text(name), nearest_decimal(value))
-                patience_s = _QUIET_S
             if len(values) == count:
                 return dict(values.values())
         missing = "nothing" if not values else f"{len(values)} of {count} parameters"

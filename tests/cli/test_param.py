@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from fsw.link.wire import message_ids as ids
 from fsw.parameters.registry import PARAMETERS
 from fsw.parameters.storage import load
-from pandion import param
+from messages.frames import FrameWriter
+from pandion import param, param_vehicle
+from pandion.param_vehicle import NoAnswer, ParameterClient
 
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 
@@ -88,3 +96,86 @@ def test_an_export_imported_again_changes_nothing(
     assert "74 parameters read, 1 changed" in capsys.readouterr().out.replace(
         f"{len(PARAMETERS)} parameters read", "74 parameters read"
     )
+
+
+@contextlib.contextmanager
+def vehicle_that_sends(*sent: bytes) -> Iterator[tuple[str, int]]:
+    """It repeats these frames to the first that speaks to it; where it listens."""
+    over = threading.Event()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+
+        def repeats() -> None:
+            _, client = vehicle.recvfrom(2048)
+            while not over.wait(0.02):
+                vehicle.sendto(b"".join(sent), client)
+
+        thread = threading.Thread(target=repeats)
+        thread.start()
+        yield vehicle.getsockname()
+        over.set()
+        thread.join()
+
+
+def value_of(name: bytes, value: float, count: int, index: int) -> bytes:
+    return FrameWriter(1, 1).frame(ids.PARAM_VALUE, value, count, index, name, 9)
+
+
+@pytest.mark.parametrize(
+    ("frame", "missing"),
+    [
+        (value_of(b"A", 1.0, 2, 0), "1 of 2 parameters came"),
+        (value_of(b"_HASH_CHECK", 1.0, 2, 0xFFFF), "nothing came"),
+    ],
+    ids=["a value", "the checksum"],
+)
+def test_a_vehicle_that_repeats_itself_is_not_waited_for_again(frame: bytes, missing: str) -> None:
+    with (
+        vehicle_that_sends(frame) as where,
+        ParameterClient(where, patience_s=0.3) as client,
+        pytest.raises(NoAnswer, match=missing),
+    ):
+        client.read_all()
+
+
+def test_a_list_that_only_grows_ends_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(param_vehicle, "_LONGEST_S", 0.2)
+    begin, sender = time.monotonic(), FrameWriter(1, 1)
+    endless = (
+        sender.frame(ids.PARAM_VALUE, 1.0, 4096, index, b"P%d" % index, 9) for index in range(4096)
+    )
+    over = threading.Event()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+
+        def drips() -> None:
+            _, client = vehicle.recvfrom(2048)
+            while not over.wait(0.05):
+                vehicle.sendto(next(endless), client)
+
+        thread = threading.Thread(target=drips)
+        thread.start()
+        with ParameterClient(vehicle.getsockname()) as client, pytest.raises(NoAnswer):
+            client.read_all()
+        over.set()
+        thread.join()
+    assert time.monotonic() - begin < 30.0, "4096 of them would take minutes"
+
+
+def test_an_export_leaves_out_what_a_reader_would_refuse(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "v.params"
+    sent = (
+        value_of(b"PID_YAW_P", 5.0, 3, 0),
+        value_of(b"LND_SPEED", float("nan"), 3, 1),
+        value_of(b"WALL_LAMBDA", float("inf"), 3, 2),
+    )
+    with vehicle_that_sends(*sent) as (host, port):
+        assert param.main(["export", str(file), f"--vehicle=udp:{host}:{port}"]) == 1
+    printed = capsys.readouterr()
+    assert printed.out == f"1 parameters written to {file}\n"
+    assert printed.err.count("\n") == 1
+    assert "not a finite number: LND_SPEED, WALL_LAMBDA" in printed.err
+    loaded = load(file)
+    assert (loaded.values, loaded.complaints) == ({"PID_YAW_P": 5.0}, ())
