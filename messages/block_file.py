@@ -4,10 +4,15 @@ In real time a thread writes: a slow disk must not stop a tick. What waits is bo
 that finds no room is dropped and counted. In lockstep the caller writes: then nothing can be
 dropped and the file is the same on every machine. A disk that refuses ends the file, not the
 flight; the reason is kept in ``failure``.
+
+Whoever writes holds a lock on the file, so that nobody takes it for finished. The kernel gives it
+back when the process ends, in whatever way.
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import queue
 import threading
@@ -38,6 +43,8 @@ class BlockFile:
         self.dropped = 0  # blocks that found no room
         self._write = write
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._waiting: queue.Queue[Block | None] = queue.Queue(maxsize=_ROOM)
         self._thread: threading.Thread | None = None
         self._closed = False
@@ -58,6 +65,11 @@ class BlockFile:
             self.dropped += 1
             return False
         return True
+
+    def look(self) -> None:
+        """Find out whether somebody has deleted the file: then what is written is lost."""
+        if self.failure is None and not self._closed and os.fstat(self._file).st_nlink == 0:
+            self.failure = "the file was deleted"
 
     def close(self) -> None:
         """Write what waits, as far as the disk takes it; safe to call twice."""

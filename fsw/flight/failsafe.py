@@ -762,7 +762,7 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.host.log_failure}",
         slow=True,
-        detected="a file of the flight log could not be written, or has gaps",
+        detected="a file of the flight log could not be written, was deleted, or has gaps",
         within_us=SECOND_US,
         parameters=("COM_ARM_SDCARD",),
         does="critical text; the flight goes on, and the next arming is denied",

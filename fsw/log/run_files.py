@@ -35,6 +35,7 @@ class RunFiles:
     def check(self) -> None:
         """Report what went wrong since the last call; cheap."""
         for file in self._files():
+            file.look()
             if file.failure is not None:
                 self._report(_ends_early(file))
             elif file.dropped:
@@ -60,6 +61,7 @@ class RunFiles:
 
     def close(self) -> None:
         """Write what is left; safe to call twice."""
+        self.check()  # a closed file no longer tells that it was deleted
         self.ulog.close()
         self.tlog.close()
         self.check()

@@ -2,10 +2,15 @@
 
 The list is made once, when the vehicle starts: a number must mean the same file for as long as a
 ground station may ask for it. Only erasing the finished logs changes it.
+
+The flights beside this one may be those of other vehicles, and still in the air. Whoever writes a
+log holds a lock on it (``messages/block_file.py``).
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import threading
 from collections.abc import Sequence
@@ -33,10 +38,11 @@ class LoggedFlight:
 
 
 class Erasure:
-    """Finished logs on their way from the disk, in a thread: that takes longer than a tick."""
+    """Logs on their way from the disk, in a thread: that takes longer than a tick."""
 
     def __init__(self, logs: Sequence[LoggedFlight]) -> None:
         self.erased = 0  # flights
+        self.written = 0  # flights that are not over: kept
         self.failed = 0
         self.reason = ""  # of the last that could not be
         self._logs = logs
@@ -51,12 +57,30 @@ class Erasure:
     def _work(self) -> None:
         for log in self._logs:
             try:
-                for file in log.files:
-                    file.path.unlink()
+                _erase(log)
                 self.erased += 1
+            except BlockingIOError:
+                self.written += 1
             except OSError as error:
                 self.failed += 1
                 self.reason = f"{log.flight}: {error.strerror}"
+
+
+def _erase(log: LoggedFlight) -> None:
+    """Delete the files of a flight, all or, where one of them is being written, none.
+
+    Raises:
+        BlockingIOError: One is being written.
+        OSError: One is gone, or cannot be deleted.
+    """
+    with contextlib.ExitStack() as opened:
+        for file in log.files:
+            descriptor = os.open(file.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            opened.callback(os.close, descriptor)
+            # Shared is enough to learn of a writer, and needs no right to write.
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        for file in log.files:
+            file.path.unlink()
 
 
 class FlightLogs:
@@ -68,10 +92,13 @@ class FlightLogs:
         self.all = flight_logs(directory)
 
     def erase(self) -> Erasure:
-        """Begin to delete the logs of finished flights; from now on they are not listed."""
-        finished = [log for log in self.all if log.flight != self._present]
+        """Begin to delete the logs of finished flights; from now on only this one is listed.
+
+        Which of the others are finished is found out beside the ticks.
+        """
+        others = [log for log in self.all if log.flight != self._present]
         self.all = tuple(log for log in self.all if log.flight == self._present)
-        return Erasure(finished)
+        return Erasure(others)
 
 
 def flight_logs(directory: Path) -> tuple[LoggedFlight, ...]:

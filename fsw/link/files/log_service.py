@@ -190,6 +190,8 @@ class LogService:
 def _erasure_text(erasure: Erasure) -> StatusText:
     logs = "log" if erasure.erased == 1 else "logs"
     text = f"{erasure.erased} {logs} erased, this flight's is kept"
+    if erasure.written:
+        text += f" and {erasure.written} of flights that are not over"
     if not erasure.failed:
         return StatusText(Severity.INFO, text)
     return StatusText(Severity.WARNING, f"{text}; {erasure.failed} could not be: {erasure.reason}")

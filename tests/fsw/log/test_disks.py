@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import random
 import resource
@@ -83,6 +84,27 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     assert log.whole
 
 
+@pytest.mark.requirement("REQ-LOG-1")
+def test_a_log_that_was_deleted_is_told_once_and_while_it_flies(tmp_path: Path) -> None:
+    received: list[str] = []
+    files = RunFiles(tmp_path, 0, SUBJECT, received.append)
+    files.ulog.begin(1_000_000, lockstep=True)
+    files.check()
+    assert (files.failure(), received) == ("", [])
+    (tmp_path / "flight.ulg").unlink()
+    for _ in range(2):
+        write_ticks(files.ulog, 300)
+        files.check()
+    assert files.failure() == "flight.ulg ends early: the file was deleted"
+    (tmp_path / "flight.tlog").unlink()
+    files.close()
+    files.close()
+    assert received == [
+        "flight.ulg ends early: the file was deleted",
+        "flight.tlog ends early: the file was deleted",
+    ]
+
+
 @pytest.mark.long
 @pytest.mark.requirement("REQ-LOG-3")
 def test_a_slow_disk_delays_no_tick_and_leaves_a_marked_gap(tmp_path: Path) -> None:
@@ -135,6 +157,15 @@ def ticks_in(path: Path) -> int:
     return sum(isinstance(tick, LoggedTick) for tick in ticks(open_flight(path)))
 
 
+def is_locked(path: Path) -> bool:
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
 @pytest.mark.requirement("REQ-LOG-4")
 @pytest.mark.long
 def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
@@ -148,11 +179,13 @@ def test_a_killed_process_leaves_readable_logs(tmp_path: Path) -> None:
     assert process.stdout is not None
     assert process.stdout.readline() == "written\n"
     for path in paths:
+        assert is_locked(path)
         wait_for(lambda path=path: ticks_in(path) >= 1000 - 130)  # type: ignore[misc]
     process.send_signal(signal.SIGKILL)
     process.wait()
     process.stdout.close()
     for path in paths:
+        assert not is_locked(path)
         log = ULog(str(path))
         assert not log.file_corruption
         count = len(log.get_dataset("sensor_frame").data["q_WB[0]"])

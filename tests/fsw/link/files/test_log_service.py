@@ -16,6 +16,7 @@ from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import ServiceOutput
 from fsw.signals import Severity, StatusText
+from messages.block_file import BlockFile
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import message_of, values_of
 from tests.waiting import wait_for
@@ -208,6 +209,25 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
     other.download(0)
     assert bytes(other.log) == b"kept", "numbers of another list mean nothing any more"
     assert list(vehicle_files(logs)["logs"]) == ["run-3"]  # type: ignore[call-overload]
+
+
+def test_the_log_of_another_vehicle_that_flies_is_kept_and_told(tmp_path: Path) -> None:
+    flight(tmp_path, "over", b"finished")
+    flying = flight(tmp_path, "flying", b"of another day", suffix="ulg")
+    telemetry = BlockFile(flying / "flight.tlog")
+    telemetry.put(b"so far")
+    client = Client(LogService(FlightLogs(flight(tmp_path, "here", b"kept"))))
+    client.ask(ids.LOG_ERASE, 1, 1)
+    reported = wait_for(lambda: list(client.service.poll(0)))
+    kept = "1 log erased, this flight's is kept and 1 of flights that are not over"
+    assert reported == [StatusText(Severity.INFO, kept)]
+    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
+    assert left == ["flying/flight.tlog", "flying/flight.ulg", "here/flight.tlog"]
+    telemetry.close()
+    logs = FlightLogs(tmp_path / "here")
+    erasure = logs.erase()
+    wait_for(lambda: erasure.done)
+    assert erasure.erased == 1, "a flight that is over has given its lock back"
 
 
 def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
