@@ -134,6 +134,13 @@ def instances(unit: Unit) -> int:
     return _INSTANCES.get(unit, 0)
 
 
+def absence(unit: Unit, aboard: tuple[str, ...]) -> str | None:
+    """Key, value and what there is, where a unit is a sensor that is not ``aboard``."""
+    if unit in SENSORS and unit not in aboard:
+        return f'unit = "{unit}": not on board; the sensors are {", ".join(aboard)}'
+    return None
+
+
 def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None:
     """Key, value and what is allowed, where a fault contradicts itself or what is ``aboard``.
 
@@ -143,8 +150,8 @@ def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None
     if fault.kind not in kinds:
         allowed = ", ".join(f'"{kind}"' for kind in kinds)
         return f'kind = "{fault.kind}": a {fault.unit} can be {allowed}'
-    if fault.unit in SENSORS and fault.unit not in aboard:
-        return f'unit = "{fault.unit}": not on board; the sensors are {", ".join(aboard)}'
+    if (missing := absence(fault.unit, aboard)) is not None:
+        return missing
     if fault.number > most:
         allowed = f"0 (all) to {most}" if most else f"0, because there is one {fault.unit}"
         return f"instance = {fault.number}: must be {allowed}"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sitl.faults.keys import Fault, Kind, Unit, instances
+from sitl.faults.keys import Fault, Kind, Unit, absence, instances
 from sitl.link.message_ids import ACCEPTED, DENIED, UNSUPPORTED
 from sitl.scenario import Scenario
+from sitl.scenario_validation import units_aboard
 from sitl.simulation import Simulation
 from sitl.zones import zones_of
 
@@ -63,6 +64,12 @@ def carry_out(simulation: Simulation, asked: Injection) -> Answer:
     unit = _UNITS.get(asked.unit)
     if unit is None:
         return Answer(UNSUPPORTED, f"no fault: the vehicle has no unit {asked.unit}")
+    # First of all: what is not there does not work either.
+    missing = absence(unit, units_aboard(simulation.scenario))
+    if missing is not None:
+        return Answer(UNSUPPORTED, f"no fault: {missing}")
+    if unit == "mavlink" and not _has_pilot(simulation.scenario):
+        return Answer(UNSUPPORTED, _NO_PILOT)
     most = instances(unit)
     if asked.instance > max(most, 1):
         return Answer(DENIED, f"no fault: {unit} {asked.instance} is not one of {max(most, 1)}")
@@ -80,8 +87,6 @@ def carry_out(simulation: Simulation, asked: Injection) -> Answer:
     kind = _KINDS.get(asked.kind)
     if kind is None:
         return Answer(UNSUPPORTED, f"no fault: kind {asked.kind} is not one of 0 to 7")
-    if unit == "mavlink" and not _has_pilot(simulation.scenario):
-        return Answer(UNSUPPORTED, _NO_PILOT)
     fault = Fault(unit, kind, instance=float(number))
     refusal = simulation.inject(fault)
     if refusal is not None:

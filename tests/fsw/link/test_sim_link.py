@@ -570,6 +570,8 @@ def test_the_simulator_passes_over_a_fault_of_no_number(
     ("numbers", "result", "sentence"),
     [
         ((2, 1, 0), 3, 'no fault: unit = "mag": not on board'),
+        ((2, 0, 0), 3, 'no fault: unit = "mag": not on board'),  # nor does it work again
+        ((5, 0, 0), 3, 'no fault: unit = "optical flow": not on board'),
         ((104, 1, 0), 3, "no fault: the vehicle has no unit 104"),
         ((0, 9, 0), 3, "no fault: kind 9 is not one of 0 to 7"),
         ((101, 1, 5), 2, "no fault: motor 5 is not one of 4"),
@@ -595,6 +597,8 @@ def test_only_a_pilot_that_is_there_can_be_silenced(name: str, result: int) -> N
     assert answer.result == result
     if result:
         assert answer.sentence.endswith("the scenario's pilot, and this scenario has none")
+        works = carry_out(simulation, Injection(105, 0, 0, system=255, component=190))
+        assert works == answer, "a link that is not there does not work again"
     simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0, 0.0), armed=True))
     simulation.faults.at(simulation.step)
     assert simulation.faults.pilot_silent(simulation.t_us) == (result == 0)
