@@ -26,15 +26,22 @@ def pieces(sentence: str, severity: int, text_id: int) -> list[tuple[int, bytes,
 
 def joined(frames: Iterable[Frame]) -> tuple[str, ...]:
     """The sentences in these frames, the pieces of a long one joined; whole ones come first."""
-    cut: dict[int, bytes] = {}
-    whole: list[bytes] = []
+    return tuple(sentence for _, sentence in graded(frames))
+
+
+def graded(frames: Iterable[Frame]) -> tuple[tuple[int, str], ...]:
+    """The same, each with its severity; that of a long one is its last piece's."""
+    cut: dict[int, tuple[int, bytes]] = {}
+    whole: list[tuple[int, bytes]] = []
     for frame in frames:
         if frame.message_id != STATUSTEXT:
             continue
-        _, raw, text_id, _ = cast("tuple[int, bytes, int, int]", frame.payload_values)
+        severity, raw, text_id, _ = cast("tuple[int, bytes, int, int]", frame.payload_values)
         text = raw.rstrip(b"\0")
         if text_id == 0:
-            whole.append(text)
+            whole.append((severity, text))
         else:
-            cut[text_id] = cut.get(text_id, b"") + text
-    return tuple(text.decode("utf-8", "replace") for text in (*whole, *cut.values()))
+            _, before = cut.get(text_id, (severity, b""))
+            cut[text_id] = severity, before + text
+    every = (*whole, *cut.values())
+    return tuple((severity, text.decode("utf-8", "replace")) for severity, text in every)

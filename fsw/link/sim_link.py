@@ -44,6 +44,7 @@ from fsw.signals import (
     MessageSource,
     Mode,
     SensorFrame,
+    Severity,
     StatusText,
 )
 from messages import status_text
@@ -100,7 +101,7 @@ class SimLink:
         self.measured = False  # what comes is measured by sensors, each at its own time
         self.shutdown = False  # the simulator has ended the run
         self.retransmissions = 0
-        self.notices: list[str] = []  # what was odd, for the operator; the loop empties it
+        self.notices: list[StatusText] = []  # for the operator; the loop empties it
         self.routed_acks: list[CommandAck] = []  # of the simulator to what was routed; the same
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
@@ -117,7 +118,7 @@ class SimLink:
         self._thrust_scale = 1.0 / facts.rotor_thrust_max
         self._torque_scale = 1.0 / facts.joint_torque_max
         self._steps = SensorClock(
-            facts.tick_period_us, clock, self.notices.append, inbox.accept_clock_jump
+            facts.tick_period_us, clock, self._note_what_is_odd, inbox.accept_clock_jump
         )
         self._answered_in = deque[tuple[int, int]](maxlen=_ANSWERS)  # stamps and numbers of steps
         self._early: list[Sample] = []  # of the next step, which had no room for them
@@ -252,12 +253,18 @@ class SimLink:
         if step in self._answered_in:
             return
         self._answered_in.append(step)
-        self.notices += status_text.joined(frames)
+        for severity, sentence in status_text.graded(frames):
+            # No worse than a refusal: an emergency passes every limit, and is the vehicle's own.
+            grade = Severity.CRITICAL if severity <= Severity.CRITICAL else Severity.WARNING
+            self.notices.append(StatusText(grade, sentence, prompt=True))
         for frame in frames:
             if frame.message_id == message_ids.COMMAND_ACK:
                 command, result, _, _, system, component = cast(Numbers, frame.payload_values)
                 ack = CommandAck(int(command), int(result), int(system), int(component))
                 self.routed_acks.append(ack)
+
+    def _note_what_is_odd(self, sentence: str) -> None:
+        self.notices.append(StatusText(Severity.WARNING, sentence))
 
     def _note_pacing(self, custom_mode: int) -> None:
         self.pacing = Pacing(custom_mode & _LOCKSTEP_BIT)

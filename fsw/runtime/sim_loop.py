@@ -325,7 +325,7 @@ class SimLoop(Generic[State]):
             self._notices += [StatusText(Severity.WARNING, event) for event in events]
             events.clear()
         if self._sim.notices:
-            self._notices += [StatusText(Severity.WARNING, one) for one in self._sim.notices]
+            self._notices += self._sim.notices
             self._sim.notices.clear()
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))

@@ -35,7 +35,7 @@ _ACTIVE: Final = 4  # MAV_STATE
 _MAVLINK_VERSION: Final = 3
 _UNKNOWN_CELL, _UNKNOWN_WARMTH = 0xFFFF, 0x7FFF  # of BATTERY_STATUS
 _FOR_EVERYTHING, _LIPO = 1, 1  # MAV_BATTERY_FUNCTION, MAV_BATTERY_TYPE
-_WARNING: Final = 4  # MAV_SEVERITY
+_CRITICAL, _WARNING = 2, 4  # MAV_SEVERITY
 # An unknown covariance is a NaN in its first entry.
 _NO_COVARIANCE: Final = (math.nan, *(0.0,) * 20)
 _ODOMETRY_TAIL: Final = (
@@ -117,7 +117,9 @@ class StepEncoder:
         """COMMAND_ACK to the one that asked for a fault, and the sentence for the operator."""
         ack = (message_ids.CMD_INJECT_FAILURE, answer.result, 0, 0, asked.system, asked.component)
         self._text_id = self._text_id % 0xFFFF + 1
-        texts = status_text.pieces(answer.sentence, _WARNING, self._text_id)
+        # As the vehicle's own: a refusal is critical, a fault that begins or ends a warning.
+        severity = _WARNING if answer.result == message_ids.ACCEPTED else _CRITICAL
+        texts = status_text.pieces(answer.sentence, severity, self._text_id)
         frames = (self._sensors.frame(message_ids.STATUSTEXT, *values) for values in texts)
         return self._sensors.frame(message_ids.COMMAND_ACK, *ack) + b"".join(frames)
 

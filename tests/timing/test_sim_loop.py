@@ -62,7 +62,7 @@ class Sim(VirtualSensors):
     pacing: Pacing = Pacing.REALTIME
     done: list[str] = field(default_factory=list)  # shared by all parts
     answers: list[tuple[int, Answer]] = field(default_factory=list)  # at, what
-    notices: list[str] = field(default_factory=list)
+    notices: list[StatusText] = field(default_factory=list)
     routed_acks: list[CommandAck] = field(default_factory=list)
     routed: list[CommandRequest] = field(default_factory=list)
 
@@ -110,7 +110,7 @@ class Ground:
 
     done: list[str]
     takes: Callable[[], None]
-    texts: list[str] = field(default_factory=list)
+    told: list[StatusText] = field(default_factory=list)
     acks: list[CommandAck] = field(default_factory=list)
     received: int = 0
 
@@ -119,8 +119,12 @@ class Ground:
 
     def publish(self, outputs: TickOutputs) -> None:
         self.done.append("telemetry")
-        self.texts += [text.text for text in outputs.texts]
+        self.told += outputs.texts
         self.takes()
+
+    @property
+    def texts(self) -> list[str]:
+        return [text.text for text in self.told]
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         self.acks.append(ack)
@@ -342,6 +346,17 @@ def test_a_planner_that_died_is_reported_at_once_and_logged() -> None:
     bench.run(0.5)
     assert bench.ground.texts == ["planner process died (-9), restarted"]
     assert bench.files.ulog.notices == bench.ground.texts
+
+
+def test_what_the_simulator_answers_is_published_as_it_is_and_logged() -> None:
+    refusal = StatusText(Severity.CRITICAL, "no fault: not on board", prompt=True)
+    bench = Bench(standing)
+    bench.asleep = lambda: (
+        bench.sim.notices.append(refusal) if len(bench.sim.answers) == 100 else None
+    )
+    bench.run(0.5)
+    assert bench.ground.told == [refusal]
+    assert bench.files.ulog.notices == [refusal.text]
 
 
 @pytest.mark.requirement("REQ-MODE-6")

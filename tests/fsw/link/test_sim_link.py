@@ -13,6 +13,7 @@ import pytest
 
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.text_limiter import TextLimiter
 from fsw.link.wire import message_ids as ids
 from fsw.measurements import ImuSample, JointSample, PressureSample
 from fsw.signals import (
@@ -193,7 +194,7 @@ def test_one_stamp_far_ahead_does_not_make_the_vehicle_deaf(wire: Wire, wrong_us
         released.append(wire.link.wait_for_step())
     assert [one and one.t_us for one in released] == [1_002_000, None, 1_004_000, 1_006_000]
     (notice,) = wire.link.notices
-    assert "ahead: ignored" in notice
+    assert "ahead: ignored" in notice.text
 
 
 @pytest.mark.parametrize("wrong_us", [11_000_000, 2**62 - 1, 2**62, 2**64 - 1])
@@ -206,7 +207,8 @@ def test_a_first_stamp_far_ahead_does_not_make_the_vehicle_deaf(wire: Wire, wron
     first = wrong_us if wrong_us < 2**62 else None
     assert [one and one.t_us for one in released] == [first, 1_002_000, 1_004_000, 1_006_000]
     (notice,) = wire.link.notices
-    assert notice.startswith("first step stamped")
+    assert notice.text.startswith("first step stamped")
+    assert (notice.severity, notice.prompt) == (Severity.WARNING, False)
 
 
 class Flight:
@@ -534,9 +536,37 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
     wire.send(answer + encoder.datagram(readings(1_004_000), ()))
     assert wire.link.wait_for_step() is not None
     assert wire.link.routed_acks == [CommandAck(420, 0, 245, 190)]
-    assert wire.link.notices == ["fault injected: gyro off"]
+    begun = StatusText(Severity.WARNING, "fault injected: gyro off", prompt=True)
+    assert wire.link.notices == [begun]
     simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.0, 0.0), armed=True))
     assert math.isnan(simulation.sense().gyro_B[0])
+
+
+def test_a_refusal_of_the_simulator_is_critical_and_prompt_as_the_vehicle_s_own(wire: Wire) -> None:
+    """A second one in the same words is an answer too, and is sent at once."""
+    encoder, limiter = StepEncoder(lockstep=True), TextLimiter()
+    simulation = Simulation(load_scenario("walls-calm"), 0)
+    asked = Injection(unit=2, kind=1, instance=0, system=245, component=190)
+    for t_us in (1_002_000, 1_004_000):
+        answer = encoder.answer(asked, carry_out(simulation, asked))
+        wire.send(answer + encoder.datagram(readings(t_us), ()))
+        assert wire.link.wait_for_step() is not None
+    assert len(wire.link.notices) == 2
+    for notice, t_us in zip(wire.link.notices, (1_002_000, 1_004_000), strict=True):
+        assert notice.text.startswith('no fault: unit = "mag": not on board')
+        assert notice.severity == Severity.CRITICAL
+        assert limiter.admit(notice, t_us) is not None
+
+
+def test_no_text_of_the_simulator_is_an_emergency(wire: Wire) -> None:
+    """Those pass every limit."""
+    writer = FrameWriter(1, 200)
+    answer = writer.frame(ids.COMMAND_ACK, 420, 0, 0, 0, 245, 190)
+    for severity in (0, 255):
+        answer += writer.frame(ids.STATUSTEXT, severity, b"odd", 0, 0)
+    wire.send(answer + StepEncoder(lockstep=True).datagram(readings(1_002_000), ()))
+    assert wire.link.wait_for_step() is not None
+    assert [one.severity for one in wire.link.notices] == [Severity.CRITICAL, Severity.WARNING]
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
