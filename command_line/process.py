@@ -65,7 +65,7 @@ class StopRequest:
         self.requested = False
 
     def listen(self) -> None:
-        """Take over both signals; until then SIGINT raises KeyboardInterrupt."""
+        """Take over both signals; for what SIGINT does until then see ``interrupts.py``."""
         signal.signal(signal.SIGINT, self._request)
         signal.signal(signal.SIGTERM, self._request)
 

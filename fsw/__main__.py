@@ -1,16 +1,18 @@
-"""Entry point: ``python -m fsw``."""
+"""Entry point: ``python -m fsw``. It imports when an interrupt ends it without a traceback."""
 
 from __future__ import annotations
 
 import sys
 
-from command_line.options import read
-from fsw.arguments import FswOptions
-from fsw.runtime.process import pin_numerics_to_one_thread
+from command_line.interrupts import end_at_once
 
 
 def main(argv: list[str] | None = None, prog: str = "fsw") -> int:
     """Fly until the simulator ends the run; returns the exit code."""
+    from command_line.options import read
+    from fsw.arguments import FswOptions
+    from fsw.runtime.process import pin_numerics_to_one_thread
+
     options = read(FswOptions, prog, "Run the flight software alone.", argv)
     pin_numerics_to_one_thread()
     # numpy reads the variables above when it is imported, and this imports it.
@@ -20,4 +22,5 @@ def main(argv: list[str] | None = None, prog: str = "fsw") -> int:
 
 
 if __name__ == "__main__":
+    end_at_once()
     sys.exit(main())
