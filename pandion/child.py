@@ -17,6 +17,9 @@ from pathlib import Path
 from typing import Any, Final
 
 GRACE_S: Final = 0.6  # between one way to end a process and the next, stronger one
+# The same before the flight, when nobody waits for a verdict within 2 s: a busy machine takes its
+# time for the end of a process that has loaded much.
+UNFLOWN_GRACE_S: Final = 5.0
 
 Event = dict[str, Any]
 """One JSON object that a child wrote on its standard output."""

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any, Final
 
 from command_line.parser import COULD_NOT_START
-from pandion.child import GRACE_S, Child, Event
+from pandion.child import GRACE_S, UNFLOWN_GRACE_S, Child, Event
 from pandion.display import Display
 from pandion.process_faults import ProcessFaults
 from pandion.processor import ANYWHERE, Places
@@ -198,7 +198,12 @@ class Supervisor:
             flown.errors[name] = f"{name} ended without a result; see {self._log(name)}"
         # Before the flight there is no link whose silence the other process would notice.
         for other in self._others(child):
-            other.expect(_FOLLOW_S if flown.started else 0.0)
+            other.expect(_FOLLOW_S if flown.started else 0.0, self._grace_s)
+
+    @property
+    def _grace_s(self) -> float:
+        """Between an interrupt and the kill [s]."""
+        return GRACE_S if self._flown.started else UNFLOWN_GRACE_S
 
     def _log(self, name: str) -> Path:
         return self._out / f"{name}.log"
@@ -207,6 +212,6 @@ class Supervisor:
         """End the simulator, which ends the flight software and still gives a result."""
         self._flown.interrupted = True
         for child in self._children:
-            child.expect(GRACE_S)
+            child.expect(GRACE_S, self._grace_s)
         for child in self._children[:1]:
             child.interrupt()

@@ -6,15 +6,21 @@ import json
 import signal
 import sys
 import time
+from types import FrameType
 
 
 def main(name: str, script: list[str]) -> int:
-    """Act word by word: an event as JSON, ``deaf`` to interrupts, ``sleep``, or an exit code."""
+    """Act word by word.
+
+    An event as JSON; ``deaf`` to interrupts or ``slow`` to end; ``short``, ``sleep``; an exit code.
+    """
     for word in script:
         if word.startswith("{"):
             print(word, flush=True)
         elif word == "deaf":
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+        elif word == "slow":
+            signal.signal(signal.SIGINT, end_slowly)
         elif word == "sleep":
             time.sleep(60.0)
         elif word == "short":
@@ -24,6 +30,12 @@ def main(name: str, script: list[str]) -> int:
         else:
             break
     return 0
+
+
+def end_slowly(number: int, frame: FrameType | None) -> None:
+    """As a process does that has loaded much, on a busy machine."""
+    time.sleep(1.0)
+    sys.exit(1)
 
 
 def event(name: str, **details: object) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pandion.display import Display
-from pandion.supervisor import Flown, Supervisor
+from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from tests.cli.command import environment
 from tests.cli.fake_processes import event
 
@@ -55,6 +55,14 @@ def test_a_process_that_has_to_be_killed_is_a_failure(reported: list[str], tmp_p
     assert flown.aftermath == ["fsw did not end by itself and had to be killed"]
     assert flown.sitl == {"completed": True}
     assert time.monotonic() - begin_s < 3.0
+
+
+def test_a_half_that_is_slow_to_end_before_the_flight_is_given_the_time(tmp_path: Path) -> None:
+    """What refused the flight is the reason, and all of it."""
+    supervisor = Supervisor(Display(io.StringIO()), tmp_path, runner="tests.cli.fake_processes")
+    with pytest.raises(ProcessFailed) as failed:
+        supervisor.run(["slow", LISTENING, "sleep"], lambda port: ["short", event("error"), "2"])
+    assert str(failed.value) == "error said"
 
 
 def test_an_interrupt_that_is_obeyed_is_not_a_kill(tmp_path: Path) -> None:
