@@ -157,7 +157,7 @@ class Supervisor:
                 event["t_s"], flown.duration_s, event["min_margin_m"], event["real_time_factor"]
             )
         elif kind == "error":
-            flown.errors[child.name] = event["message"]
+            self._note_error(child, event)
         elif kind == "listening":
             endless = event["duration_s"] is None  # JSON knows no infinity
             flown.port = event["port"]
@@ -174,6 +174,11 @@ class Supervisor:
             self._found(event["ports"]["gcs"])
         if kind in ("listening", "preparing", "warning", "parameters", "fault", "text"):
             self._display.say(event["message"])
+
+    def _note_error(self, child: Child, event: Event) -> None:
+        """Keep the reason; before the flight, what an interrupted process says is none."""
+        if self._flown.started or not child.interrupted:
+            self._flown.errors[child.name] = event["message"]
 
     def _note_result(self, child: Child, event: Event) -> None:
         """Keep the result; a process that ends because the other is silent does not wait for it."""

@@ -34,6 +34,7 @@ def main(name: str, script: list[str]) -> int:
 
 def end_slowly(number: int, frame: FrameType | None) -> None:
     """As a process does that has loaded much, on a busy machine."""
+    print(event("error"), flush=True)
     time.sleep(1.0)
     sys.exit(1)
 
