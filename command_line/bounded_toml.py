@@ -9,7 +9,7 @@ from typing import Any, Final
 MOST_PARTS: Final = 16  # of a dotted key; what we write has 2
 # The library keeps every beginning of a dotted key: 100,000 parts would take tens of gigabytes. A
 # chain in a text or a comment counts as well. A part begins where no part goes on: so it is linear.
-_PART: Final = r"""(?:(?<![\w-])[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_PART: Final = r"""(?:(?<![\w-])[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 _CHAIN: Final = re.compile(rf"(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 

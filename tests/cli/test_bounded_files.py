@@ -168,6 +168,8 @@ CHAIN = f"a{'.a' * (MOST_PARTS - 1)}"  # a key of as many parts as it may have
         ("[a" + ".a" * (LONG // 2) + "]", "nested too deeply"),
         ("x = {a" + " . a" * (LONG // 4) + " = 1}", "nested too deeply"),
         ('"a b"' + "\t.'c.d'" * (LONG // 8) + " = 1", "nested too deeply"),
+        (r'"\"".' * (LONG // 5) + "a = 1", "nested too deeply"),
+        (r'"\\".' * (LONG // 5) + "a = 1", "nested too deeply"),
         (f"{CHAIN}.a = 1", "nested too deeply"),
         (f"{CHAIN} = 1", None),
         ("a" * LONG + " = 1", None),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,7 +102,7 @@ class KeyFile:
         The file must stay open since it was read or written: a tick may call this. One that another
         process has replaced is taken up if it holds the same ``key`` (32 bytes).
         """
-        with contextlib.suppress(OSError, ValueError):
+        with contextlib.suppress(OSError):
             if self._open is not None and os.fstat(self._open[0]).st_nlink == 0:
                 self.close()
                 self._take_up(key)
@@ -133,7 +132,9 @@ class KeyFile:
         try:
             content = os.read(handle, _MOST_BYTES)
             others = os.fstat(handle).st_mode & 0o077
-            if others or re.fullmatch(re.escape(head) + rb" *\d+}", content) is None:
+            digits = content[len(head) : -1]
+            made = content[: len(head)] == head and content[-1:] == b"}"
+            if others or not made or len(digits) != _TIME_DIGITS or not digits.strip().isdigit():
                 os.close(handle)
                 return False
         except BaseException:

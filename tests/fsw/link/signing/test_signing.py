@@ -492,6 +492,22 @@ def test_the_time_in_a_file_never_goes_back_and_no_other_key_gets_it(file: Path)
     assert KeyFile(file).read(LATEST) == SigningKey(OTHER_KEY, 5)
 
 
+@pytest.mark.requirement("REQ-LINK-3")
+@pytest.mark.parametrize("width", [1, 14, 16])
+def test_a_file_that_was_not_written_here_is_written_anew_and_its_time_kept(
+    ground: Ground, file: Path, width: int
+) -> None:
+    """As an earlier version wrote it, or somebody by hand."""
+    file.write_text(f'{{"key": "{KEY.hex()}", "newest": {5:>{width}}}}')
+    file.chmod(0o600)
+    with ground_station(key_file=KeyFile(file)) as flown:
+        flown.fly(5)
+        old = Client(flown).at(Client(flown).now() + 5).arm()
+        flown.polled(old)
+        assert commands(flown) == 1
+    assert KeyFile(file).read(LATEST) == SigningKey(KEY, int.from_bytes(old[-12:-6], "little"))
+
+
 @pytest.mark.requirement("REQ-LINK-9")
 def test_a_time_ahead_of_the_clock_is_refused_and_ends_nothing(ground: Ground, file: Path) -> None:
     now = Client(ground).now()
