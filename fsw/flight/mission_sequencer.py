@@ -234,7 +234,8 @@ def _destination(step: MissionStep, at: EndEffectorTarget, context: MissionConte
     if step.position is None:
         return at.p_WE
     x, y, z = step.position
-    z += context.home_z if step.above_home else 0.0
+    if step.above_home:
+        z = min(z + context.home_z, 0.0)  # home may have been set below the ground
     if step.action is MissionAction.LAND:
         return x, y, at.p_WE[2]  # the descent is the landing's
     if step.action is MissionAction.TAKE_OFF:

@@ -10,7 +10,7 @@ import pytest
 from fsw.geometry.geodesy import to_global
 from fsw.parameters.flight_config import flight_config
 from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import Command, Mode, SafeSet, SafeSetAnnouncement, SensorFrame
+from fsw.signals import Command, CommandResult, Mode, SafeSet, SafeSetAnnouncement, SensorFrame
 from sitl.scenario_file import load_scenario
 from studies.flight.mission import SIMULATOR, safe_set
 from tests.closed_loop.harness import (
@@ -25,7 +25,7 @@ from tests.closed_loop.harness import (
 )  # fmt: skip
 
 NAN = math.nan
-RETURN, SET_ACTUATOR, GOTO = 20, 187, 192
+RETURN, SET_ACTUATOR, GOTO, SET_HOME = 20, 187, 192, 179
 
 
 def as_int(number: int, frame: int, *params: float) -> Command:
@@ -40,6 +40,17 @@ def up() -> Flight:
     flight.run(4.0)
     assert flight.mode is Mode.HOLD
     return flight
+
+
+@pytest.mark.parametrize("below", [0.0, 4.0, 50.0])
+def test_a_return_to_a_home_below_the_ground_ends_on_the_ground(below: float) -> None:
+    flight = up()
+    latitude, longitude, altitude = to_global(flight.config.origin, (0.5, 0.0, below))
+    flight.step(as_int(SET_HOME, 5, 0.0, NAN, NAN, NAN, latitude, longitude, altitude))
+    assert flight.results[-1] == (SET_HOME, CommandResult.ACCEPTED)
+    flight.step(command(RETURN))
+    flight.run(20.0)
+    assert flight.modes[-3:] == [Mode.RETURN, Mode.LAND, Mode.DISARMED]
 
 
 def test_goto_a_place_on_earth_then_home_and_down() -> None:

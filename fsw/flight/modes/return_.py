@@ -44,10 +44,14 @@ class Return(FlightMode):
         return replace(state, setpoint=way)
 
     def _way_home(self, home: Home, estimate: StateEstimate) -> SetpointMemory:
-        """Up to the height of return, across, down to where it waits, and there it ends."""
+        """Up to the height of return, across, down to where it waits, and there it ends.
+
+        It waits in the air: home may have been set below the ground, where it would never arrive.
+        """
         (x, y, z), limits = estimate.p_WB, self.config.limits
+        lowest = -self.config.airframe.leg_length - limits.airborne_height
         height = min(z, home.p[2] - limits.return_height)
-        waits = max(height, home.p[2] - limits.return_descent)
+        waits = min(max(height, home.p[2] - limits.return_descent), max(height, lowest))
         goal = PositionGoal(MotionSetpoint(False, (x, y, height)))
         across: Vec3 = (home.p[0], home.p[1], height)
         down: Vec3 = (home.p[0], home.p[1], waits)

@@ -279,6 +279,8 @@ def test_a_jump_in_a_mission_that_is_complete_lets_it_start_there() -> None:
 def test_altitude_above_home_counts_from_home() -> None:
     flown = Flown(begun(loaded((go(0.0, 0.0, -2.0, above_home=True),)), START, PACE), home_z=-0.35)
     assert flown.fly().points[-1].p_WE == (0.0, 0.0, -2.35)
+    deep = Flown(begun(loaded((go(0.0, 0.0, -2.0, above_home=True),)), START, PACE), home_z=5.0)
+    assert deep.fly().points[-1].p_WE == (0.0, 0.0, 0.0), "no lower than an item may be"
 
 
 def test_a_takeoff_is_straight_up_to_a_height_of_the_base() -> None:
