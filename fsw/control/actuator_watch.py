@@ -282,12 +282,16 @@ def _observe_base(
         s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
         s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
         s.failed_more2 += forget * (more * more - s.failed_more2)
+        # What turns beside what the failed one lacks: a battery that sags lowers all rotors alike,
+        # and looks along z like an opposite rotor that is gone.
+        turned = (s.effect - 1.0) * thrust - off
         gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
         s.lost_for = s.lost_for + dt if gives_nothing else 0.0
         for i in range(4):
             other = 0.5 * (z - off) if i == opposite else turns[i]
             unlike = 0.0 if i == opposite else abs(z - off - other)
             gone = g[i] > LOST_FROM and other < (LOST - 1.0) * g[i] and unlike < -UNLIKE * other
+            gone = gone and (i != opposite or turned < UNLIKE * (LOST - 1.0) * g[i])
             s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and i != k else 0.0
 
 

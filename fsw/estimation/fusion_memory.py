@@ -17,7 +17,7 @@ from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.measurements import GnssSample, PoseSample
 from fsw.signals import Vec2, Vec3, Vec4
 
-REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
+_REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
 _REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 
@@ -40,22 +40,17 @@ class Reset(NamedTuple):
 
 
 class EncoderWatch(NamedTuple):
-    """Whether the joints' encoders still follow the joints, each for itself."""
+    """Whether the joints' encoders still follow the joints."""
 
     angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
     asked: Vec2 = (0.0, 0.0)  # rad, of the joints when it came first
-    repeats: tuple[int, int] = (0, 0)  # readings in a row that were the same
-    sticks: tuple[bool, bool] = (False, False)
-
-    @property
-    def stuck(self) -> bool:
-        """Whether one of them is stuck."""
-        return self.sticks[0] or self.sticks[1]
+    repeats: int = 0  # readings in a row that were the same
+    stuck: bool = False
 
     @property
     def repeating(self) -> bool:
-        """Whether one has said the same for long enough to ask whether it is stuck."""
-        return max(self.repeats) >= REPEATS
+        """Whether they have said the same for long enough to ask whether they are stuck."""
+        return self.repeats >= _REPEATS
 
 
 class FusionMemory(NamedTuple):

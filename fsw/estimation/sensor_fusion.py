@@ -635,7 +635,7 @@ class SensorFusion:
             health = health.with_fault(SensorFault.JUMP, now)
         if refused:
             latest = (*[one for one in latest if type(one) is not type(sample)], sample)
-            if confirmed and little and isinstance(sample, PoseSample):
+            if confirmed and little and not announced and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
                 ratio = self._fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)

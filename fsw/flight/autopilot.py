@@ -25,7 +25,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor
-from fsw.flight.accuracy_watch import AccuracyWatch
+from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, nowhere, told
 from fsw.flight.commander import Commander
 from fsw.flight.damage_watch import DamageWatch
@@ -447,6 +447,10 @@ class Autopilot:
         texts: list[StatusText] = []
         if covariance is None or pose is None or state.accuracy.told:
             return state, texts
+        if state.aiding.unaided_us >= self.config.limits.aiding_loss_us:
+            # How sure it is without a position is no property of the sensors: look anew later.
+            begun = state.accuracy == AccuracyMemory()
+            return (state if begun else replace(state, accuracy=AccuracyMemory())), texts
         safe_set, source = state.kept.source, state.aiding.pose.value
         position = self._clearance.deviation(estimate, pose) if safe_set.zones else 0.0
         sure = self._accuracy.see(

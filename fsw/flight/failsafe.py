@@ -134,7 +134,7 @@ class FailsafeMemory(NamedTuple):
     overridden: tuple[Condition, ...] = ()  # whose actions a command of the pilot has put aside
     # As they were looked at last; another one is the same condition, and news.
     joint: str = ""  # which joints have failed
-    sensors: tuple[Sensor, ...] = ()  # that have been lost since one is
+    sensors: tuple[Sensor, ...] = ()  # that are lost
     contradiction: str = ""  # of parameters
 
 

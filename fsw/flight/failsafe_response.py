@@ -42,12 +42,11 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
     now = tuple([row.condition for row in rows])
     known = dict(zip(before, memory.since_us, strict=False))
     joint, contradiction = state.damage.joint, context.contradiction
-    lost = [one.sensor for one in lost_sensors(context)]
-    sensors = (*memory.sensors, *[one for one in lost if one not in memory.sensors])
+    sensors = tuple([one.sensor for one in lost_sensors(context)])
     # A second joint or sensor that fails is the same condition, and news: it acts as the first did.
     changed = {
         Condition.JOINT_FAILED: joint != memory.joint,
-        Condition.SENSOR_LOST: sensors != memory.sensors,
+        Condition.SENSOR_LOST: any(one not in memory.sensors for one in sensors),
         Condition.PARAMETERS_CONTRADICT: contradiction != memory.contradiction,
     }
     overridden = tuple([c for c in memory.overridden if c in now and not changed.get(c)])
@@ -86,7 +85,7 @@ def respond(context: FailsafeContext, rows: tuple[Failsafe, ...]) -> Response:
         since_us=since,
         overridden=overridden,
         joint=joint,
-        sensors=sensors if Condition.SENSOR_LOST in now else (),
+        sensors=sensors,
         contradiction=contradiction,
     )
     return Response(after, tuple(reports), begun)

@@ -9,7 +9,7 @@ from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import Array, P
-from fsw.estimation.fusion_memory import REPEATS, EncoderWatch, FusionMemory, Reset, at_start
+from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
@@ -269,32 +269,20 @@ def _watched(
     """Encoders are stuck when they say the same while torques should have moved the joints.
 
     What of the acceleration does not show, the filter takes for a disturbance. Friction holds a
-    joint as well, but not one that is asked to move on.
+    joint as well, but not one that is asked to move on. Of one encoder alone nothing tells whether
+    it or its joint is stuck: that is left to the watch over the joints.
     """
-    asked, last = state.cascade.joints.reference, watch.angles
-    same = angles[0] == last[0], angles[1] == last[1]
-    if not (same[0] or same[1]) or not state.vehicle.flies:
-        return made(EncoderWatch, (angles, asked, (0, 0), (False, False)))
-    asked = (
-        watch.asked[0] if same[0] else asked[0],
-        watch.asked[1] if same[1] else asked[1],
-    )
-    repeats = (
-        watch.repeats[0] + 1 if same[0] else 0,
-        watch.repeats[1] + 1 if same[1] else 0,
-    )
-    if max(repeats) < REPEATS:
-        return made(EncoderWatch, (angles, asked, repeats, (False, False)))
-    held, now = memory.numbers["joints"][0][:, 2].tolist(), state.cascade.joints.reference
-    first, second = [
-        repeats[k] >= REPEATS
-        and (
-            watch.sticks[k]  # until it says something else
-            or (abs(held[k]) > _HELD[k] and abs(now[k] - asked[k]) > _ASKED)
-        )
-        for k in range(2)
-    ]
-    return made(EncoderWatch, (angles, asked, repeats, (first, second)))
+    asked = state.cascade.joints.reference
+    if angles != watch.angles or not state.vehicle.flies:
+        return made(EncoderWatch, (angles, asked, 0, False))
+    stuck = watch.stuck
+    watch = made(EncoderWatch, (angles, watch.asked, watch.repeats + 1, stuck))
+    if watch.repeating and not stuck:
+        first, second = memory.numbers["joints"][0][:, 2].tolist()
+        held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
+        moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
+        return watch._replace(stuck=held and moved > _ASKED)
+    return watch
 
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:

@@ -115,7 +115,7 @@ def test_each_rotor_is_named_in_time(
 
 @pytest.mark.requirement("REQ-ACT-2", "REQ-ACT-4")
 @pytest.mark.long
-@pytest.mark.parametrize("suite", ["perfect", "mocap"])
+@pytest.mark.parametrize("suite", ["perfect", "mocap", "rtk"])
 @pytest.mark.parametrize("kind", ["off", "stuck"])
 @pytest.mark.parametrize("joint", [1, 2])
 def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> None:
@@ -124,8 +124,10 @@ def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> 
     assert seen.warning is not None
     assert f"joint {joint}" in seen.warning.text
     assert not seen.contact
+    assert seen.actions == ("land",)
     assert seen.least_m is not None
-    assert seen.least_m > 0.0
+    # Satellites are off by centimetres, and so is the way down.
+    assert seen.least_m > (-0.05 if suite == "rtk" else 0.0)
 
 
 @pytest.mark.long

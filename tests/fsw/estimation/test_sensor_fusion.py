@@ -470,6 +470,20 @@ def test_a_jump_that_the_sensor_announces_is_taken_once_two_poses_agree(
     np.testing.assert_allclose(flown.error()[:3], (0.0, -0.5, 0.0), atol=0.03)
 
 
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize("jump", [0.02, 0.03, 0.045])
+def test_a_small_jump_that_is_announced_is_taken_as_it_is_and_reported(jump: float) -> None:
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, PoseSample) and sample.time > START + 1.0:
+            x, y, z = sample.position
+            return replace(sample, position=(x, y + jump, z), reset_counter=1)
+        return sample
+
+    reset = Flown(run(MOCAP, 8, 1.2), change).memory.reset
+    assert reset.number == 1
+    assert reset.position[1] == pytest.approx(jump, abs=6e-3)
+
+
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("suite", [MOCAP, VIO], ids=["mocap", "vio"])
 def test_garbage_that_announces_a_jump_is_not_believed(suite: Suite) -> None:

@@ -198,6 +198,21 @@ def test_beside_a_weak_rotor_pushes_and_another_weak_one_lose_nothing(share: flo
     assert not any(one.report.lost or one.report.disobeys for one in motion.history)
 
 
+@pytest.mark.requirement("REQ-ACT-1")
+@pytest.mark.parametrize("rotor", range(4))
+@pytest.mark.parametrize("left", [0.8, 0.6, 0.45])
+def test_a_battery_that_sags_beside_a_weak_rotor_is_no_lost_one(rotor: int, left: float) -> None:
+    def given(t: float, i: int) -> float:
+        share = left if t >= FAULT_S + 1.0 else 1.0
+        return 0.55 * share if i == rotor and t >= FAULT_S else share
+
+    motion = Motion(given)
+    motion.run(FAULT_S + 2.5)
+    assert motion.history[round((FAULT_S + 1.0) / DT)].rotor.startswith(NAMES[rotor])
+    assert not any(one.report.lost for one in motion.history)
+    assert {one.report.rotor for one in motion.history} == {0, rotor + 1}
+
+
 def test_a_rotor_that_gives_too_much_does_not_obey_and_is_counted_on_as_it_is() -> None:
     def stuck(t: float, i: int) -> float:
         return 1.0 + 0.6 * math.sin(9.0 * t) if i == 0 and t >= FAULT_S else 1.0
