@@ -176,6 +176,12 @@ class Autopilot:
         """Findings on whether this configuration can keep a safe set."""
         return self._safe_sets.analyse(safe_set)
 
+    def least_margin(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> float:
+        """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone."""
+        return self._safe_sets.least_margin(safe_set, estimate, target)
+
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
         return self.conclude(self.control(state, inputs))

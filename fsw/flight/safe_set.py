@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from fsw.barriers.margins import Margins
 from fsw.flight.safe_set_change import growth, is_moving, is_update, summary
+from fsw.flight.safety_watch import least
 from fsw.flight.state import MissionMemory
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import replace
@@ -153,10 +154,12 @@ class SafeSetCheck:
         if grown:
             whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
             return f"{grown}, which {whose}"
-        if flies and estimate is not None:
-            margins = self._margins.report(safe_set, estimate, None).margins
-            if not min(margins, default=0.0) >= 0.0:
-                return "the vehicle is not inside it, and another source owns the safe set"
+        if (
+            flies
+            and estimate is not None
+            and not self.least_margin(safe_set, estimate, None) >= 0.0
+        ):
+            return "the vehicle is not inside it, and another source owns the safe set"
         return ""
 
     def _owns(
@@ -244,6 +247,19 @@ class SafeSetCheck:
         walled = SafeSet((wall((0.0, 0.0, -1.0), 0.0, 0.0),))
         surfaces(walled, estimate.p_WB, estimate.t_us)
         self._margins.report(walled, estimate, still_at(estimate.p_WB))
+
+    def least_margin(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> float:
+        """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone.
+
+        Below 0 the failsafe of a breach would be active at once. Without a target, zones that
+        follow it are left out.
+        """
+        if target is None:
+            zones = [one for one in safe_set.zones if not kind_of(one.shape).follows_target]
+            safe_set = SafeSet(tuple(zones))
+        return least(self._margins.report(safe_set, estimate, target).margins)
 
     def margins(
         self, kept: KeptSet, estimate: StateEstimate, target: EndEffectorTarget | None

@@ -166,10 +166,11 @@ def _least_margins(report: ConstraintReport, announced: int) -> tuple[float, flo
     first = len(margins)
     if len(report.per_zone) > announced:
         first = sum(report.per_zone[:announced])
-    return _least(margins[:first]), _least(margins[first:])
+    return least(margins[:first]), least(margins[first:])
 
 
-def _least(margins: tuple[float, ...]) -> float:
+def least(margins: tuple[float, ...]) -> float:
+    """The least of ``margins`` [m]: inf of none, -inf where one is not a number."""
     # No comparison would find NaN.
     return -math.inf if math.isnan(sum(margins)) else min(margins, default=math.inf)
 

@@ -12,7 +12,7 @@ from fsw.frozen import replace
 from fsw.parameters.consistency import Finding, refusals
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import SafeSet, Severity, StatusText, TickInputs, TickOutputs
+from fsw.signals import FlightSnapshot, SafeSet, Severity, StatusText, TickInputs, TickOutputs
 from fsw.tuning import Tuning, part, tuned
 
 
@@ -48,6 +48,11 @@ class TunedAutopilot:
     def against(self, safe_set: SafeSet) -> tuple[str, ...]:
         """Why what flies now could not keep a safe set; nothing if it is to fly all the same."""
         return () if self._config.soft else refusals(self._in_use[1].analyse(safe_set))
+
+    def least_margin(self, safe_set: SafeSet, snapshot: FlightSnapshot) -> float:
+        """The least margin [m] the whole vehicle would have in a safe set now."""
+        loop = self._in_use[1]
+        return loop.least_margin(safe_set, snapshot.estimate, snapshot.reference)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Both parts of a tick."""

@@ -50,6 +50,7 @@ def flight_software(
         Site(
             locate=partial(to_local, config.origin),
             judge=lambda safe_set: flight.against(safe_set),
+            least_margin=flight.least_margin,
             clearance=lambda: flight.config.limits.fence_clearance,
             owner=lambda: int(flight.config.limits.safe_set_owner),
         )

@@ -140,7 +140,9 @@ def connected(folder: Path, config: FlightConfig) -> Iterator[Connected]:
     flight, inbox = Flight(on_the_ground(), config=config), Inbox()
     parameters = ParameterStore(config, lambda tuning: None)
     parameters.open(AtOnce(), lambda values: None)
-    site = Site(partial(to_local, config.origin), lambda safe_set: (), lambda: 0.1)
+    site = Site(
+        partial(to_local, config.origin), flight.loop.against, lambda: 0.1, flight.loop.least_margin
+    )
     missions = MissionStore(site)
     health = LoopHealth()
     facts = vehicle_facts(config)

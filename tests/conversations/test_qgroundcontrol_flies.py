@@ -15,7 +15,7 @@ import pytest
 
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import MissionState
+from fsw.signals import MissionState, Mode
 from messages import dialect as d
 from tests.conversations.connected import Connected, connected
 from tests.conversations.qgroundcontrol import (
@@ -252,3 +252,34 @@ def test_a_signed_link_accepts_nothing_of_mavlink_1(vehicle: Connected) -> None:
     vehicle.run(1.0)
     assert not [m for m in vehicle.heard[before:] if m.get_type() == "COMMAND_ACK"]
     assert link.signing.counters.unsigned > 1, "the command, and heartbeats"
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_a_fence_through_the_rotors_is_denied_and_stops_no_rotor(tmp_path: Path) -> None:
+    """GF_ACTION 4 ends the flight outside a fence: it must not be the answer to an upload."""
+    config = flight_config()
+    limits = replace(config.limits, climb_speed=1.5, fence_action=4)
+    (tmp_path / "present").mkdir()
+    with connected(tmp_path / "present", replace(config, limits=limits)) as vehicle:
+        vehicle.run(2.5)
+        speaks(vehicle, 2)
+        play(vehicle, take_off(QGC_5))
+        north, east, _ = vehicle.flight.snapshot.estimate.p_WB
+
+        def around(ahead: float) -> list[Message]:
+            corners = ((ahead, 5.0), (ahead, -5.0), (-5.0, -5.0), (-5.0, 5.0))
+            return [
+                d.MAVLink_mission_item_int_message(
+                    *(1, 1, seq, 1, 5001, 0, 1, 4.0, 0, 0, 0),
+                    *(round(1e4 * (north + x)), round(1e4 * (east + y)), 0.0, 1),
+                )
+                for seq, (x, y) in enumerate(corners)
+            ]
+
+        assert upload(vehicle, 1, around(0.15)).type == 14
+        vehicle.run(1.0)
+        assert vehicle.flight.state.safety.fence_us < 0
+        assert vehicle.flight.mode is Mode.HOLD
+        assert upload(vehicle, 1, around(2.0)).type == 0
+        vehicle.run(1.0)
+        assert vehicle.flight.state.safety.fence_us < 0

@@ -39,6 +39,9 @@ from fsw.signals import (
 SafeSetCheck = Callable[[SafeSet], tuple[str, ...]]
 """Why the vehicle could not keep a safe set; nothing where it can."""
 
+MarginCheck = Callable[[SafeSet, FlightSnapshot], float]
+"""The least margin [m] that the whole vehicle would have in a safe set; below 0 it is outside."""
+
 Meaning = MissionStep | Vec2 | None
 """What one item means; a fence item means something only in its shape."""
 
@@ -77,6 +80,7 @@ class Site:
     locate: Locate
     judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
+    least_margin: MarginCheck
     owner: Callable[[], int] = lambda: 0  # system that may grow a fence in flight; 0: its uploader
 
 
@@ -156,17 +160,31 @@ class MissionStore:
         if against:
             raise BadItem(DENIED, f"the fence cannot be kept: {'; '.join(against)}")
         if self._snapshot is not None:
-            estimate = self._snapshot.estimate
-            for number, at in enumerate(surfaces(fence, estimate.p_WB, estimate.t_us)):
-                if not at.distance > 0.0:
-                    wall = fence.zones[number].shape.kind == "half-space"
-                    where = "not inside the fence" if wall else "excluded"
-                    raise BadItem(
-                        DENIED,
-                        f"the vehicle is {where}: {-at.distance:.2f} m beyond the clearance of "
-                        f"wall or cylinder {number}",
-                    )
+            self._refuse_outside(fence, self._snapshot)
         return fence
+
+    def _refuse_outside(self, fence: SafeSet, seen: FlightSnapshot) -> None:
+        """Refuse a fence that leaves the vehicle outside.
+
+        Armed, all of the vehicle counts, as for the failsafe that would act at once, and perhaps
+        stop the rotors. Disarmed, none acts, and the base's place is enough.
+        """
+        if seen.armed:
+            margin = self._site.least_margin(fence, seen)
+            if not margin >= 0.0:
+                reason = f"the vehicle would be outside the fence by {-1e3 * margin:.1f} mm"
+                raise BadItem(DENIED, reason)
+            return
+        estimate = seen.estimate
+        for number, at in enumerate(surfaces(fence, estimate.p_WB, estimate.t_us)):
+            if not at.distance > 0.0:
+                wall = fence.zones[number].shape.kind == "half-space"
+                where = "not inside the fence" if wall else "excluded"
+                raise BadItem(
+                    DENIED,
+                    f"the vehicle is {where}: {-at.distance:.2f} m beyond the clearance of "
+                    f"wall or cylinder {number}",
+                )
 
     def _change(self, update: MissionUpdate) -> None:
         waiting = self._update

@@ -140,7 +140,7 @@ def whole_vehicle(folder: Path) -> Iterator[Ground]:
     logs = FlightLogs(run)
     services = (
         ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
-        MissionService(MissionStore(Site(_nowhere, _as_it_is, lambda: 0.1))),
+        MissionService(MissionStore(Site(_nowhere, _as_it_is, lambda: 0.1, lambda *_: 0.0))),
         LogService(logs),
         FtpService(vehicle_files(logs)),
         TimeService(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -10,8 +11,10 @@ from typing import Any
 
 import pytest
 
+from fsw.flight.tuned_autopilot import TunedAutopilot
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import Kind, MissionStore, Site
+from fsw.parameters.flight_config import flight_config
 from fsw.signals import (
     TARGET_SPHERE,
     MissionAction,
@@ -42,6 +45,11 @@ WAYPOINTS: list[Item] = [
 TRIANGLE: list[Item] = [
     {"command": 5001, "params": (3.0, 0.0, 0.0, 0.0), "x": 10_000 * n, "y": 10_000 * e, "z": 0.0}
     for n, e in ((9, 0), (-9, 9), (-9, -9))
+]
+
+BOX: list[Item] = [
+    {"command": 5001, "params": (4.0, 0.0, 0.0, 0.0), "x": 10_000 * n, "y": 10_000 * e, "z": 0.0}
+    for n, e in ((9, 9), (9, -9), (-9, -9), (-9, 9))
 ]
 
 
@@ -75,7 +83,9 @@ class Vehicle:
 
 @pytest.fixture
 def vehicle() -> Iterator[Vehicle]:
-    store = MissionStore(Site(locate, judge, lambda: 0.1))
+    store = MissionStore(
+        Site(locate, judge, lambda: 0.1, TunedAutopilot(flight_config()).least_margin)
+    )
     with ground_station(services=(MissionService(store),)) as ground:
         yield Vehicle(ground, store)
 
@@ -356,11 +366,28 @@ def test_a_fence_that_cannot_be_kept_is_refused_with_the_inequality(vehicle: Veh
 
 def test_a_fence_around_another_place_is_refused(vehicle: Vehicle) -> None:
     client = vehicle.client()
-    vehicle.store.observe(SNAPSHOT)  # at 1 m north, 2 m east
+    vehicle.store.observe(replace(SNAPSHOT, armed=False))  # at 1 m north, 2 m east
     elsewhere = [{**item, "x": item["x"] + 300_000} for item in TRIANGLE]
     assert client.upload(elsewhere, FENCE) == DENIED
     assert "not inside" in client.texts()
     assert client.upload(TRIANGLE, FENCE) == ACCEPTED
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_armed_a_fence_through_the_vehicle_is_refused_with_how_far_outside_it_is(
+    vehicle: Vehicle,
+) -> None:
+    """Its base is inside, its rotors are not: the failsafe would act, and may stop the rotors."""
+    client = vehicle.client()
+    near = [{**item, "x": min(item["x"], 12_000)} for item in BOX]  # at 1 m north, 0.2 m from it
+    vehicle.store.observe(SNAPSHOT)
+    assert client.upload(near, FENCE) == DENIED
+    told = client.texts()
+    assert re.search(r"fence refused: the vehicle would be outside the fence by \d{3}\.\d mm", told)
+    assert vehicle.store.take_update() is None
+    assert client.upload(BOX, FENCE) == ACCEPTED
+    vehicle.store.observe(replace(SNAPSHOT, armed=False))
+    assert client.upload(near, FENCE) == ACCEPTED  # where it stands, no failsafe acts
 
 
 def test_the_current_item_can_be_set_and_is_told_at_once(vehicle: Vehicle) -> None:
