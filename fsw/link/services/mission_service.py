@@ -261,11 +261,14 @@ class MissionService:
         if refused is not None:
             return refused
         self._upload = self._download = None
-        for kind in map(Kind, kinds):
-            try:
-                self._store.keep(kind, (), (), self.source)
-            except BadItem as wrong:
-                return self._refuse(wrong, kind, peer)
+        try:
+            self._store.clear(tuple(map(Kind, kinds)), self.source)
+        except BadItem as wrong:
+            text = f"nothing cleared: fence refused: {wrong.reason}"
+            return (
+                encode_ack(wrong.result, number, peer),
+                StatusText(Severity.WARNING, text),
+            )
         return (encode_ack(ACCEPTED, number, peer),)
 
     def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:

@@ -134,6 +134,13 @@ class MissionStore:
         self.items[kind] = items
         self.ids[kind] = _identity(items)
 
+    def clear(self, kinds: tuple[Kind, ...], source: MessageSource | None = None) -> None:
+        """Clear all of these lists; ``BadItem`` leaves every one of them as it is."""
+        if Kind.FENCE in kinds:
+            self._fence((), source)  # the only one that may be refused
+        for kind in kinds:
+            self.keep(kind, (), (), source)
+
     def set_current(self, number: int) -> bool:
         """Make a step the current one; False where there is no such step."""
         if not 0 <= number < len(self.items[Kind.MISSION]):

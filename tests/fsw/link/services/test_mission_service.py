@@ -304,6 +304,29 @@ def test_clearing_clears_what_it_names(vehicle: Vehicle, kind: int) -> None:
     assert (update.rally == ()) is (kind in (2, 255))
 
 
+@pytest.mark.parametrize("kind", [FENCE, 255])
+def test_clearing_a_fence_of_another_in_flight_clears_nothing_and_names_what_was_asked_for(
+    vehicle: Vehicle, kind: int
+) -> None:
+    owner, other = vehicle.client(254), vehicle.client(255)
+    vehicle.store.observe(SNAPSHOT)
+    assert owner.upload(BOX, FENCE) == ACCEPTED
+    other.t_us = owner.t_us
+    assert other.upload(WAYPOINTS) == ACCEPTED
+    assert other.upload([{"command": 5100}], RALLY) == ACCEPTED
+    before, ids = dict(vehicle.store.items), dict(vehicle.store.ids)
+    vehicle.store.take_update()
+    clear = other.mav.mission_clear_all_encode(1, 1, kind)
+    ack = other.ask(clear, "MISSION_ACK")
+    assert (ack.type, ack.mission_type) == (DENIED, kind)
+    assert "nothing cleared: fence refused" in other.texts()
+    assert (vehicle.store.items, vehicle.store.ids) == (before, ids)
+    assert vehicle.store.take_update() is None
+    owner.t_us = other.t_us
+    assert owner.ask(clear, "MISSION_ACK").type == ACCEPTED
+    assert vehicle.store.items[FENCE] == ()
+
+
 def test_an_upload_of_nothing_clears_too(vehicle: Vehicle) -> None:
     client = vehicle.client()
     assert client.upload(WAYPOINTS) == ACCEPTED
