@@ -1,6 +1,7 @@
 """Missions, fences and rally points over MAVLink's mission protocol.
 
-One transfer at a time a link; a second ground station is denied until it has ended. An upload is
+One transfer at a time a link; a second ground station, known by ids and address, is denied until it
+has ended. An upload is
 collected aside and takes the old one's place whole, or not at all. The vehicle asks again for an
 item that does not come; duplicates and items out of turn are passed over without an answer,
 because each answer would bring forth another duplicate.
@@ -52,6 +53,7 @@ class _Upload:
     """Items on their way in."""
 
     peer: Peer
+    address: str  # two ground stations may have the same ids: QGroundControl's are always 255/190
     kind: Kind
     count: int
     items: list[MissionItem] = field(default_factory=list)
@@ -65,6 +67,7 @@ class _Download:
     """Items on their way out, as they were when it began."""
 
     peer: Peer
+    address: str
     kind: Kind
     items: tuple[MissionItem, ...]
     heard_us: int
@@ -78,7 +81,7 @@ class MissionService:
         self._store = store
         self._upload: _Upload | None = None
         self._download: _Download | None = None
-        self._done: tuple[Peer, Kind, int] | None = None  # last upload: sender, kind, last item
+        self._done: _Upload | None = None  # the last one
         self._shown = store.progress
         self._show_again = False
         self._repeats = 0  # of MISSION_ITEM_REACHED that are still to be sent
@@ -155,7 +158,7 @@ class MissionService:
         if count > ROOM[kind]:
             reason = f"{count} items of {kind.name.lower()}; the limit is {ROOM[kind]}"
             return self._refuse(BadItem(NO_SPACE, reason), kind, peer)
-        self._upload = _Upload(peer, kind, count)
+        self._upload = _Upload(peer, self._address, kind, count)
         if count == 0:
             return self._finish(self._upload)
         return (self._ask(self._upload, t_us),)
@@ -166,7 +169,7 @@ class MissionService:
         """Add the item that was asked for; the last one completes the upload."""
         seq, number = int(values[7]), int(values[14])
         upload = self._upload
-        if upload is None or upload.peer != peer or upload.kind != number:
+        if upload is None or not self._is_of(upload, peer) or upload.kind != number:
             return self._stray(seq, number, peer)
         if seq >= upload.count:
             reason = f"item {seq} in an upload of {upload.count}"
@@ -187,10 +190,11 @@ class MissionService:
 
     def _stray(self, seq: int, number: int, peer: Peer) -> Sequence[ServiceOutput]:
         """Handle an item without an upload; the acknowledgement of the last one may be lost."""
-        if self._done is not None and self._done[:2] == (peer, number):
-            again = encode_ack(ACCEPTED, number, peer, self._store.ids[self._done[1]])
-            return (again,) if seq == self._done[2] else ()
-        if self._upload is not None and self._upload.peer == peer:
+        done = self._done
+        if done is not None and self._is_of(done, peer) and done.kind == number:
+            again = encode_ack(ACCEPTED, number, peer, self._store.ids[done.kind])
+            return (again,) if seq == done.count - 1 else ()
+        if self._is_of(self._upload, peer):
             return ()
         return (encode_ack(DENIED if self._upload else ERROR, number, peer),)
 
@@ -207,7 +211,7 @@ class MissionService:
         except BadItem as refused:
             return self._refuse(refused, kind, peer)
         self._upload = None
-        self._done = (peer, kind, upload.count - 1)
+        self._done = upload
         text = f"{kind.name.lower()} of {upload.count} items received"
         return (
             encode_ack(ACCEPTED, kind, peer, self._store.ids[kind]),
@@ -224,7 +228,7 @@ class MissionService:
         kind = Kind(number)
         self._upload = None
         items = self._store.items[kind]
-        self._download = _Download(peer, kind, items, t_us) if items else None
+        self._download = _Download(peer, self._address, kind, items, t_us) if items else None
         count = (len(items), *peer, kind, self._store.ids[kind])
         return (Outgoing(ids.MISSION_COUNT, count),)
 
@@ -234,11 +238,12 @@ class MissionService:
         """Send any item, in any order and repeatedly: requests and items may be lost."""
         seq, number = int(values[0]), int(values[3])
         download = self._download
-        if download is None or download.peer != peer or download.kind != number:
+        if download is None or not self._is_of(download, peer) or download.kind != number:
             refused = self._unavailable(number, peer, t_us)
             if refused is not None:
                 return refused
-            download = _Download(peer, Kind(number), self._store.items[Kind(number)], t_us)
+            kind = Kind(number)
+            download = _Download(peer, self._address, kind, self._store.items[kind], t_us)
         if seq >= len(download.items):
             return (encode_ack(INVALID_SEQUENCE, number, peer),)
         download.heard_us = t_us
@@ -248,9 +253,9 @@ class MissionService:
 
     def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """Handle the client's acknowledgement, which ends the transfer."""
-        if self._download is not None and self._download.peer == peer:
+        if self._is_of(self._download, peer):
             self._download = None
-        if self._upload is not None and self._upload.peer == peer and values[2] != ACCEPTED:
+        if self._is_of(self._upload, peer) and values[2] != ACCEPTED:
             self._upload = None
         return ()
 
@@ -293,9 +298,20 @@ class MissionService:
         if download is not None and t_us - download.heard_us > SILENCE_US:
             download = self._download = None
         busy = upload or download
-        if busy is not None and busy.peer != peer:
+        if busy is not None and not self._is_of(busy, peer):
             return (encode_ack(DENIED, number, peer),)
         return None
+
+    @property
+    def _address(self) -> str:
+        """Where the frame that is handled now came from."""
+        return "" if self.source is None else self.source.address
+
+    def _is_of(self, transfer: _Upload | _Download | None, peer: Peer) -> bool:
+        """Whether a transfer is of the client whose frame is handled now."""
+        if transfer is None:
+            return False
+        return (transfer.peer, transfer.address) == (peer, self._address)
 
     def _refuse(self, refused: BadItem, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
         self._upload = None

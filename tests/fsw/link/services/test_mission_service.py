@@ -24,7 +24,7 @@ from fsw.signals import (
     SafeSet,
     Vec3,
 )
-from tests.fsw.link.ground import Ground, ground_station
+from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.services.mission_client import Client, Item, Weather
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
 from tests.fsw.zones import of_kind
@@ -349,6 +349,51 @@ def test_a_second_ground_station_is_denied_until_the_transfer_has_ended(vehicle:
     first.ask(first.item(WAYPOINTS[2], 0), "MISSION_REQUEST_INT")
     assert first.ask(first.item(WAYPOINTS[3], 1), "MISSION_ACK").type == ACCEPTED
     assert second.upload(TRIANGLE, FENCE) == ACCEPTED
+
+
+@pytest.fixture
+def twin(vehicle: Vehicle) -> Iterator[Client]:
+    """A second ground station on the link, at another address and with the ids of the first."""
+    with station_socket() as station:
+        yield Client(vehicle.ground.link, station)
+
+
+def test_a_second_ground_station_of_the_same_ids_is_denied_as_well(
+    vehicle: Vehicle, twin: Client
+) -> None:
+    """QGroundControl's ids are 255/190 everywhere: the mission was one of both's items."""
+    first = vehicle.client()
+    first.ask(first.mav.mission_count_encode(1, 1, 3, 0), "MISSION_REQUEST_INT")
+    first.ask(first.item(WAYPOINTS[2], 0), "MISSION_REQUEST_INT")
+    twin.t_us = first.t_us
+    for message in (
+        twin.mav.mission_count_encode(1, 1, 3, 0),
+        twin.item(WAYPOINTS[4], 1),
+        twin.mav.mission_request_list_encode(1, 1, 0),
+        twin.mav.mission_clear_all_encode(1, 1, 255),
+    ):
+        assert twin.ask(message, "MISSION_ACK", patience_s=0.1).type == DENIED
+    twin.send(twin.mav.mission_ack_encode(1, 1, CANCELLED, 0))
+    twin.pump(0.05)
+    first.t_us = twin.t_us
+    first.pump(0.05)
+    first.heard.clear()
+    first.ask(first.item(WAYPOINTS[3], 1), "MISSION_REQUEST_INT")
+    assert first.ask(first.item(WAYPOINTS[2], 2), "MISSION_ACK").type == ACCEPTED
+    same(first.download(), [WAYPOINTS[2], WAYPOINTS[3], WAYPOINTS[2]])
+    twin.t_us = first.t_us
+    twin.pump(0.1)
+    twin.heard.clear()
+    assert twin.ask(twin.item(WAYPOINTS[2], 2), "MISSION_ACK").type == ERROR
+    assert twin.upload(WAYPOINTS) == ACCEPTED
+
+
+def test_a_client_that_begins_its_upload_anew_replaces_it(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    client.ask(client.mav.mission_count_encode(1, 1, 3, 0), "MISSION_REQUEST_INT")
+    client.ask(client.item(WAYPOINTS[2], 0), "MISSION_REQUEST_INT")
+    assert client.upload(WAYPOINTS) == ACCEPTED
+    same(client.download(), WAYPOINTS)
 
 
 def test_a_download_that_nobody_goes_on_with_does_not_block_for_ever(vehicle: Vehicle) -> None:
