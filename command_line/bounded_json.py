@@ -33,8 +33,10 @@ def read_json(path: Path, most: int) -> dict[str, Any]:
     return json_object(content)
 
 
-def json_object(text: str | bytes) -> dict[str, Any]:
+def json_object(text: str | bytes, *, not_finite: bool = False) -> dict[str, Any]:
     """The object that a text is.
+
+    With ``not_finite`` a number may be NaN, Infinity or -Infinity, as Python writes those.
 
     Raises:
         JsonError: It is no JSON, no object, nested too deeply, or has a value that JSON does not
@@ -42,7 +44,10 @@ def json_object(text: str | bytes) -> dict[str, Any]:
     """
     try:
         found = json.loads(
-            text, parse_constant=_no_number, parse_float=_finite, parse_int=_in_range
+            text,
+            parse_constant=float if not_finite else _no_number,
+            parse_float=_finite,
+            parse_int=_in_range,
         )
     except JsonError:
         raise

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 TARGET, BASE, END_EFFECTOR, BOUND = "#2da44e", "#0969da", "#e36209", "#8c959f"
 WALL = "#cf222e"
+
+_MOST_DRAWN: Final = 1e12  # of a number: bins of a range up to the largest double overflow
 
 _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 
@@ -37,6 +40,11 @@ class Sheet:
         with mpl.rc_context({"svg.hashsalt": "pandion", "svg.fonttype": "none"}):
             self.canvas.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
         return _METADATA.sub("", text.getvalue())
+
+
+def drawable(values: Iterable[float]) -> list[float]:
+    """The values that a histogram can show: a flight that diverged leaves NaN, or any size."""
+    return [value for value in values if abs(value) <= _MOST_DRAWN]
 
 
 def sheet(rows: int, columns: int, width: float, height: float, **options: Any) -> Sheet:

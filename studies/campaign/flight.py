@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -89,6 +90,20 @@ class CampaignRow:
         return {one.name: line[one.name] for one in fields(self) if one.compare}
 
 
+def row_of(plan: CampaignPlan, line: Mapping[str, Any]) -> CampaignRow:
+    """The row of a flight of a plan that a line of a journal holds, without its key.
+
+    Raises:
+        TypeError: It holds none: see :func:`kept_row`; or its values are not of what is varied.
+    """
+    row = kept_row(CampaignRow, line)
+    if row.values.keys() != {one.key for one in plan.varied}:
+        raise TypeError(f"values are of {', '.join(row.values)}, which is not what is varied")
+    if not all(map(math.isfinite, row.values.values())):
+        raise TypeError("a value is not finite")
+    return row
+
+
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
     """Flight ``number`` of a plan; see :class:`studies.campaign.campaign.Flight`."""
@@ -132,7 +147,10 @@ class CampaignFlight:
 
     def from_line(self, line: Mapping[str, Any]) -> CampaignRow:
         """See :class:`studies.campaign.campaign.Flight`."""
-        return kept_row(CampaignRow, line)
+        row = row_of(self.plan, line)
+        if row.flight != self.number:  # or the directory would never have a row of this flight
+            raise TypeError(f"flight = {row.flight} under the key of flight {self.number}")
+        return row
 
     def _row(self, **more: Any) -> CampaignRow:
         flight = self.plan.draw(self.number)

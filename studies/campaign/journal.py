@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Final
 
 from command_line.bounded_file import open_regular
+from command_line.bounded_json import JsonError, json_object
 
 _NO_LOCKS: Final = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)  # of a file system
 
@@ -81,7 +82,7 @@ class Journal:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The lines of a journal, oldest first; one that a crash cut short is left out."""
+    """The lines of a journal, oldest first; one that is cut short or damaged is left out."""
     if not path.exists():
         return
     with open_regular(path) as file:
@@ -106,8 +107,11 @@ def _lock(file: BinaryIO, path: Path) -> None:
 
 
 def _object(line: bytes) -> dict[str, Any] | None:
+    """What a line holds; None if it is cut short or damaged.
+
+    A flight that diverged has a margin that is no number, and is not to be lost for that.
+    """
     try:
-        content = json.loads(line)
-    except (ValueError, RecursionError):
+        return json_object(line, not_finite=True)
+    except JsonError:
         return None
-    return content if isinstance(content, dict) else None

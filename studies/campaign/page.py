@@ -13,7 +13,7 @@ from command_line.html_page import document, items, table
 from studies.campaign.flight import CampaignRow
 from studies.campaign.store import CampaignResult
 from studies.campaign.summary import CaseSummary, summaries, worst
-from studies.drawing import BASE, BOUND, WALL, NoMatplotlibError, sheet
+from studies.drawing import BASE, BOUND, WALL, NoMatplotlibError, drawable, sheet
 from studies.table_text import metres, millimetres
 
 _MOST_CASES: Final = 12  # that are drawn
@@ -130,8 +130,8 @@ def _distributions(rows: Sequence[CampaignRow], result: CampaignResult) -> str:
     cases = dict(list(_of_cases(rows, result).items())[:_MOST_CASES])
     drawn = sheet(max(len(cases), 1), 2, 11.0, max(1.6 * len(cases), 1.6))
     for (left, right), (name, of) in zip(drawn.axes, cases.items(), strict=False):
-        margins = [1e3 * row.margin_m for row in of if row.margin_m is not None]
-        errors = [row.te_m for row in of if row.te_m is not None]
+        margins = drawable(1e3 * row.margin_m for row in of if row.margin_m is not None)
+        errors = drawable(row.te_m for row in of if row.te_m is not None)
         left.hist(margins, bins=40, color=BASE)
         left.axvline(0.0, color=WALL, linewidth=1.0)
         right.hist(errors, bins=40, color=BOUND)

@@ -9,7 +9,6 @@ campaign.html   the page
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Iterable
@@ -18,16 +17,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from command_line.bounded_file import read_bounded
+from command_line.bounded_json import read_json
 from command_line.output import json_text
 from command_line.version import version
-from studies.campaign.flight import CampaignRow, code, row_key
+from studies.campaign.flight import CampaignRow, code, row_key, row_of
 from studies.campaign.identity import packages
 from studies.campaign.journal import Journal, lines
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
 from studies.campaign.values import MOST_FLIGHTS
-from studies.flight.kept_row import kept_row
 
 PLAN, JOURNAL, FACTS, TABLE, PAGE = (
     "campaign.toml",
@@ -92,7 +90,7 @@ def read(directory: Path) -> CampaignResult:
                 f"{facts.get('version', 'of that day')}"
             )
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
-    rows, left_out = _rows(directory / JOURNAL, digests)
+    rows, left_out = _rows(directory / JOURNAL, plan, digests)
     asked = max([asked, *(row.flight + 1 for row in rows[-1:])])
     return CampaignResult(plan, rows, asked, digests, facts, left_out)
 
@@ -100,9 +98,9 @@ def read(directory: Path) -> CampaignResult:
 def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int] | None:
     """What campaign.json says, its digests and flights; None if it cannot be read or used."""
     try:
-        facts = json.loads(read_bounded(directory / FACTS, _MOST_BYTES))
+        facts = read_json(directory / FACTS, _MOST_BYTES)
         digests, asked = Digests(**facts["digests"]), facts["flights"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+    except (OSError, ValueError, TypeError, KeyError):
         return None
     known = all(isinstance(one, str) for one in asdict(digests).values())
     if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MOST_FLIGHTS:
@@ -175,7 +173,7 @@ def _there(directory: Path, plan: CampaignPlan) -> int:
         return found.asked
     # A crash or a full disk left no facts. They follow from the file and the rows, if both are
     # those of this plan and this code.
-    rows, _ = _rows(directory / JOURNAL, own)
+    rows, _ = _rows(directory / JOURNAL, plan, own)
     if not rows and any(lines(directory / JOURNAL)):
         raise CampaignError(f"{directory} has a journal of something else; give another --out")
     if rows and (not (directory / PLAN).exists() or load_plan(directory / PLAN).digest != own.plan):
@@ -228,14 +226,16 @@ def _check_same(directory: Path, there: CampaignResult, own: Digests) -> None:
             )
 
 
-def _rows(journal: Path, digests: Digests) -> tuple[tuple[CampaignRow, ...], int]:
+def _rows(
+    journal: Path, plan: CampaignPlan, digests: Digests
+) -> tuple[tuple[CampaignRow, ...], int]:
     """One row a flight, the last that was written, in their order; how many lines are none."""
     found: dict[int, CampaignRow] = {}
     left_out = 0
     for line in lines(journal):
         key = line.pop("key", None)
         try:
-            row = kept_row(CampaignRow, line)
+            row = row_of(plan, line)
         except TypeError:
             left_out += 1
             continue

@@ -295,7 +295,7 @@ def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[st
     if seen.contact and expected.contact not in ("any", seen.contact):
         found.append(seen.ended)
     least_mm = math.inf if seen.least_m is None else 1e3 * seen.least_m
-    if expected.contact == "none" and least_mm < expected.margin_mm:
+    if expected.contact == "none" and not least_mm >= expected.margin_mm:  # NaN is less
         found.append(f"margin {least_mm:.1f} mm; must be {expected.margin_mm:g} mm")
     return tuple(found)
 
@@ -307,7 +307,7 @@ def _untold(seen: FaultFlight, names: str, within_s: float) -> list[str]:
     named = next((one for one in seen.warnings if re.search(names, one.text)), None)
     if named is None:
         return [f'no text names "{names}"']
-    if named.after_s > within_s:
+    if not named.after_s <= within_s:  # NaN is late
         return [f"told after {named.after_s:.2f} s, not within {within_s:g} s"]
     return []
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final
 
 from fsw.flight.autopilot import Autopilot
@@ -41,6 +41,7 @@ from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.collector import collector_off
+from studies.flight.kept_row import kept_row
 from studies.flight.result import processor_time_us
 
 # A wall whose clearance begins 0.24 m off the blades' tips.
@@ -69,6 +70,8 @@ _STATION_TIMEOUT_US: Final = 3_000_000  # the least that COM_DL_LOSS_T allows, f
 _LANDS: Final = (Mode.RETURN, Mode.LAND)  # a return that is complete
 
 _FOLLOWS_S: Final = 0.1  # after that, a vehicle that is not in Trajectory has left it
+
+_CONTACTS: Final = ("", "ground", "wall")
 
 Spoken = tuple[float, CommandAction]  # at a time [s], and what is commanded
 
@@ -226,10 +229,24 @@ class FaultFlight:
         """The flight that :meth:`as_line` has described, after JSON.
 
         Raises:
-            KeyError, TypeError: Another version has described it.
+            TypeError: Another version has described it, or it is damaged.
         """
-        texts = tuple(Said(**said) for said in line["texts"])
-        return cls(**{**line, "texts": texts, "actions": tuple(line["actions"])})
+        # A field that is not there is no default: without a margin nothing would be judged.
+        if line.keys() != {one.name for one in fields(cls)}:
+            raise TypeError(f"{', '.join(line)} are not the fields of a flight")
+        texts = tuple(kept_row(Said, said) for said in _listed(line, "texts"))
+        actions = tuple(_listed(line, "actions"))
+        flight = kept_row(cls, {**line, "texts": texts, "actions": actions})
+        if flight.contact not in _CONTACTS:
+            raise TypeError(f"contact = {flight.contact!r} is none of {', '.join(_CONTACTS)}")
+        return flight
+
+
+def _listed(line: Mapping[str, Any], name: str) -> list[Any]:
+    found = line[name]
+    if not isinstance(found, list):
+        raise TypeError(f"{name} = {found!r} is no array")
+    return found
 
 
 def contact_of(kind: EndKind | None, sentence: str) -> str:

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from types import NoneType, UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
 RowT = TypeVar("RowT")
+
+_EXACT: Final = 1 << 53  # up to it every integer is a double
+_LONG: Final = 1 << 63  # of a column of integers
 
 
 def kept_row(kind: type[RowT], line: Mapping[str, Any]) -> RowT:
     """The row of a dataclass ``kind`` that a line holds.
 
     Raises:
-        TypeError: A field is missing, unknown, or of another type.
+        TypeError: It is no object; a field is missing, unknown, or of another type.
     """
+    if not isinstance(line, Mapping):
+        raise TypeError(f"{line!r} is no object")
     made: Any = kind
     hints = _hints(made)
     for name, value in line.items():
@@ -38,10 +43,16 @@ def _is(value: Any, hint: Any) -> bool:
         return isinstance(value, dict) and all(
             _is(name, key) and _is(part, of) for name, part in value.items()
         )
+    if get_origin(hint) is tuple:  # of any length
+        return isinstance(value, tuple) and all(_is(part, get_args(hint)[0]) for part in value)
     if hint is float:
-        return isinstance(value, int | float) and not isinstance(value, bool)
+        return isinstance(value, float) or _is_whole(value, _EXACT)
     if hint is int:
-        return isinstance(value, int) and not isinstance(value, bool)
+        return _is_whole(value, _LONG - 1)
     if hint is None or hint is NoneType:
         return value is None
     return isinstance(value, hint)
+
+
+def _is_whole(value: Any, most: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and -most <= value <= most

@@ -11,7 +11,7 @@ from typing import Any, Final
 from command_line.html_page import document, items, table
 from command_line.output import json_text
 from studies.campaign.store import CampaignResult
-from studies.drawing import BASE, WALL, NoMatplotlibError, sheet
+from studies.drawing import BASE, WALL, NoMatplotlibError, drawable, sheet
 from studies.statistics.certificate import ANY, VIOLATIONS
 
 _HOLDER: Final = ('<script type="application/json" id="certificate">', "</script>")
@@ -189,11 +189,11 @@ def _histograms(stated: dict[str, Any], result: CampaignResult) -> str:
     shown = [one for one in stated["margins"] if one["quantiles_m"]][:_MOST_DRAWN]
     drawn = sheet(max(len(shown), 1), 1, 9.0, max(1.7 * len(shown), 1.7))
     for (ax,), one in zip(drawn.axes, shown, strict=False):
-        margins = [
+        margins = drawable(
             1e3 * row.margin_m
             for row in result.rows
             if names[row.flight % count] == one["name"] and row.margin_m is not None
-        ]
+        )
         ax.hist(margins, bins=50, color=BASE)
         ax.axvline(0.0, color=WALL, linewidth=1.0)
         ax.set_title(f"{one['name']}: minimum margin [mm]", fontsize=8, loc="left")

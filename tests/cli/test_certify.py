@@ -13,7 +13,8 @@ import pytest
 
 from command_line.output import complain
 from pandion.certify import main
-from studies.campaign.store import read
+from studies.campaign.page import page as campaign_page
+from studies.campaign.store import JOURNAL, read
 from studies.search.tune import EXAMPLE
 from studies.statistics.certificate import certificate, digest
 from tests.studies.campaign.test_store import begun, put
@@ -90,6 +91,26 @@ def test_a_certificate_with_numbers_that_are_none_is_refused(
     capsys.readouterr()
     assert main([str(directory), f"--verify={kept}"]) == 2
     assert "a number is not finite" in capsys.readouterr().err
+
+
+def test_a_damaged_row_is_told_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, directory, plan = begun(tmp_path)
+    put(directory, plan, range(4))
+    journal = directory / JOURNAL
+    journal.write_text(journal.read_text().replace('"margin_m": 0.1', '"margin_m": 1e999', 1))
+    assert main([str(directory)]) == 2
+    assert "1 of 4 flights have no row" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("margin_m", [float("nan"), -1e308])
+def test_a_margin_of_any_size_is_certified_and_not_drawn(margin_m: float, tmp_path: Path) -> None:
+    _, directory, plan = begun(tmp_path)
+    put(directory, plan, range(3))
+    put(directory, plan, range(3, 4), margin_m=margin_m, te_m=1e308, completed=False)
+    assert main([str(directory)]) == 0
+    assert campaign_page(read(directory), (), directory).count("<svg") >= 1
 
 
 def test_the_margin_of_a_flight_that_diverged_has_a_digest(tmp_path: Path) -> None:

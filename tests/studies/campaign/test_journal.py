@@ -37,6 +37,17 @@ def test_a_line_cut_short_costs_that_line_alone(tmp_path: Path) -> None:
     assert [line["key"] for line in lines(path)] == ["a", "c"]
 
 
+@pytest.mark.parametrize("number", ["1e999", "1" + 400 * "0", '"\\ud800"'])
+def test_a_line_that_no_journal_writes_is_damaged(tmp_path: Path, number: str) -> None:
+    path = tmp_path / "journal.jsonl"
+    path.write_text(f'{{"key": "a", "x": {number}}}\n{{"key": "b", "x": NaN}}\n')
+    assert [line["key"] for line in lines(path)] == ["b"]  # a flight that diverged leaves NaN
+    journal = Journal(path)
+    assert journal.get("a") is None
+    assert journal.get("b") is not None
+    journal.close()
+
+
 def test_a_row_with_an_error_is_kept_but_not_taken_for_the_flight(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.jsonl")
     journal.append([("a", {"error": True, "reason": "it died"})])

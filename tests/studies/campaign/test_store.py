@@ -142,7 +142,15 @@ def test_facts_are_not_made_up_for_rows_of_something_else(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "facts", ['{"flights": Infinity}', '{"flights": true}', '{"flights": "4"}', "[1]", "[" * 9999]
+    "facts",
+    [
+        '{"flights": Infinity}',
+        '{"flights": true}',
+        '{"flights": "4"}',
+        '{"name": "\\ud800"}',
+        "[1]",
+        "[" * 9999,
+    ],
 )
 def test_facts_that_cannot_be_used_are_refused_in_a_sentence(tmp_path: Path, facts: str) -> None:
     _, directory, _ = begun(tmp_path)
@@ -156,7 +164,20 @@ def test_facts_that_cannot_be_used_are_refused_in_a_sentence(tmp_path: Path, fac
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"flight": "0"}, {"margin_m": "low"}, {"contact": 1}, {"values": [1]}, {"values": {"a": "b"}}],
+    [
+        {"flight": "0"},
+        {"margin_m": "low"},
+        {"margin_m": 2**53 + 1},
+        {"margin_m": 10**19},
+        {"plans": 2**63},
+        {"contact": 1},
+        {"values": [1]},
+        {"values": {"a": "b"}},
+        {"values": {"a": 1}},
+        {"values": {}},
+        {"values": {"vehicle_scale.mass": 2**53 + 1}},
+        {"values": {"vehicle_scale.mass": float("nan")}},
+    ],
 )
 def test_a_line_of_other_types_is_no_row(tmp_path: Path, wrong: dict[str, Any]) -> None:
     _, directory, plan = begun(tmp_path)
@@ -167,6 +188,15 @@ def test_a_line_of_other_types_is_no_row(tmp_path: Path, wrong: dict[str, Any]) 
     assert found.left_out == 1
     with pytest.raises(TypeError):
         CampaignFlight(plan, 0).from_line(found.rows[0].as_line() | wrong)
+
+
+def test_a_row_under_the_key_of_another_flight_is_flown_again(tmp_path: Path) -> None:
+    _, directory, plan = begun(tmp_path)
+    put(directory, plan, range(1))
+    (row,) = read(directory).rows
+    assert CampaignFlight(plan, 0).from_line(row.as_line()) == row
+    with pytest.raises(TypeError, match="flight = 0 under the key of flight 1"):
+        CampaignFlight(plan, 1).from_line(row.as_line())
 
 
 def test_facts_are_on_the_disk_before_their_name_is(

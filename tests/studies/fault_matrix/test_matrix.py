@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -73,10 +74,45 @@ def test_contact_is_never_allowed_without_a_reason() -> None:
         (replace(FINE, problem="no flight", texts=()), ("no flight",)),
         (replace(FINE, least_m=-0.001), ("margin -1.0 mm; must be 0 mm",)),
         (replace(FINE, least_m=None), ()),
+        (replace(FINE, least_m=float("nan")), ("margin nan mm; must be 0 mm",)),
+        (
+            replace(FINE, texts=(replace(TOLD, after_s=float("nan")),)),
+            ("told after nan s, not within 0.5 s",),
+        ),
     ],
 )
 def test_what_is_not_as_it_must_be_is_named(flight: FaultFlight, differs: tuple[str, ...]) -> None:
     assert differences("orbit", LAND_SOON, flight) == differs
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"least_m": "x"},
+        {"least_m": 10**400},
+        {"actions": [["a"]]},
+        {"actions": {"a": 1}},
+        {"actions": "land"},
+        {"texts": [1]},
+        {"texts": [{"after_s": 1, "text": "a"}]},
+        {"texts": [{"after_s": "1", "severity": 2, "text": "a"}]},
+        {"contact": "none"},
+        {"error": 0},
+        {"more": 1},
+    ],
+)
+def test_a_line_of_other_types_is_no_flight(wrong: dict[str, Any]) -> None:
+    line = json.loads(json.dumps(FINE.as_line()))
+    assert FaultFlight.from_line(line) == FINE
+    with pytest.raises(TypeError):
+        FaultFlight.from_line(line | wrong)
+
+
+def test_a_flight_without_its_margin_is_none() -> None:
+    line = FINE.as_line()
+    del line["least_m"]
+    with pytest.raises(TypeError, match="are not the fields of a flight"):
+        FaultFlight.from_line(line)
 
 
 def test_what_must_come_of_it_in_the_end_may_not_be_left_out() -> None:
