@@ -21,6 +21,7 @@ from typing import Final, cast
 from fsw.frozen import replace
 from fsw.link.inbox import MAX_SAMPLES, Inbox
 from fsw.link.outbox import packed
+from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sensor_clock import SensorClock
 from fsw.link.udp_endpoint import Address
 from fsw.link.wire import decode, encode_replies, message_ids
@@ -33,7 +34,7 @@ from fsw.link.wire.decode_sensors import (
     joint_sample,
     pose_sample,
 )
-from fsw.link.wire.message_ids import AUTOPILOT, SIMULATOR, SYSTEM_ID
+from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
 from fsw.measurements import ImuSample, Sample
 from fsw.ports import Clock, VehicleFacts
@@ -86,6 +87,9 @@ _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
 _NO_JOINTS: Final = (math.nan, math.nan)
 
 
+_NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
+
+
 class Pacing(Enum):
     """Lockstep or real time, from bit 0 of custom_mode in the simulator's HEARTBEAT."""
 
@@ -125,7 +129,7 @@ class SimLink:
         self._answer: tuple[int, list[bytes]] = (-1, [])  # with the stamp of its step
         self._acks: list[CommandAck] = []
         self._texts: tuple[StatusText, ...] = ()  # of the last tick, after its answer
-        self._routed: list[bytes] = []
+        self._routed = RoutedCommands()
         self._text_id = 0
         self._reported_us = -_REPORT_US
         self._reported_mode: Mode | None = None
@@ -170,10 +174,8 @@ class SimLink:
         self._acks.append(ack)
 
     def route(self, request: CommandRequest) -> None:
-        """Send a command on with the next answer, in the name of who sent it, as a router does."""
-        writer = FrameWriter(request.source_system, request.source_component)
-        values = (*request.params, request.command, SYSTEM_ID, SIMULATOR, request.confirmation)
-        self._routed.append(writer.frame(message_ids.COMMAND_LONG, *values))
+        """Send a command on with the next answer, and again until it is answered."""
+        self._routed.add(request)
 
     def queue_texts(self, texts: tuple[StatusText, ...]) -> None:
         """Send texts with the next answer."""
@@ -186,14 +188,20 @@ class SimLink:
         due = t_us - self._reported_us >= _REPORT_US
         changed = due or answer.mode is not self._reported_mode
         texts = (*self._texts, *answer.texts) if self._texts else answer.texts
-        if self._acks or texts or changed or self._routed:
+        routed = self._due(t_us) if self._routed else b""
+        if self._acks or texts or changed or routed:
             mode = self._mode(t_us, answer)
             # Last, in the datagram of the controls: texts without room in it are of no use there.
-            routed = b"".join(self._routed)
-            self._routed.clear()
             self._send((stamp_us, packed([mode, *self._replies(texts), routed + controls])))
         else:
             self._send((stamp_us, [controls]))
+
+    def _due(self, t_us: int) -> bytes:
+        """Commands to send on now; what was not answered for long is answered here."""
+        for ack in self._routed.given_up(t_us):
+            self.routed_acks.append(ack)
+            self.notices.append(StatusText(Severity.CRITICAL, _NO_ANSWER, prompt=True))
+        return self._routed.due(t_us)
 
     def close(self) -> None:
         """Close the socket."""
@@ -253,15 +261,19 @@ class SimLink:
         if step in self._answered_in:
             return
         self._answered_in.append(step)
+        acks = []
+        for frame in frames:
+            if frame.message_id == message_ids.COMMAND_ACK:
+                command, result, _, _, system, component = cast(Numbers, frame.payload_values)
+                acks.append(CommandAck(int(command), int(result), int(system), int(component)))
+        awaited = self._routed.answered(acks)
+        if not awaited:
+            return  # it was asked again meanwhile, and both are answered
+        self.routed_acks += awaited
         for severity, sentence in status_text.graded(frames):
             # No worse than a refusal: an emergency passes every limit, and is the vehicle's own.
             grade = Severity.CRITICAL if severity <= Severity.CRITICAL else Severity.WARNING
             self.notices.append(StatusText(grade, sentence, prompt=True))
-        for frame in frames:
-            if frame.message_id == message_ids.COMMAND_ACK:
-                command, result, _, _, system, component = cast(Numbers, frame.payload_values)
-                ack = CommandAck(int(command), int(result), int(system), int(component))
-                self.routed_acks.append(ack)
 
     def _note_what_is_odd(self, sentence: str) -> None:
         self.notices.append(StatusText(Severity.WARNING, sentence))

@@ -79,13 +79,13 @@ def _injections(frames: list[Frame]) -> tuple[Injection, ...]:
     found = []
     for frame in frames:
         if frame.message_id == message_ids.COMMAND_LONG:
-            *params, command, _, _, _ = cast("tuple[float, ...]", frame.payload_values)
+            *params, command, _, _, again = cast("tuple[float, ...]", frame.payload_values)
             if command == message_ids.CMD_INJECT_FAILURE:
                 if not all(value in _WHOLE for value in params[:3]):
                     continue
                 unit, kind, instance = (int(value) for value in params[:3])
-                asked = Injection(unit, kind, instance, frame.system_id, frame.component_id)
-                found.append(asked)
+                sender = frame.system_id, frame.component_id
+                found.append(Injection(unit, kind, instance, *sender, int(again)))
     return tuple(found)
 
 

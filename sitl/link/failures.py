@@ -37,6 +37,7 @@ _KINDS: Final[dict[int, Kind]] = {
     7: "intermittent",
 }
 _WORKS: Final = 0
+_AGAIN_S: Final = 3.0  # for which the same words, sent again, are the same command
 _NO_PILOT: Final = (
     "no fault: mavlink is the link of the scenario's pilot, and this scenario has none"
 )
@@ -50,6 +51,7 @@ class Injection(NamedTuple):
     instance: int  # from 1; 0: all
     system: int  # who asked
     component: int
+    confirmation: int = 0  # how often it was asked before
 
 
 class Answer(NamedTuple):
@@ -57,6 +59,25 @@ class Answer(NamedTuple):
 
     result: int  # MAV_RESULT
     sentence: str
+
+
+class Injector:
+    """Carries out what is asked for, once: an answer that got lost is asked for again."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._last: tuple[Injection, Answer, float] | None = None
+
+    def answer(self, asked: Injection) -> Answer:
+        """What becomes of it, or became of it when it was asked for first."""
+        first, now_s = asked._replace(confirmation=0), self._simulation.time_s
+        if asked.confirmation and self._last is not None:
+            last, answer, at_s = self._last
+            if last == first and now_s - at_s <= _AGAIN_S:
+                return answer
+        answer = carry_out(self._simulation, asked)
+        self._last = first, answer, now_s
+        return answer
 
 
 def carry_out(simulation: Simulation, asked: Injection) -> Answer:

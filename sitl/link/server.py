@@ -15,7 +15,7 @@ from sitl.link import decode, pilot
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, SimulatorError
-from sitl.link.failures import carry_out
+from sitl.link.failures import Injector
 from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
@@ -83,6 +83,7 @@ def serve(
         simulation.catch_up()
         spoken = pilot.speak(plan, state, simulation.t_us + STEP_US)
 
+    injector = Injector(simulation)
     while simulation.ended is None:
         stamp_us = simulation.sensor_time_us
         # The pilot has a clock of its own, which does not fail with the sensors'.
@@ -95,7 +96,7 @@ def serve(
             answer = exchange.step(simulation.step, stamp_us, datagram, meanwhile)
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
-            answered = _injected(simulation, encoder, answer) if answer.injections else b""
+            answered = _injected(injector, encoder, answer) if answer.injections else b""
             _advance(simulation, answer)
         except SimulatorError as error:
             kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
@@ -137,10 +138,9 @@ def _heard_of(
     return () if faults.pilot_silent(simulation.t_us) else messages
 
 
-def _injected(simulation: Simulation, encoder: StepEncoder, answer: VehicleReply) -> bytes:
+def _injected(injector: Injector, encoder: StepEncoder, answer: VehicleReply) -> bytes:
     """Begin and end the faults that were asked for; returns what their senders are told."""
-    asked = answer.injections
-    return b"".join(encoder.answer(one, carry_out(simulation, one)) for one in asked)
+    return b"".join(encoder.answer(one, injector.answer(one)) for one in answer.injections)
 
 
 def _datagram(

@@ -33,7 +33,7 @@ from sitl.earth import DEFAULT_ORIGIN
 from sitl.link.decode import read_reply
 from sitl.link.encode import StepEncoder
 from sitl.link.encode_sensors import SensorEncoder
-from sitl.link.failures import Injection, carry_out
+from sitl.link.failures import Injection, Injector, carry_out
 from sitl.link.pilot import Phase, PilotState, flight_plan, speak
 from sitl.link.pilot_messages import SendCommand
 from sitl.mission_clock import MissionClock
@@ -531,7 +531,7 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
     reply = read_reply(wire.hear(), 2)
     assert reply is not None
     (asked,) = reply.injections
-    assert asked == Injection(unit=0, kind=1, instance=0, system=245, component=190)
+    assert asked == Injection(unit=0, kind=1, instance=0, system=245, component=190, confirmation=1)
     answer = encoder.answer(asked, carry_out(simulation, asked))
     wire.send(answer + encoder.datagram(readings(1_004_000), ()))
     assert wire.link.wait_for_step() is not None
@@ -548,6 +548,7 @@ def test_a_refusal_of_the_simulator_is_critical_and_prompt_as_the_vehicle_s_own(
     simulation = Simulation(load_scenario("walls-calm"), 0)
     asked = Injection(unit=2, kind=1, instance=0, system=245, component=190)
     for t_us in (1_002_000, 1_004_000):
+        wire.link.route(INJECT)
         answer = encoder.answer(asked, carry_out(simulation, asked))
         wire.send(answer + encoder.datagram(readings(t_us), ()))
         assert wire.link.wait_for_step() is not None
@@ -560,6 +561,7 @@ def test_a_refusal_of_the_simulator_is_critical_and_prompt_as_the_vehicle_s_own(
 
 def test_no_text_of_the_simulator_is_an_emergency(wire: Wire) -> None:
     """Those pass every limit."""
+    wire.link.route(INJECT)
     writer = FrameWriter(1, 200)
     answer = writer.frame(ids.COMMAND_ACK, 420, 0, 0, 0, 245, 190)
     for severity in (0, 255):
@@ -572,6 +574,7 @@ def test_no_text_of_the_simulator_is_an_emergency(wire: Wire) -> None:
 @pytest.mark.parametrize("lockstep", [True, False])
 def test_an_answer_of_the_simulator_is_taken_late_and_once(wire: Wire, lockstep: bool) -> None:
     flight = Flight(wire, lockstep=lockstep)
+    wire.link.route(INJECT)
     answer = FrameWriter(1, 200).frame(ids.COMMAND_ACK, 420, 0, 0, 0, 245, 190)
     late = answer + flight.datagram(1_004_000)
     if not lockstep:
@@ -580,6 +583,44 @@ def test_an_answer_of_the_simulator_is_taken_late_and_once(wire: Wire, lockstep:
         wire.send(late)
         flight.take()
     assert wire.link.routed_acks == [CommandAck(420, 0, 245, 190)]
+
+
+@pytest.mark.parametrize("lost", range(8))
+@pytest.mark.parametrize("there", [True, False], ids=["command", "answer"])
+def test_a_command_to_the_simulator_is_answered_however_often_it_is_lost(
+    wire: Wire, there: bool, lost: int
+) -> None:
+    """On its way there, or on the way of its answer back; and it is carried out once."""
+    simulation, controls = Simulation(load_scenario("walls-calm"), 0), (0.5, 0.5, 0.5, 0.5)
+    encoder, injector = StepEncoder(lockstep=True), Injector(simulation)
+    wire.link.route(replace(INJECT, confirmation=0))
+    heard: list[int] = []  # ticks in which the command was sent
+    for k in range(400):
+        t_us = 1_002_000 + 2_000 * k
+        wire.link.send_actuators(t_us, answer_of(outputs_at(t_us)))
+        if wire.link.routed_acks:
+            break
+        reply = read_reply(wire.hear(), 2)
+        assert reply is not None
+        answer = b""
+        for asked in reply.injections:
+            heard.append(k)
+            arrives = len(heard) > lost
+            if arrives or not there:
+                said = encoder.answer(asked, injector.answer(asked))
+                answer += said if arrives else b""
+        simulation.advance(Controls(controls, (0.0, 0.0), armed=True))
+        wire.send(answer + encoder.datagram(readings(t_us + 2_000), ()))
+        assert wire.link.wait_for_step() is not None
+    known = lost < 6
+    assert heard == [50 * n for n in range(min(lost + 1, 6))], "each 0.1 s, for 0.6 s"
+    assert wire.link.routed_acks == [CommandAck(420, 0 if known else 4, 245, 190)]
+    assert k == (50 * lost + 1 if known else 300)
+    simulation.advance(Controls(controls, (0.0, 0.0), armed=True))
+    assert len(simulation.faults.active) == (0 if there and not known else 1)
+    (notice,) = wire.link.notices
+    words = "fault injected: gyro off" if known else "the simulator does not answer"
+    assert notice.text.startswith(words)
 
 
 @pytest.mark.parametrize("number", [NAN, math.inf, -1.0, 0.5, 256.0, 1e30])
