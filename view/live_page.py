@@ -53,6 +53,7 @@ class LivePage:
         self._wanted = {"messages": "", "parameters": ""}
         self._gizmo: Any = None
         self._drawn_t = _NAN
+        self._undrawn = ""  # why a frame was not drawn, as it was said last
         self._frames = 0
         self._due = {"text": 0.0, "plot": 0.0, "kept": 0.0, "trail": 0.0}
         self.stage = Stage(server, AIRFRAME)
@@ -188,28 +189,41 @@ class LivePage:
 
     def _run(self) -> None:
         while not self._ended.wait(_FRAME_S):
-            self._link.watched = bool(self._server.get_clients())
-            now_s = time.monotonic()
-            scene = self._link.scene()
-            self._remember(scene, now_s)
-            if not self._link.watched:
-                if self._gizmo is not None and self._drag.value:
-                    self._drag.value = False  # as if it was cleared
-                continue
-            if scene.t != self._drawn_t:
-                self._drawn_t = scene.t
+            scene, now_s = self._link.scene(), time.monotonic()
+            # Numbers of a vehicle may be such that anything fails; those of the next may be drawn.
+            for step in (self._remember, self._draw, self._tell):
                 try:
-                    with self._server.atomic():
-                        self.stage.show(scene)
-                except ValueError as error:  # of numbers that cannot be drawn; the next may be
-                    self._answer.content = panels.refusal_html(f"not drawn: {error}", good=False)
-                self._frames += 1
-            if self._is_due("text", now_s, _TEXT_S):
-                self._write(scene)
-            if self._is_due("plot", now_s, _PLOT_S) and len(self._recent) > 1:
-                curves = curves_of(list(self._recent), AIRFRAME)
-                for plot, curve in zip(self._plots, curves, strict=True):
-                    plot.replace(curve)
+                    step(scene, now_s)
+                except Exception as error:
+                    self._say_undrawn(error)
+
+    def _draw(self, scene: Scene, now_s: float) -> None:
+        self._link.watched = bool(self._server.get_clients())
+        if not self._link.watched:
+            if self._gizmo is not None and self._drag.value:
+                self._drag.value = False  # as if it was cleared
+        elif scene.t != self._drawn_t:
+            self._drawn_t = scene.t
+            self._frames += 1
+            with self._server.atomic():
+                self.stage.show(scene)
+
+    def _tell(self, scene: Scene, now_s: float) -> None:
+        if not self._link.watched:
+            return
+        if self._is_due("text", now_s, _TEXT_S):
+            self._write(scene)
+        if self._is_due("plot", now_s, _PLOT_S) and len(self._recent) > 1:
+            curves = curves_of(list(self._recent), AIRFRAME)
+            for plot, curve in zip(self._plots, curves, strict=True):
+                plot.replace(curve)
+
+    def _say_undrawn(self, error: Exception) -> None:
+        """Say why a frame was not drawn; once, or the answers of the vehicle could not be read."""
+        sentence = panels.undrawn(error)
+        if sentence != self._undrawn:
+            self._undrawn = sentence
+            self._answer.content = panels.refusal_html(sentence, good=False)
 
     def _remember(self, scene: Scene, now_s: float) -> None:
         if scene.estimate is None or math.isnan(scene.t):

@@ -37,6 +37,7 @@ class LogPage:
         self._shown: float | None = None
         self._texts_s = self._plots_s = -1e9
         self._kind = ""
+        self._undrawn = ""  # why a frame was not drawn, as it was said last
         self._ended = threading.Event()
         self.stage = Stage(server, flight.airframe)
         self.stage.frame(server, flight.region())
@@ -57,6 +58,7 @@ class LogPage:
 
     def _build(self) -> None:
         gui, flight = self._server.gui, self._flight
+        self._answer = gui.add_html("")
         tabs = gui.add_tab_group()
         begin = flight.begin
         with tabs.add_tab("Now"):
@@ -145,8 +147,14 @@ class LogPage:
                 self._texts(at, now_s)
 
     def _draw(self, at: Timeline, now_s: float) -> None:
-        with self._server.atomic():
-            self.stage.show(self._flight.scene(at.t))
+        try:
+            with self._server.atomic():
+                self.stage.show(self._flight.scene(at.t))
+        except Exception as error:  # of numbers that cannot be drawn; those of the next may be
+            sentence = panels.undrawn(error)
+            if sentence != self._undrawn:
+                self._undrawn = sentence
+                self._answer.content = panels.refusal_html(sentence)
         if now_s - self._texts_s > _TEXT_S:
             self._texts(at, now_s)
         else:

@@ -95,6 +95,12 @@ def parameters_html(rows: Iterable[tuple[str, str]]) -> str:
     return f'<div data-pandion="parameters" style="{_BOX}">{empty}{_table(lines)}</div>'
 
 
+def undrawn(error: Exception) -> str:
+    """Why a frame was not drawn; of a reason of many lines the first."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return f"not drawn: {lines[0]}"
+
+
 def refusal_html(sentence: str, *, good: bool = False) -> str:
     """How the vehicle answered."""
     colour = css(colours.GREEN if good else colours.RED)

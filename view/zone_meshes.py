@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from fsw.geometry.rotation import matrix_from_quaternion
 from fsw.signals import Shape, Vec3, Zone
@@ -15,6 +15,7 @@ from fsw.signals import Shape, Vec3, Zone
 Array = NDArray[Any]
 
 _THIN = 0.02  # m, radius that a point or a line is drawn with
+_LEAST = 0.002  # m, half a thickness that is drawn; a hull of less may have no volume
 _ROUND = 32  # corners of a circle
 _TURNS = np.linspace(0.0, 2.0 * math.pi, _ROUND, endpoint=False)
 
@@ -37,8 +38,15 @@ def zone_mesh(zone: Zone, region: tuple[Vec3, Vec3], target: Vec3 | None) -> Zon
     """A zone as triangles.
 
     A plane is drawn within the ``region`` [m, NED], least and largest corner. A zone that rides on
-    the ``target`` [m, NED] is not drawn without one, nor is a point without a clearance.
+    the ``target`` [m, NED] is not drawn without one, nor is one whose triangles cannot be found.
     """
+    try:
+        return _zone_mesh(zone, region, target)
+    except QhullError:
+        return None
+
+
+def _zone_mesh(zone: Zone, region: tuple[Vec3, Vec3], target: Vec3 | None) -> ZoneMesh | None:
     shape, clearance = zone.shape, zone.clearance
     if shape.kind == "half-space":
         shell = _plane(shape, region, clearance) if clearance > 0.0 else None
@@ -48,12 +56,12 @@ def zone_mesh(zone: Zone, region: tuple[Vec3, Vec3], target: Vec3 | None) -> Zon
         return None
     points, radius = corners
     inwards = -1.0 if zone.keep_in else 1.0
-    surface = _hull(points, radius) if radius > 0.0 or len(points) > 1 else _hull(points, _THIN)
+    surface = _hull(points, radius)
     if clearance <= 0.0:
         return ZoneMesh(surface, None)
-    if zone.keep_in and radius <= clearance:
+    if zone.keep_in and radius <= clearance + _LEAST:
         return ZoneMesh(surface, None)
-    return ZoneMesh(surface, _hull(points, max(radius, 0.0) + inwards * clearance))
+    return ZoneMesh(surface, _hull(points, radius + inwards * clearance))
 
 
 def moved(zone: Zone, t: float) -> Vec3:
@@ -86,9 +94,9 @@ def _corners(
     """
     n = np.array(shape.numbers)
     if shape.kind == "ball":
-        return n[None, :3], float(n[3])
+        return n[None, :3], _ball_radius(float(n[3]))
     if shape.kind == "target sphere":
-        return None if target is None else ((n[:3] + target)[None], float(n[3]))
+        return None if target is None else ((n[:3] + target)[None], _ball_radius(float(n[3])))
     if shape.kind == "vertical cylinder":
         # Within the region, but no end of its own is moved beyond the other: it may lie outside.
         top, bottom = float(n[2]), float(n[3])
@@ -97,18 +105,26 @@ def _corners(
         radius = max(float(n[4]), _THIN)
         return _cylinder(np.array((*n[:2], top)), np.array((*n[:2], bottom)), radius), 0.0
     if shape.kind == "cylinder":
-        return _cylinder(n[:3], n[3:6], float(n[6])), 0.0
+        return _cylinder(n[:3], n[3:6], max(float(n[6]), _LEAST)), 0.0
     if shape.kind == "box":
         w, x, y, z = n[6:10].tolist()
         axes = np.array(matrix_from_quaternion((w, x, y, z))).reshape(3, 3)
         signs = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-        return n[:3] + (signs * n[3:6]) @ axes.T, 0.0
+        return n[:3] + (signs * np.maximum(n[3:6], _LEAST)) @ axes.T, 0.0
     return None  # a kind that this build does not know
+
+
+def _ball_radius(radius: float) -> float:
+    """A point is drawn larger than it is, a ball hardly."""
+    return max(radius, _LEAST) if radius > 0.0 else _THIN
 
 
 def _cylinder(begin: Array, end: Array, radius: float) -> Array:
     axis = end - begin
-    axis = axis / max(float(np.linalg.norm(axis)), 1e-9)
+    length = float(np.linalg.norm(axis))
+    axis = axis / length if length > 1e-9 else np.array((0.0, 0.0, 1.0))
+    if length < 2.0 * _LEAST:
+        begin, end = begin - (_LEAST - 0.5 * length) * axis, end + (_LEAST - 0.5 * length) * axis
     a = np.cross(axis, (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0))
     a /= np.linalg.norm(a)
     b = np.cross(axis, a)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import QhullError
 
 from fsw.shapes.ball import ball
 from fsw.shapes.box import box
@@ -11,6 +12,7 @@ from fsw.shapes.target_sphere import target_sphere
 from fsw.shapes.vertical_cylinder import column, vertical_cylinder
 from fsw.shapes.zones import all_planes
 from fsw.signals import SafeSet, Shape, Zone
+from view import zone_meshes
 from view.zone_meshes import moved, zone_mesh
 
 REGION = ((-2.0, -2.0, -3.0), (2.0, 2.0, 0.0))
@@ -58,6 +60,37 @@ def test_triangles_face_outwards_and_close_the_surface(shape: Shape) -> None:
     edges = np.sort(mesh.surface.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, count = np.unique(edges, axis=0, return_counts=True)
     assert (count == 2).all()
+
+
+THIN = [
+    ball((1.0, 2.0, -1.0), 1e-30),
+    ball((1000.0, 2.0, -1.0), 1e-14),
+    box((0.5, 0.0, -1.0), (0.5, 0.5, 1e-15)),
+    box((100.0, 0.0, -1.0), (1e-12, 1e-12, 1e-12)),
+    cylinder((0.0, 0.0, -1.0), (0.0, 0.0, -2.0), 1e-15),
+    cylinder((100.0, 0.0, -1.0), (100.0, 0.0, -1.00001), 0.2),
+    vertical_cylinder((1000.0, 0.5), 1e-15, -1.0, -0.9999999),
+]
+
+
+@pytest.mark.parametrize("keep_in", [False, True])
+@pytest.mark.parametrize("clearance", [0.0, 0.1])
+@pytest.mark.parametrize("shape", THIN, ids=lambda shape: shape.kind)
+def test_what_is_too_thin_to_be_seen_is_drawn_thicker(
+    shape: Shape, clearance: float, keep_in: bool
+) -> None:
+    mesh = zone_mesh(Zone(shape, clearance, keep_in=keep_in), REGION, None)
+    assert mesh is not None
+    sizes = np.ptp(mesh.surface.vertices, axis=0)
+    assert (sizes > 0.003).all()
+
+
+def test_what_has_no_hull_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_: object) -> None:
+        raise QhullError("QH6154 initial simplex is flat")
+
+    monkeypatch.setattr(zone_meshes, "ConvexHull", fails)
+    assert zone_mesh(Zone(SHAPES[1], 0.1), REGION, None) is None
 
 
 def test_a_column_without_end_is_drawn_where_the_flight_was() -> None:
