@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
+from fsw.link.bounded_memory import renew
 from fsw.link.inbox import Inbox
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
@@ -218,7 +219,7 @@ class GcsLink:
             return  # no sign of life either: anybody could start or stop a failsafe with it
         self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
         self.talks = True
-        self._note_speaker((frame.system_id, frame.component_id))
+        renew(self._speakers, (frame.system_id, frame.component_id), None, _MAX_SPEAKERS)
         if frame.message_id == message_ids.SETUP_SIGNING:
             self._set_up_signing(t_us, frame, sender)
             return
@@ -238,14 +239,6 @@ class GcsLink:
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
         self.dispatch.handle(frame, t_us, source)
-
-    def _note_speaker(self, speaker: tuple[int, int]) -> None:
-        """Keep who is to be answered here, for every frame: not those who fell silent long ago."""
-        speakers = self._speakers
-        speakers.pop(speaker, None)
-        speakers[speaker] = None
-        if len(speakers) > _MAX_SPEAKERS:
-            del speakers[next(iter(speakers))]
 
     def _set_up_signing(self, t_us: int, frame: Frame, sender: Address) -> None:
         armed = self._snapshot is not None and self._snapshot.armed

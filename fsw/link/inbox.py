@@ -8,6 +8,7 @@ from functools import partial
 from typing import Final, cast
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.link.bounded_memory import renew
 from fsw.link.wire import decode, decode_commands, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_setpoints import (
@@ -263,9 +264,7 @@ class Inbox:
         zones = incomplete.zones
         zones[indexed.index] = indexed.zone
         if len(zones) < indexed.count:
-            self._incomplete[self._source] = incomplete
-            if len(self._incomplete) > _MAX_ANNOUNCERS:
-                del self._incomplete[next(iter(self._incomplete))]
+            renew(self._incomplete, self._source, incomplete, _MAX_ANNOUNCERS)
             return
         self._announce(SafeSet(tuple(zones[i] for i in range(indexed.count))))
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.link.bounded_memory import renew
 from fsw.link.wire import message_ids
 from fsw.link.wire.message_ids import SIMULATOR, SYSTEM_ID
 from fsw.signals import CommandAck, CommandRequest, CommandResult
@@ -41,10 +42,7 @@ class RoutedCommands:
     def add(self, request: CommandRequest) -> None:
         """Take a command; its sender has given up an earlier one that was the same."""
         key = (request.command, request.source_system, request.source_component)
-        self._waiting.pop(key, None)
-        self._waiting[key] = _Waiting(request)
-        if len(self._waiting) > _MOST:
-            del self._waiting[next(iter(self._waiting))]
+        renew(self._waiting, key, _Waiting(request), _MOST)
 
     def due(self, t_us: int) -> bytes:
         """Frames to send now, in the name of who sent the commands, as a router does."""

@@ -85,8 +85,6 @@ _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEA
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
 _NO_JOINTS: Final = (math.nan, math.nan)
-
-
 _NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
 
 

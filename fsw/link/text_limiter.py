@@ -14,8 +14,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
+from fsw.link.bounded_memory import renew
 from fsw.signals import FailsafeEvent, Severity, StatusText
 
 REPEAT_US: Final = 5_000_000  # the same text is sent once in this time
@@ -65,7 +66,7 @@ class TextLimiter:
             self._dropped += 1
             self._dropped_us = t_us
             return None
-        _renew(self._sent, text.text, _Sent(text, t_us, left=left))
+        renew(self._sent, text.text, _Sent(text, t_us, left=left), _MOST)
         return _counted(before) if before is not None and before.held_back else text
 
     def overdue(self, t_us: int) -> Iterator[StatusText]:
@@ -95,7 +96,7 @@ class TextLimiter:
             return room
         key = _NUMBER.sub("#", text.text) if text.severity <= Severity.CRITICAL else ""
         budget, room = _charged(self._budgets.get(key), t_us)
-        _renew(self._budgets, key, budget)
+        renew(self._budgets, key, budget, _MOST)
         return room
 
 
@@ -104,14 +105,6 @@ def _charged(before: _Budget | None, t_us: int) -> tuple[_Budget, bool]:
     before = before or _Budget()
     room = min(before.room + 1e-6 * _RATE_PER_S * (t_us - before.at_us), float(_BURST))
     return _Budget(room - 1.0 if room >= 1.0 else room, t_us), room >= 1.0
-
-
-def _renew(kept: dict[str, Any], key: str, value: object) -> None:
-    """Put a value in as the newest, and forget the oldest where there are too many."""
-    kept.pop(key, None)
-    kept[key] = value
-    if len(kept) > _MOST:
-        del kept[next(iter(kept))]
 
 
 def _counted(sent: _Sent) -> StatusText:

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from itertools import repeat
 from pathlib import Path
 
 import pytest
@@ -99,18 +100,20 @@ def test_an_export_imported_again_changes_nothing(
 
 
 @contextlib.contextmanager
-def vehicle_that_sends(*sent: bytes) -> Iterator[tuple[str, int]]:
-    """It repeats these frames to the first that speaks to it; where it listens."""
+def vehicle_that_sends(
+    datagrams: Iterator[bytes], every_s: float = 0.02
+) -> Iterator[tuple[str, int]]:
+    """It sends these to the first that speaks to it; where it listens."""
     over = threading.Event()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.bind(("127.0.0.1", 0))
 
-        def repeats() -> None:
+        def sends() -> None:
             _, client = vehicle.recvfrom(2048)
-            while not over.wait(0.02):
-                vehicle.sendto(b"".join(sent), client)
+            while not over.wait(every_s):
+                vehicle.sendto(next(datagrams), client)
 
-        thread = threading.Thread(target=repeats)
+        thread = threading.Thread(target=sends)
         thread.start()
         yield vehicle.getsockname()
         over.set()
@@ -131,7 +134,7 @@ def value_of(name: bytes, value: float, count: int, index: int) -> bytes:
 )
 def test_a_vehicle_that_repeats_itself_is_not_waited_for_again(frame: bytes, missing: str) -> None:
     with (
-        vehicle_that_sends(frame) as where,
+        vehicle_that_sends(repeat(frame)) as where,
         ParameterClient(where, patience_s=0.3) as client,
         pytest.raises(NoAnswer, match=missing),
     ):
@@ -144,21 +147,12 @@ def test_a_list_that_only_grows_ends_as_well(monkeypatch: pytest.MonkeyPatch) ->
     endless = (
         sender.frame(ids.PARAM_VALUE, 1.0, 4096, index, b"P%d" % index, 9) for index in range(4096)
     )
-    over = threading.Event()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
-        vehicle.bind(("127.0.0.1", 0))
-
-        def drips() -> None:
-            _, client = vehicle.recvfrom(2048)
-            while not over.wait(0.05):
-                vehicle.sendto(next(endless), client)
-
-        thread = threading.Thread(target=drips)
-        thread.start()
-        with ParameterClient(vehicle.getsockname()) as client, pytest.raises(NoAnswer):
-            client.read_all()
-        over.set()
-        thread.join()
+    with (
+        vehicle_that_sends(endless, 0.05) as where,
+        ParameterClient(where) as client,
+        pytest.raises(NoAnswer),
+    ):
+        client.read_all()
     assert time.monotonic() - begin < 30.0, "4096 of them would take minutes"
 
 
@@ -171,7 +165,7 @@ def test_an_export_leaves_out_what_a_reader_would_refuse(
         value_of(b"LND_SPEED", float("nan"), 3, 1),
         value_of(b"WALL_LAMBDA", float("inf"), 3, 2),
     )
-    with vehicle_that_sends(*sent) as (host, port):
+    with vehicle_that_sends(repeat(b"".join(sent))) as (host, port):
         assert param.main(["export", str(file), f"--vehicle=udp:{host}:{port}"]) == 1
     printed = capsys.readouterr()
     assert printed.out == f"1 parameters written to {file}\n"

@@ -49,6 +49,25 @@ def hover(arm_deg: tuple[float, float] | None = None, yaw_deg: float = 0.0) -> S
     return Scenario("hover", 600.0, start, Pilot("none"), Hold((0.0, 0.0, -1.2)))
 
 
+# Standing 3 m from a wall, nothing asked for.
+BESIDE_A_WALL = """
+duration_s = inf
+[start]
+kind = "ground"
+[pilot]
+plan = "none"
+[trajectory]
+kind = "hold"
+position_m = [0.0, 0.0, -1.2]
+[[zones]]
+name = "wall"
+shape = "half-space"
+normal = [-1.0, 0.0, 0.0]
+offset_m = -3.0
+clearance_m = 0.1
+"""
+
+
 def on_the_ground() -> Scenario:
     """Standing, disarmed, nothing asked for."""
     return Scenario("ground", 600.0, Start("ground"), Pilot("none"), Hold((0.0, 0.0, -1.2)))

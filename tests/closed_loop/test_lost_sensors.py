@@ -14,7 +14,7 @@ from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.signals import Mode, SensorFrame
 from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.simulation import STEP_US
-from tests.closed_loop.harness import Flight
+from tests.closed_loop.harness import BESIDE_A_WALL, Flight
 from tests.closed_loop.test_real_sensors import Spoil, changed, frozen
 
 START_US = 1_000_000
@@ -114,29 +114,11 @@ def test_telemetry_knows_which_sensor_is_lost(kind: type, name: str) -> None:
     assert flight.snapshot.sensors_lost == (name,)
 
 
-STANDING = """
-duration_s = inf
-[start]
-kind = "ground"
-[pilot]
-plan = "none"
-[trajectory]
-kind = "hold"
-position_m = [0.0, 0.0, -1.2]
-[[zones]]
-name = "wall"
-shape = "half-space"
-normal = [-1.0, 0.0, 0.0]
-offset_m = -3.0
-clearance_m = 0.1
-"""
-
-
 @pytest.mark.requirement("REQ-SAFE-3")
 def test_how_sure_the_estimate_is_is_not_judged_while_no_position_is_measured() -> None:
     """By what it was after half a minute without, no push would be told for the whole flight."""
     lost = changed(PoseSample, 2.0, 36.0, lambda _: None)
-    flight = Flight(parse_scenario(STANDING, "standing", "mocap"), spoil_samples=lost)
+    flight = Flight(parse_scenario(BESIDE_A_WALL, "standing", "mocap"), spoil_samples=lost)
     flight.run(36.0)
     assert flight.state.accuracy.reach == 0.0
     flight.run(9.0)

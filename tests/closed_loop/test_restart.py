@@ -31,27 +31,21 @@ from fsw.signals import (
 )
 from sitl.scenario import Hold
 from sitl.scenario_file import parse_scenario
-from tests.closed_loop.harness import ARM, TAKEOFF, Flight, command, hover, on_the_ground
+from tests.closed_loop.harness import (
+    ARM,
+    BESIDE_A_WALL,
+    TAKEOFF,
+    Flight,
+    command,
+    hover,
+    on_the_ground,
+)
 
 REBOOT, TERMINATE = 246, 185
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 LATER = CommandResult.TEMPORARILY_REJECTED
 # Weak until the vehicle stands, where no rotor can show what it gives, and well again then.
-SCENARIO = """
-duration_s = inf
-[start]
-kind = "ground"
-[pilot]
-plan = "none"
-[trajectory]
-kind = "hold"
-position_m = [0.0, 0.0, -1.2]
-[[zones]]
-name = "wall"
-shape = "half-space"
-normal = [-1.0, 0.0, 0.0]
-offset_m = -3.0
-clearance_m = 0.1
+SCENARIO = f"""{BESIDE_A_WALL}
 [[faults]]
 unit = "motor"
 kind = "weak"

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias, cast
 
+from fsw.link.bounded_memory import renew
 from fsw.link.files import ftp_jobs
 from fsw.link.files.ftp_jobs import Job
 from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, refused, write
@@ -232,10 +233,7 @@ class FtpService:
         self._sessions.pop(key).file.close()
 
     def _remember(self, client: Client, answered: _Answered) -> None:
-        self._answered.pop(client, None)
-        self._answered[client] = answered
-        if len(self._answered) > _MAX_REMEMBERED:
-            del self._answered[next(iter(self._answered))]
+        renew(self._answered, client, answered, _MAX_REMEMBERED)
 
 
 def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> PackedOutgoing:

@@ -108,7 +108,9 @@ class KeyFile:
                 self._take_up(key)
             if self._open is not None:
                 handle, begin = self._open
-                if newest > int(os.pread(handle, _TIME_DIGITS, begin)):
+                kept = os.pread(handle, _TIME_DIGITS, begin)
+                # What is no number there, somebody else has put there.
+                if not kept.strip().isdigit() or newest > int(kept):
                     os.pwrite(handle, _digits(newest), begin)
 
     def remove(self) -> None:
@@ -128,18 +130,16 @@ class KeyFile:
         Replaced, it would not be the file any more that another process keeps its time in.
         """
         head = _head(key)
-        handle = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
-        try:
+        with contextlib.ExitStack() as opened:
+            handle = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
+            opened.callback(os.close, handle)
             content = os.read(handle, _MOST_BYTES)
             others = os.fstat(handle).st_mode & 0o077
             digits = content[len(head) : -1]
             made = content[: len(head)] == head and content[-1:] == b"}"
             if others or not made or len(digits) != _TIME_DIGITS or not digits.strip().isdigit():
-                os.close(handle)
                 return False
-        except BaseException:
-            os.close(handle)
-            raise
+            opened.pop_all()
         self.close()
         self._open = (handle, len(head))
         return True

@@ -509,6 +509,18 @@ def test_a_file_that_was_not_written_here_is_written_anew_and_its_time_kept(
 
 
 @pytest.mark.requirement("REQ-LINK-9")
+@pytest.mark.parametrize("content", [b"", b'{"key": "', b"x" * 200])
+def test_a_file_that_is_spoilt_in_flight_ends_nothing(
+    ground: Ground, file: Path, content: bytes
+) -> None:
+    file.write_bytes(content)  # in place
+    ground.polled(Client(ground).at(Client(ground).now() + 5).arm())
+    assert commands(ground) == 1
+    with pytest.raises(LinkError, match="holds no signing key"):
+        KeyFile(file).read(LATEST)
+
+
+@pytest.mark.requirement("REQ-LINK-9")
 def test_a_time_ahead_of_the_clock_is_refused_and_ends_nothing(ground: Ground, file: Path) -> None:
     now = Client(ground).now()
     for newest, refused in ((now + MINUTE, False), (now + 2 * MINUTE, True), (LATEST, True)):
