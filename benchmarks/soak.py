@@ -21,7 +21,7 @@ from pymavlink import mavutil
 
 from benchmarks.machine_watch import descendants, version_and_machine
 from benchmarks.requirement import Requirement, print_requirements
-from benchmarks.soak_client import ANSWER_S, COMPONENT, SYSTEM, Client
+from benchmarks.soak_client import ANSWER_S, COMPONENT, GAP_S, SYSTEM, Client
 from benchmarks.soak_faults import scenario
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
@@ -117,6 +117,7 @@ def main(argv: list[str]) -> int:
         return error.exit_code
     rows = judge(flights)
     print_requirements(rows, console)
+    print(stood_still(flights), file=console)
     figures = {
         "rows": [row.as_json() for row in rows],
         "flights": [asdict(one) for one in flights],
@@ -204,6 +205,18 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
         most, unit = (_MOST_GROWTH_MB_H, "MB/h") if name.endswith("memory") else (0, "")
         rows.append(Requirement(f"{name}, growth", value, most, unit))
     return rows
+
+
+def stood_still(flights: list[Soaked]) -> str:
+    """Say how long client and vehicle were silent: where both were, the machine stood still."""
+    most = {
+        name: max((gap[1] for one in flights for gap in one.heard[name]), default=0.0)
+        for name in ("pauses", "gaps")
+    }
+    return (
+        f"Longest pause of the client {most['pauses']:.2f} s, longest gap between two datagrams "
+        f"of the vehicle {most['gaps']:.2f} s (0 where all were below {GAP_S:g} s)."
+    )
 
 
 def grown(glances: list[Glance]) -> dict[str, float]:

@@ -13,6 +13,7 @@ from messages import dialect
 
 SYSTEM, COMPONENT = 255, 190
 ANSWER_S: Final = 1.0  # within which every command must be answered
+GAP_S: Final = 0.3  # without a datagram of the vehicle or a turn of the client: is recorded
 _EVERY_S: Final = 0.2  # from an answer to the next command
 _FAULT_EVERY_S: Final = 10.0
 _FAULT_LASTS_S: Final = 1.5
@@ -54,7 +55,8 @@ class Heard:
     restarts: int = 0
     airborne_s: float = 0.0
     texts: int = 0
-    largest_gap_s: float = 0.0  # between two datagrams of the vehicle
+    gaps: list[tuple[float, float]] = field(default_factory=list)  # since the start, how long
+    pauses: list[tuple[float, float]] = field(default_factory=list)  # likewise, of the client
 
 
 class Client(threading.Thread):
@@ -77,7 +79,7 @@ class Client(threading.Thread):
         self._beat_s = self._next_s = self._fault_s = self._takes_off_s = self._heard_s = 0.0
         self._fault: tuple[int, float] | None = None  # unit, and when it ends
         self._ended = False
-        self._begin_s = time.monotonic()
+        self._begin_s = self._turn_s = time.monotonic()
 
     @property
     def port(self) -> int:
@@ -99,7 +101,11 @@ class Client(threading.Thread):
         """See :class:`Client`."""
         while not self._ended:
             now_s = time.monotonic()
-            self._hear(now_s)
+            # Where the client stands still, the machine does, and so may the vehicle.
+            self._note(self.heard.pauses, self._turn_s, now_s)
+            self._turn_s = now_s
+            if self._hear(now_s):
+                continue  # what has come is read before anything counts as missing
             if self._vehicle is not None:
                 self._beat(now_s)
                 self._forget(now_s)
@@ -107,18 +113,22 @@ class Client(threading.Thread):
                     self._next_s = now_s + _EVERY_S
                     self._ask(self._failing(now_s) or self._next(now_s), now_s)
 
-    def _hear(self, now_s: float) -> None:
+    def _hear(self, now_s: float) -> bool:
+        """Take a datagram; returns whether there was one."""
         got = self._endpoint.receive_waiting()
         if got is None:
             time.sleep(0.002)
-            return
+            return False
         datagram, self._vehicle = got
-        if self._heard_s:
-            gap_s = now_s - self._heard_s
-            self.heard.largest_gap_s = max(self.heard.largest_gap_s, gap_s)
+        self._note(self.heard.gaps, self._heard_s or now_s, now_s)
         self._heard_s = now_s
         for message in self._link.parse_buffer(datagram) or []:
             self._take(message, now_s)
+        return True
+
+    def _note(self, gaps: list[tuple[float, float]], since_s: float, now_s: float) -> None:
+        if now_s - since_s >= GAP_S:
+            gaps.append((round(now_s - self._begin_s, 2), round(now_s - since_s, 3)))
 
     def _beat(self, now_s: float) -> None:
         """A heartbeat, and a parameter to read."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from benchmarks.soak import Glance, Soaked, grown, judge, main, recorded
+from benchmarks.soak import Glance, Soaked, grown, judge, main, recorded, stood_still
+from benchmarks.soak_client import Client
 from fsw.log.tlog import TlogWriter
 from messages import dialect
 from messages.frames import FrameWriter
@@ -88,6 +90,32 @@ def test_the_record_counts_the_clients_commands_and_the_answers_to_it(tmp_path: 
         writer.add(t_us, frame)
     writer.close()
     assert recorded(tmp_path / "flight.tlog") == (2, 1)
+
+
+def test_a_client_that_stood_still_says_when_and_for_how_long() -> None:
+    class Held:
+        """Holds the client once, as a machine that stands still would."""
+
+        held = False
+
+        def receive_waiting(self) -> None:
+            if not self.held:
+                self.held = True
+                time.sleep(0.4)
+
+        def close(self) -> None:
+            """Nothing is open."""
+
+    client = Client(0)
+    client._endpoint.close()
+    client._endpoint = Held()  # type: ignore[assignment]
+    client.start()
+    time.sleep(0.6)
+    client.close()
+    ((at_s, pause_s),) = client.heard.pauses
+    assert 0.4 <= pause_s <= at_s + 0.01  # both are rounded
+    flown = replace(FINE, heard={"pauses": client.heard.pauses, "gaps": []})
+    assert f"client {pause_s:.2f} s" in stood_still([flown])
 
 
 @pytest.mark.long
