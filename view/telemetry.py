@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.link.events.event_table import condition_of
 from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids

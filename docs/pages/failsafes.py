@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from fsw.flight.arming import CHECKS, ArmingCheck
-from fsw.flight.failsafe import FAILSAFES, Action, Failsafe
+from fsw.flight.conditions import Action
+from fsw.flight.failsafe import FAILSAFES, Failsafe
 from fsw.parameters.float32 import as_text
 from fsw.parameters.registry import BY_NAME
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fsw.flight.arming import CHECKS
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 
 ROOT: Final = Path(__file__).parents[2]
 FILE: Final = ROOT / "docs" / "reference" / "requirements.toml"

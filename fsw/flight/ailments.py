@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from fsw.flight.arming import Subject
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 
 AILMENTS: Final[dict[Condition, Subject]] = {
     Condition.ATTITUDE_LOST: Subject.ATTITUDE,

@@ -28,10 +28,11 @@ from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, nowhere, told
 from fsw.flight.commander import Commander
+from fsw.flight.conditions import Condition
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
-from fsw.flight.failsafe import FAULTS, Condition
+from fsw.flight.failsafe import FAULTS
 from fsw.flight.jump import moved_along
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints, report

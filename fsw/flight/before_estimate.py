@@ -7,8 +7,9 @@ from typing import Final
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.arming import NO_ESTIMATE, joined
+from fsw.flight.conditions import Action, Condition
 from fsw.flight.estimator_report import AIDS_PLACE
-from fsw.flight.failsafe import ROWS, Action, Condition
+from fsw.flight.failsafe import ROWS
 from fsw.flight.modes.offboard import report
 from fsw.flight.state import FlightState
 from fsw.signals import (

@@ -7,20 +7,14 @@ from __future__ import annotations
 
 from fsw.control.cascade import at_rest, in_hover
 from fsw.flight import arming
+from fsw.flight.active_failsafes import active, quickly_active, surely_none
 from fsw.flight.ailments import ailments
 from fsw.flight.arming_health import arming_health
 from fsw.flight.command_dedup import answered_before, remember, still_true
 from fsw.flight.command_handlers import Decision, decide, decide_without_estimate
-from fsw.flight.failsafe import (
-    BLOCKING,
-    NOTHING_DONE,
-    SLOW_US,
-    Action,
-    FailsafeContext,
-    active,
-    quickly_active,
-    surely_none,
-)
+from fsw.flight.conditions import NOTHING_DONE, Action
+from fsw.flight.failsafe import BLOCKING, SLOW_US
+from fsw.flight.failsafe_evidence import FailsafeContext
 from fsw.flight.failsafe_response import overridden, respond
 from fsw.flight.land_detector import standing_unclear, stands
 from fsw.flight.mission_sequencer import refusal as mission_refusal

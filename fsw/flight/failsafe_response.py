@@ -5,14 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from fsw.flight.failsafe import (
-    Action,
-    Condition,
-    Failsafe,
-    FailsafeContext,
-    FailsafeMemory,
-    lost_sensors,
-)
+from fsw.flight.conditions import Action, Condition, FailsafeMemory
+from fsw.flight.failsafe import Failsafe
+from fsw.flight.failsafe_evidence import FailsafeContext, lost_sensors
 from fsw.signals import FailsafeEvent, Mode, Severity, StatusText
 
 _SHORT: Final = 1.0  # s

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from fsw.control.braking import Brake
-from fsw.flight.failsafe import PLAN_STALE_PERIODS
+from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
 from fsw.flight.state import PlanMemory
 from fsw.frozen import replace
 from fsw.geometry.rotation import wrap_angle

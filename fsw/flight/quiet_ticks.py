@@ -25,7 +25,9 @@ from fsw.control.cascade import Cascade, CascadeMemory, close_loops
 from fsw.control.joints import JointMemory
 from fsw.control.tracking import Observed
 from fsw.estimation.frame_trust import WINDOW_FRAMES, FrameTrust, Window, is_calm, looked_at
-from fsw.flight.failsafe import PLAN_STALE_PERIODS, SLOW_US, all_is_well
+from fsw.flight.active_failsafes import all_is_well
+from fsw.flight.failsafe import SLOW_US
+from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
 from fsw.flight.plan_exchange import planned_input
 from fsw.flight.safety_watch import off_plan_bound
 from fsw.flight.state import AIDED, FlightState

@@ -13,7 +13,7 @@ from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.accuracy_watch import AccuracyMemory
 from fsw.flight.command_dedup import AnsweredCommand
-from fsw.flight.failsafe import Condition, FailsafeMemory
+from fsw.flight.conditions import Condition, FailsafeMemory
 from fsw.flight.mission_sequencer import MissionFlight
 from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState

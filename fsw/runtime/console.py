@@ -11,7 +11,7 @@ import threading
 from typing import Final
 
 from command_line.process import Events
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
 from fsw.signals import Severity, StatusText
 

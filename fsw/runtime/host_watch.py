@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from fsw.flight.failsafe import JUMP_US, MISSED_TICKS
+from fsw.flight.failsafe_evidence import JUMP_US, MISSED_TICKS
 from fsw.link.ground_links import GroundLinks
 from fsw.ports import Clock
 from fsw.signals import HostHealth

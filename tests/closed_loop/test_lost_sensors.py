@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.signals import Mode, SensorFrame
 from sitl.scenario_file import load_scenario, parse_scenario

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fsw.flight.autopilot import Autopilot
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.flight.quiet_ticks import READINGS
 from fsw.flight.state import FlightState
 from fsw.frozen import replace

@@ -13,7 +13,7 @@ from functools import partial
 
 import pytest
 
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode, Plan, PlanFailure, PlanRequest

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.measurements import PoseSample
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
 from fsw.shapes.vertical_cylinder import vertical_cylinder

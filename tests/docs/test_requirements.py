@@ -21,7 +21,8 @@ from docs.pages.requirements import (
 )
 from docs.pages.safety_manual import inserted, reference
 from fsw.control.tube import all_axes, all_axes_up_to
-from fsw.flight.failsafe import ROWS, Condition
+from fsw.flight.conditions import Condition
+from fsw.flight.failsafe import ROWS
 from fsw.parameters.consistency import loop_tube
 from fsw.parameters.flight_config import flight_config
 from fsw.parameters.registry import BY_NAME

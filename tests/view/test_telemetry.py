@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.flight.failsafe import Action, Condition
+from fsw.flight.conditions import Action, Condition
 from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
 from fsw.link.wire import message_ids as ids

@@ -17,7 +17,8 @@ from typing import Any, Final
 
 from fsw.flight.ailments import AILMENTS
 from fsw.flight.arming import CHECKS, Subject
-from fsw.flight.failsafe import ROWS, Action, Condition
+from fsw.flight.conditions import Action, Condition
+from fsw.flight.failsafe import ROWS
 from fsw.link.wire.px4_mode import custom_mode
 from fsw.signals import ArmingReport, FailsafeEvent, Mode, Severity
 

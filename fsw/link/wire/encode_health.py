@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault, fault_name
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.signals import BatteryState, Charge, EstimatorReport, FlightSnapshot, SensorReport

@@ -13,7 +13,7 @@ from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.estimator import estimate_state
 from fsw.flight.arming import CHECKS
 from fsw.flight.autopilot import Autopilot
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.safe_set import joined
 from fsw.flight.state import FlightState, MissionMemory

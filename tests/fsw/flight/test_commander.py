@@ -11,7 +11,7 @@ import pytest
 
 from fsw.flight.arming import CHECKS, Subject
 from fsw.flight.commander import Commander
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.flight.modes.land import Land
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.state import FlightState, PlanMemory, SafetyMemory, SetpointMemory

@@ -9,17 +9,10 @@ import numpy as np
 import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.flight.failsafe import (
-    FAILSAFES,
-    FAULTS,
-    ROWS,
-    Action,
-    Condition,
-    FailsafeContext,
-    active,
-    quickly_active,
-    way_home_s,
-)
+from fsw.flight.active_failsafes import active, quickly_active
+from fsw.flight.conditions import Action, Condition
+from fsw.flight.failsafe import FAILSAFES, FAULTS, ROWS
+from fsw.flight.failsafe_evidence import FailsafeContext, way_home_s
 from fsw.flight.failsafe_response import report
 from fsw.flight.state import (
     AIDED,

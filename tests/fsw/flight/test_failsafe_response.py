@@ -13,14 +13,9 @@ from hypothesis import strategies as st
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.commander import Commander
-from fsw.flight.failsafe import (
-    FAILSAFES,
-    ROWS,
-    Action,
-    Condition,
-    Failsafe,
-    FailsafeContext,
-)
+from fsw.flight.conditions import Action, Condition
+from fsw.flight.failsafe import FAILSAFES, ROWS, Failsafe
+from fsw.flight.failsafe_evidence import FailsafeContext
 from fsw.flight.failsafe_response import allowed, respond
 from fsw.flight.state import (
     Aiding,

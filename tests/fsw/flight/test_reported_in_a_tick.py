@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from fsw.estimation.estimator import estimate_state
-from fsw.flight.failsafe import ROWS, Condition
+from fsw.flight.conditions import Condition
+from fsw.flight.failsafe import ROWS
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.state import FlightState, MissionMemory, PlanMemory
 from fsw.flight.uncertain_clearance import KeptSet

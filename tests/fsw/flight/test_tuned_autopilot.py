@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.flight.autopilot import Autopilot
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.state import FlightState
 from fsw.flight.tuned_autopilot import TunedAutopilot

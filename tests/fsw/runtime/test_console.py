@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.runtime.console import Console
 from fsw.signals import FailsafeEvent, Severity, StatusText
 from tests.waiting import becomes

@@ -11,7 +11,7 @@ import pytest
 
 from fsw.flight.ailments import AILMENTS
 from fsw.flight.arming import CHECKS, Subject
-from fsw.flight.failsafe import Action, Condition
+from fsw.flight.conditions import Action, Condition
 from fsw.link.events.event_log import EventLog
 from fsw.link.events.event_service import EventService
 from fsw.link.events.event_table import (

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from fsw.estimation.sensor_fault import Sensor
-from fsw.flight.failsafe import Condition
+from fsw.flight.conditions import Condition
 from fsw.link.telemetry.streams import STREAMS, Stream
 from fsw.link.wire import encode_replies, encode_standard
 from fsw.link.wire import message_ids as ids
