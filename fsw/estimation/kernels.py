@@ -40,7 +40,7 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
-from fsw.estimation.sensor_checks import believable
+from fsw.estimation.stated_variance import believable
 from fsw.geometry.quaternion import normalised
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.model.airframe import GRAVITY

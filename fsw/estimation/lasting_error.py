@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 from fsw.estimation.fusion_memory import FusionMemory
-from fsw.estimation.sensor_checks import believable
 from fsw.estimation.sensor_fault import Sensor
+from fsw.estimation.stated_variance import believable
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from fsw.compiled import compilable
 from fsw.estimation.imu import TIME_TOLERANCE
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.tuning import EstimatorTuning
@@ -18,7 +17,6 @@ from fsw.measurements import (
     PressureSample,
     RangeSample,
 )
-from fsw.signals import Vec3
 
 Aiding = PoseSample | GnssSample | PressureSample | MagneticSample | RangeSample
 SENSOR_OF: Final[dict[type, Sensor]] = {
@@ -181,11 +179,3 @@ def _plausible(sample: Aiding, tuning: EstimatorTuning) -> bool:
             return 0.0 < norm(sample.field) < _STRONGEST_FIELD
         case RangeSample():
             return 0.0 < sample.distance < _FARTHEST_RANGE
-
-
-@compilable
-def believable(variance: Vec3, least: float) -> Vec3:
-    """A ``variance`` [any unit, any frame], at least ``least`` [same unit] where it is one."""
-    x, y, z = variance
-    # NaN and zero mean that the sensor does not know; both fail the comparison.
-    return (x if x > least else least, y if y > least else least, z if z > least else least)

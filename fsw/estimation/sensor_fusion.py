@@ -11,17 +11,17 @@ makes of the filter.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import reduce
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from fsw.compiled import machine_code, packed
 from fsw.estimation import attribution, kernels
+from fsw.estimation.agreement import Agreement
 from fsw.estimation.attribution import Dispute
-from fsw.estimation.drift import FrameDrift, least
-from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, IMU_CAPACITY, Array, Filter
+from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, Array, Filter
+from fsw.estimation.filter_start import FilterStart
 from fsw.estimation.fusion_memory import (
     NO_TURN,
     EncoderWatch,
@@ -30,17 +30,17 @@ from fsw.estimation.fusion_memory import (
     at_start,
 )
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
+from fsw.estimation.measurement_update import MeasurementUpdate, attitude
 from fsw.estimation.sensor_checks import (
     SENSOR_OF,
     Aiding,
     arrived,
-    believable,
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.frozen import made
-from fsw.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
-from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.geometry.quaternion import conjugate, multiply
 from fsw.geometry.vectors import norm
 from fsw.measurements import (
     GnssSample,
@@ -59,13 +59,6 @@ LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
-_WAITING_AT_START: Final = 16  # samples that are looked at
-_SPEED_AT_START: Final = 2.0  # m/s and rad/s, with which a vehicle moves between two poses
-_RATE_AT_START: Final = 2.0
-_STRONGEST: Final = 20.0  # m/s^2, with which it does so between two velocities
-_STEADY: Final = 0.5  # s without a refused reading, until a magnetometer is believed again
-_APART: Final = 0.25  # s; readings farther apart do not confirm each other
-_SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
 # What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
@@ -98,24 +91,17 @@ class SensorFusion:
     def __init__(self, tuning: EstimatorTuning) -> None:
         self.tuning = tuning
         self.law = packed(EstimatorLaw(tuning, tuning.gates))
-        self._least_p = tuning.position_floor**2
-        self._least_q = tuning.attitude_floor**2
-        self._least_pose = self._least_p, self._least_q
+        self._stated = StatedVariance(tuning)
+        self._agreement = Agreement(tuning, self._stated)
+        self._start = FilterStart(tuning, self.law, self._stated, self._agreement)
+        self._update = MeasurementUpdate(tuning, self.law, self._stated)
         x, none = at_start().numbers, (0.0, 0.0)
         asked = Asked(x, kernels.COPY, none, none)
         pose = (0.0, 0.0, _REST, NO_TURN, _REST, _REST)
         self._tick = machine_code(kernels.tick, x, self.law, 0, 0.0, *asked)
         self._tick_with_pose = machine_code(
-            kernels.tick_with_pose, x, self.law, 0.0, *asked, pose, self._least_pose
+            kernels.tick_with_pose, x, self.law, 0.0, *asked, pose, self._stated.least_pose
         )
-        self._least_gnss = tuning.gnss_position_floor**2, tuning.gnss_velocity_floor**2
-        self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
-            PoseSample: self._fuse_pose,
-            GnssSample: self._fuse_gnss,
-            PressureSample: self._fuse_pressure,
-            MagneticSample: self._fuse_heading,
-            RangeSample: self._fuse_range,
-        }
 
     def warm_up(self) -> StateEstimate:
         """Compile every kernel: stand for a while with every sensor, then take jumps."""
@@ -126,7 +112,7 @@ class SensorFusion:
         assert estimate is not None
         for sample in _at_rest(t):
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
-                self._reset(memory, Waiting(t, 0, sample), (math.inf, math.inf))
+                self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
         kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
         kernels.judge_by_attitude(memory.numbers, self.law, t, NO_TURN, 1.0)
         kernels.judge_by_field(memory.numbers, self.law, t, (0.2, 0.0, 0.4))
@@ -379,7 +365,7 @@ class SensorFusion:
         )
         old = memory.numbers if asked.parts & kernels.COPY else asked.x
         of_imu, of_encoders, finite, known, ratio, (place, turn) = self._tick_with_pose(
-            old, self.law, until, *asked, pose, self._least_pose
+            old, self.law, until, *asked, pose, self._stated.least_pose
         )
         memory = FusionMemory(asked.x, *memory[1:])
         if of_imu or of_encoders:
@@ -439,7 +425,7 @@ class SensorFusion:
         """The memory after a ``sample`` of ``time`` [s] has told whether a gyro is right again."""
         x = memory.numbers.copy()
         if isinstance(sample, PoseSample):
-            _, about = self._noise(memory, sample)
+            _, about = self._update.noise(memory, sample)
             sigma = math.sqrt(max(about))
             kernels.judge_by_attitude(x, self.law, time, sample.attitude, sigma)
         elif isinstance(sample, MagneticSample):
@@ -470,120 +456,6 @@ class SensorFusion:
         faded = before - self.tuning.delay_decay * min(apart, 1.0)
         return min(max(delay, faded), self.tuning.longest_delay)
 
-    def _start(self, memory: FusionMemory) -> FusionMemory:
-        """Start from the newest pose that another one agrees with, for a first one may be wrong.
-
-        Without poses start from a GNSS position, gravity and the compass.
-        """
-        if not memory.numbers["end"][0]:
-            return memory._replace(waiting=())
-        for one in reversed(memory.waiting):
-            sample = one.sample
-            if isinstance(sample, MagneticSample) and memory.field is None:
-                memory = memory._replace(field=sample.field)
-        for one in reversed(memory.waiting):
-            sample = one.sample
-            if isinstance(sample, PoseSample):
-                if not self._is_agreed_with(sample, memory.waiting):
-                    continue
-                stated = self._stated(sample)
-                noise = self._least_stated(memory.waiting) if sample.drifts else stated
-                place = sample.position, _REST, normalised(sample.attitude)
-                self._begin(memory, sample.time, place, *noise)
-                if sample.drifts:
-                    frame = FrameDrift.at_start(memory.numbers[0], noise, stated)
-                    memory = memory._replace(frame=frame)
-                break
-            if isinstance(sample, GnssSample) and memory.field is not None:
-                level = _levelled(memory.numbers, memory.field, self.tuning.declination)
-                tilt = self.tuning.tilt**2
-                self._begin(
-                    memory,
-                    sample.time - self.tuning.gnss_delay,
-                    (sample.position, sample.velocity, level),
-                    believable(sample.position_variance, self._least_gnss[0]),
-                    (tilt, tilt, self.tuning.start_heading**2),
-                )
-                x = memory.numbers
-                kernels.couple_level(x, self.law)
-                # The heading was made of this field: what it does not know of it, with all of the
-                # tilt that it comes through, is what it does not know of the field.
-                kernels.fuse_heading(x, self.law, float(x["time"][0]), memory.field, True)
-                break
-        else:
-            return memory._replace(waiting=memory.waiting[-_WAITING_AT_START:])
-        return memory._replace(
-            started=True,
-            waiting=(),
-            delay_sigma=self.tuning.pose_delay_sigma,
-            began=float(memory.numbers["time"][0]),
-        )
-
-    def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
-        """The least variances of the poses so far: of a frame that drifts, the noise alone."""
-        poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
-        return reduce(least, (self._stated(pose) for pose in poses))
-
-    def _is_agreed_with(self, pose: PoseSample, waiting: tuple[Waiting, ...]) -> bool:
-        """Whether another pose says the same, but for noise and what a vehicle moves meanwhile."""
-        others = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
-        return any(other is not pose and self._agree(other, pose) for other in others)
-
-    def _agree(self, one: PoseSample, other: PoseSample) -> bool:
-        place, about = self._stated(one)
-        apart = abs(one.time - other.time)
-        gate = self.tuning.pose_gate * math.sqrt(2.0)
-        turn = rotation_vector(
-            multiply(conjugate(normalised(one.attitude)), normalised(other.attitude))
-        )
-        step = gate * math.sqrt(sum(place)) + _SPEED_AT_START * apart
-        angle = gate * math.sqrt(sum(about)) + _RATE_AT_START * apart
-        return math.dist(one.position, other.position) <= step and norm(turn) <= angle
-
-    def _agreeing(self, one: GnssSample, other: GnssSample) -> bool:
-        place = believable(one.position_variance, self._least_gnss[0])
-        speed = believable(one.velocity_variance, self._least_gnss[1])
-        apart, gates = abs(one.time - other.time), self.tuning
-        step = gates.gnss_position_gate * math.sqrt(2.0 * sum(place)) + _SPEED_AT_START * apart
-        change = gates.gnss_velocity_gate * math.sqrt(2.0 * sum(speed)) + _STRONGEST * apart
-        near = math.dist(one.position, other.position) <= step
-        return near and math.dist(one.velocity, other.velocity) <= change
-
-    def _is_confirmed(self, memory: FusionMemory, sample: Aiding) -> bool:
-        """Whether the last one of its kind that was refused too says what a ``sample`` does."""
-        seldom = memory.of(SENSOR_OF[type(sample)]).apart >= _APART
-        for one in memory.refused:
-            if sample.time - one.time > (_SELDOM_APART if seldom else _APART):
-                continue
-            if isinstance(sample, PoseSample) and isinstance(one, PoseSample):
-                return self._agree(one, sample)
-            if isinstance(sample, GnssSample) and isinstance(one, GnssSample):
-                return self._agreeing(one, sample)
-            if isinstance(sample, PressureSample) and isinstance(one, PressureSample):
-                step = _SPEED_AT_START * (sample.time - one.time)
-                step += self.tuning.pressure_gate * math.sqrt(2.0 * self._pressure_variance(sample))
-                return abs(sample.altitude - one.altitude) <= step
-        return False
-
-    def _set_pressure(self, memory: FusionMemory, time: float, sample: PressureSample) -> None:
-        variance = self._pressure_variance(sample)
-        kernels.set_pressure(memory.numbers, self.law, time, sample.altitude, variance)
-
-    def _pressure_variance(self, sample: PressureSample) -> float:
-        return max(sample.variance, self.tuning.pressure_floor**2)
-
-    def _begin(
-        self,
-        memory: FusionMemory,
-        time: float,
-        state: tuple[Vec3, Vec3, Vec4],
-        p_variance: Vec3,
-        q_variance: Vec3,
-    ) -> None:
-        slow = self.tuning.velocity**2
-        variances = p_variance, (slow, slow, slow), q_variance
-        kernels.begin(memory.numbers, self.law, time, *state, *variances)
-
     def _fuse_first(self, memory: FusionMemory, now: float) -> FusionMemory:
         """Fuse the first of the waiting samples, whose time the filter has."""
         one = memory.waiting[0]
@@ -596,7 +468,7 @@ class SensorFusion:
             if drifts:
                 memory = self._with_frame(memory, sample, announced)
         previous = memory.numbers[0].copy() if announced and drifts else None
-        ratio = self._fuse[type(sample)](memory, sample)
+        ratio = self._update.fuse(memory, one)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
         return self._judged(
             memory, one, ratio, innovation, now, announced=announced, previous=previous
@@ -625,8 +497,8 @@ class SensorFusion:
         if refused and isinstance(sample, PressureSample) and not health.fused:
             # The weather is not known until the first reading.
             refused, ratio = False, (1.0,)
-            self._set_pressure(memory, one.time, sample)
-        confirmed = refused and self._is_confirmed(memory, sample)
+            self._update.take_pressure(memory, one.time, sample)
+        confirmed = refused and self._agreement.is_confirmed(memory, sample)
         latest = memory.refused
         little = isinstance(sample, PoseSample) and _is_small(innovation)
         if refused and not announced and (little or _has_jumped(memory, sample, now)):
@@ -637,7 +509,7 @@ class SensorFusion:
             latest = (*[one for one in latest if type(one) is not type(sample)], sample)
             if confirmed and little and not announced and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
-                ratio = self._fuse_pose(memory, sample)
+                ratio = self._update.fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
@@ -647,7 +519,7 @@ class SensorFusion:
             memory = memory._replace(reset_counter=counter)
         long_refused = now - min(fused) > self.tuning.reset_time
         if max(ratio) > 1.0 and confirmed and (announced or long_refused):
-            memory = self._reset(memory, one, ratio)
+            memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
                 kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
@@ -660,90 +532,8 @@ class SensorFusion:
         self, memory: FusionMemory, sample: PoseSample, announced: bool
     ) -> FusionMemory:
         """The memory after a frame that drifts has moved, to where a pose says it is."""
-        moved = memory.frame.moved(memory.numbers[0], self._stated(sample), announced)
+        moved = memory.frame.moved(memory.numbers[0], self._stated.of_pose(sample), announced)
         return memory._replace(frame=moved)
-
-    def _stated(self, sample: PoseSample) -> tuple[Vec3, Vec3]:
-        """Variances [m^2, NED] and [rad^2, FRD] that a pose states, as far as they are believed."""
-        return (
-            believable(sample.position_variance, self._least_p),
-            believable(sample.attitude_variance, self._least_q),
-        )
-
-    def _noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
-        """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""
-        if sample.drifts:
-            return memory.frame.place_noise, memory.frame.attitude_noise
-        return self._stated(sample)
-
-    def _reset(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
-        """Take what the gate refused for long as it is."""
-        x, law, sample = memory.numbers, self.law, one.sample
-        place, velocity, turn = _REST, _REST, NO_TURN
-        if isinstance(sample, PoseSample):
-            stated, about = self._noise(memory, sample)
-            if ratio[0] > 1.0:
-                place = kernels.set_place(x, law, one.time, sample.position, stated)
-            if ratio[1] > 1.0:
-                before = _attitude(x[0])
-                after = normalised(sample.attitude)
-                kernels.set_attitude(x, law, after, about)
-                turn = multiply(after, conjugate(before))
-        elif isinstance(sample, GnssSample):
-            if ratio[0] > 1.0:
-                about_place = believable(sample.position_variance, self._least_gnss[0])
-                place = kernels.set_place(x, law, one.time, sample.position, about_place)
-            if ratio[1] > 1.0:
-                about_speed = believable(sample.velocity_variance, self._least_gnss[1])
-                velocity = kernels.set_velocity(x, law, sample.velocity, about_speed)
-        else:
-            if isinstance(sample, PressureSample):  # its bias has moved, and not the vehicle
-                self._set_pressure(memory, one.time, sample)
-            return memory
-        return memory.jumped(place, velocity, turn)
-
-    def _fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
-        return kernels.fuse_pose(
-            memory.numbers,
-            self.law,
-            sample.time,
-            sample.position,
-            normalised(sample.attitude),
-            *self._noise(memory, sample),
-        )
-
-    def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
-        return kernels.fuse_gnss(
-            memory.numbers,
-            self.law,
-            sample.time - self.tuning.gnss_delay,
-            sample.position,
-            sample.velocity,
-            believable(sample.position_variance, self._least_gnss[0]),
-            believable(sample.velocity_variance, self._least_gnss[1]),
-        )
-
-    def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
-        x, variance = memory.numbers, self._pressure_variance(sample)
-        return (kernels.fuse_pressure(x, self.law, sample.time, sample.altitude, variance),)
-
-    def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
-        # Garbage is within the gate now and then.
-        believed = not any(
-            isinstance(one, MagneticSample) and sample.time - one.time < _STEADY
-            for one in memory.refused
-        )
-        x, law = memory.numbers, self.law
-        return (kernels.fuse_heading(x, law, sample.time, sample.field, believed),)
-
-    def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
-        # What is wrong in proportion stays from one reading to the next, and against a height that
-        # satellites know better the filter would explain it by a tilt.
-        variance = max(sample.variance, self.tuning.range_floor**2)
-        variance += (self.tuning.range_share * sample.distance) ** 2
-        return (
-            kernels.fuse_range(memory.numbers, self.law, sample.time, sample.distance, variance),
-        )
 
 
 def _rests(memory: FusionMemory, now: float) -> bool:
@@ -835,35 +625,11 @@ def _is_small(innovation: tuple[float, ...]) -> bool:
     return norm((x, y, z)) < _SMALL_STEP and norm((a, b, c)) < _SMALL_TURN
 
 
-def _attitude(x: Any) -> Vec4:
-    w, i, j, k = x["q"].tolist()
-    return w, i, j, k
-
-
 def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
     """Position [m, NED], velocity [m/s, NED] and turn [1] from one state to another."""
     px, py, pz = (after["p"] - before["p"]).tolist()
     vx, vy, vz = (after["v"] - before["v"]).tolist()
-    return (px, py, pz), (vx, vy, vz), multiply(_attitude(after), conjugate(_attitude(before)))
-
-
-def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:
-    """The attitude in which the accelerometer points up and the compass north.
-
-    True at rest and in unaccelerated flight; the mean of the readings kept so far.
-    """
-    first, end = int(x["first"][0]), int(x["end"][0])
-    rows = x["imu"][0][[k % IMU_CAPACITY for k in range(first, end)]]
-    down = -rows[:, 1:4].mean(axis=0)
-    down /= np.linalg.norm(down)
-    north = np.asarray(field) - down * (down @ np.asarray(field))
-    north /= np.linalg.norm(north)
-    east = np.cross(down, north)
-    c, s = math.cos(declination), math.sin(declination)
-    # Rows of the rotation from body to NED: north, east and down in body components.
-    R = (*(c * north - s * east), *(s * north + c * east), *down)
-    w, i, j, k = quaternion_from_matrix(tuple(float(r) for r in R))  # type: ignore[arg-type]
-    return w, i, j, k
+    return (px, py, pz), (vx, vy, vz), multiply(attitude(after), conjugate(attitude(before)))
 
 
 def _at_rest(t: float) -> tuple[Sample, ...]:

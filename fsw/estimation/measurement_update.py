@@ -1,0 +1,126 @@
+"""What the filter makes of a sample of each kind: fused, or taken as it is after a jump."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from fsw.estimation import kernels
+from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, Waiting
+from fsw.estimation.stated_variance import StatedVariance
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.geometry.quaternion import conjugate, multiply, normalised
+from fsw.measurements import (
+    GnssSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+)
+from fsw.signals import Vec3, Vec4
+
+_STEADY: Final = 0.5  # s without a refused reading, until a magnetometer is believed again
+_REST: Vec3 = (0.0, 0.0, 0.0)
+
+
+class MeasurementUpdate:
+    """Changes a memory's filter by samples whose time it has."""
+
+    def __init__(self, tuning: EstimatorTuning, law: Any, stated: StatedVariance) -> None:
+        self._law = law
+        self._stated = stated
+        self._gnss_delay = tuning.gnss_delay
+        self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
+            PoseSample: self.fuse_pose,
+            GnssSample: self._fuse_gnss,
+            PressureSample: self._fuse_pressure,
+            MagneticSample: self._fuse_heading,
+            RangeSample: self._fuse_range,
+        }
+
+    def fuse(self, memory: FusionMemory, one: Waiting) -> tuple[float, ...]:
+        """Fuse a sample; returns chi-square over gate of each of its parts, above 1 if refused.
+
+        Infinite where it says nothing at present.
+        """
+        return self._fuse[type(one.sample)](memory, one.sample)
+
+    def fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
+        """The same of a pose: position, attitude."""
+        return kernels.fuse_pose(
+            memory.numbers,
+            self._law,
+            sample.time,
+            sample.position,
+            normalised(sample.attitude),
+            *self.noise(memory, sample),
+        )
+
+    def noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
+        """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""
+        if sample.drifts:
+            return memory.frame.place_noise, memory.frame.attitude_noise
+        return self._stated.of_pose(sample)
+
+    def take(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
+        """The memory after parts that the gate refused for long, by ``ratio``, are as measured."""
+        x, law, sample = memory.numbers, self._law, one.sample
+        place, velocity, turn = _REST, _REST, NO_TURN
+        if isinstance(sample, PoseSample):
+            about_place, about = self.noise(memory, sample)
+            if ratio[0] > 1.0:
+                place = kernels.set_place(x, law, one.time, sample.position, about_place)
+            if ratio[1] > 1.0:
+                before = attitude(x[0])
+                after = normalised(sample.attitude)
+                kernels.set_attitude(x, law, after, about)
+                turn = multiply(after, conjugate(before))
+        elif isinstance(sample, GnssSample):
+            about_place, about_speed = self._stated.of_gnss(sample)
+            if ratio[0] > 1.0:
+                place = kernels.set_place(x, law, one.time, sample.position, about_place)
+            if ratio[1] > 1.0:
+                velocity = kernels.set_velocity(x, law, sample.velocity, about_speed)
+        else:
+            if isinstance(sample, PressureSample):
+                self.take_pressure(memory, one.time, sample)
+            return memory
+        return memory.jumped(place, velocity, turn)
+
+    def take_pressure(self, memory: FusionMemory, time: float, sample: PressureSample) -> None:
+        """Explain an altitude of ``time`` [s] by the weather: the vehicle has not moved."""
+        variance = self._stated.of_pressure(sample)
+        kernels.set_pressure(memory.numbers, self._law, time, sample.altitude, variance)
+
+    def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
+        return kernels.fuse_gnss(
+            memory.numbers,
+            self._law,
+            sample.time - self._gnss_delay,
+            sample.position,
+            sample.velocity,
+            *self._stated.of_gnss(sample),
+        )
+
+    def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
+        x, variance = memory.numbers, self._stated.of_pressure(sample)
+        return (kernels.fuse_pressure(x, self._law, sample.time, sample.altitude, variance),)
+
+    def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
+        # Garbage is within the gate now and then.
+        believed = not any(
+            isinstance(one, MagneticSample) and sample.time - one.time < _STEADY
+            for one in memory.refused
+        )
+        x, law = memory.numbers, self._law
+        return (kernels.fuse_heading(x, law, sample.time, sample.field, believed),)
+
+    def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
+        x, variance = memory.numbers, self._stated.of_range(sample)
+        return (kernels.fuse_range(x, self._law, sample.time, sample.distance, variance),)
+
+
+def attitude(x: Any) -> Vec4:
+    """The attitude [w, x, y, z] of a filter's record."""
+    w, i, j, k = x["q"].tolist()
+    return w, i, j, k
