@@ -28,14 +28,12 @@ from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, nowhere, told
 from fsw.flight.commander import Commander
-from fsw.flight.conditions import Condition
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
-from fsw.flight.failsafe import FAULTS
 from fsw.flight.jump import moved_along
 from fsw.flight.modes.mission import with_update
-from fsw.flight.modes.offboard import accept_setpoints, report
+from fsw.flight.modes.offboard import accept_setpoints
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
 from fsw.flight.quiet_ticks import QuietTicks
 from fsw.flight.reference_horizon import ReferenceHorizon
@@ -43,6 +41,7 @@ from fsw.flight.restart import restarted
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import CaughtUp, SensedState
+from fsw.flight.snapshot import snapshot_of
 from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.frozen import replace
@@ -62,7 +61,6 @@ from fsw.signals import (
     CommandAck,
     ConstraintKind,
     EndEffectorTarget,
-    FlightSnapshot,
     Mode,
     Plan,
     PlanFailure,
@@ -320,7 +318,7 @@ class Autopilot:
             damage,
             watch,
         )
-        snapshot = _snapshot(state, estimate, c.u, inputs)
+        snapshot = snapshot_of(state, estimate, c.u, inputs)
         taken = answer.tuning_taken
         return state, TickOutputs(answer.actuators, snapshot, request, answer.acks, texts, taken)
 
@@ -616,46 +614,6 @@ def _let_down(estimate: StateEstimate) -> Vec2:
     return -damping1 * rate1, -damping2 * rate2
 
 
-def _snapshot(
-    state: FlightState, estimate: StateEstimate, u: PlanInput, inputs: TickInputs
-) -> FlightSnapshot:
-    vehicle, plan, goal = state.vehicle, state.plan, state.setpoint.goal
-    lost = state.aiding.lost
-    flies = vehicle.flies and state.nominal is not None
-    return FlightSnapshot(
-        estimate.t_us,
-        vehicle.mode,
-        vehicle.armed,
-        estimate,
-        state.reference,
-        state.nominal if flies else None,
-        u if flies else None,
-        state.cascade.commanded,
-        plan.running,
-        plan.status,
-        plan.counters,
-        state.constraints,
-        _faults(vehicle.conditions),
-        vehicle.landed,
-        vehicle.home,
-        state.battery,
-        state.arming_refusal,
-        report(state, inputs.sensors.t_us),
-        vehicle.intended_mode,
-        state.mission.flight.progress,
-        vehicle.failsafe_from,
-        goal.orbit if goal is not None and vehicle.mode is Mode.ORBIT else None,
-        inputs.sensors.accel_B,
-        state.safety.counters,
-        state.estimator,
-        state.host.log_failure,
-        state.arming,
-        state.mission.safe_set,
-        state.damage.report,
-        tuple([one.sensor.value for one in lost]) if lost else (),
-    )
-
-
 def frozen_arm(
     nominal: PredictionState, u: PlanInput, estimate: StateEstimate, kinds: Vec2
 ) -> tuple[PredictionState, PlanInput]:
@@ -673,8 +631,3 @@ def frozen_arm(
         q_arm=kept(nominal.q_arm, estimate.q_arm), qd_arm=kept(nominal.qd_arm, still)
     )
     return frozen, u._replace(qdd_arm=kept(u.qdd_arm, still))
-
-
-def _faults(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
-    """The vehicle's own faults among the active conditions."""
-    return tuple([c.value for c in conditions if c in FAULTS]) if conditions else ()

@@ -25,7 +25,9 @@ def test_the_program_on_the_page_runs(vehicle: Vehicle, tmp_path: Path, code: st
     assert "127.0.0.1:14540" in code
     program = tmp_path / "program.py"
     program.write_text(code.replace("14540", str(vehicle.api_port)), encoding="utf-8")
-    reported = subprocess.run(
-        [sys.executable, str(program)], capture_output=True, text=True, timeout=120.0
-    )
+    command = [sys.executable, str(program)]
+    try:
+        reported = subprocess.run(command, capture_output=True, text=True, timeout=120.0)
+    except subprocess.TimeoutExpired:
+        pytest.fail(f"it does not end; the vehicle: {vehicle.reported.read_text()[-2000:]}")
     assert reported.returncode == 0, reported.stdout[-1000:] + reported.stderr[-1000:]

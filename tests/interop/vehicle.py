@@ -17,6 +17,9 @@ from tests.processes.both_processes import free_port
 # The client's clock is the wall's, the vehicle's is the simulator's and four times as fast. A busy
 # machine makes it slow, where real time would make it late.
 FAST = ("--lockstep", "--speed", "4")
+# By the vehicle's clock: of the client's the usual half a second would be an eighth, for which one
+# that sends setpoints 20 times a second may have to wait for the machine.
+PATIENT = {"COM_OF_LOSS_T": 5.0}
 REAL_TIME = ("--realtime",)
 START_S = 240.0  # the first start compiles
 FAREWELL_S = 20.0
@@ -36,6 +39,11 @@ class Vehicle:
         ulog = self.out / "flight.ulg"
         return ulog if ulog.exists() else self.out / "flight.tlog"
 
+    @property
+    def reported(self) -> Path:
+        """What it has reported on its console."""
+        return self.out.parent / "reported.txt"
+
 
 @contextlib.contextmanager
 def standing_vehicle(folder: Path, *pacing: str) -> Iterator[Vehicle]:
@@ -46,13 +54,16 @@ def standing_vehicle(folder: Path, *pacing: str) -> Iterator[Vehicle]:
         *pacing: Options such as ``--realtime``.
     """
     vehicle = Vehicle(free_port(), free_port(), folder / "present")
-    reported = folder / "said.txt"
+    reported, parameters = vehicle.reported, folder / "vehicle.params"
+    if pacing == FAST:
+        lines = [f"1\t1\t{name}\t{value:g}\t9\n" for name, value in PATIENT.items()]
+        parameters.write_text("# Pandion\n" + "".join(lines), encoding="ascii")
     command = [
         *(*PANDION, "fly", "ground", *pacing),
         f"--gcs=udp:127.0.0.1:{vehicle.gcs_port}",
         f"--api=udp:127.0.0.1:{vehicle.api_port}",
         f"--keys={folder / 'keys'}",
-        f"--params={folder / 'vehicle.params'}",
+        f"--params={parameters}",
         f"--out={vehicle.out}",
     ]
     with reported.open("wb") as output:
