@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from fsw.estimation import kernels
-from fsw.estimation.agreement import Agreement
+from fsw.estimation.confirmation import Confirmation
 from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import IMU_CAPACITY, Filter
 from fsw.estimation.fusion_memory import FusionMemory, Waiting
@@ -28,12 +28,12 @@ class FilterStart:
     """Begins a filter as soon as its samples allow."""
 
     def __init__(
-        self, tuning: EstimatorTuning, law: Any, stated: StatedVariance, agreement: Agreement
+        self, tuning: EstimatorTuning, law: Any, stated: StatedVariance, confirmation: Confirmation
     ) -> None:
         self._tuning = tuning
         self._law = law
         self._stated = stated
-        self._agreement = agreement
+        self._confirmation = confirmation
 
     def __call__(self, memory: FusionMemory) -> FusionMemory:
         """Start from the newest pose that another one agrees with, for a first one may be wrong.
@@ -49,7 +49,7 @@ class FilterStart:
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
-                if not self._agreement.has_second(sample, memory.waiting):
+                if not self._confirmation.has_second(sample, memory.waiting):
                     continue
                 memory = self._from_pose(memory, sample)
                 break

@@ -18,8 +18,8 @@ import numpy as np
 
 from fsw.compiled import machine_code, packed
 from fsw.estimation import attribution, kernels
-from fsw.estimation.agreement import Agreement
 from fsw.estimation.attribution import Dispute
+from fsw.estimation.confirmation import Confirmation
 from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, Array, Filter
 from fsw.estimation.filter_start import FilterStart
 from fsw.estimation.fusion_memory import (
@@ -92,8 +92,8 @@ class SensorFusion:
         self.tuning = tuning
         self.law = packed(EstimatorLaw(tuning, tuning.gates))
         self._stated = StatedVariance(tuning)
-        self._agreement = Agreement(tuning, self._stated)
-        self._start = FilterStart(tuning, self.law, self._stated, self._agreement)
+        self._confirmation = Confirmation(tuning, self._stated)
+        self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
         self._update = MeasurementUpdate(tuning, self.law, self._stated)
         x, none = at_start().numbers, (0.0, 0.0)
         asked = Asked(x, kernels.COPY, none, none)
@@ -498,7 +498,7 @@ class SensorFusion:
             # The weather is not known until the first reading.
             refused, ratio = False, (1.0,)
             self._update.take_pressure(memory, one.time, sample)
-        confirmed = refused and self._agreement.is_confirmed(memory, sample)
+        confirmed = refused and self._confirmation.is_confirmed(memory, sample)
         latest = memory.refused
         little = isinstance(sample, PoseSample) and _is_small(innovation)
         if refused and not announced and (little or _has_jumped(memory, sample, now)):

@@ -20,7 +20,7 @@ _APART: Final = 0.25  # s; readings farther apart do not confirm each other
 _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
 
 
-class Agreement:
+class Confirmation:
     """Compares samples, but for their noise and what a vehicle moves meanwhile."""
 
     def __init__(self, tuning: EstimatorTuning, stated: StatedVariance) -> None:
