@@ -80,7 +80,7 @@ def jumped(context: FailsafeContext) -> str:
 
 
 def by_mm(length: float) -> str:
-    """How far [m] beyond a limit."""
+    """How far beyond a limit: a ``length`` [m]."""
     return f" by {1e3 * length:.0f} mm"
 
 

@@ -24,7 +24,9 @@ from fsw.control.actuator_watch import Watch, at_start, blank, watch
 from fsw.control.cascade import Cascade, CascadeMemory, close_loops
 from fsw.control.joints import JointMemory
 from fsw.control.tracking import Observed
-from fsw.estimation.frame_trust import WINDOW_FRAMES, FrameTrust, Window, is_calm, looked_at
+from fsw.estimation.frame_checks import looked_at
+from fsw.estimation.frame_trust import FrameTrust
+from fsw.estimation.pose_imu_agreement import WINDOW_FRAMES, Window, is_calm
 from fsw.flight.active_failsafes import all_is_well
 from fsw.flight.failsafe import SLOW_US
 from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
@@ -59,7 +61,7 @@ QUIET: Final = np.dtype(
         # The estimate, beside what the frame holds.
         ("R", _FLOAT, (9,)),
         ("yaw", _FLOAT),  # rad
-        # The running window of frame_trust.
+        # The running window of pose_imu_agreement.
         ("frames", _FLOAT),
         ("turn", _FLOAT, (3,)),  # rad
         ("speed", _FLOAT, (3,)),  # m/s
