@@ -33,6 +33,9 @@ PASSED, NOT_PASSED = 0, 1  # exit codes
 _GLANCE_S: Final = 5.0
 _SETTLED_S: Final = 120.0  # from here on nothing may grow
 _LEAST_GLANCES: Final = 24  # two minutes, to say anything
+# Of the time, that a process must have lived for its memory to be judged: what one takes once in
+# some minutes is not what it takes in an hour. A planner that nothing happens to lives for half.
+_LEAST_LIFE: Final = 0.25
 _MOST_GROWTH_MB_H: Final = 10.0
 _MOST_FLIGHTS: Final = 3  # an hour: what is injected should not end them
 _MOST_GROUNDED: Final = 0.5  # of the time; a soak of a vehicle that stands says little
@@ -179,7 +182,7 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
     growth: defaultdict[str, float] = defaultdict(float)
     for one in flights:
         for name, glances in one.glances.items():
-            for what, value in grown(glances).items():
+            for what, value in grown(glances, _LEAST_LIFE * one.flown_s).items():
                 kind = f"{name.split()[0]}: {what}"
                 growth[kind] = max(growth[kind], value)
     flown_s = max(sum(one.flown_s for one in flights), 1.0)
@@ -199,7 +202,7 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
         Requirement("share of the time on the ground", 1.0 - aloft_s / flown_s, _MOST_GROUNDED, ""),
     ]
     # What did not live for long enough is not judged, and says nothing.
-    unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "sitl"))
+    unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "planner", "sitl"))
     rows.append(Requirement("processes that were not seen for long enough", unjudged, 0, ""))
     for name, value in sorted(growth.items()):
         most, unit = (_MOST_GROWTH_MB_H, "MB/h") if name.endswith("memory") else (0, "")
@@ -219,19 +222,24 @@ def stood_still(flights: list[Soaked]) -> str:
     )
 
 
-def grown(glances: list[Glance]) -> dict[str, float]:
-    """By what a process has grown since it had settled: memory [MB/h] by a line through it."""
+def grown(glances: list[Glance], least_s: float = 0.0) -> dict[str, float]:
+    """By what a process has grown since it had settled: memory [MB/h] by a line through it.
+
+    Memory is left out of a process that was seen for less than ``least_s`` [s].
+    """
     settled = [one for one in glances if one.at_s >= glances[0].at_s + _SETTLED_S]
     if len(settled) < _LEAST_GLANCES:
         return {}
     quarter = max(len(settled) // 4, 1)
     first, last = settled[:quarter], settled[-quarter:]
-    slope = np.polyfit([one.at_s for one in settled], [one.resident_mb for one in settled], 1)[0]
-    return {
-        "memory": 3600.0 * float(slope),
+    found: dict[str, float] = {
         "handles": max(one.handles for one in last) - max(one.handles for one in first),
         "threads": max(one.threads for one in last) - max(one.threads for one in first),
     }
+    if glances[-1].at_s - glances[0].at_s < least_s:
+        return found
+    slope = np.polyfit([one.at_s for one in settled], [one.resident_mb for one in settled], 1)[0]
+    return found | {"memory": 3600.0 * float(slope)}
 
 
 def recorded(tlog: Path) -> tuple[int, int]:
@@ -248,13 +256,20 @@ def recorded(tlog: Path) -> tuple[int, int]:
 
 def _glance(process: int, at_s: float) -> tuple[str, Glance]:
     home = Path(f"/proc/{process}")
-    words = (home / "cmdline").read_bytes().split(b"\0")
-    name = next((w.decode() for w in words if w in (b"fsw", b"sitl")), "other")
     lines = (line.split(":", 1) for line in (home / "status").read_text().splitlines())
     status = {one[0]: one[1] for one in lines if len(one) == 2}
+    name = _half(process)
+    if name == "fsw" and _half(int(status["PPid"])) == "fsw":
+        name = "planner"  # or what it is forked from
     resident = int(status["VmRSS"].split()[0]) / 1024.0
     handles = len(list((home / "fd").iterdir()))
     return name, Glance(round(at_s, 1), round(resident, 2), handles, int(status["Threads"]))
+
+
+def _half(process: int) -> str:
+    """Which of the two programs a process belongs to, by its command line."""
+    words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+    return next((word.decode() for word in words if word in (b"fsw", b"sitl")), "other")
 
 
 def _ended(flown: Flown) -> str:

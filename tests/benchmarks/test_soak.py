@@ -21,7 +21,7 @@ FINE = Soaked(
     dropped=0,
     read=1,
     written=1,
-    glances={"fsw 1": STEADY, "sitl 2": STEADY},
+    glances={"fsw 1": STEADY, "planner 3": STEADY, "sitl 2": STEADY},
     ended="flew 500 s",
     flown_s=500.0,
 )
@@ -41,6 +41,22 @@ def test_a_leak_of_memory_and_of_handles_is_seen() -> None:
     assert grown(leaks)["handles"] >= 2
 
 
+def test_what_a_short_life_takes_once_is_no_growth_of_an_hour_and_handles_count_at_any_age() -> (
+    None
+):
+    once = [one._replace(resident_mb=100.0 + (one.at_s > 200.0), handles=8) for one in STEADY]
+    opens = [one._replace(handles=8 + (one.at_s > 300.0)) for one in once]
+    assert grown(once)["memory"] > 5.0
+    assert grown(opens, 600.0) == {"handles": 1, "threads": 0}
+    leaks = [one._replace(resident_mb=100.0 + 0.01 * one.at_s) for one in STEADY]
+    flown = replace(FINE, glances=FINE.glances | {"planner 4": leaks[:60]})
+    assert all(
+        row.passed for row in judge([replace(flown, flown_s=3600.0)]) if "growth" in row.name
+    )
+    flown = replace(FINE, glances=FINE.glances | {"planner 4": leaks})
+    assert "planner: memory, growth" in [row.name for row in judge([flown]) if not row.passed]
+
+
 @pytest.mark.parametrize(
     ("flown", "fails"),
     [
@@ -57,15 +73,15 @@ def test_a_leak_of_memory_and_of_handles_is_seen() -> None:
         (
             replace(
                 FINE,
-                glances={
-                    "fsw 1": STEADY,
+                glances=FINE.glances
+                | {
                     "sitl 2": [g._replace(threads=int(g.at_s)) for g in STEADY],
                 },
             ),
             {"sitl: threads, growth"},
         ),
         (
-            replace(FINE, glances={"fsw 1": STEADY, "sitl 2": STEADY[:30]}),
+            replace(FINE, glances=FINE.glances | {"sitl 2": STEADY[:30]}),
             {"processes that were not seen for long enough"},
         ),
     ],

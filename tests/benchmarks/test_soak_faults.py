@@ -18,5 +18,10 @@ def test_an_hour_has_each_fault_and_the_simulator_takes_it() -> None:
     assert max(stopped) <= 0.5, "there is no answer meanwhile"
 
 
+def test_a_planner_lives_for_the_second_half() -> None:
+    flown = parse_scenario(scenario(3, 3600.0), "failing", "mocap").faults
+    assert 1400.0 < max(fault.start_s for fault in flown if fault.unit == "planner") < 1800.0
+
+
 def test_a_seed_gives_the_same_faults_and_another_one_others() -> None:
     assert scenario(3, 600.0) == scenario(3, 600.0) != scenario(4, 600.0)
