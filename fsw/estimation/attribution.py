@@ -5,6 +5,9 @@ by a constant and poses that run away look alike. After a while the filter shows
 make both agree: other biases. A third witness says whether the unit's readings have changed by
 them. Of the gyro it is how quickly its readings changed: no vehicle begins to turn within 2 ms. Of
 the accelerometer it is the rotors' model: thrust over mass is what a multirotor feels.
+
+A step of the gyro opens a dispute before anything contradicts: the filter takes it for a bias that
+may have moved (``error_state.advance``), and what is measured then need not be refused.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import math
 from typing import Any, Final, NamedTuple
 
 from fsw.estimation.error_state import BA, BG, FORCE, IMU_CAPACITY, LOST, NO_FORCE
+from fsw.estimation.imu import STEPS_APART
 from fsw.estimation.sensor_fault import Sensor
 from fsw.geometry.vectors import add_scaled, dot, norm, subtract
 from fsw.signals import Vec3
@@ -53,7 +57,7 @@ class Dispute(NamedTuple):
 
     since: float  # s, of the tick in which the first of them was refused
     last: float  # s, the same of the last one
-    refused: int  # how many were
+    refused: int  # how many were; none yet where a step of the gyro has opened it
     turned: bool  # whether the attitude of the first one contradicted
     before: Biases  # when it began
     witness: Witness | None = None  # not asked yet
@@ -79,7 +83,22 @@ def contradicted(dispute: Dispute | None, now: float, x: Any, *, turned: bool) -
     """
     if dispute is None:
         return Dispute(now, now, 1, turned, biases(x))
+    if dispute.refused == 0:
+        return dispute._replace(since=now, last=now, refused=1, turned=turned, witness=None)
     return dispute._replace(last=now, refused=dispute.refused + 1)
+
+
+def stepped(dispute: Dispute | None, x: Any) -> Dispute:
+    """The ``dispute`` after the newest step of the gyro, of a filter's record ``x`` [SI].
+
+    Steps that follow each other are one. Where poses contradict already, it is theirs.
+    """
+    at = float(x["stepped"])
+    if dispute is not None and (dispute.refused or at <= dispute.last):
+        return dispute
+    if dispute is None or at - dispute.last > STEPS_APART:
+        return Dispute(at, at, 0, True, biases(x), witness(x, at))
+    return dispute._replace(last=at, witness=witness(x, at))
 
 
 def biases(x: Any) -> Biases:

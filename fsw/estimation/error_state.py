@@ -69,9 +69,11 @@ FILTER: Final = np.dtype(
         ("calm", np.int64, (2,)),  # how many in a row were believed
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
         # Of the gyro (imu.note_step): how much it usually changes from one reading to the next
-        # [rad/s], and by how much it stepped lately [rad/s, FRD], up to a time [s].
+        # [rad/s], and by how much it stepped lately [rad/s, FRD], of which the largest step is so
+        # large [rad/s], up to a time [s].
         ("shaken", float),
         ("step", float, (3,)),
+        ("largest_step", float),
         ("stepped", float),
         # Of a gyro that has jumped (claim.py): time [s], what it said and what was flown [rad/s,
         # FRD], and where and when the comparison begins, with an attitude and with a field.
@@ -343,8 +345,26 @@ def advance(x: Any, law: Any, until: float) -> None:
         row = x.imu[x.first % IMU_CAPACITY]
         if row[TIME] > until and x.end - x.first < IMU_CAPACITY - 2:
             return
+        before = x.time
         step_to(x, law, row, x.imu[(x.first - 1) % IMU_CAPACITY], x.covariance)
         x.first += 1
+        if before < x.stepped <= x.time and not int(row[LOST]) & NO_RATE:
+            _doubt_gyro_bias(x)
+
+
+@compilable
+def _doubt_gyro_bias(x: Any) -> None:
+    """Know the gyro's bias less by how the gyro has stepped, and in that direction alone.
+
+    Either something has hit the vehicle, or the gyro is off by that from now on: the next
+    measurements tell. With a bias that cannot have moved they would be refused. Many small steps in
+    a row are how the vehicle turns: in sum they count no more than the largest.
+    """
+    size = math.sqrt(x.step[0] * x.step[0] + x.step[1] * x.step[1] + x.step[2] * x.step[2])
+    share = min(1.0, x.largest_step / max(size, 1e-9))
+    for i in range(3):
+        for j in range(3):
+            x.covariance[BG + i, BG + j] += share * share * x.step[i] * x.step[j]
 
 
 @compilable

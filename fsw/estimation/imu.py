@@ -119,6 +119,7 @@ def note_step(x: Any, time: float, w: Vec3) -> None:
     x.step[0] = kept * x.step[0] + a
     x.step[1] = kept * x.step[1] + b
     x.step[2] = kept * x.step[2] + c
+    x.largest_step = max(kept * x.largest_step, change)
     x.stepped = time
 
 

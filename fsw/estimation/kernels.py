@@ -203,7 +203,7 @@ def _copy_halves(a: Any, b: Any) -> None:
     for i in range(2):
         b.same[i], b.steady[i] = a.same[i], a.steady[i]
         b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
-    b.shaken, b.stepped = a.shaken, a.stepped
+    b.shaken, b.stepped, b.largest_step = a.shaken, a.stepped, a.largest_step
     for i in range(3):
         b.step[i] = a.step[i]
     if a.doubted[1] > 0:

@@ -213,6 +213,9 @@ class SensorFusion:
         for sample in samples:
             if not isinstance(sample, _OF_EVERY_TICK):
                 memory = self.take(memory, sample, now)
+        if memory.started and now - memory.numbers[0]["stepped"] < _LATELY:
+            dispute = attribution.stepped(memory.dispute, memory.numbers[0])
+            memory = memory._replace(dispute=dispute)
         if estimate is not None and _rests(memory, now):
             return memory, estimate
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))
@@ -575,9 +578,13 @@ def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) ->
         seen = dispute.witness or attribution.witness(x, now)
         seen = attribution.felt(seen, x, dispute.before, model)
         dispute = dispute._replace(witness=seen)
-        if not dispute.is_due(now):
+        due = dispute.is_due(now)
+        if not (due or dispute.refused == 0):
             return memory._replace(dispute=dispute)
-        dispute = dispute._replace(wrong=attribution.wrong(dispute, attribution.biases(x)))
+        found = attribution.wrong(dispute, attribution.biases(x))
+        if found is not Sensor.IMU and (dispute.refused == 0 or not due):
+            return memory._replace(dispute=dispute)
+        dispute = dispute._replace(wrong=found)
     elif now != dispute.last:
         return memory
     return _blamed(memory._replace(dispute=dispute), now)

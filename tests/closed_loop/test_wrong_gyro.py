@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from fsw.geometry.rotation import matrix_from_quaternion
 from fsw.measurements import ImuSample
 from fsw.signals import Mode
 from sitl.scenario_file import load_scenario
@@ -55,6 +56,37 @@ def test_a_gyro_that_is_off_for_good_is_named_and_the_vehicle_holds(
     assert estimate.R_WB[8] > 0.98, "level to 11 deg"
     assert abs(estimate.p_WB[0] - truth.p_WB[0]) < 0.05
     assert min(truth.margins_m) > 0.0
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("suite", "axis", "size"),
+    [
+        ("rtk", 1, 0.9),
+        *(pytest.param("rtk", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.5, 0.2)),
+        *(pytest.param("gnss", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.5, 0.2)),
+        *(pytest.param("vio", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.2)),
+    ],
+)
+def test_a_gyro_that_is_off_by_less_is_named_and_its_bias_found_in_flight(
+    suite: str, axis: int, size: float
+) -> None:
+    """On satellites alone each of these flights ended on the ground within 4 s."""
+    at = 3.0 if suite == "gnss" else AT
+    spoil = changed(ImuSample, at, 99.0, off_by(axis, size))
+    free = replace(hover(), sensors=load_scenario("walls", suite).sensors, duration_s=60.0)
+    flight = Flight(free, spoil_samples=spoil)
+    flight.step(command(ARM, 1.0))
+    flight.run(at + 1.2)
+    assert "IMU does not agree with the other sensors" in flight.texts
+    flight.run(4.0)
+    estimate, fusion = flight.snapshot.estimate, flight.state.fusion
+    assert fusion is not None
+    truth = flight.sim.truth()
+    assert fusion.numbers["gyro_bias"][0][axis] == pytest.approx(size, abs=0.05)
+    R = matrix_from_quaternion(truth.q_WB)
+    assert max(abs(a - b) for a, b in zip(estimate.R_WB, R, strict=True)) < 0.15
+    assert flight.sim.ended is None
 
 
 @pytest.mark.requirement("REQ-EST-7")

@@ -161,6 +161,20 @@ def test_a_step_of_the_gyro_is_noted_and_one_that_comes_back_is_none(
     np.testing.assert_allclose(unit.x.step, -off, atol=0.06)
 
 
+def test_the_largest_of_steps_that_follow_each_other_is_kept_with_their_sum() -> None:
+    unit = Unit()
+    for k in range(1, 9):
+        unit.read(rate=(0.1 * k, 0.0, 0.0))
+    np.testing.assert_allclose(unit.x.step, (0.8, 0.0, 0.0), atol=0.05)
+    assert unit.x.largest_step == pytest.approx(0.1, abs=0.05)
+    unit.read(rate=(0.5, 0.0, 0.0))
+    assert unit.x.largest_step == pytest.approx(0.3, abs=0.05)
+    for _ in range(round(STEPS_APART / TICK) + 1):
+        unit.read(rate=(0.5, 0.0, 0.01 * unit.random.standard_normal()))
+    unit.read(rate=(0.4, 0.0, 0.0))
+    assert unit.x.largest_step == pytest.approx(0.1, abs=0.05), "another one"
+
+
 def test_a_body_that_turns_as_hard_as_rotors_can_makes_no_step() -> None:
     unit, rate = Unit(), np.zeros(3)
     for k in range(300):
