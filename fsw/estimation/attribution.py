@@ -53,9 +53,9 @@ class Witness(NamedTuple):
 
 
 class Dispute(NamedTuple):
-    """Poses that contradict the inertial unit by little."""
+    """Poses that contradict the inertial unit by little, or a gyro that has stepped."""
 
-    since: float  # s, of the tick in which the first of them was refused
+    since: float  # s, of the tick in which the first of them was refused, or of the step
     last: float  # s, the same of the last one
     refused: int  # how many were; none yet where a step of the gyro has opened it
     turned: bool  # whether the attitude of the first one contradicted
@@ -70,10 +70,11 @@ class Dispute(NamedTuple):
     def is_due(self, now: float) -> bool:
         """Whether it can be said at ``now`` [s] who is wrong.
 
-        A single pose that was refused moves no bias at once: the filter knows them too well.
+        After a step of the gyro at any time: its bias is free to move. A single pose that was
+        refused moves no bias at once: the filter knows them too well.
         """
         settled = self.refused > 1 and now - self.last >= _SETTLED
-        return settled or now - self.since >= _LATEST
+        return self.refused == 0 or settled or now - self.since >= _LATEST
 
 
 def contradicted(dispute: Dispute | None, now: float, x: Any, *, turned: bool) -> Dispute:

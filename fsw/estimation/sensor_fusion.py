@@ -578,12 +578,11 @@ def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) ->
         seen = dispute.witness or attribution.witness(x, now)
         seen = attribution.felt(seen, x, dispute.before, model)
         dispute = dispute._replace(witness=seen)
-        due = dispute.is_due(now)
-        if not (due or dispute.refused == 0):
+        if not dispute.is_due(now):
             return memory._replace(dispute=dispute)
         found = attribution.wrong(dispute, attribution.biases(x))
-        if found is not Sensor.IMU and (dispute.refused == 0 or not due):
-            return memory._replace(dispute=dispute)
+        if found is Sensor.POSE and dispute.refused == 0:
+            return memory._replace(dispute=dispute)  # no pose has contradicted
         dispute = dispute._replace(wrong=found)
     elif now != dispute.last:
         return memory
