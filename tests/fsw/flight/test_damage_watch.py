@@ -301,6 +301,9 @@ def test_a_joint_that_hangs_loose_and_stands_still_may_be_one_that_is_not_seen(
     memory, loops = at_start(), in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
     memory["joint"], memory["joint_for"] = (SOUND, kind), 0.1
     now = estimate(5.0, (0.0, 0.0, 0.0), 9.81)
+    soon, _ = WATCHER.see(Damage(), memory, loops, loops, now, 1, angles_repeat=True)
+    assert bool(soon.joint) is not doubted, "stuck encoders are given time to show"
+    memory["joint_for"] = 0.5
     for repeat in (True, False):
         damage, _ = WATCHER.see(Damage(), memory, loops, loops, now, 1, angles_repeat=repeat)
         assert damage.joint.startswith("joint 2 ")
