@@ -177,7 +177,8 @@ FAILSAFES: Final = (
         of_vehicle=True,
         slow=True,
         detected="in flight, for 0.1 s, torque has no effect on a joint that does not follow its "
-        "reference: 0.12 N m, and half of what is asked for",
+        "reference: 0.12 N m, and half of what is asked for; 0.4 s while both encoders repeat "
+        "themselves, which may be stuck",
         within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
         ends="never in a flight",

@@ -71,7 +71,6 @@ def test_a_gyro_that_is_off_for_good_is_named_and_the_vehicle_holds(
 def test_a_gyro_that_is_off_by_less_is_named_and_its_bias_found_in_flight(
     suite: str, axis: int, size: float
 ) -> None:
-    """On satellites alone each of these flights ended on the ground within 4 s."""
     at = 3.0 if suite == "gnss" else AT
     spoil = changed(ImuSample, at, 99.0, off_by(axis, size))
     free = replace(hover(), sensors=load_scenario("walls", suite).sensors, duration_s=60.0)
