@@ -651,6 +651,7 @@ class SafetyCounters:
     departures: int = 0  # from the tube around the plan
     breaches: int = 0  # of the safe set
     interventions: int = 0  # of the safety filter
+    refusals: int = 0  # of what was announced, streamed or uploaded, each message counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -888,6 +889,7 @@ class TickInputs:
     host: HostHealth | None = None  # where it differs from the last one
     # By how much the sensors' clock has jumped. The times in here are the vehicle's: none has.
     sensor_clock_jump_us: int = 0
+    refused: tuple[str, ...] = ()  # what a link refused since the last tick, and why
 
 
 @dataclass(frozen=True, slots=True)

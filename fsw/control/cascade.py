@@ -136,6 +136,7 @@ class KeepClear:
     body: Body
     barriers: tuple[BarrierTuning, BarrierTuning] = (BarrierTuning(), BarrierTuning())
     tuning: FilterTuning = field(default_factory=FilterTuning)
+    speed: float = math.inf  # m/s, up to which it pushes
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +180,7 @@ class Cascade:
                 airframe.link_length,
                 gains.k[3] / gains.k[2],
                 tuning.tracking.acceleration_limit,
+                clear.speed,
             ),
             rotor_decay(airframe, dt),
             dt,

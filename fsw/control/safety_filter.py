@@ -20,6 +20,9 @@ it on, and the arm compensates by itself.
 The zones are those that are kept: clearances have grown by what the estimate is not sure of. The
 margin is that of the safe set in force.
 
+It has a room and a speed. From a zone deeper than ``ROOM`` no way leads out that is known to be
+right: it pushes nobody. And nothing is pushed faster than the law's ``speed``.
+
 The planner's own bound is :math:`h \ge \lambda`; this law has none, so in flights that go as
 planned it changes no bit. Its command can be no more than the loops stand.
 """
@@ -50,6 +53,7 @@ from fsw.shapes.zones import (
 )
 from fsw.signals import StateEstimate, Vec2, Vec3
 
+ROOM = 1.0  # m, that a vehicle may be outside of a zone and still draws back from it
 _PASSES = 4  # over all zones
 
 
@@ -76,6 +80,7 @@ class FilterLaw:
     links: Vec2  # m
     lag: float  # s, tau
     level: float  # m/s^2, at most, an axis
+    speed: float  # m/s, at most, along a zone's normal
 
 
 def filter_law(
@@ -84,8 +89,12 @@ def filter_law(
     links: Vec2,
     lag: float,
     level: float,
+    speed: float = math.inf,
 ) -> FilterLaw:
-    """The law for ``links`` [m], a loop that takes ``lag`` [s] and stands ``level`` [m/s^2]."""
+    """The law for ``links`` [m], a loop that takes ``lag`` [s] and stands ``level`` [m/s^2].
+
+    It pushes up to a ``speed`` [m/s].
+    """
     kept, following = barriers
     return FilterLaw(
         tuning=tuning,
@@ -94,6 +103,7 @@ def filter_law(
         links=links,
         lag=lag,
         level=level,
+        speed=speed,
     )
 
 
@@ -170,8 +180,9 @@ def _kept_off(
         if not follows:
             distance -= probes[j, RADIUS]
         margin = min(margin, distance + zones[zone, ADDED])
-        if probes[j, ON] == ON_BASE:
-            lacking = _needed(law, follows, distance, dot(n, relative), dot(n, a)) - dot(n, wanted)
+        if probes[j, ON] == ON_BASE and distance + zones[zone, ADDED] > -ROOM:
+            needed = _needed(law, follows, distance, dot(n, relative), dot(n, a))
+            lacking = min(needed, _fastest(law, dot(n, v), dot(n, a))) - dot(n, wanted)
             if lacking > 0.0:
                 wanted, lacked = _within(law, add_scaled(wanted, n, lacking)), True
     return wanted, lacked, margin
@@ -185,6 +196,12 @@ def _within(law: FilterLaw, a: Vec3) -> Vec3:
         clamp(a[1], -level, level),
         clamp(a[2], -vertical, vertical),
     )
+
+
+@compilable
+def _fastest(law: FilterLaw, speed: float, along: float) -> float:
+    """The acceleration [m/s^2] that brings a speed [m/s] to the most, ``along`` [m/s^2] now."""
+    return law.tuning.gamma * (law.speed - speed - law.lag * along)
 
 
 @compilable

@@ -27,6 +27,7 @@ from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, nowhere, told
+from fsw.flight.bounds import bounded_update, target_problem
 from fsw.flight.commander import Commander
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
@@ -44,6 +45,7 @@ from fsw.flight.sensed_state import CaughtUp, SensedState
 from fsw.flight.snapshot import snapshot_of
 from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
+from fsw.flight.zone_room import ZoneRoom
 from fsw.frozen import replace
 from fsw.model.actuator_health import SOUND
 from fsw.model.battery import Levels, corrected, drained
@@ -69,6 +71,7 @@ from fsw.signals import (
     PredictionState,
     SafeSet,
     SensorFrame,
+    Severity,
     StateEstimate,
     StatusText,
     TickInputs,
@@ -142,6 +145,7 @@ class Autopilot:
             + config.plan_delay_ticks * tick
             + self._cascade.law.filter.lag,
         )
+        self._room = ZoneRoom(config)
         self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
         self._tick_us = config.tick_period_us
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
@@ -373,20 +377,8 @@ class Autopilot:
     ) -> FlightState:
         """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
         now_us = inputs.sensors.t_us
-        if inputs.targets or inputs.announced or inputs.mission is not None:
-            stream = merge(state.mission.stream, inputs.targets, now_us)
-            mission = self._safe_sets.update(
-                replace(state.mission, stream=stream),
-                inputs,
-                state.estimate,
-                texts,
-                flies=state.vehicle.flies,
-            )
-            state = replace(state, mission=mission)
-            if mission.safe_set is not state.kept.source:
-                state = replace(state, kept=state.kept.of(mission.safe_set))
-            if inputs.mission is not None:
-                state = with_update(state, inputs.mission, self.config, now_us)
+        if inputs.targets or inputs.announced or inputs.mission is not None or inputs.refused:
+            state = self._believe(state, inputs, texts)
         if inputs.battery is not None:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
@@ -401,6 +393,41 @@ class Autopilot:
         unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None
         if not unheard or inputs.refused_setpoints:
             state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
+        return state
+
+    def _believe(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> FlightState:
+        """Store targets, safe set and mission, as far as they are within bounds."""
+        now_us, mission = inputs.sensors.t_us, state.mission
+        update, against = bounded_update(inputs.mission)
+        problems = [(target_problem(target, now_us), target) for target in inputs.targets]
+        believed = tuple([target for problem, target in problems if problem is None])
+        against += [f"target refused: {problem}" for problem, _ in problems if problem is not None]
+        against += inputs.refused
+        texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)]
+        stream = merge(mission.stream, believed, now_us)
+        refused_count = mission.refused_count + len(against)
+        vehicle, target = state.vehicle, state.reference
+        if target is None and vehicle.flies:
+            target = self._commander.mode(state).target(state, now_us)
+        mission = self._safe_sets.update(
+            replace(mission, stream=stream, refused_count=refused_count),
+            inputs if update is inputs.mission else replace(inputs, mission=update),
+            state.estimate,
+            texts,
+            flies=vehicle.flies,
+            armed=vehicle.armed,
+            target=target,
+        )
+        if mission.refused_count != state.mission.refused_count:
+            counters = replace(state.safety.counters, refusals=mission.refused_count)
+            state = replace(state, safety=replace(state.safety, counters=counters))
+        state = replace(state, mission=mission)
+        if mission.safe_set is not state.kept.source:
+            state = replace(state, kept=state.kept.of(mission.safe_set))
+        if update is not None:
+            state = with_update(state, update, self.config, now_us)
         return state
 
     def _jumped(self, state: FlightState, now_us: int) -> bool:
@@ -467,7 +494,11 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
-        kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose)
+        safe_set, target = state.mission.safe_set, state.reference
+        kept = self._clearance.keep(state.kept.whole, safe_set, estimate, pose)
+        if state.vehicle.flies and safe_set.zones:
+            report = self._safe_sets.margins(kept, estimate, target)
+            kept = self._room.limit(kept, report, estimate, target)
         return state if kept is state.kept else replace(state, kept=kept)
 
     def _pose_error(
@@ -588,9 +619,9 @@ class Autopilot:
             return NO_ZONES
         known, known_target, zones = self._zones
         if kept is not known or target is not known_target:
-            same = kept.safe_set is known.safe_set and kept.added == known.added
+            same = kept.safe_set is known.safe_set and kept.beyond == known.beyond
             if not same or kept.safe_set.kind is ConstraintKind.WORKSPACE:
-                zones = moving_zones(kept.safe_set, target, kept.added)
+                zones = moving_zones(kept.safe_set, target, kept.beyond)
             self._zones = (kept, target, zones)
         return zones
 
@@ -605,6 +636,7 @@ def keep_clear(config: FlightConfig) -> KeepClear:
         body_of(config.planner.body, config.airframe),
         config.planner.tunings,
         replace(config.safety_filter, enabled=int(enabled)),
+        config.steering.speed,
     )
 
 

@@ -56,6 +56,7 @@ class Condition(Enum):
     PLANNER_LOST = "planner lost"
     BREACH = "outside the safe set"
     FENCE_BREACH = "outside the fence"
+    FAR_OUTSIDE = "too far outside to draw back"
     ROTOR_LOST = "rotor lost"
     ROTOR_FAILED = "rotor failed"
     JOINT_FAILED = "joint failed"

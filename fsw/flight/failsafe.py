@@ -18,6 +18,7 @@ from fsw.flight import failsafe_evidence as evidence
 from fsw.flight import failsafe_wording as wording
 from fsw.flight.conditions import Action, Condition
 from fsw.flight.failsafe_evidence import FailsafeContext
+from fsw.flight.zone_room import is_deep
 from fsw.signals import Charge, Severity
 
 AT_ONCE_US: Final = 2_000  # a tick
@@ -137,6 +138,20 @@ FAILSAFES: Final = (
         within_us=_SLOWLY,
         parameters=("GF_ACTION",),
         ends="every such margin has been above 10 mm for 0.5 s",
+    ),
+    Failsafe(
+        Condition.FAR_OUTSIDE,
+        lambda c: is_deep(c.state.constraints) and c.state.vehicle.flies,
+        actions.on_far_outside,
+        Severity.CRITICAL,
+        of_vehicle=True,
+        slow=True,
+        delayed=True,
+        detected="in flight, a margin to a zone or the fence is below -1 m",
+        within_us=_TWICE,
+        parameters=("SAFE_BREACH_ACT", "COM_FAIL_ACT_T"),
+        does="hold, then land; only warn where `SAFE_BREACH_ACT` is 1. Nothing pushes the vehicle "
+        "towards a boundary that is so far away",
     ),
     Failsafe(
         Condition.ROTOR_LOST,

@@ -68,6 +68,12 @@ def on_breach(context: FailsafeContext, number: int) -> Action:
     return by_number(number)
 
 
+def on_far_outside(context: FailsafeContext) -> Action:
+    """Land, where a breach is to be acted on at all."""
+    acted_on = on_breach(context, context.limits.breach_action).mode is not None
+    return Action.LAND if acted_on else Action.WARN
+
+
 def on_tilt_lost(context: FailsafeContext) -> Action:
     """Terminate, unless CBRK_FLIGHTTERM is set."""
     broken = context.limits.termination_breaker == BREAKER

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fsw.flight.bounds import MAX_RATE
+from fsw.flight.bounds import motion_refusal as motion_refusal
 from fsw.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, Airframe
-from fsw.signals import MAX_DISTANCE, AttitudeSetpoint, MotionSetpoint, Vec2, Vec3
-
-_MAX_SPEED = 20.0  # m/s; faster is a slip of the unit
-_MAX_ACCELERATION = 20.0  # m/s^2
-_MAX_RATE = 10.0  # rad/s
-_MAX_YAW = 4.0 * math.pi  # rad
+from fsw.signals import AttitudeSetpoint, MotionSetpoint, Vec2, Vec3
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,29 +22,13 @@ class Tilt:
     yaw: float = 0.0  # rad
 
 
-def motion_refusal(setpoint: MotionSetpoint) -> str | None:
-    """Why a motion setpoint is out of range."""
-    for vector, most, what in (
-        (setpoint.p, MAX_DISTANCE, "position"),
-        (setpoint.v, _MAX_SPEED, "velocity"),
-        (setpoint.a, _MAX_ACCELERATION, "acceleration"),
-    ):
-        if vector is not None and not math.hypot(*vector) <= most:
-            return f"{what} out of range"
-    if setpoint.yaw is not None and not abs(setpoint.yaw) <= _MAX_YAW:
-        return "yaw out of range"
-    if setpoint.yaw_rate is not None and not abs(setpoint.yaw_rate) <= _MAX_RATE:
-        return "yaw rate out of range"
-    return None
-
-
 def attitude_refusal(setpoint: AttitudeSetpoint) -> str | None:
     """Why an attitude is out of range."""
     if not 0.0 <= setpoint.thrust <= 1.0:
         return "thrust out of range"
     if setpoint.q_WB is not None and not abs(math.hypot(*setpoint.q_WB) - 1.0) < 0.01:
         return "the quaternion is not of length 1"
-    if setpoint.w_WB_B is not None and not math.hypot(*setpoint.w_WB_B) <= _MAX_RATE:
+    if setpoint.w_WB_B is not None and not math.hypot(*setpoint.w_WB_B) <= MAX_RATE:
         return "body rates out of range"
     return None
 

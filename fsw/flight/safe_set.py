@@ -3,14 +3,19 @@
 One source owns what is announced, the first or the configured one, and one the fence. In flight any
 source may shrink either, and only its owner may grow it (``safe_set_change.growth``); every change
 and every refusal is a text that says who and what. On the ground another source may become the
-owner once the old one has been silent for a while, or the vehicle has disarmed. A moving zone that
+owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
+nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the
+way in which it could stop, outside. A moving zone that
 is not announced any more is not predicted for ever: it is held where it is after a time-out.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from fsw.barriers.margins import Margins
-from fsw.flight.safe_set_change import growth, is_moving, is_update, summary
+from fsw.flight.bounds import safe_set_problem
+from fsw.flight.safe_set_change import growth, held, is_moving, is_update, is_update_of, summary
 from fsw.flight.safety_watch import least
 from fsw.flight.state import MissionMemory
 from fsw.flight.uncertain_clearance import KeptSet
@@ -30,14 +35,19 @@ from fsw.signals import (
     SafeSet,
     SafeSetAnnouncement,
     Severity,
-    Shape,
     StateEstimate,
     StatusText,
     TickInputs,
-    Zone,
 )
 
 _ACCEPTED = 8  # sources whose last announcement is remembered
+
+
+class _Vehicle(NamedTuple):
+    """The vehicle that must be inside what is announced."""
+
+    estimate: StateEstimate | None  # None: it stands disarmed, and need not be
+    target: EndEffectorTarget | None  # that zones follow
 
 
 class SafeSetCheck:
@@ -64,27 +74,42 @@ class SafeSetCheck:
         texts: list[StatusText],
         *,
         flies: bool,
+        armed: bool | None = None,
+        target: EndEffectorTarget | None = None,
     ) -> MissionMemory:
-        """Take in what was uploaded and announced; in flight only what can be kept."""
+        """Take in what was uploaded and announced; in flight only what can be kept.
+
+        A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
+        that follow the ``target`` if there is one.
+        """
+        here = _Vehicle(estimate if (flies if armed is None else armed) else None, target)
         update = inputs.mission
         if update is not None:
             if update.rally is not None:
                 mission = replace(mission, rally=update.rally)
             if update.fence is not None:
-                mission = self._take_fence(mission, update, texts, flies=flies)
-        for announcement in inputs.announced:
+                mission = self._take_fence(mission, update, here, texts, flies=flies)
+        for heard in inputs.announced:
             now_us = inputs.sensors.t_us
-            owns = self._owns(mission, announcement.source, now_us, flies=flies)
-            if owns and now_us != mission.owner_heard_us:
-                mission = replace(mission, owner_heard_us=now_us)
-            against = "" if owns else self._against(mission, announcement.safe_set, estimate, flies)
-            mission = self._take(mission, announcement, against, texts, owns=owns, flies=flies)
+            announcement = heard
+            owns = self._owns(mission, heard.source, now_us, flies=flies)
+            problem = safe_set_problem(heard.safe_set, self._config.surroundings.zone_speed)
+            if problem is None:
+                # Judged is what will be in force, not where a stamp of another clock puts it.
+                announcement = replace(heard, safe_set=self._standing(heard.safe_set, now_us)[0])
+                if owns and now_us != mission.owner_heard_us:
+                    mission = replace(mission, owner_heard_us=now_us)
+                problem = "" if owns else self._against(mission, announcement.safe_set)
+            mission = self._take(
+                mission, announcement, problem, here, texts, owns=owns, flies=flies
+            )
         return mission
 
     def _take_fence(
         self,
         mission: MissionMemory,
         update: MissionUpdate,
+        here: _Vehicle,
         texts: list[StatusText],
         *,
         flies: bool,
@@ -92,11 +117,15 @@ class SafeSetCheck:
         """A fence that was uploaded; in flight only its owner may grow it."""
         fence, source = update.fence or SafeSet(), update.fence_source
         entitled = not flies or may_grow_fence(mission.fence_owner, source, self._chosen)
-        grown = "" if entitled else growth(mission.fence, fence)
-        if grown:
-            text = f"fence of {source} refused: {grown}, which {mission.fence_owner} owns"
+        against = safe_set_problem(fence, self._config.surroundings.zone_speed) or ""
+        if not (against or entitled):
+            grown = growth(mission.fence, fence)
+            against = f"{grown}, which {mission.fence_owner} owns" if grown else ""
+        against = against or self._outside(mission, mission.fence, fence, here)
+        if against:
+            text = f"fence of {source} refused: {against}"
             texts.append(StatusText(Severity.CRITICAL, text))
-            return mission
+            return replace(mission, refused_count=mission.refused_count + 1)
         wanted = replace(
             mission, fence=fence, fence_owner=source if entitled else mission.fence_owner
         )
@@ -110,6 +139,7 @@ class SafeSetCheck:
         mission: MissionMemory,
         announcement: SafeSetAnnouncement,
         against: str,
+        here: _Vehicle,
         texts: list[StatusText],
         *,
         owns: bool,
@@ -122,12 +152,14 @@ class SafeSetCheck:
             return mission  # in case a datagram was lost
         repeated = _is_repeated(announcement, mission.refused)
         who, safe_set = f"safe set of {source}", announcement.safe_set
+        against = against or self._outside(mission, mission.announced, safe_set, here)
+        refused = replace(mission, refused=announcement, refused_count=mission.refused_count + 1)
         if against:
             if not repeated:
                 texts.append(StatusText(Severity.CRITICAL, f"{who} refused: {against}"))
-            return replace(mission, refused=announcement)
-        if repeated and flies:
-            return mission
+            return refused
+        if announcement == mission.refused and flies:
+            return refused
         others = [one for one in mission.accepted if not one.source.is_same(source)]
         wanted = replace(
             mission,
@@ -140,27 +172,60 @@ class SafeSetCheck:
         if becomes_owner:
             change += "; it owns the safe set now"
         kept = self._kept(mission, wanted, change, texts, flies=flies)
-        return replace(mission, refused=announcement) if kept is mission else kept
+        return refused if kept is mission else kept
 
-    def _against(
-        self,
-        mission: MissionMemory,
-        safe_set: SafeSet,
-        estimate: StateEstimate | None,
-        flies: bool,
-    ) -> str:
+    def _against(self, mission: MissionMemory, safe_set: SafeSet) -> str:
         """Why a source that does not own the safe set may not change it so."""
         grown = growth(mission.announced, safe_set)
-        if grown:
-            whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
-            return f"{grown}, which {whose}"
-        if (
-            flies
-            and estimate is not None
-            and not self.least_margin(safe_set, estimate, None) >= 0.0
-        ):
-            return "the vehicle is not inside it, and another source owns the safe set"
+        if not grown:
+            return ""
+        whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
+        return f"{grown}, which {whose}"
+
+    def _outside(self, mission: MissionMemory, old: SafeSet, new: SafeSet, here: _Vehicle) -> str:
+        """Why the vehicle ``here`` cannot be in a ``new`` set that replaces an ``old`` one.
+
+        Zones in force are not asked again. One that has only moved on must leave the vehicle no
+        further outside than it is already; how it turns is what was measured of it.
+        """
+        estimate, target = here
+        if estimate is None or new == old:
+            return ""
+        inside = self._values(new, estimate, target)
+        was = self._values(old, estimate, target) if is_update(old, new) else {}
+        for number, (margin, h) in inside.items():
+            zone = new.zones[number]
+            if zone in mission.safe_set.zones:
+                continue
+            which = f"zone {number + 1} ({zone.shape.kind})"
+            moves_on = number in was and is_update_of(old.zones[number], zone)
+            if not margin >= (min(was[number][0], 0.0) if moves_on else 0.0):
+                return f"the vehicle would be {-margin:.2f} m outside {which}"
+            if not (moves_on or h >= 0.0):
+                return f"the vehicle could not stop before {which}: it is {-h:.2f} m/s too fast"
         return ""
+
+    def _values(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> dict[int, tuple[float, float]]:
+        """The least margin [m] and h [m/s] of each zone, by its number; of all that there are now.
+
+        Without a target, zones that follow it are left out.
+        """
+        numbers = [
+            number
+            for number, zone in enumerate(safe_set.zones)
+            if target is not None or not kind_of(zone.shape).follows_target
+        ]
+        asked = safe_set
+        if len(numbers) < len(safe_set.zones):
+            asked = SafeSet(tuple([safe_set.zones[number] for number in numbers]))
+        report, first, found = self._margins.report(asked, estimate, target), 0, {}
+        for number, count in zip(numbers, report.per_zone, strict=True):
+            of_zone = slice(first, first + count)
+            found[number] = least(report.margins[of_zone]), least(report.barrier[of_zone])
+            first += count
+        return found
 
     def _owns(
         self, mission: MissionMemory, source: MessageSource, now_us: int, *, flies: bool
@@ -224,23 +289,31 @@ class SafeSetCheck:
         What is predicted longer than that is a guess, and one that leaves the vehicle's way free. A
         time stamp that far ahead is of another clock: the zone stands where its numbers say.
         """
-        timeout_us = self._config.limits.zone_timeout_us
-        zones = mission.announced.zones
-        silent = [is_moving(zone) and abs(now_us - zone.t_us) >= timeout_us for zone in zones]
-        if not any(silent):
+        standing, silent = self._standing(mission.announced, now_us)
+        if not silent:
             return mission
-        held = SafeSet(
-            tuple(
-                _held(zone, timeout_us if now_us > zone.t_us else 0) if stops else zone
-                for zone, stops in zip(zones, silent, strict=True)
-            )
-        )
         return replace(
             mission,
-            announced=held,
-            safe_set=joined(held, mission.fence),
-            silent_zones=mission.silent_zones + sum(silent),
+            announced=standing,
+            safe_set=joined(standing, mission.fence),
+            silent_zones=mission.silent_zones + silent,
         )
+
+    def _standing(self, safe_set: SafeSet, now_us: int) -> tuple[SafeSet, int]:
+        """The set with the zones standing whose stamp is too far from now, and how many there are.
+
+        The same object where there is none.
+        """
+        timeout_us = self._config.limits.zone_timeout_us
+        zones = safe_set.zones
+        silent = [is_moving(zone) and abs(now_us - zone.t_us) >= timeout_us for zone in zones]
+        if not any(silent):
+            return safe_set, 0
+        stood = [
+            held(zone, timeout_us if now_us > zone.t_us else 0) if stops else zone
+            for zone, stops in zip(zones, silent, strict=True)
+        ]
+        return SafeSet(tuple(stood)), sum(silent)
 
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel of distances and margins, before anything flies."""
@@ -284,16 +357,6 @@ def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, ch
     if source is None or (owner is None and not chosen):
         return True
     return source.system == chosen if chosen else source.is_same(owner)
-
-
-def _held(zone: Zone, after_us: int) -> Zone:
-    """A moving zone, standing where it is so long after its time stamp."""
-    vx, vy, vz = zone.velocity
-    elapsed = 1e-6 * after_us
-    moved = kind_of(zone.shape).moved(
-        zone.shape.numbers, (elapsed * vx, elapsed * vy, elapsed * vz)
-    )
-    return Zone(Shape(zone.shape.kind, moved), zone.clearance, zone.keep_in)
 
 
 def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:

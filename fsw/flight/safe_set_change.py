@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+from fsw.shapes import kind_of
 from fsw.shapes.zones import surfaces
 from fsw.signals import MAX_DISTANCE, SafeSet, Shape, Vec3, Zone
 
@@ -35,10 +36,24 @@ def growth(old: SafeSet, new: SafeSet) -> str:
 def is_update(old: SafeSet, new: SafeSet) -> bool:
     """Whether only moving zones differ, and only in where they are and how fast they move."""
     return len(old.zones) == len(new.zones) and all(
-        before == after
-        or (is_moving(before) and is_moving(after) and _look(before) == _look(after))
+        before == after or is_update_of(before, after)
         for before, after in zip(old.zones, new.zones, strict=True)
     )
+
+
+def is_update_of(before: Zone, after: Zone) -> bool:
+    """Whether both are one moving zone, as far as can be seen."""
+    return is_moving(before) and is_moving(after) and _look(before) == _look(after)
+
+
+def held(zone: Zone, after_us: int) -> Zone:
+    """A moving zone, standing where it is so long after its time stamp."""
+    vx, vy, vz = zone.velocity
+    elapsed = 1e-6 * after_us
+    moved = kind_of(zone.shape).moved(
+        zone.shape.numbers, (elapsed * vx, elapsed * vy, elapsed * vz)
+    )
+    return Zone(Shape(zone.shape.kind, moved), zone.clearance, zone.keep_in)
 
 
 def summary(safe_set: SafeSet) -> str:

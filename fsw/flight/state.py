@@ -135,6 +135,7 @@ class MissionMemory:
     stream: tuple[EndEffectorTarget, ...] = ()
     safe_set: SafeSet = field(default_factory=SafeSet)  # in force: announced and fence together
     refused: SafeSetAnnouncement | None = None  # the last one
+    refused_count: int = 0  # messages that were refused since start
     refusals: tuple[str, ...] = ()  # why this configuration cannot keep the safe set
     announced: SafeSet = field(default_factory=SafeSet)
     fence: SafeSet = field(default_factory=SafeSet)

@@ -69,6 +69,23 @@ class KeptSet(NamedTuple):
     ample_us: int = -1  # when there was room enough last; -1: not known yet
     spread: tuple[float, ...] = ()  # m, k sigma at each zone
     t_us: int = 0  # at that time
+    given: tuple[float, ...] = ()  # m, that each clearance is less for want of room; empty: nothing
+
+    @property
+    def whole(self) -> KeptSet:
+        """The same without what was given."""
+        if not self.given:
+            return self
+        whole = _grown(self.source, self.added)
+        return self._replace(safe_set=whole.safe_set, given=())
+
+    @property
+    def beyond(self) -> tuple[float, ...]:
+        """What of each zone's clearance is no margin [m]; empty: nothing."""
+        if not self.given:
+            return self.added
+        added = self.added or (0.0,) * len(self.given)
+        return tuple(map(float.__sub__, added, self.given))
 
     def of(self, safe_set: SafeSet) -> KeptSet:
         """The same for another safe set in force, until the next planning tick knows better."""

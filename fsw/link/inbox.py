@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Final, cast
+from typing import Final, TypeVar, cast
 
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.link.bounded_memory import renew
@@ -47,11 +47,13 @@ _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_PUT_OFF: Final = 64  # more of them a tick and link, which are answered and not carried out
 _MAX_TARGETS: Final = 64  # a tick
 _MAX_ANNOUNCEMENTS: Final = 4  # a tick
+_MAX_REASONS: Final = 4  # a tick, of refusals; more are counted
 _MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
 MAX_SAMPLES: Final = 512  # a tick; a second of a suite has some 1300
 _GROUND_STATION: Final = 6  # MAV_TYPE
 UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 
+T = TypeVar("T")
 Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 
@@ -70,6 +72,7 @@ class Received:
     samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
     battery: BatteryReading | None = None  # the newest
     sensor_clock_jump_us: int = 0
+    refused: list[str] = field(default_factory=list)  # why, of the first
 
 
 @dataclass(slots=True)
@@ -170,7 +173,7 @@ class Inbox:
             samples, self._received.samples = self._received.samples, []
             return TickInputs(
                 *(sensors, plan, (), (), (), None, None, None, 0, False),
-                *(mission, tuning, stale_us, tuple(samples), None, host, 0),
+                *(mission, tuning, stale_us, tuple(samples), None, host, 0, ()),
             )
         came = self.take()
         return TickInputs(
@@ -191,6 +194,7 @@ class Inbox:
             came.battery,
             host,
             came.sensor_clock_jump_us,
+            tuple(came.refused),
         )
 
     def _command(
@@ -223,8 +227,10 @@ class Inbox:
             return
         if not decode.for_this_vehicle(frame):
             return
-        target = decode.end_effector_target(values)
-        if target is None or len(self._received.targets) >= _MAX_TARGETS:
+        target = self._read(decode.end_effector_target, values)
+        if target is None:
+            return
+        if len(self._received.targets) >= _MAX_TARGETS:
             self.refused += 1
             return
         self._received.targets.append(target)
@@ -253,9 +259,8 @@ class Inbox:
     ) -> None:
         if not decode.for_this_vehicle(frame):
             return
-        indexed = read(cast(Numbers, frame.payload_values))
+        indexed = self._read(read, cast(Numbers, frame.payload_values))
         if indexed is None:
-            self.refused += 1
             return
         incomplete = self._incomplete.pop(self._source, None)
         if incomplete is None or indexed.count != incomplete.count:
@@ -279,11 +284,21 @@ class Inbox:
     def _sphere(self, frame: Frame) -> None:
         if not decode.for_this_vehicle(frame):
             return
-        sphere = decode.workspace_sphere(cast(Numbers, frame.payload_values))
-        if sphere is None:
+        sphere = self._read(decode.workspace_sphere, cast(Numbers, frame.payload_values))
+        if sphere is not None:
+            self._announce(SafeSet((sphere,)))
+
+    def _read(self, read: Callable[[Numbers], T | None], values: Numbers) -> T | None:
+        """What a message means; None where it is refused, which is counted and perhaps told."""
+        try:
+            meaning = read(values)
+        except decode.RefusedError as error:
+            meaning, reasons = None, self._received.refused
+            if len(reasons) < _MAX_REASONS:
+                reasons.append(f"{error}; from {self._source}")
+        if meaning is None:
             self.refused += 1
-            return
-        self._announce(SafeSet((sphere,)))
+        return meaning
 
 
 def _begun(announcement: SafeSetAnnouncement, now_us: int) -> SafeSetAnnouncement:

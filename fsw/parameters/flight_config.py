@@ -119,6 +119,7 @@ class Surroundings:
     target_acceleration: float = 0.05  # m/s^2, of the end-effector reference
     tangential_speed: float = 0.1  # m/s, of the base against the sphere's centre
     hanging: float = 0.225  # m, end-effector below the base, d_iw of Table II
+    zone_speed: float = 1.5  # m/s, of a zone that moves; the vehicle makes way no faster
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +155,11 @@ class FlightConfig:
     def mpc_period_us(self) -> int:
         """Of the planner."""
         return self.planner.period_us
+
+
+def lowest_height(config: FlightConfig) -> float:
+    """Least height [m] above the origin to which the base is led, but for a landing."""
+    return config.airframe.leg_length + config.limits.airborne_height
 
 
 # lambda of eq 25 [m/s]. The paper's two contradict its own sphere and tilt limits and fly only

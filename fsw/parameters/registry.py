@@ -221,6 +221,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Assumed target acceleration (start-up analysis)"),
         ("SUR_V_TAN", "surroundings.tangential_speed", "m/s", 0.0, 3.0,
          "Assumed speed along the sphere (start-up analysis)"),
+        ("SUR_V_ZONE", "surroundings.zone_speed", "m/s", 0.0, 3.0,
+         "Maximum speed of a moving zone that is accepted"),
         ("SUR_HANGING", "surroundings.hanging", "m", 0.0, 0.3,
          "Distance of the end-effector below the base (start-up analysis)"),
     ],

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.signals import Shape, Vec3
+from fsw.signals import MAX_DISTANCE, Shape, Vec3
 
 NUMBERS = 16  # most numbers that describe a shape
+ENDLESS = 1e4  # m; what has no end ends here
 
 
 class Surface(NamedTuple):
@@ -58,11 +59,17 @@ class ShapeKind:
     moved: Callable[[Numbers, Vec3], Numbers] = place_moved  # the numbers of the shape elsewhere
     flat: bool = False  # its plane is the same wherever the point is
     follows_target: bool = False  # rides on the end-effector's target, and keeps the base alone
+    endless: frozenset[int] = frozenset()  # which of its numbers may be ENDLESS
 
     @property
     def size(self) -> int:
         """How many numbers describe it."""
         return len(self.meaning)
+
+    @property
+    def farthest(self) -> tuple[float, ...]:
+        """The largest magnitude of each of its numbers that is believed [the number's unit]."""
+        return tuple(ENDLESS if k in self.endless else MAX_DISTANCE for k in range(self.size))
 
     def check(self, shape: Shape) -> str | None:
         """Why this is not a shape of this kind, in a sentence; None if it is one."""

@@ -7,10 +7,8 @@ from numpy.typing import NDArray
 
 from fsw.compiled import kernel
 from fsw.shapes.cylinder import PLANES_INSIDE, cylinder_surface
-from fsw.shapes.kind import Numbers, ShapeKind, Surface
+from fsw.shapes.kind import ENDLESS, Numbers, ShapeKind, Surface
 from fsw.signals import Shape, Vec2, Vec3, Zone
-
-ENDLESS = 1e4  # m, half the height of one that goes from far below to far above
 
 
 def vertical_cylinder(
@@ -56,4 +54,5 @@ KIND = ShapeKind(
     plane=_plane,
     problem=_problem,
     moved=_moved,
+    endless=frozenset({2, 3}),
 )

@@ -1,8 +1,9 @@
 """From wire values to the boundary types; pure.
 
-A MAVLink payload that carries NaN or infinity where the vehicle would use it as a number is
-refused here by returning None, and the caller counts it. NaN in a COMMAND_LONG is normal:
-clients put it into every parameter that they do not use.
+A MAVLink payload that is no setpoint, shape or place in a set is refused here by returning None,
+and one with numbers out of ``fsw.flight.bounds`` by ``RefusedError``, which says why; the caller
+counts both. NaN in a COMMAND_LONG is normal: clients put it into every parameter that they do not
+use.
 """
 
 from __future__ import annotations
@@ -12,15 +13,16 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final, cast
 
+from fsw.flight.bounds import motion_refusal, zone_problem
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.shapes import BY_NUMBER, kind_of
+from fsw.shapes import BY_NUMBER
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
-    MAX_DISTANCE,
     CommandRequest,
     EndEffectorTarget,
+    MotionSetpoint,
     SensorFrame,
     Shape,
     Vec3,
@@ -40,9 +42,11 @@ _YAW_IGNORED: Final = 0x400
 _POSITION_IGNORED: Final = 0x007
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 MAX_ZONES: Final = 64  # in a set
-_FARTHEST: Final = 1e4  # m; what has no end ends here
-_FASTEST: Final = 30.0  # m/s, of a shape that moves
 _KEEP_IN: Final = 1  # PANDION_SHAPE_FLAGS
+
+
+class RefusedError(Exception):
+    """Why a message for this vehicle is not believed, in a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +144,11 @@ def _scaled(number: float, scale: float) -> float:
 def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
     """Read an END_EFFECTOR_TARGET; None if it is not a valid setpoint.
 
-    A masked velocity, acceleration or yaw reads as zero; a target without a position, in another
-    frame than local NED or with a number that is not finite is refused.
+    A masked velocity, acceleration or yaw reads as zero; a target without a position or in another
+    frame than local NED is none.
+
+    Raises:
+        RefusedError: A number is out of bounds, or none.
     """
     mask, frame = int(values[12]), values[15]
     if frame != _LOCAL_NED or mask & _POSITION_IGNORED:
@@ -150,57 +157,67 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
     velocity = _ZERO if mask & _VELOCITY_IGNORED else cast(Vec3, values[4:7])
     acceleration = _ZERO if mask & _ACCELERATION_IGNORED else cast(Vec3, values[7:10])
     yaw = 0.0 if mask & _YAW_IGNORED else values[10]
-    if not _all_finite((*position, *velocity, *acceleration, yaw)):
-        return None
+    motion = MotionSetpoint(True, position, velocity, acceleration, yaw)
+    problem = motion_refusal(motion)
+    if problem is not None:
+        raise RefusedError(f"target refused: {problem}")
     return EndEffectorTarget(int(values[0]), position, velocity, acceleration, yaw)
 
 
 def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
-    """Read an OBSTACLE_WALL; None if it describes no plane or no place in its set."""
-    numbers = values[0:5]
-    index, count = int(values[7]), int(values[8])
-    if not _all_finite(numbers) or not index < count <= MAX_ZONES:
-        return None
+    """Read an OBSTACLE_WALL; None if it has no place in its set.
+
+    Raises:
+        RefusedError: It is no plane, or out of bounds.
+    """
     zone = wall(cast(Vec3, values[0:3]), values[3], values[4])
-    if kind_of(zone.shape).check(zone.shape) is not None or not values[4] >= 0.0:
-        return None
-    return IndexedObstacle(zone, index, count)
+    return _indexed(zone, int(values[7]), int(values[8]))
 
 
 def obstacle_point(values: Numbers) -> IndexedObstacle | None:
-    """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set."""
-    index, count = int(values[6]), int(values[7])
-    if not _all_finite(values[0:4]) or not index < count <= MAX_ZONES or not values[3] > 0.0:
+    """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set.
+
+    Raises:
+        RefusedError: It is out of bounds.
+    """
+    if values[3] <= 0.0:
         return None
-    return IndexedObstacle(point(cast(Vec3, values[0:3]), values[3]), index, count)
+    zone = point(cast(Vec3, values[0:3]), values[3])
+    return _indexed(zone, int(values[6]), int(values[7]))
 
 
 def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
-    """Read an OBSTACLE_SHAPE; None if it is no shape, out of range or has no place in its set."""
+    """Read an OBSTACLE_SHAPE; None if its kind is not known or it has no place in its set.
+
+    Raises:
+        RefusedError: It is no such shape, or out of bounds.
+    """
     index, count, number, flags = map(int, values[23:27])
     kind = BY_NUMBER.get(number)
-    if kind is None or not _all_finite(values[1:21]) or not index < count <= MAX_ZONES:
+    if kind is None or flags & ~_KEEP_IN:
         return None
     clearance, velocity, keep_in = values[1], cast(Vec3, values[2:5]), flags == _KEEP_IN
-    shape = Shape(kind.name, values[5 : 5 + kind.size])
-    within = 0.0 <= clearance <= MAX_DISTANCE and math.hypot(*velocity) <= _FASTEST
-    if not within or not all(abs(number) <= _FARTHEST for number in shape.numbers):
-        return None
-    if flags & ~_KEEP_IN or kind.check(shape) is not None:
-        return None
-    if kind.follows_target and (not keep_in or velocity != _ZERO):
-        return None
     # One that stands is the same whenever it is announced.
     t_us = int(values[0]) if velocity != _ZERO else 0
-    return IndexedObstacle(Zone(shape, clearance, keep_in, velocity, t_us), index, count)
+    shape = Shape(kind.name, values[5 : 5 + kind.size])
+    return _indexed(Zone(shape, clearance, keep_in, velocity, t_us), index, count)
 
 
-def workspace_sphere(values: Numbers) -> Zone | None:
-    """Read a WORKSPACE_SPHERE; None if it contains nothing."""
-    if not _all_finite(values[0:4]) or not values[3] > 0.0:
-        return None
-    return target_sphere(cast(Vec3, values[0:3]), values[3])
+def workspace_sphere(values: Numbers) -> Zone:
+    """Read a WORKSPACE_SPHERE.
+
+    Raises:
+        RefusedError: It contains nothing, or is out of bounds.
+    """
+    return _bounded(target_sphere(cast(Vec3, values[0:3]), values[3]))
 
 
-def _all_finite(numbers: Numbers) -> bool:
-    return all(map(math.isfinite, numbers))
+def _indexed(zone: Zone, index: int, count: int) -> IndexedObstacle | None:
+    return IndexedObstacle(_bounded(zone), index, count) if index < count <= MAX_ZONES else None
+
+
+def _bounded(zone: Zone) -> Zone:
+    problem = zone_problem(zone)
+    if problem is not None:
+        raise RefusedError(f"{zone.shape.kind} refused: {problem}")
+    return zone

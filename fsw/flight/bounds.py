@@ -1,0 +1,130 @@
+"""The one set of bounds of what others say, before anything believes it.
+
+Zones, targets, setpoints, places of commands and steps of missions pass here, on the link where an
+answer can name the reason and again in the tick, which believes no link: finite, within a kilometre
+of the origin, clearances of at most ten metres, and no faster than the vehicle is told to expect.
+Each function says what is wrong in a sentence; None where nothing is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.frozen import replace
+from fsw.shapes import BY_NAME
+from fsw.signals import (
+    MAX_DISTANCE,
+    EndEffectorTarget,
+    MissionAction,
+    MissionStep,
+    MissionUpdate,
+    MotionSetpoint,
+    SafeSet,
+    Vec3,
+    Zone,
+)
+
+MAX_CLEARANCE: Final = 10.0  # m; what needs more is a larger shape
+MAX_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
+MAX_ACCELERATION: Final = 20.0  # m/s^2, the same
+MAX_RATE: Final = 10.0  # rad/s
+MAX_YAW: Final = 4.0 * math.pi  # rad
+MAX_STAY: Final = 3600.0  # s, at a place of a mission, and ahead of now of a target
+_AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
+
+
+def safe_set_problem(safe_set: SafeSet, max_speed: float = math.inf) -> str | None:
+    """Why a safe set is none that can be believed; its zones move at ``max_speed`` [m/s] at most.
+
+    A link does not know that speed, and leaves it to the tick.
+    """
+    for number, zone in enumerate(safe_set.zones, start=1):
+        problem = zone_problem(zone, max_speed)
+        if problem is not None:
+            return f"zone {number} ({zone.shape.kind}): {problem}"
+    return None
+
+
+def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
+    """Why a zone is out of bounds; it moves at ``max_speed`` [m/s] at most."""
+    kind = BY_NAME.get(zone.shape.kind)
+    if kind is None:
+        return "there is no such shape"
+    problem = kind.check(zone.shape)
+    if problem is not None:
+        return problem
+    for number, meaning, most in zip(zone.shape.numbers, kind.meaning, kind.farthest, strict=True):
+        if not abs(number) <= most:
+            return f"{meaning} is {number:g}; at most {most:g} is accepted"
+    if not 0.0 <= zone.clearance <= MAX_CLEARANCE:
+        return f"a clearance of {zone.clearance:g} m is outside 0 to {MAX_CLEARANCE:g} m"
+    speed = math.hypot(*zone.velocity)
+    if not speed <= min(max_speed, MAX_SPEED):
+        most = min(max_speed, MAX_SPEED)
+        return f"it moves at {speed:g} m/s; at most {most:g} m/s is expected (SUR_V_ZONE)"
+    if kind.follows_target and (not zone.keep_in or zone.velocity != _AT_REST):
+        return "what follows the target is to be kept in, and has no velocity of its own"
+    return None
+
+
+def target_problem(target: EndEffectorTarget, now_us: int) -> str | None:
+    """Why a target of a stream cannot be believed at a time."""
+    motion = MotionSetpoint(True, target.p_WE, target.v_WE, target.a_WE, target.yaw)
+    if abs(target.t_us - now_us) > 1e6 * MAX_STAY:
+        return f"its time is more than {MAX_STAY:g} s from now"
+    return motion_refusal(motion)
+
+
+def motion_refusal(setpoint: MotionSetpoint) -> str | None:
+    """Why a motion setpoint is out of range."""
+    for vector, most, what in (
+        (setpoint.p, MAX_DISTANCE, "position"),
+        (setpoint.v, MAX_SPEED, "velocity"),
+        (setpoint.a, MAX_ACCELERATION, "acceleration"),
+    ):
+        if vector is not None and not math.hypot(*vector) <= most:
+            return f"{what} out of range"
+    if setpoint.yaw is not None and not abs(setpoint.yaw) <= MAX_YAW:
+        return "yaw out of range"
+    if setpoint.yaw_rate is not None and not abs(setpoint.yaw_rate) <= MAX_RATE:
+        return "yaw rate out of range"
+    return None
+
+
+def place_problem(place: Vec3) -> str | None:
+    """Why a ``place`` [m, NED] is none to fly to, or to look at."""
+    if math.hypot(*place) <= MAX_DISTANCE:
+        return None
+    return f"the place is more than {MAX_DISTANCE:g} m from the origin"
+
+
+def bounded_update(update: MissionUpdate | None) -> tuple[MissionUpdate | None, list[str]]:
+    """An upload without what is out of bounds, the same object where all is within; and why."""
+    if update is None:
+        return None, []
+    kept, against = update, []
+    for number, step in enumerate(update.steps or ()):
+        problem = step_problem(step)
+        if problem is not None:
+            kept = replace(kept, steps=None, current=None)
+            against.append(f"mission refused: step {number}: {problem}")
+            break
+    if not all(math.hypot(*place) <= MAX_DISTANCE for place in update.rally or ()):
+        kept = replace(kept, rally=None)
+        against.append(f"rally points refused: one is more than {MAX_DISTANCE:g} m away")
+    return kept, against
+
+
+def step_problem(step: MissionStep) -> str | None:
+    """Why a step of a mission is out of range; a stay without end is infinite."""
+    if step.position is not None and not all(abs(x) <= MAX_DISTANCE for x in step.position):
+        return f"the place is more than {MAX_DISTANCE:g} m from the origin"
+    if step.yaw is not None and not abs(step.yaw) <= MAX_YAW:
+        return "yaw out of range"
+    if step.speed is not None and not 0.0 < step.speed <= MAX_SPEED:
+        return f"a speed of {step.speed:g} m/s is outside 0 to {MAX_SPEED:g} m/s"
+    stays = step.hold_s == math.inf and step.action is MissionAction.GO
+    if not (stays or 0.0 <= step.hold_s <= MAX_STAY):
+        return f"a stay of {step.hold_s:g} s is outside 0 to {MAX_STAY:g} s"
+    return None if step.acceptance >= 0.0 else "the acceptance is less than 0"

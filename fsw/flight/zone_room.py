@@ -1,0 +1,104 @@
+r"""What room and what speed a zone may take to drive a vehicle out of it.
+
+Outside of a zone the barrier asks for a speed back, :math:`n\cdot v \ge k_S\,|d| + \lambda`, and
+that grows without bound with the depth. So clearances shrink, as far as it needs:
+
+* no barrier asks for more than the largest speed of a setpoint, the zone's own included,
+* a zone that the vehicle is in deeper than ``ROOM`` stands where it is, and the vehicle at rest
+  outside of it: no way out is known to be right. The failsafe table holds, and lands,
+* and the same for one that would push it below the lowest height of a reference.
+
+Margins and failsafes go on to be of the safe set in force.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.barriers.safe_approach import BarrierTuning
+from fsw.control.safety_filter import ROOM
+from fsw.flight.safe_set_change import held
+from fsw.flight.uncertain_clearance import KeptSet
+from fsw.frozen import replace
+from fsw.geometry.vectors import dot
+from fsw.parameters.consistency import stand_off
+from fsw.parameters.flight_config import FlightConfig, lowest_height
+from fsw.shapes import kind_of
+from fsw.shapes.zones import surface
+from fsw.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Zone
+
+_BRAKING: Final = 1.0  # m/s^2, that are counted on above the ground
+_DOWNWARD: Final = 0.1  # of a normal, from which on it leads to the ground
+
+
+class ZoneRoom:
+    """The room of one configuration."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._walls, self._workspace = config.planner.tunings
+        self._speed = config.steering.speed
+        self._lowest = lowest_height(config)
+        # The others are flown for comparison, to show what they do.
+        self._limits = config.controller == "blf" and not config.soft
+
+    def limit(
+        self,
+        kept: KeptSet,
+        report: ConstraintReport,
+        estimate: StateEstimate,
+        target: EndEffectorTarget | None,
+    ) -> KeptSet:
+        """The set to keep, of whose source the ``report`` says the margins now."""
+        if not self._limits or not report.per_zone:
+            return kept
+        zones, given, first = list(kept.safe_set.zones), [0.0] * len(report.per_zone), 0
+        for k, count in enumerate(report.per_zone):
+            margin, first = min(report.margins[first : first + count]), first + count
+            distance = margin - (kept.added[k] if kept.added else 0.0)
+            tuning = self._tuning(zones[k])
+            if not distance < stand_off(tuning):
+                continue
+            least, rests = self._least(kept, k, margin, tuning, estimate, target)
+            if distance < least:
+                given[k] = least - distance
+                zone = held(zones[k], estimate.t_us - zones[k].t_us) if rests else zones[k]
+                zones[k] = replace(zone, clearance=zone.clearance - given[k])
+        if not any(given):
+            return kept
+        return kept._replace(safe_set=SafeSet(tuple(zones)), given=tuple(given))
+
+    def _tuning(self, zone: Zone) -> BarrierTuning:
+        return self._workspace if kind_of(zone.shape).follows_target else self._walls
+
+    def _least(
+        self,
+        kept: KeptSet,
+        k: int,
+        margin: float,
+        tuning: BarrierTuning,
+        estimate: StateEstimate,
+        target: EndEffectorTarget | None,
+    ) -> tuple[float, bool]:
+        """The least distance [m] that a zone is to see; whether it is to stand where it is now."""
+        rest, at = stand_off(tuning), surface(kept.source, k, estimate.p_WB, estimate.t_us, target)
+        if at is None or not margin > -ROOM:
+            return rest, True
+        moves = kept.source.zones[k].velocity
+        if target is not None and kind_of(kept.source.zones[k].shape).follows_target:
+            moves = target.v_WE
+        speed = max(self._speed - tuning.lambda_ - max(dot(at.normal, moves), 0.0), 0.0)
+        least, down = -speed / tuning.slope, at.normal[2]
+        if down > _DOWNWARD:
+            sinks = max(estimate.v_WB[2], 0.0)
+            room = -estimate.p_WB[2] - self._lowest - sinks * sinks / (2.0 * _BRAKING)
+            lowest = rest - max(room, 0.0) / down
+            if lowest > least:
+                return lowest, not room > 0.0
+        return least, False
+
+
+def is_deep(report: ConstraintReport) -> bool:
+    """Whether a margin is more negative than a vehicle draws back from."""
+    least = min(report.margins, default=math.inf)
+    return not least > -ROOM
