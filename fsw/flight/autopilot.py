@@ -276,9 +276,10 @@ class Autopilot:
             pose = self._pose_error(state, estimate, fusion, covariance)
             state = self._keep_clear(state, estimate, pose)
             if flown and nominal is not None:
-                state, request, plan = self._request_plan(
+                state, request, plan, said = self._request_plan(
                     state, estimate, nominal, plan, now_us, safety.replan
                 )
+                texts += said
                 safety = replace(safety, replan=False) if safety.replan else safety
             state = self._report_slowly(state, estimate, now_us)
             state = self._sensed.reported(state, fusion, estimate, covariance)
@@ -321,6 +322,7 @@ class Autopilot:
             state.host,
             damage,
             watch,
+            state.limited,
         )
         snapshot = snapshot_of(state, estimate, c.u, inputs)
         taken = answer.tuning_taken
@@ -409,8 +411,9 @@ class Autopilot:
         stream = merge(mission.stream, believed, now_us)
         refused_count = mission.refused_count + len(against)
         vehicle, target = state.vehicle, state.reference
-        if target is None and vehicle.flies:
-            target = self._commander.mode(state).target(state, now_us)
+        if target is None and vehicle.flies and state.estimate is not None:
+            mode = self._commander.mode(state)
+            target = self._horizon.target(mode, state, state.estimate, now_us)
         mission = self._safe_sets.update(
             replace(mission, stream=stream, refused_count=refused_count),
             inputs if update is inputs.mission else replace(inputs, mission=update),
@@ -449,12 +452,18 @@ class Autopilot:
         plan: PlanMemory,
         now_us: int,
         replan: bool,
-    ) -> tuple[FlightState, PlanRequest, PlanMemory]:
-        """Request a plan that takes effect after a fixed delay, from the vehicle if ``replan``."""
+    ) -> tuple[FlightState, PlanRequest, PlanMemory, tuple[StatusText, ...]]:
+        """Request a plan that takes effect after a fixed delay, from the vehicle if ``replan``.
+
+        With what is to be said of its reference.
+        """
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
-        mode = self._commander.mode(state)
+        mode, limited = self._commander.mode(state), state.limited
         state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
+        said: tuple[StatusText, ...] = ()
+        if state.limited and state.limited != limited:
+            said = (StatusText(Severity.WARNING, f"reference limited: {state.limited}"),)
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         start, from_nominal = self._plans.start(plan, nominal, measured, now_us, replan)
         request = PlanRequest(
@@ -466,7 +475,7 @@ class Autopilot:
             from_nominal=from_nominal,
             joint_targets=joints,
         )
-        return state, request, requested(plan, apply_us)
+        return state, request, requested(plan, apply_us), said
 
     def _see_accuracy(
         self,
@@ -524,7 +533,7 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, now_us: int
     ) -> FlightState:
         """Reference, margins, arming checks and battery, once a planning period."""
-        target = self._commander.mode(state).target(state, now_us)
+        target = self._horizon.target(self._commander.mode(state), state, estimate, now_us)
         refusal, arming = self._commander.arming_report(state, estimate)
         return replace(
             state,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.flight import arming
+from fsw.flight.bounds import motion_refusal, place_problem
 from fsw.flight.command_dedup import COURSE
 from fsw.flight.modes.base import CommandContext, FlightMode
 from fsw.flight.offboard_setpoints import joints_refusal
@@ -18,7 +19,6 @@ from fsw.frozen import replace
 from fsw.model.body import hull_reach
 from fsw.shapes.zones import surface, surfaces
 from fsw.signals import (
-    MAX_DISTANCE,
     Arm,
     ChangeSpeed,
     Command,
@@ -180,6 +180,7 @@ def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decisio
         return decision
     here = -context.position[2]
     least, most = context.climb_range
+    most = min(most, context.highest - here)
     climb = height - here
     if not least - _CLIMB_TOLERANCE <= climb <= most + _CLIMB_TOLERANCE:
         range_text = f"{here + least:.1f} to {here + most:.1f} m"
@@ -197,14 +198,20 @@ def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
         reason = "not in hold, and the command does not ask to change the mode"
         return Decision(LATER, f"no goto: {reason}")
     place = _place(action.place, context)
-    blocked = _too_far(place) or _too_low(place, context) or _too_close(place, context)
+    blocked = _out_of_bounds(place, context) or _too_close(place, context)
     if blocked is not None:
         return Decision(DENIED, f"no goto: {blocked}")
     decision = _switch(Mode.HOLD, context, modes)
     if decision.result != ACCEPTED:
         return decision
-    motion = MotionSetpoint(False, place, yaw=action.yaw)
-    return replace(decision, goal=PositionGoal(motion, speed=action.speed))
+    motion, speed = MotionSetpoint(False, place, yaw=action.yaw), action.speed
+    refusal = motion_refusal(motion)
+    if refusal is not None or not (speed is None or 0.0 < speed < math.inf):
+        return Decision(DENIED, f"no goto: {refusal or 'speed out of range'}")
+    slower = ""
+    if speed is not None and speed > context.max_speed:
+        slower = f"goto at {context.max_speed:g} m/s: faster is not flown (STR_V_MAX)"
+    return replace(decision, goal=PositionGoal(motion, speed=speed), reason=slower)
 
 
 def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
@@ -212,9 +219,7 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
     if refusal is not None:
         return Decision(LATER, f"no orbit: {refusal}")
     centre, radius = _place(action.centre, context), action.radius
-    blocked = (
-        _too_far(centre) or _too_low(centre, context) or _circle_too_close(centre, radius, context)
-    )
+    blocked = _out_of_bounds(centre, context) or _circle_too_close(centre, radius, context)
     if blocked is not None:
         return Decision(DENIED, f"no orbit: {blocked}")
     most = max_orbit_speed(radius, context.yaw_rate, context.acceleration)
@@ -237,7 +242,7 @@ def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
     if action.place is None:
         return Decision(ACCEPTED, look_at=NewHeading(None))
     place = _place(action.place, context)
-    far = _too_far(place)
+    far = place_problem(place)
     if far is not None:
         return Decision(DENIED, f"no region of interest: {far}")
     if not _is_armed(context):
@@ -276,7 +281,7 @@ def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decisio
     if not context.estimate_valid:
         return Decision(LATER, "home not set: the estimate is invalid")
     place = context.position if action.place is None else _place(action.place, context)
-    far = _too_far(place)
+    far = place_problem(place)
     if far is not None:
         return Decision(DENIED, f"home not set: {far}")
     return Decision(ACCEPTED, home=Home(place, context.yaw))
@@ -422,18 +427,17 @@ def _place(place: Place, context: CommandContext) -> Vec3:
     return north, east, context.position[2] if height is None else -height
 
 
-def _too_far(place: Vec3) -> str | None:
-    if math.hypot(*place) <= MAX_DISTANCE:
-        return None
-    return f"the place is more than {MAX_DISTANCE:g} m from the origin"
-
-
-def _too_low(place: Vec3, context: CommandContext) -> str | None:
-    """Why the body cannot be at a height."""
-    least = context.airframe.leg_length + context.climb_range[0]
-    if -place[2] >= least:
-        return None
-    return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
+def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
+    """Why the body is not to be at a place, whatever the safe set."""
+    far = place_problem(place)
+    if far is not None:
+        return far
+    least, most = context.airframe.leg_length + context.climb_range[0], context.highest
+    if not -place[2] >= least:
+        return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
+    if not -place[2] <= most:
+        return f"{-place[2]:.1f} m above the origin is too high; the maximum is {most:g} m"
+    return None
 
 
 def _too_close(place: Vec3, context: CommandContext) -> str | None:

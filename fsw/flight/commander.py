@@ -25,6 +25,7 @@ from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import is_fresh
 from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.restart import rests
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
@@ -63,6 +64,7 @@ class Commander:
         self._tube_radius = base_reach(loop_tube(config), config.surroundings)
         self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)
+        self._horizon = ReferenceHorizon(config)
         self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
         self._contradiction = "; ".join(contradictions(config))
         self._no_mode = FlightMode(config)  # disarmed or terminated
@@ -135,6 +137,7 @@ class Commander:
             max_speed=setpoint_limits.speed,
             yaw_rate=setpoint_limits.yaw_rate,
             acceleration=setpoint_limits.acceleration,
+            highest=setpoint_limits.highest,
             failures_allowed=limits.failure_injection == 1,
             rests=rests(state, estimate, limits.aiding_loss_us),
         )
@@ -391,7 +394,9 @@ class Commander:
         follower = self._modes.get(mode, self._no_mode)
         p_WE = point_in_flight(estimate, self._config.airframe.link_length)[0]
         here = still_at(p_WE, estimate.t_us, estimate.yaw)
-        last = self.mode(state).target(state, estimate.t_us) if vehicle.flies else here
+        last = here
+        if vehicle.flies:
+            last = self._horizon.target(self.mode(state), state, estimate, estimate.t_us)
         handover = Handover(last, completed)
         origin = last if completed or follower.continues_reference else here
         state = follower.activate(mission_left(state, mode), estimate, handover)

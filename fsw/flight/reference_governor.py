@@ -9,7 +9,8 @@ reference                     limits
 of the vehicle's own: a       ``limit_setpoint``: near the vehicle, off every wall and the ground,
 setpoint that is generated    and towards either no faster than the barrier lets it stop
 from outside: streamed        ``limit_horizon``: near the vehicle's own motion, not far behind a
-targets, mission, setpoints   wall and not fast towards one
+targets, mission, setpoints   wall and not fast towards one; streamed targets and missions no
+                              faster than a setpoint, between the lowest and the highest height
 a place of a mission          ``project``: the nearest place inside
 ============================  =====================================================
 
@@ -25,12 +26,12 @@ from functools import cache, lru_cache
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.compiled import compilable, kernel, machine_code
 from fsw.frozen import replace
-from fsw.geometry.vectors import add_scaled, dot, norm, subtract
+from fsw.geometry.vectors import add_scaled, dot, limit_norm, norm, subtract
 from fsw.model.body import Body, body_of, hull_reach
-from fsw.parameters.flight_config import FlightConfig
+from fsw.parameters.flight_config import FlightConfig, lowest_height
 from fsw.shapes.kind import Surface
 from fsw.shapes.zones import NO_ZONES, Array, moving_zones, nearest_plane, surface
-from fsw.signals import EndEffectorTarget, SafeSet, Vec3
+from fsw.signals import EndEffectorTarget, MotionSetpoint, SafeSet, Vec3
 
 SETTLE_RATE = 2.0  # 1/s, of the last bit of the way
 _GROUND_BRAKING = 1.0  # m/s^2
@@ -40,10 +41,17 @@ _MAX_LEAD_DISTANCE = 0.4  # m from where the end-effector's motion leads to the 
 _LEAD_GROWTH = 0.4  # m/s, by which that grows over the horizon
 _MAX_VELOCITY_ERROR = 1.0  # m/s; more makes the planned arm wind up
 _MAX_DEPTH = 0.1  # m behind the clearance; the paper's path goes 0.03 m deep
+_NEAR = 0.1  # m, that a reference may be ahead of a vehicle at the largest speed
 _ALWAYS = 0.5  # m/s towards a wall, half of what the penalty of a row stands
 _PROJECTIONS = 30  # one after the other; in a corner they have to settle
 _TOLERANCE = 1e-4  # m
 _HERE: Vec3 = (0.0, 0.0, 0.0)
+_LOW, _HIGH, _FAST = 1, 2, 4  # which limits a target has left
+_TOLD = 1e-3  # m, m/s; less is rounding
+
+Limits = tuple[float, float, float]
+"""Lowest and highest z of the end-effector [m, NED], largest speed [m/s] of a reference."""
+UNLIMITED: Limits = (math.inf, -math.inf, math.inf)
 
 
 @compilable
@@ -120,15 +128,28 @@ def limit_reference(
     What is asked for near the motion of the end-effector, ``p_WE`` [m] and ``v_WE`` [m/s], and not
     far behind a wall passes as it is: the paper's own path enters the safety zone.
     """
-    zones, begin_us, limited = _moving_zones(safe_set), targets[0].t_us, []
+    return _limit_all(targets, p_WE, v_WE, safe_set, barrier, UNLIMITED)[0]
+
+
+def _limit_all(
+    targets: tuple[EndEffectorTarget, ...],
+    p_WE: Vec3,
+    v_WE: Vec3,
+    safe_set: SafeSet,
+    barrier: BarrierTuning,
+    limits: Limits,
+) -> tuple[tuple[EndEffectorTarget, ...], int]:
+    """``limit_reference`` with limits of height and speed, and which of them targets have left."""
+    zones, begin_us, limited, left = _moving_zones(safe_set), targets[0].t_us, [], 0
     for target in targets:
-        p, v = _limit_target()(
+        p, v, which = _limit_target()(
             *(zones, begin_us, target.t_us, target.p_WE, target.v_WE),
-            *(p_WE, v_WE, barrier.alpha, barrier.slope),
+            *(p_WE, v_WE, barrier.alpha, barrier.slope, limits),
         )
         limited.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw))
+        left |= which
     result = tuple(limited)
-    return targets if result == targets else result
+    return targets if result == targets else result, left
 
 
 @kernel
@@ -142,11 +163,29 @@ def _limited(
     v_WE: Vec3,
     alpha: float,
     slope: float,
-) -> tuple[Vec3, Vec3]:
-    """``limit_reference`` for place and velocity of one target, of ``t_us``."""
-    ahead = 1e-6 * (t_us - begin_us)
+    limits: Limits,
+) -> tuple[Vec3, Vec3, int]:
+    """``limit_reference`` for place and velocity of one target, of ``t_us``; what it has left."""
+    ahead, left = 1e-6 * (t_us - begin_us), 0
+    lowest, highest, fastest = limits
     led = add_scaled(p_WE, v_WE, ahead)
-    p = limit_lead(p, led, _MAX_LEAD_DISTANCE + _LEAD_GROWTH * ahead)
+    near = limit_lead(p, led, _MAX_LEAD_DISTANCE + _LEAD_GROWTH * ahead)
+    if fastest < math.inf:
+        if p[2] > lowest + _TOLD:
+            left |= _LOW
+        if p[2] < highest - _TOLD:
+            left |= _HIGH
+        # A vehicle that is led by as much at any speed would be led to any speed.
+        slower = max(1.0 - norm(v_WE) / fastest, 0.0)
+        reach = fastest * ahead + max(_MAX_LEAD_DISTANCE * slower, _NEAR)
+        near = limit_lead(near, p_WE, reach)
+        if norm(v) > fastest + _TOLD or norm(subtract(near, p)) > _TOLD:
+            left |= _FAST
+        v = limit_norm(v, fastest)
+        near = (near[0], near[1], min(max(near[2], highest), lowest))
+        down = safe_approach_speed(max(lowest - p_WE[2], 0.0), _GROUND_BRAKING, SETTLE_RATE)
+        v = (v[0], v[1], min(v[2], down))
+    p = near
     v = limit_lead(v, v_WE, _MAX_VELOCITY_ERROR)
     for zone in range(len(zones)):
         at = nearest_plane(zones, zone, p, t_us)
@@ -155,13 +194,13 @@ def _limited(
     for zone in range(len(zones)):
         at = nearest_plane(zones, zone, p_WE, begin_us)
         v = _slowed(v, (at.nx, at.ny, at.nz), _fastest(at, alpha, slope))
-    return p, v
+    return p, v, left
 
 
 @cache
-def _limit_target() -> Callable[..., tuple[Vec3, Vec3]]:
+def _limit_target() -> Callable[..., tuple[Vec3, Vec3, int]]:
     """``_limited``, compiled when it is first wanted."""
-    return machine_code(_limited, NO_ZONES, 0, 0, _HERE, _HERE, _HERE, _HERE, 1.0, 1.0)
+    return machine_code(_limited, NO_ZONES, 0, 0, _HERE, _HERE, _HERE, _HERE, 1.0, 1.0, UNLIMITED)
 
 
 @lru_cache(maxsize=16)
@@ -206,6 +245,10 @@ class ReferenceGovernor:
         self._max_lead_distance = config.steering.max_lead_distance
         self._barrier = config.planner.walls
         self._body = body_of(config.planner.body, config.airframe)
+        # The arm hangs: the end-effector is that much lower than the base.
+        lowest, highest = lowest_height(config), config.steering.highest
+        self._hanging = hanging = config.surroundings.hanging
+        self._limits = (hanging - lowest, hanging - highest, config.steering.speed)
 
     def limit_setpoint(
         self,
@@ -222,8 +265,13 @@ class ReferenceGovernor:
         ``other_end`` [m, NED] of the arm is seen from it.
         """
         body_down = p[2] + (other_end[2] if of_end_effector else 0.0)
+        above = body_down + self._config.steering.highest
+        if above < 0.0:
+            p, v = (p[0], p[1], p[2] - above), (v[0], v[1], max(v[2], 0.0))
         touch_speed = 0.0 if of_end_effector else self._config.limits.land_speed
         height = -body_down - self._config.airframe.leg_length
+        if of_end_effector:  # a body may be asked down to the ground, to land
+            height -= self._config.limits.airborne_height - _CLEAR_OF_GROUND
         p, v = limit_descent(p, v, height, touch_speed)
         body, tip = (other_end, _HERE) if of_end_effector else (_HERE, other_end)
         return limit_approach(
@@ -239,3 +287,43 @@ class ReferenceGovernor:
     ) -> tuple[EndEffectorTarget, ...]:
         """See ``limit_reference``; the end-effector is at ``p_WE`` [m] and moves at v_WE [m/s]."""
         return limit_reference(targets, p_WE, v_WE, safe_set, self._barrier)
+
+    def limit_external(
+        self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
+    ) -> tuple[tuple[EndEffectorTarget, ...], str]:
+        """The same of targets from outside, limited in height and speed, and why they were."""
+        limited, left = _limit_all(targets, p_WE, v_WE, safe_set, self._barrier, self._limits)
+        return limited, self.reason(left)
+
+    def limit_now(
+        self, target: EndEffectorTarget, p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
+    ) -> EndEffectorTarget:
+        """The target from outside of this instant, ``p_WE`` [m] and ``v_WE`` [m/s] as above."""
+        return self.limit_external((target,), p_WE, v_WE, safe_set)[0][0]
+
+    def left_by(self, motion: MotionSetpoint) -> str:
+        """Which limits of a generated setpoint a motion leaves, in words; empty: none.
+
+        A body that is asked down to the ground is to land.
+        """
+        lowest, highest, fastest = self._limits
+        hanging, left = (0.0 if motion.of_end_effector else self._hanging), 0
+        if motion.p is not None and motion.p[2] > lowest + _TOLD and motion.of_end_effector:
+            left |= _LOW
+        if motion.p is not None and motion.p[2] + hanging < highest - _TOLD:
+            left |= _HIGH
+        if motion.v is not None and norm(motion.v) > fastest + _TOLD:
+            left |= _FAST
+        return self.reason(left)
+
+    def reason(self, left: int) -> str:
+        """Which limits have been left, in words; empty: none."""
+        lowest, highest, fastest = self._limits
+        said = []
+        if left & _LOW:
+            said.append(f"a target is below {-lowest:.2f} m")
+        if left & _HIGH:
+            said.append(f"a target is above {-highest:.0f} m")
+        if left & _FAST:
+            said.append(f"targets ask for more than {fastest:g} m/s")
+        return ", ".join(said)

@@ -30,9 +30,10 @@ class ReferenceHorizon:
 
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel."""
+        here, rest = estimate.p_WB, (0.0, 0.0, 0.0)
         stream = still_at(estimate.p_WB), still_at(estimate.p_WB, 100_000)
         between = sample(stream, 50_000)
-        self._governor.limit_horizon((between,), between.p_WE, between.v_WE, SafeSet())
+        self._governor.limit_external((between,), here, rest, SafeSet())
 
     def __call__(
         self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
@@ -47,10 +48,30 @@ class ReferenceHorizon:
             targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
             joints = ()
             if not mode.external_reference:
-                return state, (targets, joints)
+                same = not state.limited
+                return state if same else replace(state, limited=""), (targets, joints)
         p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
-        safe_set = state.kept.safe_set
-        return state, (self._governor.limit_horizon(targets, p_WE, v_WE, safe_set), joints)
+        safe_set, why = state.kept.safe_set, ""
+        if mode.external_reference:
+            targets, why = self._governor.limit_external(targets, p_WE, v_WE, safe_set)
+        else:
+            targets = self._governor.limit_horizon(targets, p_WE, v_WE, safe_set)
+            if goal is not None:
+                why = self._governor.left_by(goal.motion)
+        return replace(state, limited=why) if why != state.limited else state, (targets, joints)
+
+    def target(
+        self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
+    ) -> EndEffectorTarget:
+        """Where a mode has the end-effector at an instant, if it is from outside as it is limited.
+
+        What follows the target, and the mode that takes over, go by this.
+        """
+        target = mode.target(state, t_us)
+        if not mode.external_reference:
+            return target
+        p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set)
 
     def _generated(
         self,

@@ -271,3 +271,4 @@ class FlightState:
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = Damage()
     watch: Watch | None = None  # over the actuators, in flight
+    limited: str = ""  # why the reference is not what was asked for; empty: it is

@@ -103,6 +103,7 @@ class SetpointLimits:
     # Faster and harder, setpoints that change every half second drove the fast loop into the
     # rotors' limits, and the vehicle off its plan.
     speed: float = 1.5  # m/s, at most
+    highest: float = 120.0  # m above the origin, of the base
     acceleration: float = 1.0  # m/s^2
     yaw_rate: float = 0.3  # rad/s
     yaw_acceleration: float = 0.06  # rad/s^2; the plan's limit is 0.1

@@ -318,6 +318,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
     "Steering": [
         ("STR_CRUISE", "steering.cruise_speed", "m/s", 0.1, 3.0, "Cruise speed"),
         ("STR_V_MAX", "steering.speed", "m/s", 0.1, 3.0, "Maximum speed setpoint"),
+        ("STR_ALT_MAX", "steering.highest", "m", 2.0, 1000.0,
+         "Maximum height above the origin"),
         ("STR_ACC_MAX", "steering.acceleration", "m/s^2", 0.2, 2.5,
          "Maximum acceleration of the position setpoint"),
         ("STR_YAW_RATE", "steering.yaw_rate", "rad/s", 0.05, 1.0, "Maximum yaw rate"),

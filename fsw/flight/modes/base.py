@@ -6,6 +6,7 @@ A flight mode is one file in this folder: a subclass of ``FlightMode`` and a nam
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -72,6 +73,7 @@ class CommandContext:
     acceleration: float  # m/s^2, of a generated setpoint
     failures_allowed: bool = False  # to be injected
     rests: bool = True  # it lies or stands still
+    highest: float = math.inf  # m above the origin, of the base
 
 
 @dataclass(frozen=True, slots=True)

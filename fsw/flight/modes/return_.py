@@ -50,7 +50,7 @@ class Return(FlightMode):
         """
         (x, y, z), limits = estimate.p_WB, self.config.limits
         lowest = -self.config.airframe.leg_length - limits.airborne_height
-        height = min(z, home.p[2] - limits.return_height)
+        height = max(min(z, home.p[2] - limits.return_height), -self.config.steering.highest)
         waits = min(max(height, home.p[2] - limits.return_descent), max(height, lowest))
         goal = PositionGoal(MotionSetpoint(False, (x, y, height)))
         across: Vec3 = (home.p[0], home.p[1], height)

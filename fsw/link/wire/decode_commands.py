@@ -1,7 +1,7 @@
 """Decodes MAVLink commands: parameters in, a typed action out; pure.
 
-Invalid parameters are refused here with a sentence; NaN means the vehicle's default. What
-depends on the state of the vehicle is decided in ``fsw.flight.command_handlers``.
+Invalid parameters are refused here with a sentence; NaN means the vehicle's default, and infinity
+nothing. What depends on the state of the vehicle is decided in ``fsw.flight.command_handlers``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from fsw.flight.bounds import MAX_SPEED, MAX_YAW
 from fsw.flight.command_handlers import MIN_SPEED
 from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, LOCAL_NED, Locate
 from fsw.link.wire.px4_mode import MODE_BY_PX4, MODE_BY_STANDARD
@@ -60,6 +61,9 @@ def command(request: CommandRequest, locate: Locate) -> Command:
     if reader is None:
         return Command(Rejected(CommandResult.UNSUPPORTED), request)
     try:
+        for number, value in enumerate(request.params, start=1):
+            if math.isinf(value):
+                raise _InvalidError(f"command {request.command} refused: param{number} is infinite")
         return Command(reader(request, locate), request)
     except _InvalidError as error:
         return Command(Rejected(CommandResult.DENIED, str(error)), request)
@@ -104,11 +108,15 @@ def _take_off(request: CommandRequest, locate: Locate) -> CommandAction:
 
 def _reposition(request: CommandRequest, locate: Locate) -> CommandAction:
     speed, flags, _, yaw = request.params[:4]
+    if abs(yaw) > MAX_YAW:
+        raise _InvalidError(f"no goto: a heading of {yaw:g} rad is outside {MAX_YAW:.2f} rad")
+    if speed > MAX_SPEED:
+        raise _InvalidError(f"no goto: {speed:g} m/s is more than {MAX_SPEED:g} m/s")
     return GoTo(
         _place(request, locate, "no goto"),
-        yaw if math.isfinite(yaw) else None,
-        speed if math.isfinite(speed) and speed > 0.0 else None,
-        may_switch_mode=math.isfinite(flags) and bool(int(flags) & _MAY_SWITCH_MODE),
+        None if math.isnan(yaw) else yaw,
+        speed if speed > 0.0 else None,
+        may_switch_mode=not math.isnan(flags) and bool(int(flags) & _MAY_SWITCH_MODE),
     )
 
 
