@@ -291,14 +291,17 @@ class ReferenceGovernor:
     def limit_external(
         self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
     ) -> tuple[tuple[EndEffectorTarget, ...], str]:
-        """The same of targets from outside, limited in height and speed, and why they were."""
+        """The same of targets from outside, limited in height and speed, and why they were.
+
+        The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED].
+        """
         limited, left = _limit_all(targets, p_WE, v_WE, safe_set, self._barrier, self._limits)
         return limited, self.reason(left)
 
     def limit_now(
         self, target: EndEffectorTarget, p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
     ) -> EndEffectorTarget:
-        """The target from outside of this instant, ``p_WE`` [m] and ``v_WE`` [m/s] as above."""
+        """The target from outside of this instant; ``p_WE`` [m, NED], ``v_WE`` [m/s] as above."""
         return self.limit_external((target,), p_WE, v_WE, safe_set)[0][0]
 
     def left_by(self, motion: MotionSetpoint) -> str:
