@@ -40,6 +40,7 @@ from fsw.signals import (
     TickInputs,
 )
 
+_SAME = 1e-3  # m; a zone that is where it was predicted is off by rounding
 _ACCEPTED = 8  # sources whose last announcement is remembered
 
 
@@ -199,7 +200,7 @@ class SafeSetCheck:
                 continue
             which = f"zone {number + 1} ({zone.shape.kind})"
             moves_on = number in was and is_update_of(old.zones[number], zone)
-            if not margin >= (min(was[number][0], 0.0) if moves_on else 0.0):
+            if not margin >= (min(was[number][0] - _SAME, 0.0) if moves_on else 0.0):
                 return f"the vehicle is not inside {which}, by {-margin:.2f} m"
             if not (moves_on or h >= 0.0):
                 return f"the vehicle could not stop before {which}: it is {-h:.2f} m/s too fast"

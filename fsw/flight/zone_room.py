@@ -3,7 +3,8 @@ r"""What room and what speed a zone may take to drive a vehicle out of it.
 Outside of a zone the barrier asks for a speed back, :math:`n\cdot v \ge k_S\,|d| + \lambda`, and
 that grows without bound with the depth. So clearances shrink, as far as it needs:
 
-* no barrier asks for more than the largest speed of a setpoint, the zone's own included,
+* no barrier asks for more than the largest speed of a setpoint, the zone's own included, which
+  is taken to be slower where it is more than that alone,
 * a zone that the vehicle is in deeper than ``ROOM`` stands where it is, and the vehicle at rest
   outside of it: no way out is known to be right. The failsafe table holds, and lands,
 * and the same for one that would push it below the lowest height of a reference.
@@ -14,6 +15,7 @@ Margins and failsafes go on to be of the safe set in force.
 from __future__ import annotations
 
 import math
+import operator
 from typing import Final
 
 from fsw.barriers.safe_approach import BarrierTuning
@@ -26,10 +28,11 @@ from fsw.parameters.consistency import stand_off
 from fsw.parameters.flight_config import FlightConfig, lowest_height
 from fsw.shapes import kind_of
 from fsw.shapes.zones import surface
-from fsw.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Zone
+from fsw.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Vec3, Zone
 
 _BRAKING: Final = 1.0  # m/s^2, that are counted on above the ground
 _DOWNWARD: Final = 0.1  # of a normal, from which on it leads to the ground
+_STILL: Final[Vec3] = (0.0, 0.0, 0.0)
 
 
 class ZoneRoom:
@@ -59,12 +62,13 @@ class ZoneRoom:
             tuning = self._tuning(zones[k])
             if not distance < stand_off(tuning):
                 continue
-            least, rests = self._least(kept, k, margin, tuning, estimate, target)
+            least, share = self._least(kept, k, margin, tuning, estimate, target)
+            if share < 1.0:
+                zones[k] = _slowed(zones[k], share, estimate.t_us)
             if distance < least:
                 given[k] = least - distance
-                zone = held(zones[k], estimate.t_us - zones[k].t_us) if rests else zones[k]
-                zones[k] = replace(zone, clearance=zone.clearance - given[k])
-        if not any(given):
+                zones[k] = replace(zones[k], clearance=zones[k].clearance - given[k])
+        if not any(given) and all(map(operator.is_, zones, kept.safe_set.zones)):
             return kept
         return kept._replace(safe_set=SafeSet(tuple(zones)), given=tuple(given))
 
@@ -79,23 +83,33 @@ class ZoneRoom:
         tuning: BarrierTuning,
         estimate: StateEstimate,
         target: EndEffectorTarget | None,
-    ) -> tuple[float, bool]:
-        """The least distance [m] that a zone is to see; whether it is to stand where it is now."""
+    ) -> tuple[float, float]:
+        """The least distance [m] at which a zone is to be seen, and the share of its speed [1]."""
         rest, at = stand_off(tuning), surface(kept.source, k, estimate.p_WB, estimate.t_us, target)
         if at is None or not margin > -ROOM:
-            return rest, True
+            return rest, 0.0
         moves = kept.source.zones[k].velocity
         if target is not None and kind_of(kept.source.zones[k].shape).follows_target:
             moves = target.v_WE
-        speed = max(self._speed - tuning.lambda_ - max(dot(at.normal, moves), 0.0), 0.0)
-        least, down = -speed / tuning.slope, at.normal[2]
+        comes, most = max(dot(at.normal, moves), 0.0), max(self._speed - tuning.lambda_, 0.0)
+        share = min(1.0, most / comes) if comes > 0.0 else 1.0
+        least, down = -max(most - comes, 0.0) / tuning.slope, at.normal[2]
         if down > _DOWNWARD:
             sinks = max(estimate.v_WB[2], 0.0)
             room = -estimate.p_WB[2] - self._lowest - sinks * sinks / (2.0 * _BRAKING)
-            lowest = rest - max(room, 0.0) / down
-            if lowest > least:
-                return lowest, not room > 0.0
-        return least, False
+            least = max(least, rest - max(room, 0.0) / down)
+            if not room > 0.0:
+                share = 0.0
+        return least, share
+
+
+def _slowed(zone: Zone, share: float, now_us: int) -> Zone:
+    """A zone from where it is now on at a ``share`` [1] of its speed."""
+    if zone.velocity == _STILL:
+        return zone
+    vx, vy, vz = zone.velocity
+    velocity = (share * vx, share * vy, share * vz)
+    return replace(held(zone, now_us - zone.t_us), velocity=velocity, t_us=now_us)
 
 
 def is_deep(report: ConstraintReport) -> bool:

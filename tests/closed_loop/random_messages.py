@@ -82,8 +82,22 @@ clearance_m = 0.1
 _LOCAL_NED: Final = 1
 _CONTACTS: Final = (EndKind.COLLISION, EndKind.CRASH, EndKind.DIVERGED)
 _ENDING: Final = (185, 400, 246, 420)  # terminate, (dis)arm, reboot, inject a failure
-_OF_OTHERS: Final = (ids.PARAM_SET, ids.OBSTACLE_WALL, ids.OBSTACLE_POINT)  # not of any payload
-_MAIN_SUB: Final = ((4, 2), (4, 3), (4, 3), (4, 4), (4, 5), (4, 6), (4, 11), (4, 11), (6, 0), (6, 0))
+# Drawn with values of their own, from whom they may come.
+_OF_OTHERS: Final = (
+    ids.PARAM_SET, ids.OBSTACLE_WALL, ids.OBSTACLE_POINT, ids.OBSTACLE_SHAPE, ids.WORKSPACE_SPHERE
+)  # fmt: skip
+_MAIN_SUB: Final = (
+    (4, 2),
+    (4, 3),
+    (4, 3),
+    (4, 4),
+    (4, 5),
+    (4, 6),
+    (4, 11),
+    (4, 11),
+    (6, 0),
+    (6, 0),
+)
 _ANY: Final = (math.nan, math.inf, -math.inf, 3.396e38, -3.4e38, 1e20, 1e30, 0.0, -1.0, 1e4)
 _STREAM_S: Final = 0.1
 _QUIET_S: Final = 2.0  # of a message's follow-ups
@@ -108,7 +122,7 @@ class Talkers:
     """Everybody who talks to the vehicle of one flight."""
 
     def __init__(self, seed: int, config: FlightConfig, *, wall: bool, start: str) -> None:
-        self.chance = random.Random(seed)
+        self.chance, self.wall = random.Random(seed), wall
         # Whoever owns the safe set may take the wall away, and then nobody knows of it.
         self.announcers = SENDERS[1:] if wall else SENDERS
         text = _SCENARIO.format(start=start) + (_WALL if wall else "")
@@ -180,6 +194,8 @@ class Talkers:
         chance = self.chance
         sender = chance.choice(SENDERS)
         if chance.random() < 0.35:
+            if self.wall and not self.loop.state.vehicle.armed:
+                return  # disarmed, the safe set is anybody's, as the manual says
             chance.choice(
                 (self._wall, self._point, self._shape, self._shape, self._shape, self._sphere)
             )(chance.choice(self.announcers))
@@ -248,9 +264,11 @@ class Talkers:
             2: (self.number(0.0, 0.1), self.number(0.0, 0.1), self.number(-0.2, 0.2), size),
             3: (x, y, z - size, z + abs(self.number(1.0, 1.0)), size),
             4: (x, y, z, *self.near(), size),
-            5: (x, y, z, size, abs(self.number(0.5, 0.3)), abs(self.number(0.5, 0.3)), 1.0, 0, 0, 0),
+            5: (x, y, z, size, abs(self.number(0.5, 0.3)), size, 1.0, 0.0, 0.0, 0.0),
         }[kind]  # fmt: skip
-        velocity = tuple(self.number(0.0, 0.7) for _ in range(3)) if moves and kind != 2 else (0.0,) * 3
+        velocity = (
+            tuple(self.number(0.0, 0.7) for _ in range(3)) if moves and kind != 2 else (0.0,) * 3
+        )
         t_us = self.simulation.t_us + chance.choice((0, 0, 0, -1_000_000, 2_000_000, 10**9))
         flags = int(kind == 2 or chance.random() < 0.2)
 
@@ -269,7 +287,11 @@ class Talkers:
         chance = self.chance
         if chance.random() < 0.7:
             self.later.append((self.simulation.time_s + 0.1, partial(self._switch, sender, 4, 11)))
-        begin, p, v = self.simulation.time_s, list(self.near(1.0)), [chance.gauss(0.0, 0.5) for _ in range(3)]
+        begin, p, v = (
+            self.simulation.time_s,
+            list(self.near(1.0)),
+            [chance.gauss(0.0, 0.5) for _ in range(3)],
+        )
         jump = chance.choice((0.0, 0.0, 0.3, 5.0))
         lasts = chance.uniform(0.5, 6.0)
         count = round(lasts / _STREAM_S)
@@ -296,7 +318,9 @@ class Talkers:
             self.later.append((begin + 0.1, partial(self._switch, sender, 6, 0)))
         x, y, z = self.near(1.0)
         velocity = tuple(self.number(0.0, 1.5) for _ in range(3))
-        mask = chance.choice((0x1F8, 0x1C7, 0x03F, 0x1C0, 0x1F8, 0x1C7)) | chance.choice((0xC00, 0x400, 0))
+        mask = chance.choice((0x1F8, 0x1C7, 0x03F, 0x1C0, 0x1F8, 0x1C7)) | chance.choice(
+            (0xC00, 0x400, 0)
+        )
         frame = chance.choice((1, 1, 1, 8, 12, 6))
         end_effector = chance.random() < 0.4
 
@@ -371,7 +395,11 @@ class Talkers:
         for seq in range(count):
             x, y, z = self.near(2.0)
             command = chance.choice((16, 16, 16, 22, 21, 20, 178, 93, 19))
-            p1, p2 = (1.0, abs(self.number(1.0, 2.0))) if command == 178 else (self.number(0.5, 0.5), 0.0)
+            p1, p2 = (
+                (1.0, abs(self.number(1.0, 2.0)))
+                if command == 178
+                else (self.number(0.5, 0.5), 0.0)
+            )
             self.send(
                 sender, ids.MISSION_ITEM_INT, seq=seq, frame=1, command=command, autocontinue=1,
                 param1=abs(p1), param2=p2, param4=self.number(0.0, 90.0),
@@ -379,7 +407,9 @@ class Talkers:
                 mission_type=0,
             )  # fmt: skip
         if chance.random() < 0.7:
-            self.later.append((self.simulation.time_s + 0.2, partial(self.command, sender, 300, 0.0, 0.0)))
+            self.later.append(
+                (self.simulation.time_s + 0.2, partial(self.command, sender, 300, 0.0, 0.0))
+            )
 
     def _fence(self, sender: MessageSource) -> None:
         """A circle to stay in or out of, or the sphere that rides with the target."""
@@ -480,7 +510,12 @@ def _whole(value: float) -> int:
 
 
 def fly_talked_to(
-    seed: int, seconds: float, *, rate: float = 4.0, wall: bool | None = None, start: str = "airborne"
+    seed: int,
+    seconds: float,
+    *,
+    rate: float = 4.0,
+    wall: bool | None = None,
+    start: str = "airborne",
 ) -> Outcome:
     """One flight; by its seed beside a wall that the simulator owns, or with no owner."""
     wall = seed % 2 == 1 if wall is None else wall

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
+from fsw.flight.bounds import safe_set_problem
 from fsw.flight.safe_set import may_grow_fence
 from fsw.flight.safe_set_change import growth
 from fsw.link.wire.fence_items import check_fence_item, read_fence
@@ -160,6 +161,9 @@ class MissionStore:
 
     def _fence(self, items: tuple[MissionItem, ...], source: MessageSource | None) -> SafeSet:
         fence = read_fence(items, self._site.locate, self._site.clearance())
+        problem = safe_set_problem(fence)
+        if problem is not None:
+            raise BadItem(DENIED, problem)
         grown = "" if self._may_grow(source) else growth(self._kept_fence[0], fence)
         if grown:
             raise BadItem(DENIED, f"{grown}, which {self._kept_fence[1]} owns")

@@ -42,6 +42,7 @@ from fsw.signals import (
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
 _MAY_SWITCH_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
+_FLAGS: Final = float(1 << 24)  # what a float holds whole
 _RADIUS_RANGE: Final = (0.5, 100.0)  # m
 _USUAL_RADIUS: Final = 2.0  # m
 _UNCHANGED: Final = 5.0  # ORBIT_YAW_BEHAVIOUR: what an earlier orbit said, here the usual
@@ -112,6 +113,8 @@ def _reposition(request: CommandRequest, locate: Locate) -> CommandAction:
         raise _InvalidError(f"no goto: a heading of {yaw:g} rad is outside {MAX_YAW:.2f} rad")
     if speed > MAX_SPEED:
         raise _InvalidError(f"no goto: {speed:g} m/s is more than {MAX_SPEED:g} m/s")
+    if not math.isnan(flags) and not 0.0 <= flags < _FLAGS:
+        raise _InvalidError(f"no goto: flags {flags:g} are not a whole number of 24 bits")
     return GoTo(
         _place(request, locate, "no goto"),
         None if math.isnan(yaw) else yaw,

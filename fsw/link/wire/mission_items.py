@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.flight.bounds import MAX_SPEED, MAX_STAY, MAX_YAW
 from fsw.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
 
 # MAV_CMD
@@ -43,7 +44,7 @@ INVALID_PARAM1: Final = 6  # and so on up to parameter 7
 DENIED: Final = 14
 
 NO_PLACE: Final = 2**31 - 1  # x or y of an item that names none, as MAVLink writes NaN there
-LONGEST_STAY: Final = 3600.0  # s
+LONGEST_STAY: Final = MAX_STAY  # s
 WIDEST_ACCEPTANCE: Final = 10.0  # m
 USUAL_ACCEPTANCE: Final = 0.1  # m
 
@@ -181,8 +182,8 @@ def _change_speed(item: MissionItem, _: Locate) -> MissionStep:
         raise _bad(1, f"speed type {kind:g} is neither air speed (0) nor ground speed (1)")
     if speed in (-1.0, -2.0):
         return MissionStep(MissionAction.SPEED)
-    if not 0.01 <= speed <= _MAX_SPEED:
-        raise _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {_MAX_SPEED:g} m/s")
+    if not 0.01 <= speed <= MAX_SPEED:
+        raise _bad(2, f"a speed of {speed:g} m/s is outside 0.01 to {MAX_SPEED:g} m/s")
     return MissionStep(MissionAction.SPEED, speed=speed)
 
 
@@ -203,7 +204,7 @@ def _look(item: MissionItem, locate: Locate) -> MissionStep:
     raise _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
 
 
-_MAX_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
+_MAX_HEADING: Final = math.degrees(MAX_YAW)
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     NAV_WAYPOINT: _waypoint,
     NAV_LOITER_UNLIMITED: _loiter_unlimited,
@@ -241,7 +242,12 @@ def _z(item: MissionItem, locate: Locate) -> float:
 
 
 def _heading(degrees: float) -> float | None:
-    return math.radians(degrees) if math.isfinite(degrees) else None
+    """The heading [rad] that parameter 4 names; NaN keeps it."""
+    if math.isnan(degrees):
+        return None
+    if not abs(degrees) <= _MAX_HEADING:
+        raise _bad(4, f"a heading of {degrees:g} deg is outside {_MAX_HEADING:g} deg either way")
+    return math.radians(degrees)
 
 
 def _within(value: float, most: float) -> bool:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.control.safety_filter import (
+    ROOM,
     FilterLaw,
     FilterTuning,
     filter_law,
@@ -263,3 +264,27 @@ def test_what_clearances_have_grown_by_is_kept_and_is_no_margin() -> None:
     _, _, announced = asked((AHEAD,), place, v, wanted)
     assert margin == pytest.approx(announced), "and reports the margin of the safe set"
     assert nearer == pytest.approx(announced - 0.05)
+
+
+@pytest.mark.requirement("REQ-SAFE-5")
+def test_nothing_is_pushed_faster_than_the_speed_of_setpoints() -> None:
+    law = filter_law(STRICT, (TUNING, TUNING), AIRFRAME.link_length, LAG, 2.5, 1.5)
+    outside = (1.6, 0.0, -1.0)  # by 0.7 m: the barrier asks for 2.8 m/s back
+    for speed, pushed in ((0.0, True), (1.0, True), (1.5, False), (3.0, False)):
+        result, changed, _ = asked((AHEAD,), outside, (-speed, 0.0, 0.0), ZERO, law=law)
+        assert changed is pushed
+        assert bool(result[0] < 0.0) is pushed
+        _, unbounded, _ = asked((AHEAD,), outside, (-min(speed, 2.0), 0.0, 0.0), ZERO)
+        assert unbounded
+    unchanged = asked((AHEAD,), (0.85, 0.0, -1.0), (0.2, 0.0, 0.0), (0.5, 0.0, 0.0))
+    same = asked((AHEAD,), (0.85, 0.0, -1.0), (0.2, 0.0, 0.0), (0.5, 0.0, 0.0), law=law)
+    assert same == unchanged
+
+
+@pytest.mark.requirement("REQ-SAFE-5")
+def test_a_zone_deeper_than_its_room_pushes_nobody_and_is_reported() -> None:
+    result, changed, margin = asked((AHEAD,), (0.9 + ROOM + 0.01, 0.0, -1.0), ZERO, ZERO)
+    assert (result, changed) == (ZERO, False)
+    assert margin == pytest.approx(-ROOM - 0.01)
+    _, changed, _ = asked((AHEAD,), (0.9 + ROOM - 0.01, 0.0, -1.0), ZERO, ZERO)
+    assert changed

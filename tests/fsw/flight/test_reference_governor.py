@@ -16,10 +16,10 @@ from fsw.flight.reference_governor import (
     project,
     project_to_safe_set,
 )
-from fsw.parameters.flight_config import flight_config
+from fsw.parameters.flight_config import flight_config, lowest_height
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
-from fsw.signals import EndEffectorTarget, SafeSet, Vec3
+from fsw.signals import EndEffectorTarget, MotionSetpoint, SafeSet, Vec3
 
 WALL = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -123,15 +123,16 @@ def test_a_setpoint_of_the_body_sinks_no_faster_than_braking_at_1_m_s2_allows(
 
 
 @given(st.floats(-0.2, 3.0), st.floats(-2.0, 2.0))
-def test_a_setpoint_of_the_end_effector_keeps_the_body_a_decimetre_above_its_standing_height(
+def test_a_setpoint_of_the_end_effector_keeps_the_body_at_the_lowest_height_of_references(
     height: float, sink: float
 ) -> None:
     hanging = 0.25
     p, (_, _, vz) = limited(
         (0.0, 0.0, -LEGS - height + hanging), (0.0, 0.0, sink), (0.0, 0.0, -hanging), tip=True
     )
-    assert -(p[2] - hanging) - LEGS == pytest.approx(max(height, 0.1))
-    room = max(height - 0.1, 0.0)
+    least = CONFIG.limits.airborne_height
+    assert -(p[2] - hanging) - LEGS == pytest.approx(max(height, least))
+    room = max(height - least, 0.0)
     stops = 2.0 * room if room < 0.25 else math.sqrt(2.0 * (room - 0.125))
     assert vz == pytest.approx(min(sink, stops), abs=1e-9)
 
@@ -195,3 +196,79 @@ def test_a_projected_place_keeps_every_clearance_and_is_the_nearest_of_a_single_
     alone = project_to_safe_set(p, WALL, 0)
     # Within the tolerance a place counts as inside.
     assert alone == (p if p[0] <= 0.9 + 1e-4 else pytest.approx((0.9, p[1], p[2])))
+
+
+HIGHEST, SPEED = CONFIG.steering.highest, CONFIG.steering.speed
+LOWEST_TIP = lowest_height(CONFIG) - CONFIG.surroundings.hanging
+
+
+def streamed(
+    first: Vec3, v: Vec3 = STILL, here: Vec3 = (0.0, 0.0, -1.0), moves: Vec3 = STILL
+) -> tuple[tuple[EndEffectorTarget, ...], str]:
+    return GOVERNOR.limit_external(horizon(first, v), here, moves, SafeSet())
+
+
+def test_targets_from_outside_pass_between_floor_and_ceiling_at_a_speed_that_may_be_flown() -> None:
+    targets = horizon((0.1, 0.0, -1.0), (0.6, -0.8, 0.3))
+    moves = (0.5, -0.7, 0.3)
+    assert GOVERNOR.limit_external(targets, (0.0, 0.0, -1.0), moves, SafeSet()) == (targets, "")
+
+
+@pytest.mark.parametrize(
+    ("first", "here", "words"),
+    [
+        ((0.0, 0.0, 3.2), (0.0, 0.0, -1.0), "below 0.40 m"),
+        ((0.0, 0.0, -125.0), (0.0, 0.0, -119.7), "above 120 m"),
+        ((0.0, 0.0, -11.0), (0.0, 0.0, -1.0), "more than 1.5 m/s"),
+    ],
+)
+def test_targets_from_outside_that_leave_them_are_limited_and_the_limit_named(
+    first: Vec3, here: Vec3, words: str
+) -> None:
+    near, why = streamed(first, here=here)
+    assert words in why
+    for target in near:
+        height = -target.p_WE[2]
+        assert LOWEST_TIP - 1e-9 <= height <= HIGHEST - CONFIG.surroundings.hanging + 1e-9
+
+
+@given(st.floats(0.0, 4.0), st.floats(-math.pi, math.pi), st.floats(0.0, 1.0))
+def test_a_vehicle_at_the_largest_speed_is_led_no_faster(
+    speed: float, way: float, target_speed: float
+) -> None:
+    """However far away targets are: those of a moving vehicle used to run ahead of it for ever."""
+    ahead = (math.cos(way), math.sin(way), 0.0)
+    moves = (speed * ahead[0], speed * ahead[1], 0.0)
+    v = (20.0 * target_speed * ahead[0], 20.0 * target_speed * ahead[1], 0.0)
+    near, why = streamed((50.0 * ahead[0], 50.0 * ahead[1], -1.0), v, moves=moves)
+    assert "more than" in why
+    last = near[-1]
+    reach = SPEED * 0.5 + max(0.4 * (1.0 - speed / SPEED), 0.1)
+    assert math.dist(last.p_WE, (0.0, 0.0, -1.0)) <= reach + 1e-9
+    assert math.hypot(*last.v_WE) <= max(SPEED, speed - 1.0) + 1e-9
+
+
+def test_near_the_lowest_height_targets_sink_as_fast_as_braking_allows() -> None:
+    near, _ = streamed((0.0, 0.0, -0.5), (0.0, 0.0, 1.0), here=(0.0, 0.0, -0.5))
+    room = 0.5 - LOWEST_TIP
+    assert near[0].v_WE[2] == pytest.approx(2.0 * room)
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        (MotionSetpoint(False, (0.0, 0.0, -1.0)), ""),
+        (MotionSetpoint(False, (0.0, 0.0, 0.5)), ""),  # a body is asked to land
+        (MotionSetpoint(True, (0.0, 0.0, 0.5)), "below"),
+        (MotionSetpoint(False, (0.0, 0.0, -120.5)), "above 120 m"),
+        (MotionSetpoint(False, v=(1.2, 1.2, 0.0)), "more than 1.5 m/s"),
+    ],
+)
+def test_a_setpoint_is_held_against_the_same_limits(motion: MotionSetpoint, words: str) -> None:
+    left = GOVERNOR.left_by(motion)
+    assert words in left if words else left == ""
+
+
+def test_a_setpoint_goes_no_higher_than_the_highest_height() -> None:
+    (_, _, z), (_, _, vz) = limited((0.0, 0.0, -HIGHEST - 3.0), (0.0, 0.0, -1.0))
+    assert (z, vz) == (pytest.approx(-HIGHEST), 0.0)

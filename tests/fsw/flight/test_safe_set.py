@@ -297,8 +297,87 @@ def test_a_stranger_cannot_shut_the_vehicle_out_in_flight() -> None:
     after, texts = received(memory, walled(1.0, 5.0), source=STRANGER, at=(0.95, 0.0, -1.0))
     assert after.safe_set == memory.safe_set
     assert "not inside" in refused(texts)
-    after, _ = received(memory, walled(1.0, 5.0), at=(0.95, 0.0, -1.0))
-    assert after.safe_set == walled(1.0, 5.0), "the owner can"
+    after, texts = received(memory, walled(1.0, 5.0), at=(0.95, 0.0, -1.0))
+    assert after.safe_set == memory.safe_set, "nor can the owner"
+    assert "not inside" in refused(texts)
+    after, _ = received(memory, walled(1.0, 5.0), at=(0.95, 0.0, -1.0), flies=False)
+    assert after.safe_set == walled(1.0, 5.0), "on the ground it speaks against arming"
+
+
+def announced_to(
+    safe_set: SafeSet, memory: MissionMemory | None = None, *, v: Vec3 = (0.0, 0.0, 0.0),
+    target: EndEffectorTarget | None = None, t_us: int = 1_000_000, **how: bool,
+) -> tuple[MissionMemory, list[StatusText]]:  # fmt: skip
+    """What becomes of a set that is announced to a vehicle at (0, 0, -1) that moves at ``v``."""
+    texts: list[StatusText] = []
+    inputs = TickInputs(frame(t_us), announced=(SafeSetAnnouncement(STRANGER, safe_set),))
+    estimate = vehicle_at((0.0, 0.0, -1.0), v, t_us)
+    how = how or {"flies": True}
+    memory = memory or MissionMemory()
+    return CHECK.update(memory, inputs, estimate, texts, target=target, **how), texts  # type: ignore[arg-type]
+
+
+@pytest.mark.requirement("REQ-SAFE-7")
+@pytest.mark.parametrize(
+    "zone",
+    [
+        wall((-1.0, 0.0, 0.0), 10.0, 0.1),  # the vehicle is 10 m behind it
+        wall((-1.0, 0.0, 0.0), 1e30, 0.1),
+        point((0.0, 0.0, -1.0), 5.0),
+        point((0.0, 0.0, -50.0), 1e20),
+        target_sphere((5.0, 0.0, 0.0), 0.3),
+        target_sphere((3.4e38,) * 3, 3.4e38),
+        Zone(vertical_cylinder((3.0, 0.0), 0.3), 0.1, velocity=(1.1, 0.0, 0.0), t_us=1_000_000),
+    ],
+)
+def test_in_flight_the_first_to_announce_cannot_shut_the_vehicle_out(zone: Zone) -> None:
+    target = EndEffectorTarget(0, (0.0, 0.0, -0.775), (0.0,) * 3, (0.0,) * 3)
+    for how in ({"flies": True}, {"flies": False, "armed": True}):
+        memory, texts = announced_to(SafeSet((zone,)), target=target, **how)
+        assert (memory.safe_set, memory.owner) == (SafeSet(), None)
+        assert memory.refused_count == 1
+        refused(texts)
+        memory, texts = announced_to(SafeSet((zone,)), memory, target=target, **how)
+        assert (memory.refused_count, texts) == (2, []), "counted again, and told once"
+
+
+@pytest.mark.requirement("REQ-SAFE-7")
+def test_in_flight_the_way_in_which_the_vehicle_stops_is_inside_as_well() -> None:
+    """0.9 m are left: enough from 1 m/s, and not from 2."""
+    memory, _ = announced_to(walled(1.0, 5.0), v=(1.0, 0.0, 0.0))
+    assert memory.safe_set == walled(1.0, 5.0)
+    memory, texts = announced_to(walled(1.0, 5.0), v=(2.0, 0.0, 0.0))
+    assert memory.safe_set == SafeSet()
+    assert "could not stop" in refused(texts)
+    memory, _ = announced_to(walled(1.0, 5.0), v=(-2.0, 0.0, 0.0))
+    assert memory.safe_set == walled(1.0, 5.0), "it flies away from it"
+
+
+def test_a_zone_that_has_turned_towards_the_vehicle_is_believed_while_that_is_outside_of_it() -> (
+    None
+):
+    def person(x: float, vx: float, t_us: int = 1_000_000) -> SafeSet:
+        at = vertical_cylinder((x, 0.0), 0.3)
+        return SafeSet((Zone(at, 0.1, velocity=(vx, 0.0, 0.0), t_us=t_us),))
+
+    memory, _ = announced_to(person(-0.6, 0.1))
+    memory, _ = announced_to(person(-0.5, 1.0), memory)
+    assert memory.safe_set == person(-0.5, 1.0), "it cannot stop before it, and must know of it"
+    after, texts = announced_to(person(-0.3, 1.0), memory)
+    assert after.safe_set == memory.safe_set
+    assert "not inside" in refused(texts)
+    # It has come nearer as it was announced, and the vehicle is inside of its clearance by now.
+    after, _ = announced_to(person(-0.3, 0.5, 1_200_000), memory, t_us=1_200_000)
+    assert after.safe_set == person(-0.3, 0.5, 1_200_000)
+
+
+def test_a_stamp_of_another_clock_hides_no_zone_on_the_vehicle() -> None:
+    """Judged where it will stand, not where a stamp a minute ahead has it for a moment."""
+    at = vertical_cylinder((0.2, 0.0), 0.3)
+    hidden = Zone(at, 0.1, velocity=(1.0, 0.0, 0.0), t_us=61_000_000)
+    memory, texts = announced_to(SafeSet((hidden,)))
+    assert memory.safe_set == SafeSet()
+    assert "not inside" in refused(texts)
 
 
 def test_on_the_ground_another_source_takes_over_once_the_owner_is_silent() -> None:
