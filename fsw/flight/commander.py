@@ -30,6 +30,7 @@ from fsw.flight.restart import rests
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
+from fsw.flight.zone_room import within_room
 from fsw.frozen import replace
 from fsw.model.body import body_of
 from fsw.model.kinematics import point_in_flight
@@ -203,9 +204,8 @@ class Commander:
         """
         config = self._config
         room = stand_off(config.planner.walls) + self._tube_radius
-        place = retreat_place(
-            state.kept.safe_set, estimate, self._body, config.airframe.link_length, room
-        )
+        safe_set = within_room(state.kept.safe_set, estimate, self._body)
+        place = retreat_place(safe_set, estimate, self._body, config.airframe.link_length, room)
         return self._towards(state, PositionGoal(MotionSetpoint(False, place)), estimate)
 
     def check_mode_completion(

@@ -5,9 +5,9 @@ that grows without bound with the depth. So clearances shrink, as far as it need
 
 * no barrier asks for more than the largest speed of a setpoint, the zone's own included, which
   is taken to be slower where it is more than that alone,
-* a zone that the vehicle is in deeper than ``ROOM`` stands where it is, and the vehicle at rest
-  outside of it: no way out is known to be right. The failsafe table holds, and lands,
-* and the same for one that would push it below the lowest height of a reference.
+* a zone that the vehicle is in deeper than ``ROOM`` stands where it is, well away from the vehicle:
+  no way out is known to be right. The failsafe table holds, and lands,
+* and one that would push it below the lowest height of a reference ends there.
 
 Margins and failsafes go on to be of the safe set in force.
 """
@@ -24,6 +24,7 @@ from fsw.flight.safe_set_change import held
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import replace
 from fsw.geometry.vectors import dot
+from fsw.model.body import Body, hull_reach
 from fsw.parameters.consistency import stand_off
 from fsw.parameters.flight_config import FlightConfig, lowest_height
 from fsw.shapes import kind_of
@@ -31,6 +32,7 @@ from fsw.shapes.zones import surface
 from fsw.signals import ConstraintReport, EndEffectorTarget, SafeSet, StateEstimate, Vec3, Zone
 
 _BRAKING: Final = 1.0  # m/s^2, that are counted on above the ground
+_FREE: Final = 0.5  # m; a boundary that came along without any would let nothing back
 _DOWNWARD: Final = 0.1  # of a normal, from which on it leads to the ground
 _STILL: Final[Vec3] = (0.0, 0.0, 0.0)
 
@@ -87,7 +89,7 @@ class ZoneRoom:
         """The least distance [m] at which a zone is to be seen, and the share of its speed [1]."""
         rest, at = stand_off(tuning), surface(kept.source, k, estimate.p_WB, estimate.t_us, target)
         if at is None or not margin > -ROOM:
-            return rest, 0.0
+            return rest + _FREE, 0.0
         moves = kept.source.zones[k].velocity
         if target is not None and kind_of(kept.source.zones[k].shape).follows_target:
             moves = target.v_WE
@@ -97,7 +99,7 @@ class ZoneRoom:
         if down > _DOWNWARD:
             sinks = max(estimate.v_WB[2], 0.0)
             room = -estimate.p_WB[2] - self._lowest - sinks * sinks / (2.0 * _BRAKING)
-            least = max(least, rest - max(room, 0.0) / down)
+            least = max(least, rest - room / down)  # and back up, from below
             if not room > 0.0:
                 share = 0.0
         return least, share
@@ -110,6 +112,16 @@ def _slowed(zone: Zone, share: float, now_us: int) -> Zone:
     vx, vy, vz = zone.velocity
     velocity = (share * vx, share * vy, share * vz)
     return replace(held(zone, now_us - zone.t_us), velocity=velocity, t_us=now_us)
+
+
+def within_room(safe_set: SafeSet, estimate: StateEstimate, body: Body) -> SafeSet:
+    """The zones that a vehicle with a ``body`` may draw back from."""
+    zones = []
+    for k, zone in enumerate(safe_set.zones):
+        at = surface(safe_set, k, estimate.p_WB, estimate.t_us)
+        if at is not None and at.distance - hull_reach(body, at.normal) > -ROOM:
+            zones.append(zone)
+    return SafeSet(tuple(zones))
 
 
 def is_deep(report: ConstraintReport) -> bool:
