@@ -117,9 +117,12 @@ def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
 
     numba looks at the type of every number in every call, which for the nested tuples of a tick
     costs as much as the arithmetic. Here numbers become what they are in the example and tuples
-    may be named or not; an array must be of the example's type: it is not checked.
+    may be named or not; an array must be of the example's type: it is not checked. With
+    NUMBA_DISABLE_JIT there is none, and the kernel is plain Python.
     """
     dispatcher = cast(Any, kernel)
+    if not hasattr(dispatcher, "typeof_pyval"):
+        return kernel
     types = tuple(dispatcher.typeof_pyval(argument) for argument in example)
     return cast(Callable[P, R], dispatcher.compile(types))
 

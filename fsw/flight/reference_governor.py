@@ -302,6 +302,13 @@ class ReferenceGovernor:
         self, target: EndEffectorTarget, p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
     ) -> EndEffectorTarget:
         """The target from outside of this instant; ``p_WE`` [m, NED], ``v_WE`` [m/s] as above."""
+        lowest, highest, fastest = self._limits
+        if (
+            highest <= target.p_WE[2] <= lowest
+            and norm(target.v_WE) <= fastest
+            and norm(subtract(target.p_WE, p_WE)) <= _NEAR
+        ):
+            return target
         return self.limit_external((target,), p_WE, v_WE, safe_set)[0][0]
 
     def left_by(self, motion: MotionSetpoint) -> str:

@@ -24,12 +24,17 @@ from fsw.signals import (
     STOPPED,
     BatteryState,
     CommandResult,
+    EndEffectorTarget,
     HostHealth,
     MessageSource,
+    MissionAction,
+    MissionStep,
+    MissionUpdate,
     Mode,
     SafeSet,
     SafeSetAnnouncement,
     SensorFrame,
+    Severity,
     StatusText,
     TickInputs,
     TickOutputs,
@@ -334,3 +339,31 @@ def test_disarming_opens_the_safe_set_to_another_owner() -> None:
     assert not outputs.snapshot.armed
     state, _ = tick(state, 108_000, announced=(SafeSetAnnouncement(theirs, SafeSet()),))
     assert (state.mission.owner, state.mission.safe_set) == (theirs, SafeSet())
+
+
+@pytest.mark.requirement("REQ-SAFE-7")
+def test_what_is_refused_is_told_and_counted_whoever_refuses_it() -> None:
+    """By the link, a target by the tick, and a mission, of which nothing is kept."""
+    loop = Autopilot(CONFIG)
+    state, _ = loop.tick(FlightState(), TickInputs(frame(1_000_000)))
+    far = EndEffectorTarget(1_100_000, (0.0, 0.0, -2e3), (0.0,) * 3, (0.0,) * 3)
+    near = replace(far, p_WE=(0.0, 0.0, -1.0))
+    bad = MissionStep(MissionAction.GO, (0.0, math.nan, -1.0))
+    inputs = TickInputs(
+        frame(1_002_000),
+        targets=(far, near),
+        mission=MissionUpdate(steps=(bad,), current=0),
+        refused=("ball refused: it is too large",),
+    )
+    state, outputs = loop.tick(state, inputs)
+    assert [(text.severity, text.text) for text in outputs.texts if "refused" in text.text] == [
+        (
+            Severity.CRITICAL,
+            "mission refused: step 0: the place is more than 1000 m from the origin",
+        ),
+        (Severity.CRITICAL, "target refused: position out of range"),
+        (Severity.CRITICAL, "ball refused: it is too large"),
+    ]
+    assert outputs.snapshot.safety.refusals == 3
+    assert state.mission.stream == (near,)
+    assert state.mission.flight.steps == ()

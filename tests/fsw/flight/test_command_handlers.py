@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from fsw.flight.arming_health import ArmingHealth
 from fsw.flight.command_handlers import Decision, NewHeading, decide
 from fsw.flight.modes.base import CommandContext
+from fsw.link.wire.decode_commands import _READERS
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.vertical_cylinder import column
@@ -576,3 +577,52 @@ def test_a_failure_is_injected_only_where_the_parameter_allows_it(
     assert ask(allowed, 420, 0.0, 1.0, NAN) == Decision(CommandResult.IN_PROGRESS)
     assert ask(allowed, 420, 0.5, 1.0, 0.0).result == DENIED
     assert ask(allowed, 420, math.inf, 1.0, 0.0).result == DENIED
+
+
+@pytest.mark.parametrize("number", range(1, 8))
+@pytest.mark.parametrize("value", [math.inf, -math.inf])
+@pytest.mark.parametrize("command", sorted(_READERS))
+def test_no_parameter_of_any_command_may_be_infinite(
+    command: int, value: float, number: int
+) -> None:
+    """DO_REPOSITION to an infinite heading was accepted."""
+    params = [math.nan] * 7
+    params[number - 1] = value
+    decision = ask(replace(HOLDING, failures_allowed=True), command, *params)
+    assert decision.result == DENIED
+    assert f"param{number} is infinite" in decision.reason
+
+
+@pytest.mark.parametrize(
+    ("params", "accepted"),
+    [
+        ((math.nan, 1.0, math.nan, 12.5), True),
+        ((math.nan, 1.0, math.nan, 12.6), False),
+        ((math.nan, 1.0, math.nan, -1e9), False),
+        ((20.0, 1.0), True),
+        ((20.1, 1.0), False),
+        ((-1.0, 1.0), True),
+        ((1.0, 3.4e38), False),
+        ((1.0, -1.0), False),
+    ],
+)
+def test_heading_speed_and_flags_of_a_place_are_in_range(
+    params: tuple[float, ...], accepted: bool
+) -> None:
+    decision = ask(HOLDING, 192, *params)
+    assert (decision.result == ACCEPTED) is accepted, decision
+    assert accepted or decision.reason.startswith("no goto: ")
+
+
+def test_a_speed_that_is_not_flown_is_told() -> None:
+    decision = ask(replace(HOLDING, max_speed=1.5), 192, 5.0, 1.0)
+    assert decision.result == ACCEPTED
+    assert decision.reason == "goto at 1.5 m/s: faster is not flown (STR_V_MAX)"
+
+
+def test_a_place_above_the_highest_height_is_refused() -> None:
+    low = replace(HOLDING, highest=5.0)
+    for command in (192, 34):
+        decision = ask(low, command, *[math.nan] * 6, 5.5)
+        assert decision.result == DENIED
+        assert decision.reason.endswith("too high; the maximum is 5 m")

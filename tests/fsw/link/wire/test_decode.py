@@ -9,7 +9,7 @@ import pytest
 from fsw.link.inbox import Inbox
 from fsw.link.wire import message_ids as ids
 from fsw.shapes import BY_NAME, KINDS
-from fsw.signals import Arm, Mode, Rejected, SensorFrame, SwitchMode
+from fsw.signals import Arm, MessageSource, Mode, Rejected, SensorFrame, SwitchMode
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
@@ -298,6 +298,36 @@ def test_a_sphere_that_contains_nothing_is_refused(radius: float) -> None:
     inbox.accept(frame(ids.WORKSPACE_SPHERE, radius=radius))
     assert inbox.take().announced == []
     assert inbox.refused == 1
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        (point(0, 1, clearance=1e20), "ball refused: a clearance of 1e+20 m is outside 0 to 10 m"),
+        (wall(0, 1, offset=1e30), "half-space refused: offset [m] is 1e+30; at most 1000"),
+        (
+            frame(ids.WORKSPACE_SPHERE, radius=3.4e38),
+            "target sphere refused: radius [m] is 3.4e+38",
+        ),
+        (shape(1, clearance=10.5), "ball refused: a clearance of 10.5 m"),
+        (target(**{"position[2]": -1000.5}), "target refused: position out of range"),
+        (target(**{"velocity[0]": 20.5}), "target refused: velocity out of range"),
+    ],
+)
+def test_what_is_out_of_bounds_is_refused_with_the_bound_and_who_sent_it(
+    message: Frame, words: str
+) -> None:
+    inbox = Inbox()
+    source = MessageSource(66, 6, "gcs", "127.0.0.1:5555")
+    for _ in range(9):
+        inbox.accept(message, source)
+    assert inbox.refused == 9
+    received = inbox.take()
+    assert (received.announced, received.targets) == ([], [])
+    assert len(received.refused) == 4, "the first are told, all are counted"
+    assert received.refused[0].startswith(words)
+    assert received.refused[0].endswith("; from 66/6 (gcs 127.0.0.1:5555)")
+    assert inbox.take().refused == []
 
 
 def test_the_inbox_is_bounded() -> None:

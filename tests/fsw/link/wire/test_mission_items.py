@@ -125,3 +125,9 @@ def test_a_rally_point_is_a_place_and_nothing_else() -> None:
     with pytest.raises(BadItem) as wrong:
         read_rally(item(items.NAV_WAYPOINT), locate)
     assert wrong.value.result == 3
+
+
+@pytest.mark.parametrize("degrees", [math.inf, -math.inf, 721.0, 1e30])
+def test_a_heading_that_is_none_is_refused(degrees: float) -> None:
+    wrong = refused(item(items.NAV_WAYPOINT, params=(0.0, 0.0, 0.0, degrees)))
+    assert (wrong.result, "heading" in wrong.reason) == (items.INVALID_PARAM1 + 3, True)
