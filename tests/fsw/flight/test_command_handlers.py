@@ -609,13 +609,13 @@ def test_no_parameter_of_any_command_may_be_infinite(
 def test_heading_speed_and_flags_of_a_place_are_in_range(
     params: tuple[float, ...], accepted: bool
 ) -> None:
-    decision = ask(HOLDING, 192, *params)
+    decision = ask(replace(HOLDING, position=(0.0, 0.0, -2.0)), 192, *params)
     assert (decision.result == ACCEPTED) is accepted, decision
     assert accepted or decision.reason.startswith("no goto: ")
 
 
 def test_a_speed_that_is_not_flown_is_told() -> None:
-    decision = ask(replace(HOLDING, max_speed=1.5), 192, 5.0, 1.0)
+    decision = ask(replace(HOLDING, position=(0.0, 0.0, -2.0), max_speed=1.5), 192, 5.0, 1.0)
     assert decision.result == ACCEPTED
     assert decision.reason == "goto at 1.5 m/s: faster is not flown (STR_V_MAX)"
 
