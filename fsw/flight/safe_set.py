@@ -2,7 +2,7 @@
 
 One source owns what is announced, the first or the configured one, and one the fence. In flight any
 source may shrink either, and only its owner may grow it (``safe_set_change.growth``); every change
-and every refusal is a text that says who and what. On the ground another source may become the
+and every refusal is a text that says who and what. Disarmed, another source may become the
 owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
 nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the
 way in which it could stop, outside. A moving zone that
@@ -83,7 +83,8 @@ class SafeSetCheck:
         A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
         that follow the ``target`` if there is one.
         """
-        here = _Vehicle(estimate if (flies if armed is None else armed) else None, target)
+        armed = flies if armed is None else armed
+        here = _Vehicle(estimate if armed else None, target)
         update = inputs.mission
         if update is not None:
             if update.rally is not None:
@@ -93,7 +94,7 @@ class SafeSetCheck:
         for heard in inputs.announced:
             now_us = inputs.sensors.t_us
             announcement = heard
-            owns = self._owns(mission, heard.source, now_us, flies=flies)
+            owns = self._owns(mission, heard.source, now_us, armed=armed)
             problem = safe_set_problem(heard.safe_set, self._config.surroundings.zone_speed)
             if problem is None:
                 # Judged is what will be in force, not where a stamp of another clock puts it.
@@ -229,7 +230,7 @@ class SafeSetCheck:
         return found
 
     def _owns(
-        self, mission: MissionMemory, source: MessageSource, now_us: int, *, flies: bool
+        self, mission: MissionMemory, source: MessageSource, now_us: int, *, armed: bool
     ) -> bool:
         """Whether a source owns what is announced, or may from now on."""
         chosen, owner = self._chosen, mission.owner
@@ -241,7 +242,7 @@ class SafeSetCheck:
             return True
         silent_us = now_us - mission.owner_heard_us
         gone = mission.owner_heard_us < 0 or silent_us >= self._config.limits.owner_timeout_us
-        return gone and not flies
+        return gone and not armed
 
     @property
     def _chosen(self) -> int:

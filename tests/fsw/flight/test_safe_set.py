@@ -440,3 +440,13 @@ def test_in_flight_a_fence_is_grown_by_its_uploader_only() -> None:
     assert after.safe_set == SafeSet()
     ground, _ = received(memory, fence=SafeSet(), flies=False, **theirs)
     assert (ground.fence, ground.fence_owner) == (SafeSet(), STRANGER)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+def test_a_vehicle_that_stands_armed_has_the_owner_that_it_was_armed_with() -> None:
+    memory = MissionMemory(announced=walled(5.0, 5.0), safe_set=walled(5.0, 5.0), owner=OWNER)
+    after, texts = announced_to(walled(9.0, 9.0), memory, flies=False, armed=True)
+    assert (after.owner, after.safe_set) == (OWNER, walled(5.0, 5.0))
+    assert "owns" in refused(texts)
+    after, _ = announced_to(walled(9.0, 9.0), memory, flies=False, armed=False)
+    assert (after.owner, after.safe_set) == (STRANGER, walled(9.0, 9.0))
