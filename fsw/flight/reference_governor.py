@@ -46,7 +46,8 @@ _ALWAYS = 0.5  # m/s towards a wall, half of what the penalty of a row stands
 _PROJECTIONS = 30  # one after the other; in a corner they have to settle
 _TOLERANCE = 1e-4  # m
 _HERE: Vec3 = (0.0, 0.0, 0.0)
-_LOW, _HIGH, _FAST = 1, 2, 4  # which limits a target has left
+_LOW, _HIGH, _FAST, _FAR = 1, 2, 4, 8  # which limits a target has left
+_AWAY = 1.0  # m from the end-effector; what a vehicle falls behind while it makes way is less
 _TOLD = 1e-3  # m, m/s; less is rounding
 
 Limits = tuple[float, float, float]
@@ -179,8 +180,10 @@ def _limited(
         slower = max(1.0 - norm(v_WE) / fastest, 0.0)
         reach = fastest * ahead + max(_MAX_LEAD_DISTANCE * slower, _NEAR)
         near = limit_lead(near, p_WE, reach)
-        if norm(v) > fastest + _TOLD or norm(subtract(near, p)) > _TOLD:
+        if norm(v) > fastest + _TOLD:
             left |= _FAST
+        if norm(subtract(p, p_WE)) > fastest * ahead + _AWAY:
+            left |= _FAR
         v = limit_norm(v, fastest)
         near = (near[0], near[1], min(max(near[2], highest), lowest))
         down = safe_approach_speed(max(lowest - p_WE[2], 0.0), _GROUND_BRAKING, SETTLE_RATE)
@@ -336,4 +339,6 @@ class ReferenceGovernor:
             said.append(f"a target is above {-highest:.0f} m")
         if left & _FAST:
             said.append(f"targets ask for more than {fastest:g} m/s")
+        if left & _FAR:
+            said.append(f"targets are more than {_AWAY:g} m ahead of the end-effector")
         return ", ".join(said)

@@ -219,7 +219,7 @@ def test_targets_from_outside_pass_between_floor_and_ceiling_at_a_speed_that_may
     [
         ((0.0, 0.0, 3.2), (0.0, 0.0, -1.0), "below 0.40 m"),
         ((0.0, 0.0, -125.0), (0.0, 0.0, -119.7), "above 120 m"),
-        ((0.0, 0.0, -11.0), (0.0, 0.0, -1.0), "more than 1.5 m/s"),
+        ((0.0, 0.0, -11.0), (0.0, 0.0, -1.0), "more than 1 m ahead"),
     ],
 )
 def test_targets_from_outside_that_leave_them_are_limited_and_the_limit_named(
