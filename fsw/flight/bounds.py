@@ -47,13 +47,15 @@ def safe_set_problem(safe_set: SafeSet, max_speed: float = math.inf) -> str | No
 
 
 def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
-    """Why a zone is out of bounds; it moves at ``max_speed`` [m/s] at most."""
+    """Why a zone is out of bounds; it moves at ``max_speed`` [m/s] at most.
+
+    Whether its numbers describe such a shape is for the link to ask.
+    """
     kind = BY_NAME.get(zone.shape.kind)
     if kind is None:
         return "there is no such shape"
-    problem = kind.check(zone.shape)
-    if problem is not None:
-        return problem
+    if len(zone.shape.numbers) != kind.size:
+        return kind.check(zone.shape)
     for number, meaning, most in zip(zone.shape.numbers, kind.meaning, kind.farthest, strict=True):
         if not abs(number) <= most:
             return f"{meaning} is {number:g}; at most {most:g} is accepted"

@@ -91,14 +91,11 @@ class SafeSetCheck:
                 mission = replace(mission, rally=update.rally)
             if update.fence is not None:
                 mission = self._take_fence(mission, update, here, texts, flies=flies)
-        for heard in inputs.announced:
+        for announcement in inputs.announced:
             now_us = inputs.sensors.t_us
-            announcement = heard
-            owns = self._owns(mission, heard.source, now_us, armed=armed)
-            problem = safe_set_problem(heard.safe_set, self._config.surroundings.zone_speed)
+            owns = self._owns(mission, announcement.source, now_us, armed=armed)
+            problem = safe_set_problem(announcement.safe_set, self._config.surroundings.zone_speed)
             if problem is None:
-                # Judged is what will be in force, not where a stamp of another clock puts it.
-                announcement = replace(heard, safe_set=self._standing(heard.safe_set, now_us)[0])
                 if owns and now_us != mission.owner_heard_us:
                     mission = replace(mission, owner_heard_us=now_us)
                 problem = "" if owns else self._against(mission, announcement.safe_set)
@@ -193,6 +190,12 @@ class SafeSetCheck:
         estimate, target = here
         if estimate is None or new == old:
             return ""
+        # Nor where it will stand if its stamp is too far from now.
+        standing, silent = self._standing(new, estimate.t_us)
+        if silent:
+            against = self._outside(mission, old, standing, here)
+            if against:
+                return against
         inside = self._values(new, estimate, target)
         was = self._values(old, estimate, target) if is_update(old, new) else {}
         for number, (margin, h) in inside.items():

@@ -55,7 +55,7 @@ class Descend(FlightMode):
 
         Clearances have grown by what the place is uncertain by, as far as there is room for.
         """
-        safe_set, limits = state.kept.safe_set, self.config.limits
+        safe_set, limits = state.kept.whole.safe_set, self.config.limits
         if state.aiding.unaided_us < limits.aiding_loss_us or not safe_set.zones:
             known = state.setpoint.goal is None
             return state if known else replace(state, setpoint=SetpointMemory())

@@ -15,7 +15,7 @@ from typing import Final, cast
 
 from fsw.flight.bounds import motion_refusal, zone_problem
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.shapes import BY_NUMBER
+from fsw.shapes import BY_NUMBER, kind_of
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
@@ -217,7 +217,7 @@ def _indexed(zone: Zone, index: int, count: int) -> IndexedObstacle | None:
 
 
 def _bounded(zone: Zone) -> Zone:
-    problem = zone_problem(zone)
+    problem = kind_of(zone.shape).check(zone.shape) or zone_problem(zone)
     if problem is not None:
         raise RefusedError(f"{zone.shape.kind} refused: {problem}")
     return zone
