@@ -429,6 +429,8 @@ class Autopilot:
         state = replace(state, mission=mission)
         if mission.safe_set is not state.kept.source:
             state = replace(state, kept=state.kept.of(mission.safe_set))
+            if state.estimate is not None:
+                state = self._with_room(state, state.estimate)
         if update is not None:
             state = with_update(state, update, self.config, now_us)
         return state
@@ -503,11 +505,17 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
-        safe_set, target = state.mission.safe_set, state.reference
-        kept = self._clearance.keep(state.kept.whole, safe_set, estimate, pose)
-        if state.vehicle.flies and safe_set.zones:
-            report = self._safe_sets.margins(kept, estimate, target)
-            kept = self._room.limit(kept, report, estimate, target)
+        kept = self._clearance.keep(state.kept.whole, state.mission.safe_set, estimate, pose)
+        state = state if kept is state.kept else replace(state, kept=kept)
+        return self._with_room(state, estimate)
+
+    def _with_room(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """The state with zones that take no more than their room, and their speed."""
+        kept, target = state.kept, state.reference
+        if not (state.vehicle.flies and kept.source.zones):
+            return state
+        report = self._safe_sets.margins(kept, estimate, target)
+        kept = self._room.limit(kept, report, estimate, target)
         return state if kept is state.kept else replace(state, kept=kept)
 
     def _pose_error(

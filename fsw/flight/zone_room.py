@@ -7,7 +7,8 @@ that grows without bound with the depth. So clearances shrink, as far as it need
   is taken to be slower where it is more than that alone,
 * a zone that the vehicle is in deeper than ``ROOM`` stands where it is, well away from the vehicle:
   no way out is known to be right. The failsafe table holds, and lands,
-* and one that would push it below the lowest height of a reference ends there.
+* and one that would push it below the lowest height of a reference ends there, and drives it the
+  slower the lower it is.
 
 Margins and failsafes go on to be of the safe set in force.
 """
@@ -23,7 +24,7 @@ from fsw.control.safety_filter import ROOM
 from fsw.flight.safe_set_change import held
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import replace
-from fsw.geometry.vectors import dot
+from fsw.geometry.vectors import clamp, dot
 from fsw.model.body import Body, hull_reach
 from fsw.parameters.consistency import stand_off
 from fsw.parameters.flight_config import FlightConfig, lowest_height
@@ -43,7 +44,7 @@ class ZoneRoom:
     def __init__(self, config: FlightConfig) -> None:
         self._walls, self._workspace = config.planner.tunings
         self._speed = config.steering.speed
-        self._lowest = lowest_height(config)
+        self._lowest, self._legs = lowest_height(config), config.airframe.leg_length
         # The others are flown for comparison, to show what they do.
         self._limits = config.controller == "blf" and not config.soft
 
@@ -62,7 +63,9 @@ class ZoneRoom:
             margin, first = min(report.margins[first : first + count]), first + count
             distance = margin - (kept.added[k] if kept.added else 0.0)
             tuning = self._tuning(zones[k])
-            if not distance < stand_off(tuning):
+            # Farther away, a barrier asks for no speed: S is more than lambda and the zone's own.
+            moving = math.hypot(*_velocity(zones[k], target))
+            if not tuning.approach_speed(distance) < tuning.lambda_ + moving:
                 continue
             least, share = self._least(kept, k, margin, tuning, estimate, target)
             if share < 1.0:
@@ -90,10 +93,11 @@ class ZoneRoom:
         rest, at = stand_off(tuning), surface(kept.source, k, estimate.p_WB, estimate.t_us, target)
         if at is None or not margin > -ROOM:
             return rest + _FREE, 0.0
-        moves = kept.source.zones[k].velocity
-        if target is not None and kind_of(kept.source.zones[k].shape).follows_target:
-            moves = target.v_WE
-        comes, most = max(dot(at.normal, moves), 0.0), max(self._speed - tuning.lambda_, 0.0)
+        moves = _velocity(kept.source.zones[k], target)
+        # Legs that slide over the ground tip the vehicle over.
+        height = -estimate.p_WB[2] - self._legs
+        speed = self._speed * clamp(height / (self._lowest - self._legs), 0.0, 1.0)
+        comes, most = max(dot(at.normal, moves), 0.0), max(speed - tuning.lambda_, 0.0)
         share = min(1.0, most / comes) if comes > 0.0 else 1.0
         least, down = -max(most - comes, 0.0) / tuning.slope, at.normal[2]
         if down > _DOWNWARD:
@@ -103,6 +107,12 @@ class ZoneRoom:
             if not room > 0.0:
                 share = 0.0
         return least, share
+
+
+def _velocity(zone: Zone, target: EndEffectorTarget | None) -> Vec3:
+    """Of a zone [m/s, NED], or of the ``target`` that it follows."""
+    follows = target is not None and kind_of(zone.shape).follows_target
+    return target.v_WE if follows and target is not None else zone.velocity
 
 
 def _slowed(zone: Zone, share: float, now_us: int) -> Zone:

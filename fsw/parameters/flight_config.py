@@ -120,7 +120,7 @@ class Surroundings:
     target_acceleration: float = 0.05  # m/s^2, of the end-effector reference
     tangential_speed: float = 0.1  # m/s, of the base against the sphere's centre
     hanging: float = 0.225  # m, end-effector below the base, d_iw of Table II
-    zone_speed: float = 1.0  # m/s, of a zone that moves; one that comes faster is not believed
+    zone_speed: float = 1.5  # m/s, of a zone that moves, as who walks; faster is not believed
 
 
 @dataclass(frozen=True, slots=True)

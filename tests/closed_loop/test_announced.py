@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.parameters.flight_config import lowest_height
 from fsw.shapes.ball import ball, point
 from fsw.shapes.half_space import half_space, wall
 from fsw.shapes.target_sphere import target_sphere
@@ -163,3 +164,31 @@ def test_a_mode_that_takes_over_from_targets_far_away_begins_at_the_vehicle(numb
     flight.step(command(number, *((1.0, 4.0, 3.0) if number == SET_MODE else ())))
     assert fastest(flight, 4.0) < 1.15 * flight.config.steering.speed
     assert -flight.sim.truth().p_WB[2] < began + 1.5
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_a_ceiling_announced_lower_and_lower_holds_the_vehicle_above_the_ground() -> None:
+    """Ten times a second, each time just above the vehicle, and coming down at 1 m/s."""
+    flight = hovering()
+    flight.run(1.0)
+    for _ in range(60):
+        offset = flight.sim.truth().p_WB[2] - 0.62
+        ceiling = half_space((0.0, 0.0, 1.0), offset)
+        down = Zone(ceiling, 0.1, velocity=(0.0, 0.0, 1.0), t_us=flight.sim.t_us)
+        tell(flight, SafeSet((down,)))
+        flight.run(0.098)
+    assert -flight.sim.truth().p_WB[2] == pytest.approx(lowest_height(flight.config), abs=0.05)
+
+
+@pytest.mark.requirement("REQ-SAFE-4")
+def test_a_landing_that_a_wall_runs_over_ends_upright() -> None:
+    """It slid along the ground at 1.5 m/s, and tipped over."""
+    flight = hovering()
+    flight.run(1.0)
+    flight.step(command(LAND))
+    flight.run(3.0)
+    comes = half_space((1.0, 0.0, 0.0), flight.sim.truth().p_WB[0] - 1.5)
+    wall_on_the_move = Zone(comes, 0.1, velocity=(1.5, 0.0, 0.0), t_us=flight.sim.t_us)
+    tell(flight, SafeSet((wall_on_the_move,)))
+    flight.run(6.0)  # a run that tips over raises
+    assert flight.mode is Mode.DISARMED

@@ -327,7 +327,7 @@ def announced_to(
         point((0.0, 0.0, -50.0), 1e20),
         target_sphere((5.0, 0.0, 0.0), 0.3),
         target_sphere((3.4e38,) * 3, 3.4e38),
-        Zone(vertical_cylinder((3.0, 0.0), 0.3), 0.1, velocity=(1.1, 0.0, 0.0), t_us=1_000_000),
+        Zone(vertical_cylinder((3.0, 0.0), 0.3), 0.1, velocity=(1.6, 0.0, 0.0), t_us=1_000_000),
     ],
 )
 def test_in_flight_the_first_to_announce_cannot_shut_the_vehicle_out(zone: Zone) -> None:
