@@ -35,7 +35,7 @@ LAND_SOON = Expectation(then=("land",), told_within_s=0.5, names="pose|GNSS")
 def test_every_mode_and_every_way_to_fail_is_flown() -> None:
     # Descend is what a failsafe does; no command begins it.
     assert {one.mode for one in SITUATIONS.values()} == set(MODES) - {Mode.DESCEND}
-    flown = {(one.fault.unit, one.fault.kind) for one in expectations().values() if one.fault}
+    flown = {(it.unit, it.kind) for one in expectations().values() for it in one.faults}
     there = {(unit, kind) for unit, kinds in KINDS.items() for kind in kinds}
     # No suite has a camera for it.
     assert there - flown == {("optical flow", kind) for kind in KINDS["optical flow"]}
@@ -237,7 +237,7 @@ def test_a_cell_is_flown_judged_and_written_down() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("mode", SITUATIONS)
 def test_without_a_fault_nothing_is_told_and_nothing_done(mode: str) -> None:
-    flight = fly(mode, None)
+    flight = fly(mode)
     assert (flight.warning, flight.actions, flight.contact, flight.problem) == (None, (), "", "")
     assert flight.least_m is not None
     assert flight.least_m > 0.0
