@@ -111,6 +111,8 @@ def _packaged(name: str) -> Callable[[str], Scenario]:
 
 _AIR, _GROUND = _beside_the_wall("airborne"), _beside_the_wall("ground")
 _ARM: Final[Spoken] = (0.0, Arm())  # at once: until then the vehicle falls
+# By force: with satellites alone the height does not tell that it is in the air.
+_ARM_IN_THE_AIR: Final[Spoken] = (0.0, Arm(force=True))
 
 
 def _to(mode: Mode) -> SwitchMode:
@@ -127,7 +129,7 @@ def _in_the_air(
     return Situation(
         mode,
         _AIR,
-        (_ARM, *commands),
+        (_ARM_IN_THE_AIR, *commands),
         4.0,
         16.0,
         frozenset((mode, *then)),
@@ -179,7 +181,7 @@ SITUATIONS: Final[dict[str, Situation]] = {
     "land": Situation(
         Mode.LAND,
         _AIR,
-        (_ARM, (1.0, _to(Mode.LAND))),
+        (_ARM_IN_THE_AIR, (1.0, _to(Mode.LAND))),
         2.5,
         14.5,
         frozenset(_LANDED),
