@@ -172,7 +172,7 @@ def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None
         return f"instance = {fault.number}: must be {allowed}"
     if fault.axis and fault.unit not in _VECTORS:
         allowed = ", ".join(_VECTORS)
-        return f"axis = {fault.axis:g}: must be 0, because a {fault.unit} has none ({allowed} have)"
+        return f"axis = {fault.axis:g}: must be 0, because {fault.unit} has none ({allowed} have)"
     if fault.size < 0.0 and fault.unit not in SENSORS:
         return f"size = {fault.size:g}: must be at least 0 but of a sensor"
     if fault.unit == "clock" and fault.jump_s < -fault.start_s:

@@ -65,6 +65,10 @@ class Pair(Cell):
 
     __slots__ = ()
 
+    def key(self) -> str:
+        """See :class:`studies.campaign.campaign.Flight`."""
+        return "pair " + super().key()
+
     def _flown(self) -> FaultFlight:
         flight = fly(self.mode, self.expected.faults, self.expected.suite, self.seed)
         if "silent" in findings(without_texts(flight)):
@@ -123,12 +127,13 @@ def _fault(random: np.random.Generator, latest_s: float) -> Fault:
         "size": sign * between(*((0.5, 10.0) if kind == "noisy" else (0.1, 5.0))),
         "delay_ms": 2.0 * round(between(5.0, 500.0)),
         "rate_hz": between(0.5, 50.0),
-        "jump_s": float(random.choice((-1.0, 1.0))) * between(0.005, 10.0),
+        # The link makes an even time of longer ones, which in process stay.
+        "jump_s": float(random.choice((-1.0, 1.0))) * between(0.005, 0.5),
     }
     late = kind == "delayed" or (unit, kind) == ("motor", "slow")
     used = {"start_s", "duration_s", "instance", *(("delay_ms",) if late else _USED.get(kind, ()))}
     used |= {"axis"} if sensor else set()
-    return Fault(unit, kind, **{name: drawn[name] for name in used})  # type: ignore[arg-type]
+    return Fault(unit, kind, **{name: drawn[name] for name in used})
 
 
 _SIZED: Final = ("wrong", "noisy", "drifting", "turning", "tilting")
@@ -189,7 +194,8 @@ def known_limits(path: Path = KNOWN_LIMITS) -> tuple[Limit, ...]:
     found = []
     for table in toml_table(read_bounded(path, _MOST_BYTES).decode("utf-8"))["limits"]:
         every = {"suites": SUITE_NAMES, "modes": tuple(SITUATIONS)} | table
-        limit = Limit(**{k: v if isinstance(v, str) else tuple(v) for k, v in every.items()})
+        keys: dict[str, Any] = {k: v if isinstance(v, str) else tuple(v) for k, v in every.items()}
+        limit = Limit(**keys)
         if not set(limit.ends) <= set(FINDINGS) or not limit.faults or not limit.sentence:
             raise ValueError(
                 f"{path}: {limit.name} needs faults, a sentence and ends of {FINDINGS}"
