@@ -294,7 +294,7 @@ class Observer:
         self._situation = situation
         self._mode: Mode | None = None  # of the tick before
         self._marked = False
-        self._begun = False
+        self.begun = False  # in its mode
         self.actions: list[str] = []
         self.texts: list[Said] = []
         self.problem = ""
@@ -313,9 +313,9 @@ class Observer:
                     self.problem = f"command {ack.command} was refused: {why}"
         else:
             before = self._mode
-            if not self._begun and before is not None and before is not self._situation.mode:
+            if not self.begun and before is not None and before is not self._situation.mode:
                 self.problem = self.problem or f"in {before.value} when the fault began"
-            self._begun = True
+            self.begun = self.begun or not self.problem
             self.texts += [
                 Said(round(after_s, 3), int(text.severity), text.text) for text in outputs.texts
             ]
@@ -341,13 +341,14 @@ def fly(
     """
     tries = _TRIES if suite in _BY_SATELLITES else 1
     for one in range(tries):
-        flight = _fly(mode, faults, suite, seed + one * _NEXT_SEED)
-        if not flight.problem:
+        flight, begun = _fly(mode, faults, suite, seed + one * _NEXT_SEED)
+        if begun:
             break
     return flight
 
 
-def _fly(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> FaultFlight:
+def _fly(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> tuple[FaultFlight, bool]:
+    """One flight, and whether it got to where something fails."""
     situation = SITUATIONS[mode]
     scenario = situation.scenario(suite)
     scenario = replace(scenario, faults=situation.placed(faults))
@@ -370,7 +371,7 @@ def _fly(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> FaultFl
     if simulation.ended is not None and simulation.time_s < situation.fault_s:
         seen.problem = seen.problem or f"{simulation.ended.sentence}, before anything failed"
     away_m = math.dist(started_m, simulation.truth().p_WB)
-    return _judged(simulation, seen, away_m)
+    return _judged(simulation, seen, away_m), seen.begun
 
 
 def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from fsw.flight.modes import MODES
-from fsw.signals import Mode, Severity
+from fsw.signals import ActuatorCommand, Mode, Severity
 from pandion.faults import main
 from sitl.faults.keys import KINDS
 from studies.fault_matrix.expectations import (
@@ -302,6 +303,18 @@ def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
     assert main([*words, "--expect", str(strict)]) == 1
     assert "descend; must be terminate" in capsys.readouterr().out
     assert flown == ["land"]
+
+
+def test_a_command_that_is_no_number_ends_the_flight_with_a_problem() -> None:
+    seen = Observer(SITUATIONS["hold"])
+    outputs = replace(outputs_at(0), actuators=ActuatorCommand((1.0,) * 4, (0.0, math.nan)))
+    seen.see(4.5, outputs)
+    assert seen.problem == "a command that is no number, 0.500 s after the fault"
+
+
+@pytest.mark.long
+def test_with_satellites_alone_every_seed_gets_to_where_something_fails() -> None:
+    assert [fly("land", (), "gnss", seed).problem for seed in range(8)] == [""] * 8
 
 
 @pytest.mark.parametrize(("failsafe", "actions"), [(True, ["land"]), (False, [])])
