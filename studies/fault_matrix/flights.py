@@ -63,9 +63,6 @@ offset_m = -0.8
 clearance_m = 0.1
 """
 _HEIGHT: Final = 1.425  # m, of the base above the origin at the start in the air
-_BY_SATELLITES: Final = ("rtk", "gnss")
-_TRIES: Final = 8  # of 20 seeds with gnss, up to half fly
-_NEXT_SEED: Final = 1_000_003
 _STATION: Final = (255, 190)
 _HEARTBEAT_STEPS: Final = 500
 _SETPOINT_STEPS: Final = 25
@@ -294,7 +291,7 @@ class Observer:
         self._situation = situation
         self._mode: Mode | None = None  # of the tick before
         self._marked = False
-        self.begun = False  # in its mode
+        self._begun = False
         self.actions: list[str] = []
         self.texts: list[Said] = []
         self.problem = ""
@@ -313,9 +310,9 @@ class Observer:
                     self.problem = f"command {ack.command} was refused: {why}"
         else:
             before = self._mode
-            if not self.begun and before is not None and before is not self._situation.mode:
+            if not self._begun and before is not None and before is not self._situation.mode:
                 self.problem = self.problem or f"in {before.value} when the fault began"
-            self.begun = self.begun or not self.problem
+            self._begun = True
             self.texts += [
                 Said(round(after_s, 3), int(text.severity), text.text) for text in outputs.texts
             ]
@@ -334,21 +331,7 @@ class Observer:
 def fly(
     mode: str, faults: tuple[Fault, ...] = (), suite: str = "perfect", seed: int = 0
 ) -> FaultFlight:
-    """Fly one situation; faults begin when something fails there, or so long after it.
-
-    Satellites may be off by so much at the start that the vehicle is not armed, or takes itself to
-    be on the ground: such a seed gives no flight, and the next one of a row of its own is flown.
-    """
-    tries = _TRIES if suite in _BY_SATELLITES else 1
-    for one in range(tries):
-        flight, begun = _fly(mode, faults, suite, seed + one * _NEXT_SEED)
-        if begun:
-            break
-    return flight
-
-
-def _fly(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> tuple[FaultFlight, bool]:
-    """One flight, and whether it got to where something fails."""
+    """Fly one situation; faults begin when something fails there, or so long after it."""
     situation = SITUATIONS[mode]
     scenario = situation.scenario(suite)
     scenario = replace(scenario, faults=situation.placed(faults))
@@ -371,7 +354,7 @@ def _fly(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> tuple[F
     if simulation.ended is not None and simulation.time_s < situation.fault_s:
         seen.problem = seen.problem or f"{simulation.ended.sentence}, before anything failed"
     away_m = math.dist(started_m, simulation.truth().p_WB)
-    return _judged(simulation, seen, away_m), seen.begun
+    return _judged(simulation, seen, away_m)
 
 
 def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:

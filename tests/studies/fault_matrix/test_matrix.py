@@ -13,10 +13,12 @@ import pytest
 from fsw.flight.modes import MODES
 from fsw.signals import ActuatorCommand, Mode, Severity
 from pandion.faults import main
-from sitl.faults.keys import KINDS
+from sitl.faults.keys import KINDS, Fault
+from studies.fault_matrix import matrix
 from studies.fault_matrix.expectations import (
     Expectation,
     ExpectationError,
+    Expected,
     differences,
     expectations,
 )
@@ -312,9 +314,31 @@ def test_a_command_that_is_no_number_ends_the_flight_with_a_problem() -> None:
     assert seen.problem == "a command that is no number, 0.500 s after the fault"
 
 
-@pytest.mark.long
-def test_with_satellites_alone_every_seed_gets_to_where_something_fails() -> None:
-    assert [fly("land", (), "gnss", seed).problem for seed in range(8)] == [""] * 8
+@pytest.mark.parametrize(
+    ("suite", "first", "flown"),
+    [
+        ("gnss", FaultFlight(problem="not armed"), 1_000_003),
+        ("gnss", FaultFlight(contact="wall"), 1_000_003),
+        ("rtk", FaultFlight(problem="not armed"), 1_000_003),
+        ("rtk", FaultFlight(contact="wall"), 0),  # a defect of the vehicle
+        ("mocap", FaultFlight(problem="not armed"), 0),
+    ],
+)
+def test_a_seed_with_which_satellites_give_no_flight_is_replaced(
+    suite: str, first: FaultFlight, flown: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seeds: list[int] = []
+
+    def fly_without(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> FaultFlight:
+        if faults:
+            seeds.append(seed)
+        return FINE if faults or seed else first
+
+    monkeypatch.setattr(matrix, "fly", fly_without)
+    matrix._natural.cache_clear()
+    Cell("hold", Expected("off", (Fault("gyro", "off"),), suite, False, {}), 0).row()
+    matrix._natural.cache_clear()
+    assert seeds == [flown]
 
 
 @pytest.mark.parametrize(("failsafe", "actions"), [(True, ["land"]), (False, [])])
