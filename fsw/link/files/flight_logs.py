@@ -114,7 +114,7 @@ class FlightLogs:
 
 
 def flight_logs(directory: Path, own: bytes | None) -> tuple[LoggedFlight, ...]:
-    """List this flight, last, and before it, oldest first, those beside it with the ``own`` mark."""
+    """List this flight, last, and those beside it with the ``own`` mark, oldest first."""
     directory = directory.absolute()
     dated = []
     with os.scandir(directory.parent) as entries:

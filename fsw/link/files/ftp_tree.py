@@ -40,9 +40,10 @@ def listing(directory: Directory, first: int) -> bytes:
     entries = b""
     for name in list(directory)[first:]:
         node = directory[name]
-        is_directory = isinstance(node, Mapping)
-        text = f"D{name}\0" if is_directory else f"F{name}\t{min(node.size(), MAX_FILE)}\0"
-        entry = text.encode()
+        if isinstance(node, Mapping):
+            entry = f"D{name}\0".encode()
+        else:
+            entry = f"F{name}\t{min(node.size(), MAX_FILE)}\0".encode()
         if len(entries) + len(entry) > MAX_DATA:
             break
         entries += entry
