@@ -92,12 +92,13 @@ class Lockstep:
                 answer = decode.read_reply(received, self._joints)
                 if answer is not None and answer.t_us == t_us:
                     return answer
+            # Ctrl-C goes to the vehicle too: that it is silent from then on is not held against it.
+            if self._stop.requested:
+                raise SimulatorError(f"interrupted at step {number}")
             now_s = time.perf_counter()
             # More than its patience a receive takes only if this process itself was suspended.
             self._listened_s += min(now_s - looked_s, RESEND_S)
             looked_s = now_s
-            if self._stop.requested:
-                raise SimulatorError(f"interrupted at step {number}")
             if self._listened_s >= STALL_S:
                 raise SimulatorError(
                     f"the flight software did not answer step {number} within {STALL_S:g} s"
