@@ -1,4 +1,4 @@
-"""The list of mutants that no test kills is of lines that there are: `make mutate` is run seldom."""
+"""The list of mutants that no test kills is of lines that there are: make mutate is run seldom."""
 
 from __future__ import annotations
 
