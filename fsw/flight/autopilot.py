@@ -45,6 +45,7 @@ from fsw.flight.snapshot import snapshot_of
 from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.frozen import replace
+from fsw.measurements import RangeSample
 from fsw.model.actuator_health import SOUND
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
@@ -210,7 +211,8 @@ class Autopilot:
         ticks = self._elapsed_ticks(state, now_us)
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
         vehicle = state.vehicle
-        armed, flown = vehicle.armed, vehicle.flies and nominal is not None
+        armed = vehicle.armed
+        flown = vehicle.flies and vehicle.unloaded is None and nominal is not None
         if flown and nominal is not None:
             nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
         followed = nominal if flown else None
@@ -387,6 +389,9 @@ class Autopilot:
                 state = replace(state, kept=state.kept.of(mission.safe_set))
             if inputs.mission is not None:
                 state = with_update(state, inputs.mission, self.config, now_us)
+        for one in inputs.samples:
+            if type(one) is RangeSample:
+                state = replace(state, vehicle=replace(state.vehicle, range=one))
         if inputs.battery is not None:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)

@@ -57,7 +57,7 @@ def plan_age_us(context: FailsafeContext) -> int:
 def plans(context: FailsafeContext) -> bool:
     """Whether a plan is being flown, or should be."""
     vehicle = context.state.vehicle
-    return vehicle.flies and vehicle.mode is not Mode.DESCEND
+    return vehicle.flies and vehicle.unloaded is None and vehicle.mode is not Mode.DESCEND
 
 
 def plan_is_stale(context: FailsafeContext) -> bool:
@@ -69,7 +69,8 @@ def plan_is_stale(context: FailsafeContext) -> bool:
 def planner_is_lost(context: FailsafeContext) -> bool:
     """In flight, no plan has begun for COM_PLN_LOSS_T."""
     vehicle = context.state.vehicle
-    return plan_age_us(context) > context.limits.planner_loss_us and vehicle.flies
+    plans = vehicle.flies and vehicle.unloaded is None
+    return plans and plan_age_us(context) > context.limits.planner_loss_us
 
 
 def setpoints_are_lost(context: FailsafeContext) -> bool:

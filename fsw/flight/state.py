@@ -19,6 +19,7 @@ from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import dataclass
+from fsw.measurements import RangeSample
 from fsw.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
@@ -60,6 +61,9 @@ class VehicleMemory:
     mode: Mode = Mode.DISARMED
     landed: bool = True
     moved_us: int = 0  # when the vehicle last moved, for the land detector
+    # On contact with the ground rotors idle: since when, and the velocity down [m/s] at that time.
+    unloaded: tuple[int, float] | None = None
+    range: RangeSample | None = None  # the rangefinder's last one
     mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     mode_yaw: float = 0.0  # rad, there
     mode_begin_us: int = 0
