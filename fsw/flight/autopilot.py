@@ -21,6 +21,7 @@ from fsw.control.cascade import (
     in_hover,
 )
 from fsw.control.safety_gate import gate
+from fsw.control.tube import beyond_covered
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
@@ -250,7 +251,11 @@ class Autopilot:
         safety = state.safety
         if estimate is not None:
             safety = self._watch.off_plan(
-                safety, estimate, nominal if flown else None, state.accuracy.reach
+                safety,
+                estimate,
+                nominal if flown else None,
+                state.accuracy.reach,
+                max(self._wind_room(memory)),
             )
         if fusion is not None:
             caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
@@ -389,9 +394,9 @@ class Autopilot:
                 state = replace(state, kept=state.kept.of(mission.safe_set))
             if inputs.mission is not None:
                 state = with_update(state, inputs.mission, self.config, now_us)
-        for one in inputs.samples:
-            if type(one) is RangeSample:
-                state = replace(state, vehicle=replace(state.vehicle, range=one))
+        ranges = [one for one in inputs.samples if type(one) is RangeSample]
+        if ranges:
+            state = replace(state, vehicle=replace(state.vehicle, range=ranges[-1]))
         if inputs.battery is not None:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
@@ -472,8 +477,15 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
-        kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose)
+        wind = self._wind_room(state.cascade)
+        kept = self._clearance.keep(state.kept, state.mission.safe_set, estimate, pose, wind)
         return state if kept is state.kept else replace(state, kept=kept)
+
+    def _wind_room(self, memory: CascadeMemory) -> Vec2:
+        """What the memory of wind in force can add to the tube [m, NED]."""
+        if self.config.inner != "tracking":
+            return 0.0, 0.0
+        return beyond_covered(self._safe_sets.loop_tube, memory.observed.disturbance_bias)
 
     def _pose_error(
         self,

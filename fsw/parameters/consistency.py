@@ -79,6 +79,8 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         radius = sphere.shape.numbers[-1]
         findings.append(_actuation(config, planner.workspace, surroundings, radius))
         findings.append(_room_in_sphere(planner.workspace, radius))
+        if config.inner == "tracking":
+            findings.append(_wind_in_sphere(planner.workspace, loop, radius))
     if others:
         findings.append(_actuation(config, planner.walls, surroundings, math.inf))
         points = [zone.clearance for zone in others if _is_point(zone)]
@@ -194,8 +196,11 @@ def _estimate(
 
 
 def base_reach(loop: Tube, surroundings: Surroundings) -> float:
-    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis."""
-    return loop.base * surroundings.disturbance + loop.base_wind
+    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis.
+
+    Without what clearances grow by while the memory of wind is in force.
+    """
+    return loop.base * surroundings.disturbance + loop.base_wind - loop.wind_beyond
 
 
 def stand_off(tuning: BarrierTuning) -> float:
@@ -248,6 +253,19 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
     )
 
 
+def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding:
+    """A sphere without room to spare cannot become smaller in wind."""
+    needed = stand_off(tuning) + loop.wind_beyond
+    return _finding(
+        "wind",
+        radius >= needed,
+        f"wind that is cancelled can push the base {loop.wind_beyond * 1e3:.0f} mm further off its "
+        f"plan when it turns, and the sphere of {radius * 1e3:.0f} mm has {(radius - stand_off(tuning)) * 1e3:.0f} mm to spare",
+        f"r >= {needed:.3f} m is enough",
+        refuses=False,
+    )
+
+
 def _links(config: FlightConfig, clearance: float) -> Finding:
     """Both ends of a link keep off a point; the nearest place of the link is between them."""
     longest = max(config.airframe.link_length)
@@ -285,6 +303,7 @@ def _tube_of_all_axes(
     most = all_axes_up_to(config.airframe, loop, expected)
     whole = most > 0.99 * expected
     across, up = all_axes(config.airframe, loop, most)
+    across -= loop.wind_beyond
     reach = _reach(safe_set, across, up)
     return _finding(
         "tube of all axes",

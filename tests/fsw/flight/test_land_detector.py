@@ -15,7 +15,7 @@ from fsw.flight.land_detector import (
     standing_unclear,
     stands,
 )
-from fsw.flight.state import Aiding, FlightState
+from fsw.flight.state import AIDED, Aiding, FlightState
 from fsw.measurements import RangeSample
 from fsw.signals import Mode, Vec3
 from tests.fsw.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
@@ -102,7 +102,7 @@ def landed_after(
     velocity: float = 0.0,
     fall: float = 0.0,
     height: float = 0.0,
-    aiding: Aiding = Aiding(),
+    aiding: Aiding = AIDED,
 ) -> float | None:
     """Time [s] until the ground is felt, within 4 s.
 
@@ -142,7 +142,7 @@ def test_the_ground_is_felt_when_rotors_do_not_carry_and_nothing_falls() -> None
 def test_no_accelerometer_that_is_wrong_by_3_m_s2_stops_the_rotors_in_the_air(
     wrong: float, velocity: float, height: float, blind: bool, share: float
 ) -> None:
-    aiding = BLIND if blind else Aiding()
+    aiding = BLIND if blind else AIDED
     assert landed_after(share, velocity, 9.81 + wrong, height, aiding) is None
     if share < 0.69:
         took = landed_after(share, velocity, wrong, height, aiding)
