@@ -47,8 +47,8 @@ _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
 # What the plan's own motion and the arm's move the height by, 0.7 mm measured in calm flights.
 CALM_HEIGHT = 1e-3  # m
 RARE = 3.7  # standard deviations
-# m/s^2 an axis of the memory of wind that a plan's stand-off covers. For what is beyond it clearances
-# grow: a random disturbance leaves less.
+# m/s^2 an axis of the memory of wind that a plan's stand-off covers. For what is beyond it
+# clearances grow while it is in force.
 WIND_COVERED = 0.05
 
 
@@ -59,7 +59,7 @@ class Tube:
     base: float  # m, worst case, body origin
     end_effector: float  # m, worst case, a hanging end-effector across the arm's plane
     base_wind: float  # m, what the memory of wind can add to it, at its limit
-    wind: float  # m per m/s^2 of that memory, of the base or a hanging end-effector
+    wind: float  # m per m/s^2 of that memory
     wind_beyond: float  # m of ``base_wind`` by which clearances grow while the memory is in force
     height: float  # m, worst case, vertically
     end_effector_wind: float  # m, of what is covered
@@ -106,7 +106,7 @@ def tube(
         base=_sum(base),
         end_effector=_sum(end_effector),
         base_wind=tuning.wind_limit * _sum(base_wind),
-        wind=max(_sum(base_wind), _sum(end_effector_wind)),
+        wind=_sum(base_wind),
         wind_beyond=(tuning.wind_limit - covered) * _sum(base_wind),
         height=_sum(climbs[:, 0]),
         end_effector_wind=covered * _sum(end_effector_wind),

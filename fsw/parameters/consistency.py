@@ -78,9 +78,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     for sphere in spheres:
         radius = sphere.shape.numbers[-1]
         findings.append(_actuation(config, planner.workspace, surroundings, radius))
-        findings.append(_room_in_sphere(planner.workspace, radius))
-        if config.inner == "tracking":
-            findings.append(_wind_in_sphere(planner.workspace, loop, radius))
+        findings += _rooms_in_sphere(config, loop, radius)
     if others:
         findings.append(_actuation(config, planner.walls, surroundings, math.inf))
         points = [zone.clearance for zone in others if _is_point(zone)]
@@ -242,6 +240,13 @@ def _actuation(
     )
 
 
+def _rooms_in_sphere(config: FlightConfig, loop: Tube, radius: float) -> list[Finding]:
+    found = [_room_in_sphere(config.planner.workspace, radius)]
+    if config.inner == "tracking":
+        found.append(_wind_in_sphere(config.planner.workspace, loop, radius))
+    return found
+
+
 def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
     at_centre = tuning.approach_speed(radius)
     return _finding(
@@ -255,12 +260,12 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
 
 def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding:
     """A sphere without room to spare cannot become smaller in wind."""
-    needed = stand_off(tuning) + loop.wind_beyond
+    needed, spare = stand_off(tuning) + loop.wind_beyond, radius - stand_off(tuning)
     return _finding(
         "wind",
         radius >= needed,
-        f"wind that is cancelled can push the base {loop.wind_beyond * 1e3:.0f} mm further off its "
-        f"plan when it turns, and the sphere of {radius * 1e3:.0f} mm has {(radius - stand_off(tuning)) * 1e3:.0f} mm to spare",
+        f"wind that is cancelled can push the base {loop.wind_beyond * 1e3:.0f} mm further off "
+        f"its plan when it turns, and the sphere has {spare * 1e3:.0f} mm to spare",
         f"r >= {needed:.3f} m is enough",
         refuses=False,
     )

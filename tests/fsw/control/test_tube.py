@@ -20,6 +20,7 @@ from fsw.control.tracking import (
 )
 from fsw.control.tube import (
     CALM_HEIGHT,
+    WIND_COVERED,
     Tube,
     all_axes,
     all_axes_up_to,
@@ -156,7 +157,10 @@ def test_every_figure_of_the_tube_is_that_of_the_loop_that_is_flown() -> None:
     assert got.end_effector == pytest.approx(np.abs(tip).sum(), **close)
     limit = QUICK.wind_limit
     assert got.base_wind == pytest.approx(limit * np.abs(wind_base).sum(), **close)
-    assert got.end_effector_wind == pytest.approx(limit * np.abs(wind_tip).sum(), **close)
+    covered = WIND_COVERED * np.abs(wind_tip).sum()
+    assert got.end_effector_wind == pytest.approx(covered, **close)
+    assert got.wind == pytest.approx(np.abs(wind_base).sum(), **close)
+    assert got.wind_beyond == pytest.approx(got.base_wind - WIND_COVERED * got.wind)
     pushes = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, 8000), round(0.1 / DT))
     for figure, response in (
         (got.base_expected, base),
