@@ -132,12 +132,15 @@ class UncertainClearance:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
         pose = _SURE if sure or pose is None else _finite(pose)
         spread, levers = self._spread(safe_set, estimate, pose)
-        spread = tuple(map(float.__add__, spread, turned := _turned(safe_set, wind)))
+        turned = _turned(safe_set, wind)
+        spread = tuple(map(float.__add__, spread, turned))
         wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
-        lacking = max(
-            [more - there - gust for more, there, gust in zip(wanted, granted, turned, strict=True)]
-        )
+        lacks = [
+            max(more - there - gust, 0.0)
+            for more, there, gust in zip(wanted, granted, turned, strict=True)
+        ]
+        lacking = max(lacks)
         kept = before
         if safe_set is not before.source or granted != before.added:
             kept = _grown(safe_set, granted)
