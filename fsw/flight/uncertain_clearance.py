@@ -136,11 +136,11 @@ class UncertainClearance:
         spread = tuple(map(float.__add__, spread, turned))
         wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
-        lacks = [
+        short = [
             max(more - there - gust, 0.0)
             for more, there, gust in zip(wanted, granted, turned, strict=True)
         ]
-        lacking = max(lacks)
+        lacking = max(short)
         kept = before
         if safe_set is not before.source or granted != before.added:
             kept = _grown(safe_set, granted)
