@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.estimation.redundancy import UNDECIDED
+from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.conditions import Condition
 from fsw.flight.state import FlightState, LostSensor
 from fsw.flight.uncertain_clearance import LACKING
@@ -130,6 +132,22 @@ def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
 def sensor_is_lost(context: FailsafeContext) -> bool:
     """In flight, at least one of ``lost_sensors``."""
     return bool(lost_sensors(context)) and context.state.vehicle.flies
+
+
+def sensors_contradict(context: FailsafeContext, seconds: float) -> bool:
+    """In flight, sensors contradict each other for so many ``seconds`` [s], whoever is wrong."""
+    disputed_us = context.state.aiding.disputed_us
+    return disputed_us > 1e6 * seconds and context.state.vehicle.flies
+
+
+def imu_alone_is_lost(context: FailsafeContext) -> bool:
+    """In flight, the inertial unit was of no use for long, and no pose holds the attitude."""
+    aiding, now_us = context.state.aiding, context.estimate.t_us
+    if aiding.pose is Sensor.POSE and not is_unaided(context):
+        return False
+    since = [one.since_us for one in aiding.lost if one.sensor is Sensor.IMU]
+    lasts = bool(since) and now_us - since[0] > 1e6 * UNDECIDED
+    return lasts and context.state.vehicle.flies
 
 
 def tilt_is_lost(context: FailsafeContext) -> bool:

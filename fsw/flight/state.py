@@ -228,6 +228,8 @@ class Aiding(NamedTuple):
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
+    disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
+    suspects: str = ""  # of which one is wrong then
 
     def has_lost(self, sensor: Sensor) -> bool:
         """Whether a sensor that every tick needs is of no use."""
