@@ -9,8 +9,9 @@ large and all others are not, so
 .. math:: J(X) = \sum_{k \not\ni X} \min(r_k / t_k, 5)^2, \quad
           t_k = \text{the largest that is nominal},
 
-is least for the culprit. It is named where the next hypothesis costs more by 1 three times in a
-row. Until then all that are not excluded are suspects: the filter takes their biases for unknown.
+is least for the culprit. It is named where by how much more the next hypothesis costs adds up to 3,
+in looks in a row in which that is more than 1. Until then all that are not excluded are suspects:
+the filter takes their biases for unknown.
 Thresholds of what contains the model follow from how well it has predicted so far in this flight,
 those of measurements from the noise that they state and turn out to have.
 
@@ -108,7 +109,7 @@ _NOISE: Final = 20.0  # deviations of a place that is extrapolated
 # Deciding.
 _LEAD: Final = 1.0
 _MOST: Final = 25.0  # of one residual
-_TIMES: Final = 3  # looks
+_SURE: Final = 3.0  # sum of leads
 _QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
 _AGREES: Final = 5.0  # s of agreement, until what was named is believed again
 UNDECIDED: Final = 2.0  # s, after which suspects are not told apart any more
@@ -586,8 +587,8 @@ class Verdict(NamedTuple):
     since: float = -1.0  # of the trial that is on; -1: none
     fired: float = -math.inf  # when a residual did last
     suspects: Source = Source(0)
-    leader: Source = Source(0)  # the one that is named after some more looks
-    times: int = 0
+    leader: Source = Source(0)  # the one that is named once that is sure
+    sum: float = 0.0  # of its leads
     wrong: Source = Source(0)  # not used
     agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
     named: Source = Source(0)  # by the last look
@@ -618,9 +619,9 @@ def judged(
     if not fires:
         if verdict.is_on and now - verdict.fired > _QUIET:
             return verdict._replace(
-                since=-1.0, suspects=Source(0), leader=Source(0), times=0, named=Source(0)
+                since=-1.0, suspects=Source(0), leader=Source(0), sum=0.0, named=Source(0)
             )
-        return verdict._replace(leader=Source(0), times=0, named=Source(0))
+        return verdict._replace(leader=Source(0), sum=0.0, named=Source(0))
     cost = {}
     for one in Source:
         if one & verdict.wrong or not any(of[k] & one and ratios[k] > 0.0 for k in used):
@@ -633,18 +634,20 @@ def judged(
         if cost[one] - cost[first] < _LEAD:
             suspects |= one
     leader = first if lead > _LEAD else Source(0)
-    times = verdict.times + 1 if leader and leader is verdict.leader else int(bool(leader))
-    named = leader if times >= _TIMES else Source(0)
+    total = lead if leader else 0.0
+    if leader and leader is verdict.leader:
+        total += verdict.sum
+    named = leader if total > _SURE else Source(0)
     since = verdict.since if verdict.is_on else now
     verdict = verdict._replace(
-        since=since, fired=now, suspects=suspects, leader=leader, times=times, named=named
+        since=since, fired=now, suspects=suspects, leader=leader, sum=total, named=named
     )
     if not named or named is M:
         return verdict
     agreed = list(verdict.agreed)
     agreed[list(Source).index(named)] = math.inf
     return verdict._replace(
-        wrong=verdict.wrong | named, agreed=tuple(agreed), since=-1.0, suspects=Source(0), times=0
+        wrong=verdict.wrong | named, agreed=tuple(agreed), since=-1.0, suspects=Source(0), sum=0.0
     )
 
 

@@ -89,7 +89,8 @@ class SensedState:
         pushed, model = (0.0, 0.0), UNKNOWN
         if state.estimate is not None:
             pushed, model = self._cascade.expected(state.cascade, state.estimate)
-            if not state.vehicle.flies:
+            # On the ground thrust does not explain how the vehicle moves.
+            if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
         law = self._fusion.law
         started, watch, samples = _without_stuck(state, before, inputs.samples, law)

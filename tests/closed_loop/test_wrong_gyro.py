@@ -103,7 +103,7 @@ def test_a_blow_is_believed_in_time_to_stay_in_the_air(
     flight.step(command(ARM, 1.0))
     flight.run(AT + 0.02)
     assert "IMU jumps, and is not believed" in flight.texts
-    flight.run(0.08)
+    flight.run(0.1)
     fusion = flight.state.fusion
     assert fusion is not None
     assert fusion.numbers["doubted"][0][1] == 0, "believed"
