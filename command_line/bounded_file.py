@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import BinaryIO
 
 
-def open_regular(path: Path, *, append: bool = False) -> BinaryIO:
+def open_regular(path: Path, *, append: bool = False, follow: bool = True) -> BinaryIO:
     """Open a regular file to read it, or to ``append`` to it as well; never waits.
+
+    Unless ``follow``, a symbolic link of this name is refused.
 
     Raises:
         OSError: It cannot be opened, or is a directory, pipe, socket or device; ``strerror`` says
@@ -19,6 +21,7 @@ def open_regular(path: Path, *, append: bool = False) -> BinaryIO:
     # O_NONBLOCK: to open a pipe would wait for its writer. O_NOCTTY: a terminal stays a stranger.
     flags = os.O_NONBLOCK | os.O_NOCTTY
     flags |= os.O_RDWR | os.O_CREAT | os.O_APPEND if append else os.O_RDONLY
+    flags |= 0 if follow else os.O_NOFOLLOW
     try:
         handle = os.open(path, flags, 0o666)
     except ValueError:  # a NUL byte, or what is no UTF-8
@@ -26,6 +29,8 @@ def open_regular(path: Path, *, append: bool = False) -> BinaryIO:
     except OSError as error:
         if error.errno == errno.ENXIO:  # a socket
             raise _irregular(path) from None
+        if error.errno == errno.ELOOP and not follow:
+            raise OSError(errno.ELOOP, "it is a symbolic link", str(path)) from None
         raise
     try:
         mode = os.fstat(handle).st_mode

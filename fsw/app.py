@@ -109,7 +109,7 @@ class _Session:
             start_unix_us=start_us,
             plan_ids=program.missions.ids,
         )
-        logs = FlightLogs(directory)
+        logs = FlightLogs(directory, options.params)
         clocks = (clock.now_us, clock.unix_us)
         ground = build_links(
             options.links,

@@ -18,6 +18,7 @@ from messages.ulog import Field, Topic
 _HEADER: Final = Struct("<Hc")
 _KEY = re.compile(r"(?P<type>\w+)(?:\[(?P<count>\d{1,5})\])? (?P<name>\S+)")
 _NAME = re.compile(r"\w+", re.ASCII)  # of a topic; it also names a file of an export
+_MOST_BYTES: Final = 65533  # of a record behind its number
 _TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
 _DAMAGE = (ValueError, IndexError, KeyError, struct.error)  # what a wrong byte leads to
 
@@ -196,7 +197,10 @@ def _topic(text: str) -> Topic:
     if _NAME.fullmatch(name) is None:
         raise ValueError(f"{name!r} names no topic")
     _, *declared = (_field(part) for part in fields.split(";") if part)
-    return Topic(name, "", "", tuple(declared))
+    topic = Topic(name, "", "", tuple(declared))
+    if struct.calcsize("<" + topic.codes) > _MOST_BYTES:
+        raise ValueError(f"{name} has records of more than {_MOST_BYTES} bytes")
+    return topic
 
 
 def _field(text: str) -> Field:

@@ -140,7 +140,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         "configurations": [one.as_json() for one in cases],
         "worst": [row.compared() | {"again": again(row, folder)} for row in worst(rows)],
     }
-    facts = write_facts(folder, result.plan, result.asked, more)
+    facts = write_facts(folder, result.plan, result.asked, result.seal, more)
     sentences = (f"Pandion {version()}", f"Command: pandion campaign {folder / 'campaign.toml'}")
     (folder / PAGE).write_text(page(result, sentences, folder), encoding="utf-8")
     if write_table(folder, rows) is None:

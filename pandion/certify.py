@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import json
+import random
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.bounded_file import read_bounded
-from command_line.options import json_file, option, read
+from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, json_text, unwritten
 from command_line.parser import COULD_NOT_START
-from command_line.values import number
+from command_line.values import number, whole
+from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 
 if TYPE_CHECKING:
+    from studies.campaign.flight import CampaignRow
     from studies.campaign.store import CampaignResult
 
 CERTIFIED, DIFFERS = 0, 1  # exit codes
+_INTERRUPTED: Final = 1  # as well
 PAGE = "certificate.html"
 _MOST_BYTES: Final = 64 * 1024 * 1024  # of a page that is read
 
@@ -37,6 +43,13 @@ class CertifyOptions:
         "compute a certificate, .html or .json, again from the directory and say what differs",
         Path,
     )
+    refly: int = option(
+        "--refly N",
+        "fly N of the flights again, drawn anew each time, and refuse what differs from its row",
+        whole(),
+        default=0,
+    )
+    cluster: ClusterOptions = group(ClusterOptions)
     json: str | None = json_file("the statement")
     out: Path | None = option(
         "--out FILE.html", f"where the page goes (default {PAGE} in the directory)", Path
@@ -54,17 +67,69 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
+    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
     from studies.campaign.store import read as read_campaign
 
     try:
         result = read_campaign(options.campaign)
+        if options.refly and not _flown_again(options, result):
+            return DIFFERS
         if options.verify is not None:
             return _verify(options, result, options.verify)
         return _certify(options, result)
-    except (CampaignError, NoCertificateError, OSError) as error:
+    except KeyboardInterrupt:
+        complain("pandion certify", "interrupted; nothing was certified")
+        return _INTERRUPTED
+    except (CampaignError, NoCertificateError, SchedulerGoneError, OSError) as error:
         complain("pandion certify", error)
         return COULD_NOT_START
+
+
+def _flown_again(options: CertifyOptions, result: CampaignResult) -> bool:
+    """Whether flights that are flown again here leave the rows that the campaign has.
+
+    Raises:
+        CampaignError: They cannot be, because they were flown by other code or packages.
+    """
+    from studies.campaign.flight import CampaignFlight
+    from studies.campaign.store import check_flown_here
+
+    check_flown_here(options.campaign, result)
+    # A row with an error is of the machine, and counts as a violation of every kind.
+    flown = [row for row in result.rows if not row.error]
+    # Drawn by the system's generator: nobody knows beforehand which rows are looked at.
+    drawn = random.SystemRandom().sample(flown, min(options.refly, len(flown)))
+    rows = sorted(drawn, key=lambda row: row.flight)
+    display = Display(console_beside(options.json))
+    campaign = campaign_of(
+        options.cluster,
+        None,
+        partial(display.report, "flown again"),
+        display.say,
+        time_limit_s=result.plan.time_limit_s,
+    )
+    with display.progress():
+        again = campaign.run([CampaignFlight(result.plan, row.flight) for row in rows])
+    wrong = [line for row, one in zip(rows, again, strict=True) for line in _unlike(row, one)]
+    for line in wrong:
+        display.say(line)
+    if not wrong:
+        numbers = ", ".join(str(row.flight) for row in rows)
+        display.say(f"{len(rows)} flights flown again, each as its row says: {numbers}")
+    return not wrong
+
+
+def _unlike(row: CampaignRow, again: CampaignRow) -> Iterator[str]:
+    """Where a flight that was flown again differs from its row, a sentence each."""
+    from studies.statistics.certificate import digest
+
+    for (name, kept), found in zip(row.compared().items(), again.compared().values(), strict=True):
+        if digest(kept) != digest(found):  # two NaNs are the same
+            yield (
+                f"flight {row.flight} does not fly as its row says: {name} is {found!r}, the row "
+                f"has {kept!r}"
+            )
 
 
 def _certify(options: CertifyOptions, result: CampaignResult) -> int:

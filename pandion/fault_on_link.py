@@ -64,8 +64,7 @@ class LinkCell(Cell):
 
 
 def _fly(cell: Cell, folder: Path) -> FaultFlight:
-    situation, fault = SITUATIONS[cell.mode], cell.expected.fault
-    assert fault is not None
+    situation, (fault,) = SITUATIONS[cell.mode], cell.expected.faults
     scenario = folder / "cell.toml"
     scenario.write_text(_scenario(cell.mode, fault, situation.fault_s), encoding="utf-8")
     station, watch = Station(cell.mode), _Watch()

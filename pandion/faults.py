@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from command_line.values import output_file, whole
 from command_line.version import version
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
+from pandion.reproduce import seeds
 
 if TYPE_CHECKING:
     from studies.fault_matrix.expectations import Expected
@@ -22,15 +24,35 @@ if TYPE_CHECKING:
 AS_EXPECTED, DIFFERS = 0, 1  # exit codes
 
 
+def _one_or_more(text: str) -> range:
+    """A seed, or ``A:B`` as a range."""
+    if ":" in text:
+        return seeds(text)
+    first = whole()(text)
+    return range(first, first + 1)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultsOptions:
-    """One cell, or the matrix."""
+    """One cell, the matrix, or pairs of faults."""
 
     mode: str | None = option("MODE", "fly this mode alone")
     fault: str | None = option("FAULT", "with this fault")
     matrix: bool = switch("--matrix", "every mode with every fault")
-    only: str | None = option("--only TEXT", "of the matrix: faults and modes with this text")
-    seed: int = option("--seed N", "root of all randomness", whole(), default=0)
+    pairs: int | None = option(
+        "--pairs N", "N pairs of faults, drawn at random: what is hit is found", whole(1)
+    )
+    pair: int | None = option("--pair K", "pair K of them again, alone", whole())
+    only: str | None = option(
+        "--only TEXT", "of the matrix or the pairs: faults and modes with this text"
+    )
+    seed: range = option(
+        "--seed N|A:B",
+        "root of all randomness, or a flight with each from A to below B (default 0)",
+        _one_or_more,
+        default=range(1),
+        text=lambda seeds: f"{seeds.start}:{seeds.stop}",
+    )
     cluster: ClusterOptions = group(ClusterOptions)
     expect: Path | None = option("--expect FILE", "what must happen (default the packaged)", Path)
     journal: Path | None = option(
@@ -44,7 +66,8 @@ class UnknownError(ValueError):
     """A mode or a fault that there is not."""
 
 
-_NEITHER: Final = "give MODE and FAULT, or --matrix"
+_NEITHER: Final = "give MODE and FAULT, --matrix, --pairs or --pair"
+_LIMIT_S: Final = 600.0  # of a pair's flight, which takes seconds: longer is a hang
 
 
 def main(argv: list[str]) -> int:
@@ -68,16 +91,23 @@ def main(argv: list[str]) -> int:
 def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
     from studies.fault_matrix.flights import SITUATIONS
 
-    if options.matrix == (options.mode is not None):
+    many = options.matrix or options.pairs is not None
+    asked = (options.matrix, options.pairs is not None, options.pair is not None, options.mode)
+    if sum(map(bool, asked)) != 1:
         raise UnknownError(_NEITHER)
-    if options.only is not None and not options.matrix:
-        raise UnknownError("--only chooses cells of the matrix: give --matrix with it")
+    if options.only is not None and not many:
+        raise UnknownError(
+            "--only chooses cells of the matrix, or pairs: give --matrix or --pairs with it"
+        )
+    if options.pairs is not None or options.pair is not None:
+        return _drawn(options)
     if options.matrix:
         every = [
-            _cell(mode, one, options.seed)
+            _cell(mode, one, seed)
             for one in known.values()
             for mode in one.modes
             if options.only is None or options.only in f"{mode} {one.name}"
+            for seed in options.seed
         ]
         if not every:
             raise UnknownError(f"no fault and no mode contains {options.only!r}")
@@ -89,7 +119,22 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
     expected = known[options.fault]
     if options.mode not in expected.modes:
         raise UnknownError(f"{options.mode} is not flown with {expected.suite}: see not_flown")
-    return [_cell(options.mode, expected, options.seed)]
+    return [_cell(options.mode, expected, seed) for seed in options.seed]
+
+
+def _drawn(options: FaultsOptions) -> list[Cell]:
+    from studies.fault_matrix.expectations import EXPECTATIONS, not_flown
+    from studies.fault_matrix.pairs import draw
+
+    if len(options.seed) != 1:
+        raise UnknownError("pairs are drawn from one seed: give --seed N")
+    numbers = range(options.pairs or 0) if options.pair is None else (options.pair,)
+    without, only = not_flown(options.expect or EXPECTATIONS), options.only or ""
+    drawn = [draw(options.seed.start, number, without) for number in numbers]
+    found: list[Cell] = [one for one in drawn if only in f"{one.mode} {one.expected.name}"]
+    if not found:
+        raise UnknownError(f"none of {len(drawn)} pairs contains {only!r}")
+    return found
 
 
 def _cell(mode: str, expected: Expected, seed: int) -> Cell:
@@ -107,7 +152,8 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     from studies.fault_matrix.page import page, summary
 
     display = Display(console_beside(options.json))
-    display.say(f"Pandion {version()}: {len(cells)} flights, seed {options.seed}")
+    seed = "–".join(map(str, sorted({options.seed.start, options.seed.stop - 1})))
+    display.say(f"Pandion {version()}: {len(cells)} flights, seed {seed}")
     try:
         with display.progress():
             rows = _flown(cells, options, display)
@@ -118,15 +164,20 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     for row in rows:
         if row.differs or len(rows) == 1:
             _say(display, row, summary(row))
+            if options.pairs is not None:
+                again = row.cell.expected.name.partition(":")[0]
+                display.say(f"{'':11}again: pandion faults --{again} --seed {seed}")
     if len(rows) == 1:
         for said in rows[0].flight.texts:
             display.say(f"  {said.after_s:8.3f} s  {said.text}")
     wrong = sum(1 for row in rows if row.differs)
+    for name, count in Counter(one for row in rows for one in row.known).items():
+        display.say(f"known limit {name}: {count}")
     display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
     text = json_text([row.as_json() for row in rows], 1) + "\n"
     lost = unwritten(options.json, text)
     if options.html is not None:
-        lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {options.seed}",)))
+        lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
     for what in lost:
         complain("pandion faults", f"cannot write {what}")
     return DIFFERS if wrong or lost else AS_EXPECTED
@@ -135,6 +186,7 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
 def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[Judged]:
     """Flights in process on all workers, then those in real time, one after the other."""
     from studies.fault_matrix.matrix import judge
+    from studies.fault_matrix.pairs import judge_pair, known_limits
 
     inside = [cell for cell in cells if not cell.expected.link]
     linked = [cell for cell in cells if cell.expected.link]
@@ -144,13 +196,18 @@ def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[
         display.report("flown", before + done, len(cells))
 
     where = here if len(inside) == 1 else options.cluster
-    of_processes = campaign_of(where, options.journal, partial(report, 0), display.say)
+    more = {"time_limit_s": _LIMIT_S} if options.pairs is not None else {}
+    of_processes = campaign_of(where, options.journal, partial(report, 0), display.say, **more)
     one_by_one = campaign_of(here, options.journal, partial(report, len(inside)))
     found = of_processes.run(inside) + one_by_one.run(linked)
     flights = dict(zip((*inside, *linked), found, strict=True))
-    return [judge(cell, flights[cell]) for cell in cells]
+    if options.pairs is None and options.pair is None:
+        return [judge(cell, flights[cell]) for cell in cells]
+    limits = known_limits()
+    return [judge_pair(cell, flights[cell], limits) for cell in cells]
 
 
 def _say(display: Display, row: Judged, summary: str) -> None:
-    verdict = "; ".join(row.differs) or row.flight.ended or "as it must be"
+    known = f"known limit: {', '.join(row.known)}" if row.known else ""
+    verdict = "; ".join(row.differs) or known or row.flight.ended or "as it must be"
     display.say(f"{row.cell.mode:10} {row.cell.expected.name:24} {summary}: {verdict}")

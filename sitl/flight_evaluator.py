@@ -34,6 +34,7 @@ class Flown(NamedTuple):
     thrust: V4  # commanded, before any saturation, of the most of a rotor [1]
     torque: tuple[float, ...]  # of the most of a joint [1]
     most: tuple[float, float]  # N, N·m
+    armed: bool  # whether the vehicle flies: of one that does not, nothing is asked
     before_s: float  # time before the first
     step_s: float  # between two
 
@@ -123,10 +124,13 @@ class FlightEvaluator:
     def _judge_flown(self) -> None:
         if self._flown is None:
             return
-        (places, states, thrust, torque, most, before_s, step_s), self._flown = self._flown, None
+        (places, states, thrust, torque, most, armed, before_s, step_s) = self._flown
+        self._flown = None
         aim = self.aim(before_s + len(places) * step_s)
         how = (largest(thrust, torque, most), aim or NO_AIM, (before_s, step_s), aim is not None)
-        free = self._judge_steps(self.quick, places, states, *how)
+        # The arm of a vehicle that stands is limp, and may fall against its stops.
+        judged = states if armed else states[:0]
+        free = self._judge_steps(self.quick, places, judged, *how)
         self.free = (*self._nowhere[:2], free) if self._still else self._nowhere
         if not free >= 0.0:
             self.judge_each(places, before_s, step_s)

@@ -139,8 +139,10 @@ def units_aboard(scenario: Scenario) -> tuple[str, ...]:
     sensors = scenario.sensors
     if not isinstance(sensors, MeasuredSensors):
         return EXACT
+    cameras = sensors.motion_capture is not None or sensors.visual_odometry is not None
     there = {
-        "vio": sensors.motion_capture is not None or sensors.visual_odometry is not None,
+        "vio": cameras,
+        "attitude": cameras,
         "gps": sensors.gnss is not None,
         "baro": sensors.barometer is not None,
         "mag": sensors.magnetometer is not None,

@@ -319,7 +319,7 @@ class Simulation:
         self._reading = None
         wanted, torques, armed = controls
         most = self._full if armed else _OFF
-        flown = Flown(places, states, wanted, torques, most, before_s, STEP_S)
+        flown = Flown(places, states, wanted, torques, most, armed, before_s, STEP_S)
         evaluator.judge_flown(flown, clear)
         time_s = self.time_s
         if self.step % SAMPLE_STEPS == 0:

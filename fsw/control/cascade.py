@@ -81,6 +81,8 @@ Inner = Literal["tracking", "pid"]
 Guarded = tuple[bool, float]
 """Whether the safety filter changed the acceleration, and the least margin that it saw [m]."""
 UNGUARDED: Guarded = (False, math.inf)
+Model = Vec4
+"""What rotors make of it: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
 
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -193,7 +195,7 @@ class Cascade:
         self._close_loops = machine_code(_close_loops, *example)
         sent = memory.rotors, STOPPED.rotor_thrust, STOPPED.joint_torque
         arm = _SOMEWHERE.w_WB_B, _SOMEWHERE.q_arm, _SOMEWHERE.qd_arm, _SOMEWHERE.specific_force
-        self._joint_acceleration = machine_code(_joint_acceleration, self.packed, *sent, *arm)
+        self._expected = machine_code(_expected, self.packed, *sent, *arm, 1.0)
 
     def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -202,9 +204,9 @@ class Cascade:
             self.law.airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
         )
 
-    def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
-        """Accelerations [rad/s^2] of the joints under the torques sent last, by the model."""
-        return self._joint_acceleration(
+    def expected(self, memory: CascadeMemory, estimate: StateEstimate) -> tuple[Vec2, Model]:
+        """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
+        return self._expected(
             self.packed,
             memory.rotors,
             _settling_at(memory),
@@ -213,7 +215,12 @@ class Cascade:
             estimate.q_arm,
             estimate.qd_arm,
             estimate.specific_force,
+            memory.mass,
         )
+
+    def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
+        """The joints' part of ``expected`` [rad/s^2]."""
+        return self.expected(memory, estimate)[0]
 
     def step(
         self,
@@ -394,7 +401,7 @@ def _close_loops(
 
 
 @kernel
-def _joint_acceleration(
+def _expected(
     laws: NDArray[Any],
     rotors: Vec4,
     commanded: Vec4,
@@ -403,17 +410,21 @@ def _joint_acceleration(
     q_arm: Vec2,
     qd_arm: Vec2,
     specific_force: float,
-) -> Vec2:
+    mass: float,
+) -> tuple[Vec2, Model]:
     """Of the numbers that it needs alone: to hand over whole records takes longer than all else."""
     airframe = laws[0].airframe
     f = lag_rotors(rotors, commanded, laws[0].rotor_decay)
+    rolling = airframe.rotor_arm * (f[1] - f[3]) / hanging_arm(airframe, q_arm).roll_inertia
+    yawing = airframe.yaw_per_thrust * (f[0] - f[1] + f[2] - f[3]) / airframe.inertia[2]
     pitching = (airframe.rotor_arm * (f[2] - f[0]) - torque[0]) / airframe.inertia[1]
     arm = StateEstimate(0, _NONE, _NONE, _LEVEL, rate, 0.0, q_arm, qd_arm, specific_force)
     # The accelerometer knows of gusts, and of the ground.
     dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
     carried = airframe.joint_armature * pitching
     first, second = accelerations_of(dynamics, (torque[0] + carried, torque[1]))
-    return first - pitching, second
+    model = rolling, pitching, yawing, (f[0] + f[1] + f[2] + f[3]) / mass
+    return (first - pitching, second), model
 
 
 def _settling_at(memory: CascadeMemory) -> Vec4:

@@ -40,9 +40,9 @@ class TrackingTuning:
     # Wind: what stays of the observed disturbance is cancelled whole. Slowly, because the mean of
     # a random one is not wind, and within a limit, because the estimate adds to a push that
     # acts one way for long and then the other (``tube.py``).
-    wind_time: float = 3.0  # s
-    wind_limit: float = 0.05  # m/s^2 an axis
-    position_error_limit: float = 0.1  # m; above the tube, or the loop is not the linear one
+    wind_time: float = 10.0  # s
+    wind_limit: float = 0.5  # m/s^2 an axis; clearances grow by what it takes (``wind_beyond``)
+    position_error_limit: float = 0.12  # m; above the tube, or the loop is not the linear one
     acceleration_limit: float = 2.5  # m/s^2
     jerk_limit: float = 20.0  # m/s^3
     # A jerk is limited to what this snap stops before the acceleration overshoots. Below what the

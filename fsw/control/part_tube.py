@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from fsw.control.gains import TrackingGains, TrackingTuning
-from fsw.control.tube import RARE, impulse_responses, random_steps
+from fsw.control.tube import RARE, WIND_COVERED, impulse_responses, random_steps
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.body import ON_BASE, Body, Part
 from fsw.model.prediction import Array
@@ -103,7 +103,8 @@ def _spoken(part: Part) -> str:
 
 
 def _worst(loop: LoopOfParts, push: Array, wind: Array) -> float:
-    worst = loop.disturbance * np.abs(push).sum() + loop.tuning.wind_limit * np.abs(wind).sum()
+    covered = min(loop.tuning.wind_limit, WIND_COVERED)
+    worst = loop.disturbance * np.abs(push).sum() + covered * np.abs(wind).sum()
     return float(worst)
 
 

@@ -41,11 +41,15 @@ from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import Array
 from fsw.model.rotors import WEIGHING_TIME, hanging_arm
+from fsw.signals import Vec2
 
 _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
 # What the plan's own motion and the arm's move the height by, 0.7 mm measured in calm flights.
 CALM_HEIGHT = 1e-3  # m
 RARE = 3.7  # standard deviations
+# m/s^2 an axis of the memory of wind that a plan's stand-off covers. For what is beyond it
+# clearances grow while it is in force.
+WIND_COVERED = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +59,10 @@ class Tube:
     base: float  # m, worst case, body origin
     end_effector: float  # m, worst case, a hanging end-effector across the arm's plane
     base_wind: float  # m, what the memory of wind can add to it, at its limit
+    wind: float  # m per m/s^2 of that memory
+    wind_beyond: float  # m of ``base_wind`` by which clearances grow while the memory is in force
     height: float  # m, worst case, vertically
-    end_effector_wind: float  # m
+    end_effector_wind: float  # m, of what is covered
     base_expected: float  # m, 3.7 sigma under random steps
     end_effector_expected: float  # m
     # The most that each quantity can be, worst case:
@@ -95,12 +101,15 @@ def tube(
     end_effector_wind = base_wind - below * in_wind[:, 2]
     climbs = _vertical_responses(airframe, tuning, gains, dt)
     per_hold = round(hold_s / dt)
+    covered = min(tuning.wind_limit, WIND_COVERED)
     return Tube(
         base=_sum(base),
         end_effector=_sum(end_effector),
         base_wind=tuning.wind_limit * _sum(base_wind),
+        wind=_sum(base_wind),
+        wind_beyond=(tuning.wind_limit - covered) * _sum(base_wind),
         height=_sum(climbs[:, 0]),
-        end_effector_wind=tuning.wind_limit * _sum(end_effector_wind),
+        end_effector_wind=covered * _sum(end_effector_wind),
         base_expected=RARE * random_steps(base, per_hold),
         end_effector_expected=RARE * random_steps(end_effector, per_hold),
         acceleration=_sum(acceleration),
@@ -320,3 +329,15 @@ def random_steps(response: Array, per_hold: int) -> float:
         held = shifted.reshape(-1, per_hold).sum(axis=1)
         variances.append(float(held @ held))
     return float(np.sqrt(np.mean(variances) / 3.0))
+
+
+def beyond_covered(loop: Tube, memory: Vec2) -> Vec2:
+    """What a ``memory`` of wind [m/s^2, NED] that is in force can add to the tube [m, NED].
+
+    Beyond what the stand-off covers. However the push turns, the vehicle is no further off.
+    """
+    x, y = memory
+    return (
+        loop.wind * max(abs(x) - WIND_COVERED, 0.0),
+        loop.wind * max(abs(y) - WIND_COVERED, 0.0),
+    )

@@ -42,8 +42,9 @@ IMU_CAPACITY: Final = 256  # readings since the filter's time
 # both are of no use: an older reading's, or one that repeats itself.
 TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
+ON_TRIAL = 8
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
-CLAIMS: Final = 160  # readings of a gyro that has jumped
+WITNESS: Final = 28  # integrals: see redundancy.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(
@@ -68,23 +69,19 @@ FILTER: Final = np.dtype(
         ("steady", np.int64, (2,)),  # how many in a row were near the one before
         ("calm", np.int64, (2,)),  # how many in a row were believed
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
-        # Of the gyro (imu.note_step): how much it usually changes from one reading to the next
-        # [rad/s], and by how much it stepped lately [rad/s, FRD], of which the largest step is so
-        # large [rad/s], up to a time [s].
-        ("shaken", float),
-        ("step", float, (3,)),
-        ("largest_step", float),
-        ("stepped", float),
-        # Of a gyro that has jumped (claim.py): time [s], what it said and what was flown [rad/s,
-        # FRD], and where and when the comparison begins, with an attitude and with a field.
-        ("claim", float, (CLAIMS, 7)),  # ring
-        ("claims", np.int64),
-        ("claim_started", np.int64),
-        ("claim_time", float),  # s
-        ("claim_q", float, (4,)),  # body to NED
-        ("field_started", np.int64),
-        ("field_time", float),  # s
-        ("claim_field", float, (3,)),  # Gauss, FRD
+        # Of the law for who is wrong (redundancy.py): which halves are not used, and of which the
+        # bias may be anything; what both and the rotors have made of the vehicle since it flies;
+        # and how quickly the rotors' model has been off by a rate [rad/s^2/sqrt(Hz)].
+        ("out", np.int64),
+        ("suspect", np.int64),  # and ON_TRIAL where sensors contradict each other
+        ("believed", np.int64),  # halves whose jumps are the truth
+        ("witness", float, (WITNESS,)),
+        ("baseline", float, (9,)),  # SI: biases, and what is felt beside the model
+        ("model_walk", float),
+        # By how much more than it states a pose's and a receiver's variance is, and their last
+        # innovations (fusion.py).
+        ("noise_scale", float, (4,)),
+        ("innovated_last", float, (4, ROWS)),
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
@@ -233,16 +230,17 @@ def propagate(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
 
 
 @compilable
-def add_noise(M: Array, law: Any, dt: float, lost: int) -> None:
+def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: float) -> None:
     """Add to the covariance ``M`` (17, 17) [SI] what ``dt`` [s] of noise add. Solà, eq 261-265.
 
-    Of what is ``lost`` [NO_FORCE, NO_RATE] the bias may be anything soon.
+    Of what is ``lost`` [NO_FORCE, NO_RATE] the bias may be anything soon; of a rate that is the
+    rotors' model's, what that has been off by lately, ``model_walk`` [rad/s^2/sqrt(Hz)].
     """
     force = law.accel_noise * law.accel_noise * dt
     turn = law.gyro_noise * law.gyro_noise * dt
     lost_accel_walk, lost_gyro_walk = law.lost_accel_walk, law.lost_gyro_walk
     if lost & MODELLED:
-        lost_accel_walk, lost_gyro_walk = law.modelled_accel_walk, law.modelled_gyro_walk
+        lost_accel_walk, lost_gyro_walk = law.modelled_accel_walk, model_walk
     accel_walk = lost_accel_walk if lost & NO_FORCE else law.accel_bias_walk
     gyro_walk = lost_gyro_walk if lost & NO_RATE else law.gyro_bias_walk
     for i in range(3):
@@ -283,7 +281,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
         p, v, q, a = integrated(p, v, q, f, w, dt)
         blocks = transition(R, f, w, dt)
         propagate(M, blocks, dt)
-        add_noise(M, law, dt, lost)
+        add_noise(M, law, dt, lost, x.model_walk)
         if x.drifts:
             carry(x.shared, blocks, dt)
         if x.compass:
@@ -345,26 +343,8 @@ def advance(x: Any, law: Any, until: float) -> None:
         row = x.imu[x.first % IMU_CAPACITY]
         if row[TIME] > until and x.end - x.first < IMU_CAPACITY - 2:
             return
-        before = x.time
         step_to(x, law, row, x.imu[(x.first - 1) % IMU_CAPACITY], x.covariance)
         x.first += 1
-        if before < x.stepped <= x.time and not int(row[LOST]) & NO_RATE:
-            _doubt_gyro_bias(x)
-
-
-@compilable
-def _doubt_gyro_bias(x: Any) -> None:
-    """Know the gyro's bias less by how the gyro has stepped, and in that direction alone.
-
-    Either something has hit the vehicle, or the gyro is off by that from now on: the next
-    measurements tell. With a bias that cannot have moved they would be refused. Many small steps in
-    a row are how the vehicle turns: in sum they count no more than the largest.
-    """
-    size = math.sqrt(x.step[0] * x.step[0] + x.step[1] * x.step[1] + x.step[2] * x.step[2])
-    share = min(1.0, x.largest_step / max(size, 1e-9))
-    for i in range(3):
-        for j in range(3):
-            x.covariance[BG + i, BG + j] += share * share * x.step[i] * x.step[j]
 
 
 @compilable

@@ -49,7 +49,9 @@ class FilterStart:
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
-                if not self._confirmation.has_second(sample, memory.waiting):
+                others = [one.sample for one in memory.waiting if one.sample is not sample]
+                poses = [other for other in others if isinstance(other, PoseSample)]
+                if not any(self._confirmation.of_poses(other, sample) for other in poses):
                     continue
                 memory = self._from_pose(memory, sample)
                 break

@@ -39,6 +39,13 @@ _KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
 _DOUBTED_SPEED = 0.5  # m/s
 _DOUBTED_FORCE = 3.0  # m/s^2
 _DOUBTED_RATE = 0.5  # rad/s
+# Of how a variance follows the noise that there is: with each measurement, by at most so much, and
+# from what differences of innovations are beyond which are expected.
+_SCALE_RATE = 0.06
+_SCALE_MOST = 6.0
+_SCALE_FROM = 1.5
+# Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
+POSE, GNSS = 0, 2
 
 
 @compilable
@@ -49,14 +56,38 @@ def _cleared(x: Any, rows: int) -> None:
 
 
 @compilable
-def _judged(x: Any, rows: int, gate: float, part: int = 0) -> float:
-    """Chi-square over gate of a part of a measurement; fuses what is within it."""
+def _judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> float:
+    """Chi-square over gate of a part of a measurement; fuses what is within it.
+
+    The variance of what is ``scaled`` grows where innovations say that it is larger than stated.
+    They say so by how they differ from one to the next: noise is what does not stay. What stays is
+    somebody's error, and no reason to believe a measurement less.
+    """
     for k in range(rows):
         x.innovation[part, k] = x.residual[k]
+        if scaled >= 0:
+            x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     ratio = distance(x, rows) / gate
     if ratio <= 1.0:
         correct(x, rows)
+    if scaled >= 0:
+        _follow_noise(x, rows, part, scaled)
     return ratio
+
+
+@compilable
+def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
+    """Let a scale of variances follow how far the newest innovation is from the last one."""
+    L, y, squared = x.factor, x.innovated, 0.0
+    for k in range(rows):
+        total = x.innovation[part, k] - x.innovated_last[scaled, k]
+        x.innovated_last[scaled, k] = x.innovation[part, k]
+        for j in range(k):
+            total -= L[k, j] * y[j]
+        y[k] = total / L[k, k]
+        squared += y[k] * y[k]
+    more = min(0.5 * squared / rows, _SCALE_MOST) - _SCALE_FROM
+    x.noise_scale[scaled] = max(1.0, max(x.noise_scale[scaled], 1.0) * math.exp(_SCALE_RATE * more))
 
 
 @compilable
@@ -121,10 +152,10 @@ def fuse_pose(
             delayed = 0.0
     dt = time - x.pose_delay - x.time
     position_rows(x, position, position_variance, dt, delayed)
-    first = _judged(x, 3, gates.pose)
+    first = _judged(x, 3, gates.pose, 0, POSE)
     dt = time - x.pose_delay - x.time
     attitude_rows(x, attitude, attitude_variance, dt, delayed)
-    return first, _judged(x, 3, gates.pose, 1)
+    return first, _judged(x, 3, gates.pose, 1, POSE + 1)
 
 
 @compilable
@@ -155,9 +186,9 @@ def fuse_gnss(
     """
     dt = time - x.time
     position_rows(x, position, position_variance, dt, 0.0)
-    first = _judged(x, 3, gates.gnss_position)
+    first = _judged(x, 3, gates.gnss_position, 0, GNSS)
     velocity_rows(x, velocity, velocity_variance, dt)
-    return first, _judged(x, 3, gates.gnss_velocity, 1)
+    return first, _judged(x, 3, gates.gnss_velocity, 1, GNSS + 1)
 
 
 @compilable
@@ -263,11 +294,11 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
 
 
 @compilable
-def doubt(x: Any, law: Any, place: float, turn: float) -> None:
+def doubt(x: Any, place: float, turn: float) -> None:
     """Know little more of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad].
 
-    An inertial unit that lies shows so: its biases may be anything, and velocity and attitude are
-    what they have made of them.
+    Either the pose's frame has moved, or the inertial unit leads the filter astray: its biases may
+    be anything, and velocity and attitude are what they have made of them.
     """
     M = x.covariance
     for i in range(3):

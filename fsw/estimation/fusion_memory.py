@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fsw.estimation import attribution
-from fsw.estimation.attribution import Dispute
+from fsw.estimation.confirmation import Run
 from fsw.estimation.drift import FrameDrift
 from fsw.estimation.error_state import FILTER, Filter
 from fsw.estimation.pace import Pace
+from fsw.estimation.redundancy import Verdict
 from fsw.estimation.sensor_checks import Aiding, Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault
-from fsw.measurements import GnssSample, PoseSample
+from fsw.measurements import GnssSample, MagneticSample, PoseSample, Sample
 from fsw.signals import Vec2, Vec3, Vec4
 
 _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
@@ -53,6 +54,26 @@ class EncoderWatch(NamedTuple):
         return self.repeats >= _REPEATS
 
 
+TickInputs = tuple[Sequence[Sample], float, Vec2, Vec4, bool]
+"""Samples, now [s], the joints' acceleration, the rotors' model, and whether the IMU was silent."""
+
+
+class Trail(NamedTuple):
+    """A memory, and the inputs of all ticks since: to go back, and do without a sensor."""
+
+    start: FusionMemory
+    began: float  # s
+    ticks: tuple[TickInputs, Any] | None = None  # the last one, and all before it
+
+    def inputs(self) -> list[TickInputs]:
+        """Of all ticks, in their order."""
+        found, left = [], self.ticks
+        while left is not None:
+            one, left = left
+            found.append(one)
+        return found[::-1]
+
+
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
@@ -63,6 +84,7 @@ class FusionMemory(NamedTuple):
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
     encoders: EncoderWatch = EncoderWatch()
+    trail: Trail | None = None  # the newest one
     waiting: tuple[Waiting, ...] = ()
     health: tuple[Health, ...] = ()  # of each sensor heard so far
     arrivals: int = 0
@@ -70,7 +92,7 @@ class FusionMemory(NamedTuple):
     gnss: GnssSample | None = None  # the newest one
     pose: PoseSample | None = None  # the last one that the filter has reached
     reset_counter: int | None = None  # of the last pose
-    refused: tuple[Aiding, ...] = ()  # of each kind the last one that was
+    runs: tuple[Run, ...] = ()  # of each kind the last samples that were refused
     started: bool = False
     field: Vec3 | None = None  # Gauss, body, the last one
     frame: FrameDrift = FrameDrift()  # of poses that drift
@@ -80,7 +102,11 @@ class FusionMemory(NamedTuple):
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
     began: float = -math.inf  # s, the filter's own time when it began
     without_fix: GnssSample | None = None  # the newest one that has none
-    dispute: Dispute | None = None  # between pose and IMU
+    trail_before: Trail | None = None  # up to where the newest one began
+    newest_pose: PoseSample | None = None  # whether it is used or not
+    newest_field: MagneticSample | None = None
+    verdict: Verdict = Verdict()  # on who is wrong
+    replays: int = 0  # how often the filter went back to do without a sensor
 
     def of(self, sensor: Sensor) -> Health:
         """What is known of a sensor."""
@@ -119,19 +145,25 @@ class FusionMemory(NamedTuple):
             memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
         return memory
 
-    def in_dispute(self, now: float, *, turned: bool) -> FusionMemory:
-        """The memory after a pose was refused by little at ``now`` [s]: see ``Dispute``."""
-        dispute = attribution.contradicted(self.dispute, now, self.numbers[0], turned=turned)
-        return self._replace(dispute=dispute)
+    def hearing(self, sample: Aiding) -> FusionMemory:
+        """The memory after a ``sample`` that is plausible, whether it is used or not."""
+        match sample:
+            case PoseSample():
+                return self._replace(newest_pose=sample)
+            case GnssSample():
+                return self._replace(gnss=sample)
+            case MagneticSample():
+                return self._replace(newest_field=sample)
+        return self
 
-    def after(self, one: Waiting, health: Health, refused: tuple[Aiding, ...]) -> FusionMemory:
-        """The memory after the first of the waiting samples was fused, or ``refused`` [SI]."""
+    def after(self, one: Waiting, health: Health, runs: tuple[Run, ...]) -> FusionMemory:
+        """The memory after the first of the waiting samples was fused, or refused: see ``runs``."""
         sample, pose, counter = one.sample, self.pose, self.reset_counter
         if isinstance(sample, PoseSample):
             pose, counter = sample, sample.reset_counter
         known = self.waiting[1:], (*self.without(health.sensor), health)
-        seen = pose, counter, refused
-        return FusionMemory._make((*self[:5], *known, *self[7:10], *seen, *self[13:]))
+        seen = pose, counter, runs
+        return FusionMemory._make((*self[:6], *known, *self[8:11], *seen, *self[14:]))
 
     def without(self, sensor: Sensor) -> list[Health]:
         """What is known of the other sensors."""

@@ -8,12 +8,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation import claim, fusion, imu, joint_filter
+from fsw.estimation import fusion, imu, joint_filter, redundancy
 from fsw.estimation.error_state import (
     BA,
     BARO,
     BG,
-    CLAIMS,
     COLUMNS,
     DELAY,
     ERRORS,
@@ -23,8 +22,10 @@ from fsw.estimation.error_state import (
     LOST,
     PUSHES,
     RATE,
+    ROWS,
     TH,
     TIME,
+    WITNESS,
     Array,
     Filter,
     P,
@@ -72,7 +73,7 @@ def tick(
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
-    model: Vec3,
+    model: Vec4,
 ) -> tuple[int, int, bool, Present]:
     """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
 
@@ -86,6 +87,8 @@ def tick(
     finite, known = False, _nothing()
     if more & END:
         finite, known = _predicted(new, law, times[0], until)
+        if times[1] > 0.0:
+            redundancy.witness(new[0], known[2], times[1], model)
     return fault, of_encoders, finite, known
 
 
@@ -100,7 +103,7 @@ def tick_with_pose(
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
-    model: Vec3,
+    model: Vec4,
     pose: Pose,
     least: Vec2,
 ) -> tuple[int, int, bool, Present, Vec2, tuple[Vec3, Vec3]]:
@@ -123,6 +126,8 @@ def tick_with_pose(
     finite, known = False, _nothing()
     if ratio[0] <= 1.0 and ratio[1] <= 1.0:
         finite, known = _predicted(new, law, times[0], until)
+        if times[1] > 0.0:
+            redundancy.witness(new[0], known[2], times[1], model)
     return fault, of_encoders, finite, known, ratio, innovation
 
 
@@ -136,7 +141,7 @@ def _taken_in(
     u: Vec2,
     encoders: Vec3,
     reading: Reading,
-    model: Vec3,
+    model: Vec4,
 ) -> tuple[int, int]:
     """All but the ``END``: what is wrong with the IMU and with the encoders."""
     now, dt = times
@@ -203,24 +208,16 @@ def _copy_halves(a: Any, b: Any) -> None:
     for i in range(2):
         b.same[i], b.steady[i] = a.same[i], a.steady[i]
         b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
-    b.shaken, b.stepped, b.largest_step = a.shaken, a.stepped, a.largest_step
-    for i in range(3):
-        b.step[i] = a.step[i]
-    if a.doubted[1] > 0:
-        _copy_claim(a, b)
-
-
-@compilable
-def _copy_claim(a: Any, b: Any) -> None:
-    b.claims, b.claim_started, b.claim_time = a.claims, a.claim_started, a.claim_time
-    b.field_started, b.field_time = a.field_started, a.field_time
+    b.out, b.suspect, b.believed = a.out, a.suspect, a.believed
+    b.model_walk = a.model_walk
+    for i in range(WITNESS):
+        b.witness[i] = a.witness[i]
+    for i in range(9):
+        b.baseline[i] = a.baseline[i]
     for i in range(4):
-        b.claim_q[i] = a.claim_q[i]
-    for i in range(3):
-        b.claim_field[i] = a.claim_field[i]
-    for k in range(max(0, a.claims - CLAIMS), a.claims):
-        for i in range(7):
-            b.claim[k % CLAIMS, i] = a.claim[k % CLAIMS, i]
+        b.noise_scale[i] = a.noise_scale[i]
+        for j in range(ROWS):
+            b.innovated_last[i, j] = a.innovated_last[i, j]
 
 
 @compilable
@@ -393,19 +390,7 @@ def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: f
 @kernel
 def _doubt(x: Filter, law: Law, place: float, turn: float) -> None:
     """Of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad] know little more."""
-    fusion.doubt(x[0], law[0].tuning, place, turn)
-
-
-@kernel
-def _judge_by_attitude(x: Filter, law: Law, time: float, q: Vec4, sigma: float) -> bool:
-    """Whether an attitude proves a gyro right that has jumped."""
-    return claim.judge_by_attitude(x[0], time, normalised(q), sigma)
-
-
-@kernel
-def _judge_by_field(x: Filter, law: Law, time: float, field: Vec3) -> bool:
-    """Whether the Earth's field does."""
-    return claim.judge_by_field(x[0], law[0].tuning.mag_noise, time, field)
+    fusion.doubt(x[0], place, turn)
 
 
 @kernel
@@ -474,7 +459,7 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> 
             blocks = transition(matrix_from_quaternion(q), f, w, dt)
             propagate(M, blocks, dt)
             carry(X, blocks, dt)
-            add_noise(M, t, dt, int(row[LOST]))
+            add_noise(M, t, dt, int(row[LOST]), s.model_walk)
             p, v, q, _ = integrated(p, v, q, f, w, dt)
             time = end
 
@@ -488,8 +473,6 @@ set_velocity = of_fixed_types(_set_velocity)
 set_attitude = of_fixed_types(_set_attitude)
 set_pressure = of_fixed_types(_set_pressure)
 doubt = of_fixed_types(_doubt)
-judge_by_attitude = of_fixed_types(_judge_by_attitude)
-judge_by_field = of_fixed_types(_judge_by_field)
 fuse_pose = of_fixed_types(_fuse_pose)
 fuse_gnss = of_fixed_types(_fuse_gnss)
 fuse_pressure = of_fixed_types(_fuse_pressure)

@@ -21,6 +21,7 @@ from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 
 _NONE: Vec6 = (0.0,) * 6
+_LASTING = 0.25  # of the least deviation of a pose: most of that is noise
 
 
 def lasting_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
@@ -38,7 +39,7 @@ def lasting_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
         if pose.drifts:
             place, attitude = memory.frame.place_noise, memory.frame.attitude_noise
         return (
-            *believable(place, tuning.position_floor**2),
+            *believable(place, (_LASTING * tuning.position_floor) ** 2),
             *believable(attitude, tuning.attitude_floor**2),
         )
     return _NONE

@@ -109,8 +109,7 @@ class MeasurementUpdate:
     def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
         # Garbage is within the gate now and then.
         believed = not any(
-            isinstance(one, MagneticSample) and sample.time - one.time < _STEADY
-            for one in memory.refused
+            one.kind is MagneticSample and sample.time - one.last < _STEADY for one in memory.runs
         )
         x, law = memory.numbers, self._law
         return (kernels.fuse_heading(x, law, sample.time, sample.field, believed),)

@@ -17,30 +17,43 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from fsw.compiled import machine_code, packed
-from fsw.estimation import attribution, kernels
-from fsw.estimation.attribution import Dispute
-from fsw.estimation.confirmation import Confirmation
-from fsw.estimation.error_state import DELAY, ERRORS, FILTER, FRAME, Array, Filter
+from fsw.estimation import kernels, redundancy
+from fsw.estimation.confirmation import Confirmation, Run
+from fsw.estimation.error_state import (
+    DELAY,
+    ERRORS,
+    FILTER,
+    FRAME,
+    NO_FORCE,
+    NO_RATE,
+    NOTHING,
+    ON_TRIAL,
+    Array,
+    Filter,
+)
 from fsw.estimation.filter_start import FilterStart
 from fsw.estimation.fusion_memory import (
     NO_TURN,
     EncoderWatch,
     FusionMemory,
+    Trail,
     Waiting,
     at_start,
 )
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.measurement_update import MeasurementUpdate, attitude
+from fsw.estimation.redundancy import EVIDENCE, NO_AID, Aid, Source, Verdict
 from fsw.estimation.sensor_checks import (
     SENSOR_OF,
     Aiding,
+    Health,
     arrived,
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.frozen import made
-from fsw.geometry.quaternion import conjugate, multiply
+from fsw.geometry.quaternion import conjugate, multiply, normalised
 from fsw.geometry.vectors import norm
 from fsw.measurements import (
     GnssSample,
@@ -59,14 +72,21 @@ LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
-# What poses contradict by no more, an inertial unit may have made; a frame that moves, moves more.
+# A pose that is refused by no more says nothing of itself at first: the inertial unit may have been
+# wrong by as much before it is found out.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
-_JUMPED: Final = 0.2  # s, for which poses are refused after a jump of the IMU that is believed
-_LATELY: Final = 0.02  # s, in which a fault is one of now
+_TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
+_HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
+_SOURCES: Final = {
+    PoseSample: Source.POSE,
+    GnssSample: Source.GNSS,
+    MagneticSample: Source.COMPASS,
+}
+_EYE: Final = 1e-9  # s
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
-UNKNOWN: Final[Vec3] = (0.0, 0.0, 0.0)  # what rotors make of the vehicle
+UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _USUAL_PARTS: Final = kernels.COPY | kernels.PUSH | kernels.JOINTS | kernels.READING
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
@@ -82,7 +102,7 @@ class Asked(NamedTuple):
     u: Vec2  # rad/s^2, of the joints
     encoders: Vec3 = _REST  # the same object: there was no reading
     reading: kernels.Reading = _NO_READING
-    model: Vec3 = UNKNOWN  # SI, FRD: see ``imu.add_imu``
+    model: Vec4 = UNKNOWN  # SI, FRD: see ``imu.add_imu``
 
 
 class SensorFusion:
@@ -114,8 +134,7 @@ class SensorFusion:
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
         kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
-        kernels.judge_by_attitude(memory.numbers, self.law, t, NO_TURN, 1.0)
-        kernels.judge_by_field(memory.numbers, self.law, t, (0.2, 0.0, 0.4))
+        redundancy.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
 
@@ -126,7 +145,7 @@ class SensorFusion:
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
-        model: Vec3 = UNKNOWN,
+        model: Vec4 = UNKNOWN,
         *,
         silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -137,7 +156,7 @@ class SensorFusion:
         memory, estimate = self.take_in(
             memory, samples, now, joint_acceleration, watch, model, silent=silent
         )
-        return self.catch_up(memory, samples, now, estimate, model)
+        return self.catch_up(memory, samples, now, estimate)
 
     def take_in(
         self,
@@ -146,7 +165,7 @@ class SensorFusion:
         now: float,
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
-        model: Vec3 = UNKNOWN,
+        model: Vec4 = UNKNOWN,
         *,
         silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -191,7 +210,11 @@ class SensorFusion:
             memory, known = self._do(memory, asked, kernels.END if ready else 0, -math.inf)
         # By position, because it is done in every tick: what every tick renews, and the rest.
         watched = memory.encoders if watch is None else watch
-        memory = made(FusionMemory, (x, now, imu_came, joints_came, watched, *memory[5:]))
+        trail = memory.trail
+        if trail is not None:
+            tick = samples, now, joint_acceleration, model, silent
+            trail = made(Trail, (trail.start, trail.began, (tick, trail.ticks)))
+        memory = made(FusionMemory, (x, now, imu_came, joints_came, watched, trail, *memory[6:]))
         if known is None:
             return (_anew(memory) if ready else memory), None
         return memory, made(StateEstimate, (round(1e6 * now), *known))
@@ -202,20 +225,31 @@ class SensorFusion:
         samples: Sequence[Sample],
         now: float,
         estimate: StateEstimate | None,
-        model: Vec3 = UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
 
         The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
-        there is nothing to fuse the state is the ``estimate`` of ``take_in``. Where pose and IMU
-        contradict each other, a ``model`` [SI, FRD] as there says who is wrong.
+        there is nothing to fuse the state is the ``estimate`` of ``take_in``. Every 20 ms it is
+        asked whether all sensors agree.
         """
+        memory, found = self._caught_up(memory, samples, now, estimate)
+        evidence = memory.verdict.evidence
+        if not memory.started or found is None or evidence is None:
+            return self._with_evidence(memory) if memory.started else memory, found
+        if now - evidence[0]["looked"] < redundancy.EVERY - _EYE:
+            return memory, found
+        return self._looked(memory, now, found)
+
+    def _caught_up(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        estimate: StateEstimate | None,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
         for sample in samples:
             if not isinstance(sample, _OF_EVERY_TICK):
                 memory = self.take(memory, sample, now)
-        if memory.started and now - memory.numbers[0]["stepped"] < _LATELY:
-            dispute = attribution.stepped(memory.dispute, memory.numbers[0])
-            memory = memory._replace(dispute=dispute)
         if estimate is not None and _rests(memory, now):
             return memory, estimate
         x = np.ndarray(1, FILTER, np.empty(_FLOATS))
@@ -229,11 +263,120 @@ class SensorFusion:
         else:
             memory, _ = self._done(memory, asked)
         memory = FusionMemory(x, *memory[1:])
-        if memory.dispute is not None:
-            memory = _settled(memory, memory.dispute, model, now)
         if known is None:
             return (_anew(memory) if ready else memory), None
         return memory, made(StateEstimate, (round(1e6 * now), *known))
+
+    def _with_evidence(self, memory: FusionMemory) -> FusionMemory:
+        """The memory of a filter that has just begun: what sensors say is compared from now on."""
+        verdict = memory.verdict._replace(evidence=np.zeros(1, EVIDENCE))
+        return memory._replace(verdict=verdict, trail=None, trail_before=None)
+
+    def _looked(
+        self, memory: FusionMemory, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory after a look at whether all sensors agree, and the state with it."""
+        before = memory.verdict
+        evidence, aids, seen = np.empty(1, EVIDENCE), [], []
+        evidence[:] = before.evidence
+        newest = memory.newest_pose, memory.gnss, memory.newest_field
+        for sample, last in zip(newest, before.seen, strict=True):
+            aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
+            seen.append(sample)
+        redundancy.look(evidence, memory.numbers, now, *aids, not before.is_on)
+        ratios = tuple(evidence[0]["ratio"].tolist())
+        verdict = before._replace(evidence=evidence, seen=tuple(seen))
+        if before.is_on or before.wrong or max(ratios) > 1.0:
+            pose = memory.of(Sensor.POSE).came
+            held = now - pose <= self.tuning.stale_time and not before.wrong & Source.POSE
+            verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held)
+        elif not memory.trail or now - memory.trail.began >= _TRAIL:
+            start = memory._replace(trail=None, trail_before=None)
+            return memory._replace(
+                verdict=verdict, trail_before=memory.trail, trail=Trail(start, now)
+            ), found
+        if not (verdict.is_on or verdict.wrong or before.is_on or before.wrong):
+            return memory._replace(verdict=verdict), found
+        return self._convicted(memory._replace(verdict=verdict), before, now, found)
+
+    def _aid(self, memory: FusionMemory, sample: Aiding) -> Aid:
+        """What a measurement says to the law for who is wrong."""
+        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)
+        time = self._measured_at(memory, sample)
+        if isinstance(sample, PoseSample):
+            place, about = self._update.noise(memory, sample)
+            sigma, angle = math.sqrt(max(place) * scale[0]), math.sqrt(max(about) * scale[1])
+            return True, time, sample.position, normalised(sample.attitude), sigma, angle
+        if isinstance(sample, GnssSample):
+            place, speed = self._stated.of_gnss(sample)
+            sigma, fast = math.sqrt(max(place) * scale[2]), math.sqrt(max(speed) * scale[3])
+            return True, time, sample.position, (*sample.velocity, 0.0), sigma, fast
+        assert isinstance(sample, MagneticSample)
+        return True, time, sample.field, NO_TURN, self.tuning.mag_noise, 0.0
+
+    def _convicted(
+        self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory with a filter that knows the verdict, and the state with it."""
+        verdict = memory.verdict
+        x = memory.numbers.copy()
+        memory = memory._replace(numbers=x)
+        doubted = bool(x["doubted"][0].any())
+        new = verdict.wrong & ~before.wrong
+        believes = doubted and verdict.named is Source.MODEL
+        if not verdict.is_on and doubted and not verdict.wrong:
+            believes = before.is_on  # who has jumped agrees with all others
+        x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
+        if verdict.is_on:
+            x["suspect"] |= ON_TRIAL
+        if not (new or believes):
+            return memory, found
+        x["believed"] = NOTHING if believes else 0
+        if new & (Source.GYRO | Source.ACCELEROMETER):
+            memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
+        return self._replayed(memory, now, found)
+
+    def _replayed(
+        self, memory: FusionMemory, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Go back to before sensors contradicted, and do without what is wrong since then."""
+        trails = [one for one in (memory.trail_before, memory.trail) if one is not None]
+        x = memory.numbers[0]
+        believed = int(x["believed"])
+        x["believed"] = 0
+        if not trails:
+            return memory, found
+        back, state = trails[0].start, None
+        numbers = back.numbers.copy()
+        for name in ("out", "suspect"):
+            numbers[name] = x[name]
+        numbers["believed"] = believed
+        verdict = memory.verdict._replace(evidence=None)
+        back = back._replace(numbers=numbers, verdict=verdict, started=back.started)
+        for trail in trails:
+            for samples, time, u, model, silent in trail.inputs():
+                back, state = self.take_in(back, samples, time, u, None, model, silent=silent)
+                back, state = self._caught_up(back, samples, time, state)
+        if state is None:
+            return memory, found
+        numbers = back.numbers.copy()
+        numbers["believed"] = 0
+        for name in ("witness", "baseline", "model_walk"):
+            numbers[name] = memory.numbers[name]
+        health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
+        start = memory._replace(
+            numbers=numbers,
+            health=health,
+            waiting=back.waiting,
+            runs=back.runs,
+            pose=back.pose,
+            reset_counter=back.reset_counter,
+            frame=back.frame,
+            replays=memory.replays + 1,
+            trail=None,
+            trail_before=None,
+        )
+        return start._replace(trail=Trail(start, now)), state
 
     def _usual(
         self, memory: FusionMemory, samples: Sequence[Sample], now: float
@@ -376,7 +519,7 @@ class SensorFusion:
         innovation, fused = (*place, *turn), ratio[0] <= 1.0 and ratio[1] <= 1.0
         if fused:
             health = memory.of(Sensor.POSE).with_fused((now, now), ratio, innovation)
-            memory = memory.after(one, health, memory.refused)
+            memory = memory.after(one, health, memory.runs)
         else:
             memory = self._judged(memory, one, ratio, innovation, now)
         return memory, known if finite else None, fused
@@ -395,11 +538,7 @@ class SensorFusion:
         health, fault = arrived(
             before, sample, now, self.tuning, lambda: bool(x["same"][0].min() >= STUCK_READINGS)
         )
-        time = sample.time
-        if isinstance(sample, PoseSample):
-            time -= float(x["pose_delay"][0]) if memory.started else self.tuning.pose_delay
-        elif isinstance(sample, GnssSample):
-            time -= self.tuning.gnss_delay
+        time = self._measured_at(memory, sample)
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             # Measured before the filter began, it came as soon as it could.
@@ -409,34 +548,27 @@ class SensorFusion:
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
             delay = self._delay(delay, now - time, now - before.came)
         others = memory.without(health.sensor)
+        if not fault:
+            memory = memory.hearing(sample)
+            if memory.verdict.wrong & _SOURCES.get(type(sample), Source(0)):
+                fault = SensorFault.DISAGREES
+                health = health.with_fault(fault, now)
         if fault:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
                 memory = memory._replace(without_fix=sample)
             return memory._replace(health=(*others, health), delay=delay)
-        if x["doubted"][0][1] > 0 and memory.started:
-            memory = self._with_claim_judged(memory, sample, time, now)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
-        gnss = sample if isinstance(sample, GnssSample) else memory.gnss
-        known = (waiting, (*others, health), memory.arrivals + 1, delay, gnss)
-        return FusionMemory._make((*memory[:5], *known, *memory[10:]))
+        known = (waiting, (*others, health), memory.arrivals + 1, delay)
+        return FusionMemory._make((*memory[:6], *known, *memory[10:]))
 
-    def _with_claim_judged(
-        self, memory: FusionMemory, sample: Aiding, time: float, now: float
-    ) -> FusionMemory:
-        """The memory after a ``sample`` of ``time`` [s] has told whether a gyro is right again."""
-        x = memory.numbers.copy()
+    def _measured_at(self, memory: FusionMemory, sample: Aiding) -> float:
+        """When a ``sample`` was measured [s]: its time stamp, less what that leaves out."""
         if isinstance(sample, PoseSample):
-            _, about = self._update.noise(memory, sample)
-            sigma = math.sqrt(max(about))
-            kernels.judge_by_attitude(x, self.law, time, sample.attitude, sigma)
-        elif isinstance(sample, MagneticSample):
-            heard = memory.of(Sensor.POSE).came
-            if heard >= 0.0 and now - heard <= self.tuning.stale_time:
-                return memory
-            kernels.judge_by_field(x, self.law, time, sample.field)
-        return memory._replace(numbers=x)
+            delay = float(memory.numbers["pose_delay"][0])
+            return sample.time - (delay if memory.started else self.tuning.pose_delay)
+        return sample.time - (self.tuning.gnss_delay if isinstance(sample, GnssSample) else 0.0)
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""
@@ -501,27 +633,29 @@ class SensorFusion:
             # The weather is not known until the first reading.
             refused, ratio = False, (1.0,)
             self._update.take_pressure(memory, one.time, sample)
-        confirmed = refused and self._confirmation.is_confirmed(memory, sample)
-        latest = memory.refused
-        little = isinstance(sample, PoseSample) and _is_small(innovation)
-        if refused and not announced and (little or _has_jumped(memory, sample, now)):
-            memory = memory.in_dispute(now, turned=ratio[-1] > 1.0)
-        elif refused:
-            health = health.with_fault(SensorFault.JUMP, now)
+        runs, run = memory.runs, None
+        long_refused = bool(health.fused) and now - min(health.fused) > self.tuning.reset_time
         if refused:
-            latest = (*[one for one in latest if type(one) is not type(sample)], sample)
-            if confirmed and little and not announced and isinstance(sample, PoseSample):
+            run = self._run(memory, sample, innovation)
+            runs = (*[other for other in runs if other.kind is not run.kind], run)
+            little = _is_small(sample, innovation)
+            if announced or long_refused or not little:
+                health = health.with_fault(SensorFault.JUMP, now)
+            if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
                 ratio = self._update.fuse_pose(memory, sample)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
         health = health.with_fused(fused, ratio, shown)
-        counter, memory = memory.reset_counter, memory.after(one, health, latest)
-        if announced and refused and not confirmed:
+        counter, memory = memory.reset_counter, memory.after(one, health, runs)
+        if announced and run is not None and not run.is_confirmed:
             memory = memory._replace(reset_counter=counter)
-        long_refused = now - min(fused) > self.tuning.reset_time
-        if max(ratio) > 1.0 and confirmed and (announced or long_refused):
+        if (
+            run is not None
+            and max(ratio) > 1.0
+            and (run.is_confirmed if announced else run.is_believable(self.tuning.reset_time))
+        ):
             memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
@@ -530,6 +664,13 @@ class SensorFusion:
         elif previous is not None and not refused:
             memory = memory.jumped(*_jump(previous, memory.numbers[0]))
         return memory
+
+    def _run(self, memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...]) -> Run:
+        """The run of refused samples that this one goes on with, or begins."""
+        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0).tolist()
+        scales = scale[:2] if isinstance(sample, PoseSample) else scale[2:]
+        seldom = memory.of(SENSOR_OF[type(sample)]).apart >= 0.25
+        return self._confirmation.run(memory.runs, sample, innovation, tuple(scales), seldom)
 
     def _with_frame(
         self, memory: FusionMemory, sample: PoseSample, announced: bool
@@ -544,7 +685,7 @@ def _rests(memory: FusionMemory, now: float) -> bool:
 
     Then the filter may stay where it is: the state is made of the IMU's readings since.
     """
-    if not memory.started or memory.dispute is not None:
+    if not memory.started:
         return False
     waits = memory.waiting
     if waits:
@@ -562,49 +703,20 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         waiting=(),
         pose=None,
         restarts=memory.restarts + 1,
-        dispute=None,
+        verdict=Verdict(),
+        trail=None,
+        trail_before=None,
     )
 
 
-def _settled(memory: FusionMemory, dispute: Dispute, model: Vec3, now: float) -> FusionMemory:
-    """The memory after a ``dispute`` has gone on for a tick, and the fault of who is wrong in it.
-
-    ``model`` [SI, FRD] as in ``catch_up``, at ``now`` [s].
-    """
-    if dispute.is_over(now):
-        return memory._replace(dispute=None)
-    if dispute.wrong is None:
-        x = memory.numbers[0]
-        seen = dispute.witness or attribution.witness(x, now)
-        seen = attribution.felt(seen, x, dispute.before, model)
-        dispute = dispute._replace(witness=seen)
-        if not dispute.is_due(now):
-            return memory._replace(dispute=dispute)
-        found = attribution.wrong(dispute, attribution.biases(x))
-        if found is Sensor.POSE and dispute.refused == 0:
-            return memory._replace(dispute=dispute)  # no pose has contradicted
-        dispute = dispute._replace(wrong=found)
-    elif now != dispute.last:
-        return memory
-    return _blamed(memory._replace(dispute=dispute), now)
+def _halves(sources: Source) -> int:
+    """Halves of the inertial unit, as ``FILTER`` counts them, among some ``sources``."""
+    return sum(half for source, half in _HALVES if source & sources)
 
 
-def _has_jumped(memory: FusionMemory, sample: Aiding, now: float) -> bool:
-    """Whether what an IMU said that has jumped may be why a pose is refused at ``now`` [s]."""
-    imu = memory.of(Sensor.IMU)
-    jumped = imu.fault is SensorFault.JUMP and now - imu.fault_at <= _JUMPED
-    return jumped and isinstance(sample, PoseSample)
-
-
-def _blamed(memory: FusionMemory, now: float) -> FusionMemory:
-    """The memory with the fault of who is wrong in its dispute, noted at ``now`` [s]."""
-    assert memory.dispute is not None
-    if memory.dispute.wrong is not Sensor.IMU:
-        return memory.noting_fault(Sensor.POSE, SensorFault.JUMP, now)
-    imu = memory.of(Sensor.IMU)
-    if imu.fault is not SensorFault.DISAGREES and now - imu.fault_at <= _LATELY:
-        return memory  # it is known by what is worse
-    return memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
+def _fused_as(health: Health, other: Health) -> Health:
+    """The ``health`` of a sensor of which other samples have been fused."""
+    return health.with_fused(other.fused, other.ratio, other.innovation)
 
 
 def _of_reading(asked: Asked, fault: int) -> int:
@@ -626,7 +738,10 @@ def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFa
     return SensorFault.SELDOM if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
 
 
-def _is_small(innovation: tuple[float, ...]) -> bool:
+def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
+    """Whether a pose is refused by so little that it need not be the pose that is wrong."""
+    if not isinstance(sample, PoseSample):
+        return False
     x, y, z, a, b, c = innovation
     return norm((x, y, z)) < _SMALL_STEP and norm((a, b, c)) < _SMALL_TURN
 

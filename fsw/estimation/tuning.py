@@ -33,8 +33,8 @@ class EstimatorTuning:
     lost_accel_walk: float = 10.0  # m/s^3/sqrt(Hz)
     lost_gyro_walk: float = 6.0  # rad/s^2/sqrt(Hz)
     # The same where it goes on as the rotors' commands make it: gusts and errors of the model only.
+    # By how much the model has been off by a rate is learnt in flight (redundancy.py).
     modelled_accel_walk: float = 3.0  # m/s^3/sqrt(Hz)
-    modelled_gyro_walk: float = 1.5  # rad/s^2/sqrt(Hz)
 
     # What is not known when the filter starts.
     accel_bias: float = 0.3  # m/s^2
@@ -56,7 +56,7 @@ class EstimatorTuning:
     longest_delay: float = 0.4  # s; a receiver whose solutions queue
     delay_decay: float = 0.01  # s/s, by which it is forgotten how long they took
     # The least standard deviations that sensors are believed, or theirs where they state none.
-    position_floor: float = 2e-4  # m, of a pose
+    position_floor: float = 2e-3  # m, of a pose; no motion capture is better while it flies
     attitude_floor: float = 1e-3  # rad
     gnss_position_floor: float = 0.01  # m
     gnss_velocity_floor: float = 0.1  # m/s

@@ -21,6 +21,7 @@ from fsw.control.cascade import (
     in_hover,
 )
 from fsw.control.safety_gate import gate
+from fsw.control.tube import beyond_covered
 from fsw.estimation.estimator import estimate_state
 from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
@@ -47,6 +48,7 @@ from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.flight.zone_room import ZoneRoom
 from fsw.frozen import replace
+from fsw.measurements import RangeSample
 from fsw.model.actuator_health import SOUND
 from fsw.model.battery import Levels, corrected, drained
 from fsw.model.body import body_of
@@ -214,7 +216,8 @@ class Autopilot:
         ticks = self._elapsed_ticks(state, now_us)
         nominal, plan, u = state.nominal, state.plan, REST_INPUT
         vehicle = state.vehicle
-        armed, flown = vehicle.armed, vehicle.flies and nominal is not None
+        armed = vehicle.armed
+        flown = vehicle.flies and vehicle.unloaded is None and nominal is not None
         if flown and nominal is not None:
             nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
         followed = nominal if flown else None
@@ -252,7 +255,11 @@ class Autopilot:
         safety = state.safety
         if estimate is not None:
             safety = self._watch.off_plan(
-                safety, estimate, nominal if flown else None, state.accuracy.reach
+                safety,
+                estimate,
+                nominal if flown else None,
+                state.accuracy.reach,
+                max(self._wind_room(memory)),
             )
         if fusion is not None:
             caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
@@ -381,6 +388,9 @@ class Autopilot:
         now_us = inputs.sensors.t_us
         if inputs.targets or inputs.announced or inputs.mission is not None or inputs.refused:
             state = self._believe(state, inputs, texts)
+        ranges = [one for one in inputs.samples if type(one) is RangeSample]
+        if ranges:
+            state = replace(state, vehicle=replace(state.vehicle, range=ranges[-1]))
         if inputs.battery is not None:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
@@ -505,7 +515,8 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
-        kept = self._clearance.keep(state.kept.whole, state.mission.safe_set, estimate, pose)
+        wind, whole = self._wind_room(state.cascade), state.kept.whole
+        kept = self._clearance.keep(whole, state.mission.safe_set, estimate, pose, wind)
         state = state if kept is state.kept else replace(state, kept=kept)
         return self._with_room(state, estimate)
 
@@ -517,6 +528,12 @@ class Autopilot:
         report = self._safe_sets.margins(kept, estimate, target)
         kept = self._room.limit(kept, report, estimate, target)
         return state if kept is state.kept else replace(state, kept=kept)
+
+    def _wind_room(self, memory: CascadeMemory) -> Vec2:
+        """What the memory of wind in force can add to the tube [m, NED]."""
+        if self.config.inner != "tracking":
+            return 0.0, 0.0
+        return beyond_covered(self._safe_sets.loop_tube, memory.observed.disturbance_bias)
 
     def _pose_error(
         self,

@@ -16,7 +16,7 @@ from fsw.flight.conditions import NOTHING_DONE, Action
 from fsw.flight.failsafe import BLOCKING, SLOW_US
 from fsw.flight.failsafe_evidence import FailsafeContext
 from fsw.flight.failsafe_response import overridden, respond
-from fsw.flight.land_detector import standing_unclear, stands
+from fsw.flight.land_detector import in_the_air, standing_unclear, stands
 from fsw.flight.mission_sequencer import refusal as mission_refusal
 from fsw.flight.modes import MODES
 from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, Handover
@@ -24,12 +24,12 @@ from fsw.flight.modes.hold import stop
 from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import is_fresh
-from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.plan_exchange import without_plan
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.restart import rests
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
-from fsw.flight.state import FlightState, PlanMemory, SetpointMemory, VehicleMemory
+from fsw.flight.state import FlightState, SetpointMemory, VehicleMemory
 from fsw.flight.zone_room import within_room
 from fsw.frozen import replace
 from fsw.model.body import body_of
@@ -365,7 +365,7 @@ class Commander:
             failsafe=NOTHING_DONE,
         )
         state = replace(
-            _without_plan(state, estimate),
+            without_plan(state, estimate),
             vehicle=vehicle,
             setpoint=SetpointMemory(),
             cascade=at_rest(airframe, estimate) if landed else in_hover(airframe, estimate),
@@ -402,6 +402,7 @@ class Commander:
         state = follower.activate(mission_left(state, mode), estimate, handover)
         if follower.lifts_off and vehicle.landed:
             state = _lift_off(state, estimate)
+        state = in_the_air(state, estimate)
         vehicle = replace(
             state.vehicle,
             mode=mode,
@@ -410,7 +411,6 @@ class Commander:
             mode_origin=origin.p_WE,
             mode_yaw=origin.yaw,
             mode_begin_us=estimate.t_us,
-            moved_us=estimate.t_us,
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
         if not vehicle.armed:
@@ -437,15 +437,9 @@ def _blocked(vehicle: VehicleMemory) -> str:
 
 def _lift_off(state: FlightState, estimate: StateEstimate) -> FlightState:
     """Fly from now on, with the plan's state where the vehicle is."""
+    state = in_the_air(state, estimate)
     vehicle = replace(state.vehicle, landed=False)
-    return _without_plan(replace(state, vehicle=vehicle), estimate)
-
-
-def _without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
-    """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
-    last = state.plan
-    plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
-    return replace(state, nominal=nominal_at_rest(estimate), plan=plan)
+    return without_plan(replace(state, vehicle=vehicle), estimate)
 
 
 def _reason(decision: Decision) -> tuple[StatusText, ...]:

@@ -62,6 +62,8 @@ class Condition(Enum):
     JOINT_FAILED = "joint failed"
     POSITION_LOW = "position uncertain"
     SENSOR_LOST = "sensor lost"
+    SENSORS_UNDECIDED = "sensors contradict each other for long"
+    SENSORS_CONTRADICT = "sensors contradict each other"
     ROOM_LACKING = "too little room for what the estimate is not sure of"
     TUBE_LEFT = "off the plan"
     FILTER_ACTIVE = "too fast towards a zone"

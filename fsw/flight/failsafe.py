@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.estimation.redundancy import UNDECIDED
 from fsw.flight import failsafe_actions as actions
 from fsw.flight import failsafe_evidence as evidence
 from fsw.flight import failsafe_wording as wording
@@ -220,6 +221,33 @@ FAILSAFES: Final = (
         detected="in flight, inertial unit or joint encoders were of no use for `COM_SENS_LOSS_T`",
         within_us=_SLOWLY,
         parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
+    ),
+    Failsafe(
+        Condition.SENSORS_UNDECIDED,
+        lambda c: evidence.sensors_contradict(c, UNDECIDED) or evidence.imu_alone_is_lost(c),
+        _always(Action.LAND),
+        Severity.CRITICAL,
+        lambda c: wording.suspects(c) if c.state.aiding.disputed_us else wording.lost_sensor(c),
+        of_vehicle=True,
+        slow=True,
+        detected="in flight, the same for 2 s; or the inertial unit was of no use for so long, and "
+        "no pose holds the attitude",
+        within_us=_TWICE,
+        does="land",
+    ),
+    Failsafe(
+        Condition.SENSORS_CONTRADICT,
+        lambda c: evidence.sensors_contradict(c, 0.1),
+        _always(Action.RETREAT),
+        Severity.CRITICAL,
+        wording.suspects,
+        of_vehicle=True,
+        slow=True,
+        detected="in flight, for 0.1 s, gyro, accelerometer, pose, satellites or magnetometer say "
+        "another motion than the others, and which of them is wrong is not known "
+        "([who is wrong](safety-manual.md#who-is-wrong))",
+        within_us=_TWICE,
+        does="off the zones that are too close, then hold",
     ),
     Failsafe(
         Condition.ROOM_LACKING,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.estimation.redundancy import UNDECIDED
+from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.conditions import Condition
 from fsw.flight.state import FlightState, LostSensor
 from fsw.flight.uncertain_clearance import LACKING
@@ -57,7 +59,7 @@ def plan_age_us(context: FailsafeContext) -> int:
 def plans(context: FailsafeContext) -> bool:
     """Whether a plan is being flown, or should be."""
     vehicle = context.state.vehicle
-    return vehicle.flies and vehicle.mode is not Mode.DESCEND
+    return vehicle.flies and vehicle.unloaded is None and vehicle.mode is not Mode.DESCEND
 
 
 def plan_is_stale(context: FailsafeContext) -> bool:
@@ -69,7 +71,8 @@ def plan_is_stale(context: FailsafeContext) -> bool:
 def planner_is_lost(context: FailsafeContext) -> bool:
     """In flight, no plan has begun for COM_PLN_LOSS_T."""
     vehicle = context.state.vehicle
-    return plan_age_us(context) > context.limits.planner_loss_us and vehicle.flies
+    plans = vehicle.flies and vehicle.unloaded is None
+    return plans and plan_age_us(context) > context.limits.planner_loss_us
 
 
 def setpoints_are_lost(context: FailsafeContext) -> bool:
@@ -129,6 +132,22 @@ def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
 def sensor_is_lost(context: FailsafeContext) -> bool:
     """In flight, at least one of ``lost_sensors``."""
     return bool(lost_sensors(context)) and context.state.vehicle.flies
+
+
+def sensors_contradict(context: FailsafeContext, seconds: float) -> bool:
+    """In flight, sensors contradict each other for so many ``seconds`` [s], whoever is wrong."""
+    disputed_us = context.state.aiding.disputed_us
+    return disputed_us > 1e6 * seconds and context.state.vehicle.flies
+
+
+def imu_alone_is_lost(context: FailsafeContext) -> bool:
+    """In flight, the inertial unit was of no use for long, and no pose holds the attitude."""
+    aiding, now_us = context.state.aiding, context.estimate.t_us
+    if aiding.pose is Sensor.POSE and not is_unaided(context):
+        return False
+    since = [one.since_us for one in aiding.lost if one.sensor is Sensor.IMU]
+    lasts = bool(since) and now_us - since[0] > 1e6 * UNDECIDED
+    return lasts and context.state.vehicle.flies
 
 
 def tilt_is_lost(context: FailsafeContext) -> bool:

@@ -27,6 +27,12 @@ def lost_sensor(context: FailsafeContext) -> str:
     return f": {'; '.join([one.sentence(now_us) for one in lost_sensors(context)])}"
 
 
+def suspects(context: FailsafeContext) -> str:
+    """Which sensors may be wrong, and for how long they have contradicted each other."""
+    aiding = context.state.aiding
+    return f": {aiding.suspects}, for {1e-6 * aiding.disputed_us:.2f} s"
+
+
 def charge_left(context: FailsafeContext) -> str:
     """Of the battery."""
     return f": {100.0 * context.state.battery.remaining:.0f} % left"

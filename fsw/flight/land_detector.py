@@ -1,9 +1,35 @@
-"""Whether the vehicle stands on the ground, by its height and its speed."""
+"""Whether the vehicle stands on the ground: before arming by height and speed, in flight by thrust.
+
+In a landing the stages are those of PX4's detector: ground contact, maybe landed, landed. An
+accelerometer that is wrong makes height and velocity of the estimate wrong as well, so these alone
+must not stop the rotors. What cannot be feigned is that nothing falls: on contact, when rotors
+carry less than the weight, the loops open and rotors idle. In the air the vehicle then falls, and
+its velocity shows it within 0.1 s: even an accelerometer that is wrong by 3 m/s^2 shows 6.8 of
+free fall's 9.8, and on the ground no more than 3. Then the loops close again.
+
+Source: docs/concepts/failsafes.md.
+"""
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
+from fsw.flight.plan_exchange import without_plan
+from fsw.flight.state import FlightState
+from fsw.frozen import replace
+from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import StateEstimate
+
+_CONTACT: Final = 0.7  # of the weight as configured; what flies is at most so much lighter
+_SINKS: Final = 0.15  # m/s; slower than a landing, faster than the rebound of the legs
+_FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free fall, at worst
+_SIGMAS: Final = 3.0  # by which a height may be wrong
+_RANGE_US: Final = 300_000  # in which a distance is one of now
+_CONTACT_US: Final = 100_000  # of contact before loops open
+_DOUBTED_US: Final = 1_000_000  # the same where height or velocity say that there is no ground
+_SURE_US: Final = 200_000  # with open loops, in which a fall is seen
 
 
 def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
@@ -11,19 +37,62 @@ def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
     return -estimate.p_WB[2] - config.airframe.leg_length
 
 
-def is_low(config: FlightConfig, estimate: StateEstimate) -> bool:
-    """Whether the vehicle is as low as where it stands."""
-    return height_above_ground(config, estimate) < config.limits.landed_height
-
-
 def stands(config: FlightConfig, estimate: StateEstimate) -> bool:
     """Near standing height and hardly moving."""
     vx, vy, vz = estimate.v_WB
     slow = vx * vx + vy * vy + vz * vz < config.limits.landed_speed**2
-    return is_low(config, estimate) and slow
+    return height_above_ground(config, estimate) < config.limits.landed_height and slow
 
 
 def standing_unclear(config: FlightConfig, estimate: StateEstimate) -> bool:
     """Neither at rest on the ground nor clearly in the air."""
     low = height_above_ground(config, estimate) < config.limits.airborne_height
     return low and not stands(config, estimate)
+
+
+def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether the vehicle may be as low as where it stands.
+
+    By the rangefinder where there is one, else by the estimate, as far as that knows its height.
+    """
+    limits, seen, aiding = config.limits, state.vehicle.range, state.aiding
+    if seen is not None and 0 <= estimate.t_us - round(1e6 * seen.time) < _RANGE_US:
+        height = seen.distance * estimate.R_WB[8] - config.airframe.leg_length
+        sigma = math.sqrt(max(seen.variance, 0.0))
+    elif aiding.unaided_us >= limits.aiding_loss_us:
+        return True
+    else:
+        height, sigma = height_above_ground(config, estimate), aiding.height_sigma
+    return height - _SIGMAS * sigma < limits.landed_height
+
+
+def feel_ground(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate
+) -> tuple[FlightState, bool]:
+    """The land detector's memory a tick on, and whether the vehicle has landed.
+
+    To be asked where a descent is commanded.
+    """
+    vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
+    if vehicle.unloaded is None:
+        if not sum(state.cascade.rotors) < _CONTACT * config.airframe.mass * GRAVITY:
+            return in_the_air(state, estimate), False
+        blind = state.aiding.unaided_us >= config.limits.aiding_loss_us
+        expected = may_be_low(config, state, estimate) and (blind or sinking < _SINKS)
+        if now_us - vehicle.moved_us >= (_CONTACT_US if expected else _DOUBTED_US):
+            state = replace(state, vehicle=replace(vehicle, unloaded=(now_us, sinking)))
+        return state, False
+    since_us, before = vehicle.unloaded
+    if not sinking - before < _SINKS + _FALLS * 1e-6 * (now_us - since_us):
+        return in_the_air(state, estimate), False
+    sure_us = max(config.limits.landed_time_us - _CONTACT_US, _SURE_US)
+    return state, now_us - since_us >= sure_us
+
+
+def in_the_air(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """The state without contact: loops that were open for it are closed again."""
+    vehicle = state.vehicle
+    if vehicle.unloaded is not None:
+        state = without_plan(state, estimate)
+    vehicle = replace(vehicle, moved_us=estimate.t_us, unloaded=None)
+    return replace(state, vehicle=vehicle)

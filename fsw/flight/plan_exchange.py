@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from fsw.control.braking import Brake
 from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
-from fsw.flight.state import PlanMemory
+from fsw.flight.state import FlightState, PlanMemory
 from fsw.frozen import replace
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import clamp_magnitude
@@ -220,3 +220,10 @@ def requested(memory: PlanMemory, apply_us: int) -> PlanMemory:
         next_id=memory.next_id + 1,
         counters=counters,
     )
+
+
+def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
+    last = state.plan
+    plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
+    return replace(state, nominal=nominal_at_rest(estimate), plan=plan)

@@ -63,16 +63,18 @@ class SafetyWatch:
         estimate: StateEstimate,
         nominal: PredictionState | None,
         unsure: float = 0.0,
+        wind: float = 0.0,
     ) -> SafetyMemory:
         """Compare the base with where the running plan has it now; None: nothing is flown.
 
         ``unsure`` [m] is what the estimate's errors add to the tube; some room is left for them.
+        ``wind`` [m] is what the memory of wind in force adds.
         """
         if nominal is None:
             return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
         dx, dy, dz = x - px, y - py, z - pz
-        most = off_plan_bound(self.radius, unsure)
+        most = off_plan_bound(self.radius + wind, unsure)
         if (
             memory.off_plan_us < 0
             and -most <= dx <= most

@@ -14,6 +14,7 @@ from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
+from fsw.estimation.redundancy import Source, names
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import UNKNOWN, SensorFusion
@@ -24,7 +25,7 @@ from fsw.flight.jump import on_return, told
 from fsw.flight.state import Aiding, FlightState, LostSensor
 from fsw.frozen import made, replace
 from fsw.measurements import ImuSample, JointSample, Sample
-from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2, Vec3
+from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
 
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
@@ -34,8 +35,9 @@ _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
-# The sensor is, all the same; an IMU that disagrees with its new biases.
+# The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
+_INERTIAL = Source.GYRO | Source.ACCELEROMETER
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
@@ -84,16 +86,17 @@ class SensedState:
         """
         now = 1e-6 * inputs.sensors.t_us
         before = _memory(state, now)
-        pushed = (0.0, 0.0)
+        pushed, model = (0.0, 0.0), UNKNOWN
         if state.estimate is not None:
-            pushed = self._cascade.joint_acceleration(state.cascade, state.estimate)
+            pushed, model = self._cascade.expected(state.cascade, state.estimate)
+            # On the ground thrust does not explain how the vehicle moves.
+            if not state.vehicle.flies or state.vehicle.unloaded is not None:
+                model = UNKNOWN
         law = self._fusion.law
         started, watch, samples = _without_stuck(state, before, inputs.samples, law)
-        came, model = 0.0, UNKNOWN
+        came = 0.0
         if 0.0 <= before.imu_came < now - _IMU_SILENT:
             came, samples = _without_late_imu(before, now, samples)
-        if came or now - before.fault_at(_IMU) < _LATELY:
-            model = self._model(state)
         memory, estimate = self._fusion.take_in(
             started, samples, now, pushed, watch, model, silent=came > 0.0
         )
@@ -126,8 +129,7 @@ class SensedState:
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
-        model = UNKNOWN if memory.dispute is None else self._model(state)
-        memory, found = self._fusion.catch_up(memory, inputs.samples, now, known, model)
+        memory, found = self._fusion.catch_up(memory, inputs.samples, now, known)
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
@@ -135,6 +137,7 @@ class SensedState:
             memory = self._told(before, memory, now, texts, due=due)
         reset = None
         back = (news and _is_back(before, memory, now)) or not before.started
+        back = back or memory.replays != before.replays
         if memory.reset.number != before.reset.number:
             reset = memory.reset
             texts.append(StatusText(Severity.WARNING, told(reset)))
@@ -165,14 +168,6 @@ class SensedState:
         report = estimator_report(memory, covariance, lasting, estimate, memory.now, self._stale)
         drifted = math.sqrt(max(0.0, *covariance.diagonal()[P : P + 3].tolist()))
         return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
-
-    def _model(self, state: FlightState) -> Vec3:
-        """What the rotors make of the vehicle, where that is known: see ``imu.add_imu``."""
-        if state.estimate is None or not state.vehicle.flies:
-            return UNKNOWN
-        motion = self._cascade.motion(state.cascade, state.estimate)
-        roll, pitch = motion.turning
-        return roll, pitch, motion.thrust / state.cascade.mass
 
     def _told(
         self,
@@ -300,7 +295,7 @@ def _aiding(
     Without a position the estimate drifts, by a deviation of ``drifted`` [m] so far. What lasts of
     a receiver's error was there before, and is no reason to come down.
     """
-    before, now = state.aiding, memory.now
+    before, now, verdict = state.aiding, memory.now, memory.verdict
     aid = memory.of(Sensor.POSE)
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
@@ -314,6 +309,8 @@ def _aiding(
         attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
         height_sigma=math.sqrt(max(pose[11], 0.0)),
         lost=_lost(memory, before.lost, report.t_us),
+        disputed_us=max(round(1e6 * (now - verdict.since)), 1) if verdict.contradicts else 0,
+        suspects=names(verdict.suspects),
     )
 
 
@@ -355,6 +352,8 @@ def _lost(
         health, fault = memory.of(sensor), SensorFault.NONE
         if sensor is Sensor.ENCODERS and memory.encoders.stuck:
             fault = SensorFault.STUCK
+        elif sensor is Sensor.IMU and memory.verdict.wrong & _INERTIAL:
+            fault = SensorFault.DISAGREES
         elif now - memory.came(sensor) > _LATELY:
             fault = SensorFault.STALE
         elif now - health.fault_at < _LATELY and health.fault not in _IN_USE:

@@ -19,6 +19,7 @@ from fsw.flight.offboard_setpoints import Tilt
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.frozen import dataclass
+from fsw.measurements import RangeSample
 from fsw.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
@@ -60,6 +61,9 @@ class VehicleMemory:
     mode: Mode = Mode.DISARMED
     landed: bool = True
     moved_us: int = 0  # when the vehicle last moved, for the land detector
+    # On contact with the ground rotors idle: since when, and the velocity down [m/s] at that time.
+    unloaded: tuple[int, float] | None = None
+    range: RangeSample | None = None  # the rangefinder's last one
     mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     mode_yaw: float = 0.0  # rad, there
     mode_begin_us: int = 0
@@ -225,6 +229,8 @@ class Aiding(NamedTuple):
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
+    disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
+    suspects: str = ""  # of which one is wrong then
 
     def has_lost(self, sensor: Sensor) -> bool:
         """Whether a sensor that every tick needs is of no use."""

@@ -55,6 +55,7 @@ _PASSES: Final = 60  # over all planes; in a corner they have to settle
 
 
 _LOST: Final = np.eye(6)  # m^2, rad^2
+_SURE: Final = np.zeros((6, 6))
 _NO_NORMALS: Final = np.empty((0, 3))
 _NOTHING: Final[Vec6] = (0.0,) * 6
 
@@ -130,19 +131,33 @@ class UncertainClearance:
         self.deviation(estimate, pose_covariance(np.zeros((ERRORS, ERRORS)), estimate))
 
     def keep(
-        self, before: KeptSet, safe_set: SafeSet, estimate: StateEstimate, pose: Array | None
+        self,
+        before: KeptSet,
+        safe_set: SafeSet,
+        estimate: StateEstimate,
+        pose: Array | None,
+        wind: Vec2 = (0.0, 0.0),
     ) -> KeptSet:
         """The safe set to keep from now on.
 
         ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
-        None where states are exact.
+        None where states are exact. ``wind`` [m, NED] is what the memory of wind can add to the
+        tube; what there is no room for of that is not ``lacking``: the analysis says it before.
         """
-        if pose is None or not safe_set.zones or not self._sigmas > 0.0:
+        sure = pose is None or not self._sigmas > 0.0
+        if (sure and wind == (0.0, 0.0)) or not safe_set.zones:
             return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
-        spread, levers = self._spread(safe_set, estimate, _finite(pose))
+        pose = _SURE if sure or pose is None else _finite(pose)
+        spread, levers = self._spread(safe_set, estimate, pose)
+        turned = _turned(safe_set, wind)
+        spread = tuple(map(float.__add__, spread, turned))
         wanted = self._ahead(before, spread, estimate.t_us)
         granted = self._granted(safe_set, estimate, levers, wanted)
-        lacking = max(map(float.__sub__, wanted, granted))
+        short = [
+            max(more - there - gust, 0.0)
+            for more, there, gust in zip(wanted, granted, turned, strict=True)
+        ]
+        lacking = max(short)
         kept = before
         if safe_set is not before.source or granted != before.added:
             kept = _grown(safe_set, granted)
@@ -238,6 +253,18 @@ def _kinds_and_normals(safe_set: SafeSet) -> tuple[list[ShapeKind], Array]:
     if not flat:
         return kinds, _NO_NORMALS
     return kinds, np.array([zone.shape.numbers[:3] for zone in flat])
+
+
+def _turned(safe_set: SafeSet, wind: Vec2) -> tuple[float, ...]:
+    """How far ``wind`` [m, NED] can lead towards each zone [m]."""
+    x, y = wind
+    return tuple(
+        [
+            abs(x * n[0]) + abs(y * n[1]) if kind_of(zone.shape).flat else math.hypot(x, y)
+            for zone in safe_set.zones
+            for n in (zone.shape.numbers,)
+        ]
+    )
 
 
 def _grown(safe_set: SafeSet, added: tuple[float, ...]) -> KeptSet:

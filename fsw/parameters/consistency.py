@@ -78,7 +78,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     for sphere in spheres:
         radius = sphere.shape.numbers[-1]
         findings.append(_actuation(config, planner.workspace, surroundings, radius))
-        findings.append(_room_in_sphere(planner.workspace, radius))
+        findings += _rooms_in_sphere(config, loop, radius)
     if others:
         findings.append(_actuation(config, planner.walls, surroundings, math.inf))
         points = [zone.clearance for zone in others if _is_point(zone)]
@@ -194,8 +194,11 @@ def _estimate(
 
 
 def base_reach(loop: Tube, surroundings: Surroundings) -> float:
-    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis."""
-    return loop.base * surroundings.disturbance + loop.base_wind
+    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis.
+
+    Without what clearances grow by while the memory of wind is in force.
+    """
+    return loop.base * surroundings.disturbance + loop.base_wind - loop.wind_beyond
 
 
 def stand_off(tuning: BarrierTuning) -> float:
@@ -237,6 +240,13 @@ def _actuation(
     )
 
 
+def _rooms_in_sphere(config: FlightConfig, loop: Tube, radius: float) -> list[Finding]:
+    found = [_room_in_sphere(config.planner.workspace, radius)]
+    if config.inner == "tracking":
+        found.append(_wind_in_sphere(config.planner.workspace, loop, radius))
+    return found
+
+
 def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
     at_centre = tuning.approach_speed(radius)
     return _finding(
@@ -245,6 +255,19 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
         f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
         f"{tuning.lambda_:.3f}",
         f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m is enough",
+    )
+
+
+def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding:
+    """A sphere without room to spare cannot become smaller in wind."""
+    needed, spare = stand_off(tuning) + loop.wind_beyond, radius - stand_off(tuning)
+    return _finding(
+        "wind",
+        radius >= needed,
+        f"wind that is cancelled can push the base {loop.wind_beyond * 1e3:.0f} mm further off "
+        f"its plan when it turns, and the sphere has {spare * 1e3:.0f} mm to spare",
+        f"r >= {needed:.3f} m is enough",
+        refuses=False,
     )
 
 
@@ -285,6 +308,7 @@ def _tube_of_all_axes(
     most = all_axes_up_to(config.airframe, loop, expected)
     whole = most > 0.99 * expected
     across, up = all_axes(config.airframe, loop, most)
+    across -= loop.wind_beyond
     reach = _reach(safe_set, across, up)
     return _finding(
         "tube of all axes",

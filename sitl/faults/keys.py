@@ -18,6 +18,7 @@ Unit: TypeAlias = Literal[
     "gps",
     "optical flow",
     "vio",
+    "attitude",
     "distance",
     "encoder",
     "battery",
@@ -40,6 +41,10 @@ Kind: TypeAlias = Literal[
     "slow",
     "delayed",
     "intermittent",
+    "noisy",
+    "drifting",
+    "turning",
+    "tilting",
     "weak",
     "duplicated",
     "reordered",
@@ -59,10 +64,13 @@ class Fault:
     start_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # since the start of the simulation
     duration_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # 0: to the end of the flight
     instance: Annotated[float, Range(0.0, 4.0, step=1.0)] = 0.0  # of motors and joints; 0: all
+    # Of what a sensor measures as a vector, in its own frame; 0: all.
+    axis: Annotated[float, Range(0.0, 3.0, step=1.0)] = 0.0
     # weak: of the thrust that is left, or of the battery's charge; intermittent, duplicated,
     # reordered: of the time, or of the datagrams.
     share: Annotated[float, Range(0.0, 1.0)] = 0.5
-    size: Annotated[float, Range(0.0, 1000.0)] = 1.0  # wrong: times what is usual for the unit
+    # wrong, noisy, drifting: times what is usual for the unit; turning, tilting: deg/s.
+    size: Annotated[float, Range(-1000.0, 1000.0)] = 1.0
     delay_ms: Annotated[float, Range(0.0, 10000.0, step=2.0)] = 200.0  # delayed; slow: of a motor
     rate_hz: Annotated[float, Range(0.1, 500.0)] = 5.0  # slow: of a sensor
     jump_s: Annotated[float, Range(-3600.0, 3600.0)] = 0.5  # of the clock
@@ -73,8 +81,8 @@ class Fault:
         return round(self.instance)
 
     def hits(self, index: int) -> bool:
-        """Whether the motor or joint of an index from 0 fails."""
-        return self.number in (0, index + 1)
+        """Whether the motor, joint or axis of an index from 0 fails."""
+        return (self.number or round(self.axis)) in (0, index + 1)
 
     @property
     def of_real_time(self) -> bool:
@@ -100,19 +108,25 @@ SENSORS: Final = (
     "gps",
     "optical flow",
     "vio",
+    "attitude",
     "distance",
     "encoder",
 )
 LINKS: Final = ("to vehicle", "to simulator")
 PROCESSES: Final = ("simulator", "flight software", "planner", "disk")
 
-_RANDOM: Final = ("garbage", "intermittent", "duplicated", "reordered")
+_RANDOM: Final = ("garbage", "intermittent", "noisy", "duplicated", "reordered")
 _SIGNAL: Final = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
+# Of a sensor: what its numbers are, as opposed to its messages.
+_OF_NUMBERS: Final = ("noisy", "drifting")
+_OF_A_FRAME: Final = ("turning", "tilting")
 _OF_MESSAGES: Final = ("off", "slow", "delayed", "intermittent")  # of sensors
 _LINK: Final = ("off", "delayed", "intermittent", "duplicated", "reordered")
 _PROCESS: Final = ("stopped", "killed")
 KINDS: Final[dict[str, tuple[str, ...]]] = {
-    **dict.fromkeys(SENSORS, _SIGNAL),
+    **dict.fromkeys(SENSORS, (*_SIGNAL, *_OF_NUMBERS)),
+    "vio": (*_SIGNAL, *_OF_NUMBERS, *_OF_A_FRAME),
+    "attitude": ("stuck", "garbage", "wrong", "noisy", *_OF_A_FRAME),
     "battery": ("off", "weak"),
     "motor": (*_SIGNAL, "weak"),
     "joint": ("off", "stuck"),
@@ -126,7 +140,8 @@ KINDS: Final[dict[str, tuple[str, ...]]] = {
 
 _INSTANCES: Final = {"motor": 4, "joint": 2, "encoder": 2}
 # Units that the exact states stand for: the pose is of satellites and of cameras.
-EXACT: Final = ("gyro", "accel", "gps", "vio", "encoder")
+EXACT: Final = ("gyro", "accel", "gps", "vio", "attitude", "encoder")
+_VECTORS: Final = ("gyro", "accel", "mag", "gps", "vio")
 
 
 def instances(unit: Unit) -> int:
@@ -155,6 +170,11 @@ def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None
     if fault.number > most:
         allowed = f"0 (all) to {most}" if most else f"0, because there is one {fault.unit}"
         return f"instance = {fault.number}: must be {allowed}"
+    if fault.axis and fault.unit not in _VECTORS:
+        allowed = ", ".join(_VECTORS)
+        return f"axis = {fault.axis:g}: must be 0, because {fault.unit} has none ({allowed} have)"
+    if fault.size < 0.0 and fault.unit not in SENSORS:
+        return f"size = {fault.size:g}: must be at least 0 but of a sensor"
     if fault.unit == "clock" and fault.jump_s < -fault.start_s:
         return f"jump_s = {fault.jump_s:g}: must be at least {-fault.start_s:g}, the clock's start"
     if fault.unit == "encoder" and fault.number and not exact and fault.kind in _OF_MESSAGES:

@@ -27,6 +27,7 @@ _TYPES: Final[dict[str, type[Any]]] = {
     "baro": PressureMeasurement,
     "gps": GnssMeasurement,
     "vio": PoseMeasurement,
+    "attitude": PoseMeasurement,
     "distance": RangeMeasurement,
     "encoder": JointMeasurement,
 }

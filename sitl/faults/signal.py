@@ -9,7 +9,9 @@ from typing import Any, Final, Generic, TypeVar
 import numpy as np
 
 from sitl.faults.keys import Fault
+from sitl.ranges import V3
 from sitl.sensors.exact import V4, turned
+from sitl.sensors.noise import normal
 
 M = TypeVar("M")  # a NamedTuple of readings
 
@@ -21,6 +23,7 @@ FIELDS: Final[dict[str, tuple[str, ...]]] = {
     "baro": ("pressure_pa",),
     "gps": ("p_WB", "v_WB"),
     "vio": ("p_WB", "v_WB", "q_WB", "w_WB_B"),
+    "attitude": ("q_WB",),
     "distance": ("distance",),
     "encoder": ("q_arm", "qd_arm", "angles"),
 }
@@ -39,6 +42,20 @@ _OFFSETS: Final[dict[str, tuple[tuple[float, ...], float]]] = {
     "qd_arm": ((0.0, 0.0, 0.0, 0.0), 20.0),  # rad/s
 }
 _TURN: Final = (0.1, -0.1, 0.2)  # rad, of a wrong attitude
+# Of each unit and field: the deviation of white noise on top of its own that is usual.
+_NOISE: Final[dict[str, dict[str, float]]] = {
+    "gyro": {"gyro_B": 0.05},
+    "accel": {"accel_B": 0.5},
+    "mag": {"field_B": 0.02},
+    "baro": {"pressure_pa": 12.0},
+    "gps": {"p_WB": 0.3, "v_WB": 0.1},
+    "vio": {"p_WB": 0.001},
+    "attitude": {"q_WB": 0.01},
+    "distance": {"distance": 0.1},
+    "encoder": {"q_arm": 0.01, "angles": 0.01, "qd_arm": 0.1},
+}
+_DRIFT: Final = 0.1  # 1/s, of what a wrong reading is off
+_FRAME_RATE: Final = math.radians(1.0)  # rad/s, of a frame that turns or tilts
 _WINDOW_US: Final = 100_000  # in which an intermittent unit is there or not
 
 
@@ -68,6 +85,7 @@ class SignalFault(Generic[M]):
         self._random = random
         self._kept: M | None = None  # the first reading since it began
         self._next_us = -math.inf
+        self._first_us: int | None = None  # of the readings that are spoilt
         self._under_way: deque[tuple[int, M]] = deque()
         self._windows = Windows(fault.share, random)
 
@@ -90,7 +108,11 @@ class SignalFault(Generic[M]):
         if fault.kind == "delayed":
             self._under_way.append((t_us + round(1000.0 * fault.delay_ms), reading))
             return None
-        spoilt = {name: self._spoilt(name, getattr(reading, name)) for name in self._names(reading)}
+        if self._first_us is None:
+            self._first_us = t_us
+        since_s = 1e-6 * (t_us - self._first_us)
+        names = self._names(reading)
+        spoilt = {name: self._spoilt(name, getattr(reading, name), since_s) for name in names}
         return self.merged(reading, _replaced(reading, spoilt))
 
     def due(self, t_us: int) -> list[M]:
@@ -122,21 +144,49 @@ class SignalFault(Generic[M]):
         return [name for name in FIELDS[self.fault.unit] if hasattr(reading, name)]
 
     def _hit(self, healthy: Any, failed: Any) -> Any:
-        if self.fault.number == 0 or not isinstance(healthy, tuple):
+        if self.fault.axis and not (isinstance(healthy, tuple) and len(healthy) == 3):
+            return healthy
+        if self.fault.number == 0 == self.fault.axis or not isinstance(healthy, tuple):
             return failed
         pairs = enumerate(zip(healthy, failed, strict=True))
         return tuple(bad if self.fault.hits(k) else good for k, (good, bad) in pairs)
 
-    def _spoilt(self, name: str, value: Any) -> Any:
-        if self.fault.kind == "garbage":
+    def _spoilt(self, name: str, value: Any, since_s: float) -> Any:
+        """A reading that began to fail ``since_s`` [s] ago."""
+        kind, size = self.fault.kind, self.fault.size
+        if kind == "garbage":
             return self._garbage(name, value)
-        size = self.fault.size
-        if name == "q_WB":
+        if kind == "noisy":
+            return self._noisy(name, value)
+        if kind in ("turning", "tilting"):
+            down, angle = kind == "turning", size * _FRAME_RATE * since_s
+            if name == "q_WB":
+                return turned(value, tuple(angle * one for one in _row(value, down=down)))
+            return value if name == "w_WB_B" else _about(value, angle, down=down)
+        if kind == "drifting":
+            if name in ("q_WB", "w_WB_B"):
+                return value
+            # The velocity is that of the drift, which so contradicts itself in nothing.
+            offsets = _OFFSETS["p_WB" if name == "v_WB" else name][0]
+            size *= _DRIFT * (1.0 if name == "v_WB" else since_s)
+        elif name == "q_WB":
             return turned(value, tuple(size * angle for angle in _TURN))
-        offsets, _ = _OFFSETS[name]
+        else:
+            offsets = _OFFSETS[name][0]
         if not isinstance(value, tuple):
             return value + size * offsets[0]
         return tuple(v + size * off for v, off in zip(value, offsets, strict=False))
+
+    def _noisy(self, name: str, value: Any) -> Any:
+        deviation = abs(self.fault.size) * _NOISE[self.fault.unit].get(name, 0.0)
+        if deviation == 0.0:
+            return value
+        if name == "q_WB":
+            return turned(value, tuple(normal(self._random, deviation, 3)))
+        if not isinstance(value, tuple):
+            return value + normal(self._random, deviation, 1)[0]
+        drawn = normal(self._random, deviation, len(value))
+        return tuple(v + more for v, more in zip(value, drawn, strict=True))
 
     def _garbage(self, name: str, value: Any) -> Any:
         if name == "q_WB":
@@ -157,3 +207,17 @@ def _attitude(random: np.random.Generator) -> V4:
     q = random.standard_normal(4)
     w, x, y, z = (q / math.sqrt(float(q @ q))).tolist()
     return (w, x, y, z)
+
+
+def _row(q: V4, *, down: bool) -> V3:
+    """The axis of W that points north, or ``down``, as B has it: of attitude ``q``."""
+    w, x, y, z = q
+    if down:
+        return (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+    return (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y))
+
+
+def _about(v: V3, angle: float, *, down: bool) -> V3:
+    """A vector turned by ``angle`` [rad] about the axis of W that points north, or ``down``."""
+    (x, y, z), c, s = v, math.cos(angle), math.sin(angle)
+    return (c * x - s * y, s * x + c * y, z) if down else (x, c * y - s * z, s * y + c * z)

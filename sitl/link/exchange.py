@@ -16,7 +16,8 @@ from sitl.link.udp_endpoint import RESEND_S
 from sitl.simulation import Controls
 
 STALL_S: Final = 1.2  # so that 2 s after a stall both processes have ended; a pause of 1 s passes
-SILENT_S: Final = 0.1  # real time: older controls are not held, the rotors stop
+SILENT_S: Final = 0.1  # from then on a vehicle that ends so counts as silent
+HOLD_S: Final = 0.5  # real time: older controls are not held, the rotors stop, as PX4's IO does
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 
 _OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
@@ -92,12 +93,13 @@ class Lockstep:
                 answer = decode.read_reply(received, self._joints)
                 if answer is not None and answer.t_us == t_us:
                     return answer
+            # Ctrl-C goes to the vehicle too: that it is silent from then on is not held against it.
+            if self._stop.requested:
+                raise SimulatorError(f"interrupted at step {number}")
             now_s = time.perf_counter()
             # More than its patience a receive takes only if this process itself was suspended.
             self._listened_s += min(now_s - looked_s, RESEND_S)
             looked_s = now_s
-            if self._stop.requested:
-                raise SimulatorError(f"interrupted at step {number}")
             if self._listened_s >= STALL_S:
                 raise SimulatorError(
                     f"the flight software did not answer step {number} within {STALL_S:g} s"
@@ -162,7 +164,7 @@ class RealTime:
             self._heard_s, self._heard_step = self._clock(), number
             self._held = max(answers, key=lambda answer: answer.t_us).controls
         self._silent_s = self._clock() - self._heard_s
-        if self._silent_s > SILENT_S:
+        if self._silent_s > HOLD_S:
             self._held = _OFF
         if self._silent_s > STALL_S:
             raise SimulatorError(

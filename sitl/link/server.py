@@ -99,8 +99,8 @@ def serve(
             answered = _injected(injector, encoder, answer) if answer.injections else b""
             _advance(simulation, answer)
         except SimulatorError as error:
-            kind = EndKind.INTERRUPTED if stop.requested else EndKind.STOPPED
-            simulation.end(kind, str(error))
+            _end_if_over(simulation, state, stop, t_us)
+            simulation.end(EndKind.STOPPED, str(error))
             break
         if pilot.attends(state) or answer.says_more:
             heard = pilot.listen(plan, state, _heard(answer, seen), t_us)
@@ -125,7 +125,9 @@ def _end_if_over(simulation: Simulation, state: PilotState, stop: StopRequest, t
     elif state.done:
         simulation.end(EndKind.MISSION, f"landed and disarmed after {simulation.time_s:.1f} s")
     elif stop.requested:
-        simulation.end(EndKind.INTERRUPTED, f"interrupted at step {simulation.step}")
+        endless = math.isinf(simulation.scenario.duration_s)  # and has no other end than this
+        by = ": ended by you" if endless else ""
+        simulation.end(EndKind.INTERRUPTED, f"interrupted at step {simulation.step}{by}")
 
 
 def _heard_of(

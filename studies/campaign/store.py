@@ -22,10 +22,11 @@ from command_line.output import json_text
 from command_line.version import version
 from studies.campaign.flight import CampaignRow, code, row_key, row_of
 from studies.campaign.identity import packages
-from studies.campaign.journal import Journal, lines
+from studies.campaign.journal import Journal, JournalError, Seal, lines, sealed_lines
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
 from studies.campaign.values import MOST_FLIGHTS
+from studies.flight.kept_row import kept_row
 
 PLAN, JOURNAL, FACTS, TABLE, PAGE = (
     "campaign.toml",
@@ -55,7 +56,8 @@ class CampaignResult:
     asked: int  # how many flights there are to be
     digests: Digests
     facts: dict[str, Any]  # campaign.json
-    left_out: int = 0  # lines of the journal that are no rows of these flights
+    left_out: int  # lines of the journal that are no rows of these flights
+    seal: Seal  # of the journal
 
     @property
     def complete(self) -> bool:
@@ -72,6 +74,7 @@ def read(directory: Path) -> CampaignResult:
 
     Raises:
         CampaignError: It is none, or one of another version.
+        JournalError: The journal does not verify, or has lost lines.
     """
     kept = _facts(directory)
     if kept is None:
@@ -80,7 +83,7 @@ def read(directory: Path) -> CampaignResult:
             "another version; give what `pandion campaign --out` was given, or mend it with that "
             "command"
         )
-    facts, digests, asked = kept
+    facts, digests, asked, sealed = kept
     plan = replace(load_plan(directory / PLAN), name=str(facts.get("name", directory.name)))
     if plan.digest != digests.plan:
         if digests.code != code():
@@ -90,22 +93,23 @@ def read(directory: Path) -> CampaignResult:
                 f"{facts.get('version', 'of that day')}"
             )
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
-    rows, left_out = _rows(directory / JOURNAL, plan, digests)
+    rows, left_out, seal = _rows(directory / JOURNAL, plan, digests, sealed)
     asked = max([asked, *(row.flight + 1 for row in rows[-1:])])
-    return CampaignResult(plan, rows, asked, digests, facts, left_out)
+    return CampaignResult(plan, rows, asked, digests, facts, left_out, seal)
 
 
-def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int] | None:
-    """What campaign.json says, its digests and flights; None if it cannot be read or used."""
+def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal] | None:
+    """What campaign.json says, its digests, flights and seal; None if it cannot be read or used."""
     try:
         facts = read_json(directory / FACTS, _MOST_BYTES)
         digests, asked = Digests(**facts["digests"]), facts["flights"]
+        sealed = kept_row(Seal, facts.pop("journal"))
     except (OSError, ValueError, TypeError, KeyError):
         return None
     known = all(isinstance(one, str) for one in asdict(digests).values())
     if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MOST_FLIGHTS:
         return None
-    return (facts, digests, asked) if known else None
+    return (facts, digests, asked, sealed) if known else None
 
 
 def begin(directory: Path, source: Path, plan: CampaignPlan, flights: int | None = None) -> int:
@@ -121,6 +125,8 @@ def begin(directory: Path, source: Path, plan: CampaignPlan, flights: int | None
         OSError: It cannot be written.
     """
     asked = flights or plan.count
+    if (directory / JOURNAL).exists():
+        Journal(directory / JOURNAL).close()  # which mends what a crash has left of a line
     there = _there(directory, plan)
     if flights is not None and flights < there:
         raise CampaignError(
@@ -129,15 +135,33 @@ def begin(directory: Path, source: Path, plan: CampaignPlan, flights: int | None
         )
     asked = max(asked, there)
     directory.mkdir(parents=True, exist_ok=True)
-    with closing(Journal(directory / JOURNAL)):
+    with closing(Journal(directory / JOURNAL)) as journal:
         for name in plan.files:
             if (source.parent / name).resolve() != (directory / name).resolve():
                 (directory / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source.parent / name, directory / name)
         if source.resolve() != (directory / PLAN).resolve():
             shutil.copyfile(source, directory / PLAN)
-        write_facts(directory, plan, asked)
+        write_facts(directory, plan, asked, journal.seal)
     return asked
+
+
+def check_flown_here(directory: Path, result: CampaignResult) -> None:
+    """Refuse a campaign whose flights would be others if they were flown here and now.
+
+    Raises:
+        CampaignError: It was flown by other code or with other packages.
+    """
+    for what, found, wanted in (
+        ("code", result.digests.code, code()),
+        ("packages", result.digests.packages, packages()),
+    ):
+        if found != wanted:
+            raise CampaignError(
+                f"{directory} was flown by other {what} ({found[:8]}, here {wanted[:8]}), with "
+                "which a flight may go otherwise: fly it again with Pandion "
+                f"{result.facts.get('version', 'of that day')} and its locked packages"
+            )
 
 
 def left_out(lines: int) -> str:
@@ -173,7 +197,7 @@ def _there(directory: Path, plan: CampaignPlan) -> int:
         return found.asked
     # A crash or a full disk left no facts. They follow from the file and the rows, if both are
     # those of this plan and this code.
-    rows, _ = _rows(directory / JOURNAL, plan, own)
+    rows, _, _ = _rows(directory / JOURNAL, plan, own, Seal())
     if not rows and any(lines(directory / JOURNAL)):
         raise CampaignError(f"{directory} has a journal of something else; give another --out")
     if rows and (not (directory / PLAN).exists() or load_plan(directory / PLAN).digest != own.plan):
@@ -185,13 +209,21 @@ def _there(directory: Path, plan: CampaignPlan) -> int:
 
 
 def write_facts(
-    directory: Path, plan: CampaignPlan, asked: int, more: dict[str, Any] | None = None
+    directory: Path,
+    plan: CampaignPlan,
+    asked: int,
+    seal: Seal,
+    more: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Write what was flown with what, in one step that outlives a crash; returns it."""
+    """Write what was flown with what, in one step that outlives a crash; returns it.
+
+    ``seal`` is that of the journal: what it has now, it must have for ever.
+    """
     facts = {
         "name": plan.name,
         "flights": asked,
         "digests": asdict(Digests(plan.digest, code(), packages())),
+        "journal": asdict(seal),
         "version": version(),
         "seed": plan.seed,
         "design": plan.design,
@@ -227,12 +259,17 @@ def _check_same(directory: Path, there: CampaignResult, own: Digests) -> None:
 
 
 def _rows(
-    journal: Path, plan: CampaignPlan, digests: Digests
-) -> tuple[tuple[CampaignRow, ...], int]:
-    """One row a flight, the last that was written, in their order; how many lines are none."""
+    journal: Path, plan: CampaignPlan, digests: Digests, sealed: Seal
+) -> tuple[tuple[CampaignRow, ...], int, Seal]:
+    """One row a flight, the last that was written, in their order; how many lines are none.
+
+    Raises:
+        JournalError: The journal does not verify, or does not begin as it was ``sealed``.
+    """
     found: dict[int, CampaignRow] = {}
-    left_out = 0
-    for line in lines(journal):
+    left_out, seal, kept = 0, Seal(), sealed == Seal()
+    for line, seal in sealed_lines(journal):
+        kept = kept or seal == sealed
         key = line.pop("key", None)
         try:
             row = row_of(plan, line)
@@ -243,7 +280,12 @@ def _rows(
             found[row.flight] = row
         else:
             left_out += 1
-    return tuple(found[number] for number in sorted(found)), left_out
+    if not kept:
+        raise JournalError(
+            f"{journal} has {seal.lines} lines, which are not the {sealed.lines} that {FACTS} was "
+            "written with: lines were taken away, or it is another journal; fly it again"
+        )
+    return tuple(found[number] for number in sorted(found)), left_out, seal
 
 
 def write_table(directory: Path, rows: Iterable[CampaignRow]) -> Path | None:

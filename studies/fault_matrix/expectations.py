@@ -27,13 +27,14 @@ _MOST_BYTES: Final = 1 << 20
 _SHOWN: Final = 60  # characters of a wrong value
 _MOST_MM: Final = 1e6  # of a margin
 _MOST_S: Final = 86400.0  # of a time
-_NUMBERS: Final = ("duration_s", "share", "size", "delay_ms", "rate_hz", "jump_s")
+_NUMBERS: Final = ("duration_s", "share", "size", "axis", "delay_ms", "rate_hz", "jump_s")
 _EXPECTED: Final = ("told_within_s", "names", "then", "last", "contact", "margin_mm", "why")
 _KNOWN: Final = (
     "name",
     "units",
     "kinds",
     "instances",
+    "with",
     "suites",
     "link",
     "in",
@@ -61,13 +62,22 @@ class Expectation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expected:
-    """One fault as it is flown, and what must follow in each mode."""
+    """Faults as they are flown together, and what must follow in each mode."""
 
     name: str
-    fault: Fault | None
+    faults: tuple[Fault, ...]  # none, one or more; times count from that of the situation
     suite: str
     link: bool  # needs both processes in real time
     modes: dict[str, Expectation]  # those that are flown with the suite
+
+
+def not_flown(path: Path = EXPECTATIONS) -> NotFlown:
+    """Modes that cannot be flown with a suite at all, and why.
+
+    Raises:
+        ExpectationError: It cannot be read, or a table is wrong.
+    """
+    return _tables(path)[1]
 
 
 def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
@@ -134,12 +144,14 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
     if not isinstance(link, bool):
         raise ExpectationError(f"link = {_shown(link)}: must be true or false")
     found = []
+    more = _more(table)
     for fault, name in _faults(table):
         modes = _modes(table, _names(fault, names))
+        faults = () if fault is None else (fault, *more)
         for suite in suites:
             full = name if suite == "perfect" else f"{name}-{suite}"
             flown = {one: it for one, it in modes.items() if suite not in without.get(one, {})}
-            found.append(Expected(full, fault, suite, link, flown))
+            found.append(Expected(full, faults, suite, link, flown))
     return found
 
 
@@ -162,6 +174,17 @@ def _faults(table: dict[str, Any]) -> list[tuple[Fault | None, str]]:
                 name = f"{unit}-{kind}" + (f"-{instance}" if instance else "")
                 found.append((fault, (given or name).replace(" ", "-")))
     return found
+
+
+def _more(table: dict[str, Any]) -> tuple[Fault, ...]:
+    """Faults in the same flight; their ``start_s`` counts from the first one."""
+    tables = table.get("with", [])
+    if not isinstance(tables, list) or (tables and not (table.get("units") and table.get("name"))):
+        raise ExpectationError(
+            "with must be an array of tables, each a fault beside that of units and kinds, and "
+            "needs a name"
+        )
+    return tuple(build_table(Fault, one, f"with[{k}]") for k, one in enumerate(tables))
 
 
 def _instances(table: dict[str, Any], unit: Unit) -> list[int]:

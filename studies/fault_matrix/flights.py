@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final
@@ -90,6 +91,10 @@ class Situation:
     motion: MotionSetpoint | None = None  # streamed
     body: str = "full"
 
+    def placed(self, faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
+        """Faults whose times count from that of the situation, in times of the simulation."""
+        return tuple(replace(one, start_s=self.fault_s + one.start_s) for one in faults)
+
 
 def beside_the_wall_text(kind: str, plan: str) -> str:
     """The scenario in TOML, with a start of this kind and a pilot with this plan."""
@@ -106,6 +111,8 @@ def _packaged(name: str) -> Callable[[str], Scenario]:
 
 _AIR, _GROUND = _beside_the_wall("airborne"), _beside_the_wall("ground")
 _ARM: Final[Spoken] = (0.0, Arm())  # at once: until then the vehicle falls
+# By force: with satellites alone the height does not tell that it is in the air.
+_ARM_IN_THE_AIR: Final[Spoken] = (0.0, Arm(force=True))
 
 
 def _to(mode: Mode) -> SwitchMode:
@@ -122,7 +129,7 @@ def _in_the_air(
     return Situation(
         mode,
         _AIR,
-        (_ARM, *commands),
+        (_ARM_IN_THE_AIR, *commands),
         4.0,
         16.0,
         frozenset((mode, *then)),
@@ -174,7 +181,7 @@ SITUATIONS: Final[dict[str, Situation]] = {
     "land": Situation(
         Mode.LAND,
         _AIR,
-        (_ARM, (1.0, _to(Mode.LAND))),
+        (_ARM_IN_THE_AIR, (1.0, _to(Mode.LAND))),
         2.5,
         14.5,
         frozenset(_LANDED),
@@ -207,6 +214,7 @@ class FaultFlight:
     contact: str = ""  # "", "ground" or "wall"
     ended: str = ""  # why before its time; empty if it was flown to its end
     least_m: float | None = None  # margin to the safe set, of any part, in the whole flight
+    away_m: float | None = None  # from the start at the end
     problem: str = ""  # the flight was none: refused, or not in the mode when the fault began
     error: bool = False  # it could not be flown at all
 
@@ -291,7 +299,9 @@ class Observer:
     def see(self, time_s: float, outputs: TickOutputs) -> None:
         """Take in a tick."""
         after_s = time_s - self._situation.fault_s
-        snapshot = outputs.snapshot
+        snapshot, (thrust, torque) = outputs.snapshot, outputs.actuators
+        if not math.isfinite(sum(thrust) + sum(torque)):
+            self.problem = f"a command that is no number, {after_s:.3f} s after the fault"
         mode, marked = snapshot.mode, snapshot.failsafe_from is not None
         if after_s < 0.0:
             for ack in outputs.acks:
@@ -318,12 +328,13 @@ class Observer:
 
 
 @collector_off()
-def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -> FaultFlight:
-    """Fly one situation, with a fault that begins at its time, if any."""
+def fly(
+    mode: str, faults: tuple[Fault, ...] = (), suite: str = "perfect", seed: int = 0
+) -> FaultFlight:
+    """Fly one situation; faults begin when something fails there, or so long after it."""
     situation = SITUATIONS[mode]
     scenario = situation.scenario(suite)
-    if fault is not None:
-        scenario = replace(scenario, faults=(replace(fault, start_s=situation.fault_s),))
+    scenario = replace(scenario, faults=situation.placed(faults))
     simulation = Simulation(scenario, seed)
     config = flight_config(body=situation.body)
     limits = replace(config.limits, station_timeout_us=_STATION_TIMEOUT_US)
@@ -333,13 +344,17 @@ def fly(mode: str, fault: Fault | None, suite: str = "perfect", seed: int = 0) -
     loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
     seen = Observer(situation)
     steps = round(1e6 * situation.ends_s / STEP_US)
+    started_m = simulation.truth().p_WB
     while simulation.ended is None and simulation.step < steps and not seen.problem:
         time_s = simulation.time_s
         outputs = loop.step(_inputs(situation, loop))
         seen.see(time_s, outputs)
         if outputs.snapshot.mode is not Mode.TRAJECTORY and time_s > _FOLLOWS_S:
             simulation.leave_trajectory(simulation.t_us, outputs.snapshot.mode.value)
-    return _judged(simulation, seen)
+    if simulation.ended is not None and simulation.time_s < situation.fault_s:
+        seen.problem = seen.problem or f"{simulation.ended.sentence}, before anything failed"
+    away_m = math.dist(started_m, simulation.truth().p_WB)
+    return _judged(simulation, seen, away_m)
 
 
 def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:
@@ -376,7 +391,7 @@ def _command(number: int, action: CommandAction) -> Command:
     return Command(action, CommandRequest(10_000 + number, (0.0,) * 7, *_STATION))
 
 
-def _judged(simulation: Simulation, seen: Observer) -> FaultFlight:
+def _judged(simulation: Simulation, seen: Observer, away_m: float) -> FaultFlight:
     end = simulation.ended
     return FaultFlight(
         texts=tuple(seen.texts),
@@ -384,5 +399,6 @@ def _judged(simulation: Simulation, seen: Observer) -> FaultFlight:
         contact="" if end is None else contact_of(end.kind, end.sentence),
         ended="" if end is None else end.sentence,
         least_m=simulation.result().min_margin_m,
+        away_m=round(away_m, 3) if math.isfinite(away_m) else None,
         problem=seen.problem,
     )

@@ -18,13 +18,15 @@ def page(rows: Sequence[Judged], provenance: Sequence[str]) -> str:
     """Faults down, modes across; a cell says when it was told, what followed, the margin."""
     modes = list(dict.fromkeys(row.cell.mode for row in rows))
     faults = list(dict.fromkeys(row.cell.expected.name for row in rows))
-    cells = {(row.cell.expected.name, row.cell.mode): row for row in rows}
+    cells: dict[tuple[str, str], list[Judged]] = {}
+    for row in rows:
+        cells.setdefault((row.cell.expected.name, row.cell.mode), []).append(row)
     wrong = sum(1 for row in rows if row.differs)
     title = "Faults in every mode"
     head = "".join(f"<th>{html.escape(mode)}</th>" for mode in modes)
     body = "\n".join(
         f"<tr><th>{html.escape(fault)}</th>"
-        + "".join(_cell(cells.get((fault, mode))) for mode in modes)
+        + "".join(_cell(cells.get((fault, mode), [])) for mode in modes)
         + "</tr>"
         for fault in faults
     )
@@ -40,14 +42,16 @@ def page(rows: Sequence[Judged], provenance: Sequence[str]) -> str:
     )
 
 
-def _cell(row: Judged | None) -> str:
-    if row is None:
+def _cell(rows: Sequence[Judged]) -> str:
+    """All seeds of a cell."""
+    if not rows:
         return "<td></td>"
-    lines = [summary(row), *row.differs]
+    lines = [line for row in rows for line in (summary(row), *row.differs, *row.known)]
     text = "<br>".join(html.escape(line) for line in lines if line)
-    warning = row.flight.warning
+    warning = rows[0].flight.warning
     title = "" if warning is None else html.escape(warning.text, quote=True)
-    return f'<td class="{"bad" if row.differs else "good"}" title="{title}">{text}</td>'
+    bad = any(row.differs for row in rows)
+    return f'<td class="{"bad" if bad else "good"}" title="{title}">{text}</td>'
 
 
 def summary(row: Judged) -> str:

@@ -12,12 +12,15 @@ from pathlib import Path
 import pytest
 
 from command_line.output import complain
+from pandion.campaign import main as campaign
 from pandion.certify import main
+from studies.campaign.journal import Journal
 from studies.campaign.page import page as campaign_page
-from studies.campaign.store import JOURNAL, read
+from studies.campaign.store import FACTS, JOURNAL, read
 from studies.search.tune import EXAMPLE
 from studies.statistics.certificate import certificate, digest
-from tests.studies.campaign.test_store import begun, put
+from tests.cli.command import one_sentence
+from tests.studies.campaign.test_store import FILE, begun, put
 
 
 @pytest.mark.long
@@ -101,7 +104,96 @@ def test_a_damaged_row_is_told_in_a_sentence(
     journal = directory / JOURNAL
     journal.write_text(journal.read_text().replace('"margin_m": 0.1', '"margin_m": 1e999', 1))
     assert main([str(directory)]) == 2
-    assert "1 of 4 flights have no row" in capsys.readouterr().err
+    assert "journal.jsonl, line 1 is none that" in capsys.readouterr().err
+
+
+def small(folder: Path, seed: int = 0) -> tuple[Path, list[bytes]]:
+    """The directory of a campaign of four whole flights of a tenth of a second, and its journal."""
+    source, directory = folder / "tiny.toml", folder / f"of-{seed}"
+    folder.mkdir(exist_ok=True)
+    source.write_text(FILE.replace("duration_s = 2.0", f"duration_s = 0.1\nseed = {seed}"))
+    assert campaign([str(source), f"--out={directory}", "--workers=0"]) == 0
+    return directory, (directory / JOURNAL).read_bytes().splitlines(keepends=True)
+
+
+def one_refusal(directory: Path, capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The one sentence with which a certificate is refused."""
+    capsys.readouterr()
+    assert main([str(directory), *words, "--workers=0"]) != 0
+    err = capsys.readouterr().err
+    assert one_sentence(err), err
+    return err
+
+
+def test_a_campaign_that_is_not_as_it_was_flown_is_not_certified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    directory, kept = small(tmp_path)
+    _, other = small(tmp_path, seed=1)
+    journal = directory / JOURNAL
+    assert main([str(directory)]) == 0
+    rows = [json.loads(line) for line in kept]
+    better = [json.dumps(row | {"margin_m": 9.9}).encode() + b"\n" for row in rows]
+    for forged in (
+        better,
+        kept[::-1],
+        kept[1:],
+        [*kept, kept[0]],
+        [*other[:1], *kept[1:]],
+        [*kept[:3], other[3]],
+        [*kept[:3], kept[3][:-10]],
+        [*kept, b"x" * (1 << 22)],
+    ):
+        journal.write_bytes(b"".join(forged))
+        assert "journal.jsonl, line " in one_refusal(directory, capsys)
+    # Whole lines that are missing at the end, and another journal that verifies by itself.
+    for forged in (kept[:3], other, []):
+        journal.write_bytes(b"".join(forged))
+        assert "which are not the 4 that campaign.json was" in one_refusal(directory, capsys)
+    journal.unlink()
+    (tmp_path / "elsewhere").write_bytes(b"".join(kept))
+    journal.symlink_to(tmp_path / "elsewhere")
+    assert "it is a symbolic link" in one_refusal(directory, capsys)
+    journal.unlink()
+    journal.write_bytes(b"".join(kept))
+    assert main([str(directory)]) == 0
+
+
+def test_a_row_that_was_forged_with_its_digests_is_found_by_flying_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    directory, kept = small(tmp_path)
+    assert main([str(directory), "--refly=9", "--workers=0"]) == 0
+    assert "4 flights flown again, each as its row says: 0, 1, 2, 3" in capsys.readouterr().out
+    # Whoever knows how a chain is made can write another one.
+    rows = [json.loads(line) for line in kept]
+    rows[2]["te_m"] *= 1.0 + 1e-9
+    (directory / JOURNAL).unlink()
+    journal = Journal(directory / JOURNAL)
+    for row in rows:
+        del row["digest"]
+        journal.append([(row.pop("key"), row)])
+    journal.close()
+    facts = json.loads((directory / FACTS).read_text())
+    sealed = {"lines": journal.seal.lines, "digest": journal.seal.digest}
+    (directory / FACTS).write_text(json.dumps(facts | {"journal": sealed}))
+    assert main([str(directory)]) == 0, "digests do not show who wrote it"
+    (directory / "certificate.html").unlink()
+    capsys.readouterr()
+    assert main([str(directory), "--refly=4", "--workers=0"]) == 1
+    assert "flight 2 does not fly as its row says: te_m is" in capsys.readouterr().out
+    assert not (directory / "certificate.html").exists()
+
+
+def test_flights_of_other_code_are_not_flown_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    directory, _ = small(tmp_path)
+    facts = json.loads((directory / FACTS).read_text())
+    facts["digests"]["packages"] = "0" * 32
+    (directory / FACTS).write_text(json.dumps(facts))
+    assert main([str(directory)]) == 0
+    assert "was flown by other packages (00000000" in one_refusal(directory, capsys, "--refly=1")
 
 
 @pytest.mark.parametrize("margin_m", [float("nan"), -1e308])

@@ -213,18 +213,33 @@ def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
     assert frozen or result["mpc"]["p50_us"] > 0.0
 
 
-def test_a_vehicle_waits_on_the_ground_until_it_is_interrupted(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("pace", "to_all"),
+    [
+        (("--realtime",), False),
+        (("--speed", "1"), True),  # what a terminal does on Ctrl-C: the vehicle ends first
+        pytest.param(("--realtime",), True, marks=pytest.mark.long),
+        pytest.param((), True, marks=pytest.mark.long),
+    ],
+)
+def test_a_flight_without_an_end_is_ended_by_its_user(
+    pace: tuple[str, ...], to_all: bool, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     process = start(
-        "fly", "ground", "--realtime", "--gcs", f"udp:127.0.0.1:{free_port()}", "--api", "none",
+        "fly", "ground", *pace, "--gcs", f"udp:127.0.0.1:{free_port()}", "--api", "none",
         "--out", str(out), cwd=tmp_path,
     )  # fmt: skip
     try:
         read_until(process, "flying until interrupted")
-        process.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        if to_all:
+            os.killpg(process.pid, signal.SIGINT)
+        else:
+            process.send_signal(signal.SIGINT)
         reported, _ = process.communicate(timeout=10)
-        assert process.returncode == 0
-        assert "PASS interrupted at step" in reported
+        assert process.returncode == 0, reported
+        assert re.search(r"PASS interrupted at step \d+: ended by you$", reported, re.MULTILINE)
         result = json.loads((out / "result.json").read_text())
         assert (result["completed"], result["min_margin_m"]) == (True, None)
     finally:

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.command import clean_up
+from sitl.scenario_file import PACKAGED
+from tests.cli.command import clean_up, start
 from tests.cli.test_stall import flying, half_of
+from tests.processes.both_processes import free_port
 
 
 @pytest.mark.long
@@ -46,5 +48,30 @@ def test_a_flight_survives_a_pause(
             assert "sitl: process was suspended" in reported
         else:
             assert simulator["pauses"] == 0
+    finally:
+        clean_up(flight)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("at_s", "seed"), [(3.0, 1), (5.3, 2), (7.7, 3)])
+def test_a_short_pause_of_the_flight_software_costs_no_contact(
+    at_s: float, seed: int, tmp_path: Path
+) -> None:
+    """From which pause on a flight is lost stands in the safety manual."""
+    scenario, out = tmp_path / "paused.toml", tmp_path / "out"
+    fault = f'unit = "flight software"\nkind = "stopped"\nstart_s = {at_s}\nduration_s = 0.2\n'
+    walls = (PACKAGED / "walls.toml").read_text(encoding="utf-8")
+    scenario.write_text(f"{walls}\n[[faults]]\n{fault}", encoding="utf-8")
+    flight = start(
+        "fly", str(scenario), "--realtime", "--sensors", "mocap", "--seed", str(seed),
+        "--duration", str(at_s + 5.0), "--api", "none", f"--gcs=udp:127.0.0.1:{free_port()}",
+        "--out", str(out), cwd=tmp_path,
+    )  # fmt: skip
+    try:
+        reported, _ = flight.communicate(timeout=120.0)
+        result = json.loads((out / "result.json").read_text())
+        assert f"flew {at_s + 5.0:.1f} s" in result["end_reason"], reported
+        assert json.loads((out / "sitl.json").read_text())["missed_steps"] >= 90
+        assert min(result["surfaces_m"].values()) > 0.0
     finally:
         clean_up(flight)

@@ -105,7 +105,7 @@ def test_each_rotor_is_named_in_time(
     rotor: int, share: float, within_s: float, mode: str, suite: str
 ) -> None:
     fault = Fault("motor", "weak", instance=rotor + 1.0, share=share)
-    seen = fly(mode, fault, suite)
+    seen = fly(mode, (fault,), suite)
     assert seen.warning is not None
     assert NAMES[rotor] in seen.warning.text
     assert seen.warning.after_s <= within_s

@@ -42,6 +42,8 @@ from tests.closed_loop.harness import Flight, on_the_ground
 Message = Any
 TICK_S = 0.002
 
+PARAMETER_FILE = Path("/var/vehicle.params")  # of the vehicle; the earlier flight was its too
+
 
 class AtOnce(Executor):
     """Does what it is given at once."""
@@ -147,7 +149,7 @@ def connected(folder: Path, config: FlightConfig) -> Iterator[Connected]:
     health = LoopHealth()
     facts = vehicle_facts(config)
     context = TelemetryContext(facts, health, origin=config.origin, plan_ids=missions.ids)
-    logs = FlightLogs(folder)
+    logs = FlightLogs(folder, PARAMETER_FILE)
     services = (
         TimeService(),
         ParameterService(parameters),

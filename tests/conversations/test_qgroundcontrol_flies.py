@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
+from fsw.link.files.flight_logs import MARK
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import MissionState, Mode
 from messages import dialect as d
-from tests.conversations.connected import Connected, connected
+from tests.conversations.connected import PARAMETER_FILE, Connected, connected
 from tests.conversations.qgroundcontrol import (
     QGC_4_4,
     QGC_5,
@@ -55,6 +56,7 @@ def vehicle(tmp_path: Path) -> Iterator[Connected]:
     for name, content in (("earlier", EARLIER), ("present", b"not yet")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "flight.ulg").write_bytes(content)
+        (tmp_path / name / MARK).write_bytes(bytes(PARAMETER_FILE))
     config = flight_config(body="points")
     # A quicker vehicle: ten metres of climb are a test's longest wait.
     limits = replace(config.limits, climb_speed=1.5, land_speed=0.6)

@@ -16,6 +16,8 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.operator import Operator
 from cosmic_ray.plugins import get_operator
 
+from tests.mutation.functions import enclosing
+
 # One or two plausible slips for every construct. cosmic-ray's full list replaces each + by eleven
 # other operators; << of two floats is a type error, which any test finds and which proves nothing.
 _BINARY = "Add_Sub Sub_Add Mul_Div Div_Mul FloorDiv_Mul Mod_Mul Pow_Mul BitOr_BitAnd BitAnd_BitOr"
@@ -116,23 +118,6 @@ def _is_type(value: ast.expr) -> bool:
     return getattr(value, "id", "") in ("tuple", "dict", "Callable", "NDArray", "Vec3")
 
 
-def _names(tree: ast.Module) -> list[tuple[int, int, str]]:
-    """First and last line of every function and class, outer ones first."""
-    found: list[tuple[int, int, str]] = []
-
-    def visit(node: ast.AST, prefix: str) -> None:
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.FunctionDef | ast.ClassDef):
-                name = f"{prefix}{child.name}"
-                found.append((child.lineno, child.end_lineno or child.lineno, name))
-                visit(child, f"{name}.")
-            else:
-                visit(child, prefix)
-
-    visit(tree, "")
-    return found
-
-
 # A star before keyword parameters that became a slash; a length for numpy to find, which any
 # negative number asks for.
 _ALIKE = re.compile(r"(^|[(,])\s*/\s*,|reshape\(- ?2\b")
@@ -153,7 +138,7 @@ def mutants(copy: Path, module: str) -> tuple[Mutant, ...]:
     source = (copy / module).read_text()
     lines = source.splitlines()
     tree = ast.parse(source)
-    skipped, names = _not_run(tree), _names(tree)
+    skipped, functions = _not_run(tree), enclosing(tree)
     found: list[tuple[Any, ...]] = []
     parsed = get_ast(source)
     for operator_name, operator in OPERATORS.items():
@@ -178,7 +163,7 @@ def mutants(copy: Path, module: str) -> tuple[Mutant, ...]:
         if not changed or _proves_nothing(mutated, changed[0][2]):
             continue
         number, before, after = changed[0]
-        inside = [name for first, last, name in names if first <= number <= last]
+        inside = [name for first, last, name in functions if first <= number <= last]
         function = inside[-1] if inside else ""
         texts = (function, before.strip(), after.strip())
         counted[texts] = counted.get(texts, 0) + 1

@@ -126,7 +126,9 @@ def test_there_is_no_incident_within_what_is_free(name: str) -> None:
 def flown(passed: Array, k: int) -> Flown:
     """Two steps of a vehicle at rest, placed."""
     commanded = ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-    return Flown(passed[k : k + 2], np.array([at_rest(2)] * 2), *commanded, STEP_S * k, STEP_S)
+    return Flown(
+        passed[k : k + 2], np.array([at_rest(2)] * 2), *commanded, True, STEP_S * k, STEP_S
+    )
 
 
 def test_where_a_zone_moves_nothing_is_free() -> None:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fsw.model.airframe import AIRFRAME
 from sitl.limits import LimitRecord, limits, record_use
 from sitl.plant.parameters import EndStops, Vehicle
-from sitl.plant.state import at_rest
+from sitl.plant.state import ARM, at_rest
 from sitl.plant.vector import Array
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Controls, Simulation
@@ -92,6 +92,21 @@ def test_what_is_not_a_number_breaks_its_limit() -> None:
     add(record, [state], (0.0, 0.0), 0.0)
     assert not record.uses()["joint_1_angle"].kept
     assert record.uses()["tilt"].kept
+
+
+@pytest.mark.requirement("REQ-ACT-9")
+@pytest.mark.parametrize("armed", [True, False])
+def test_limits_are_those_of_a_vehicle_that_is_armed(armed: bool) -> None:
+    """The arm of one that has landed is limp: it falls, as fast as it likes."""
+    simulation = Simulation(load_scenario("ground"), 0)
+    simulation.advance(Controls((0.0,) * 4, (0.0, 0.0), armed=True))
+    simulation._state[ARM : ARM + 2] = (0.9, 0.5)  # rad; then nothing holds it
+    for _ in range(200):
+        simulation.advance(Controls((0.0,) * 4, (0.0, 0.0), armed=armed))
+    result = simulation.result()
+    assert ("joint 1 rate" in result.end_reason) is armed
+    assert result.limits["joint_1_rate"].kept is not armed
+    assert result.limits["joint_1_rate"].at_s == pytest.approx(0.4, abs=0.3) or not armed
 
 
 @pytest.mark.requirement("REQ-ACT-9")

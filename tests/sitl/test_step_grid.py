@@ -127,12 +127,14 @@ def test_what_the_simulator_stood_still_is_not_the_vehicles_silence() -> None:
     run.steps(100)
     clock.pauses[clock.now_s] = 3.0
     awake = False
-    run.steps(40)  # 80 ms: the controls are still held
-    assert all(run.armed)
+    run.steps(40)  # 80 ms
     assert run.exchange.silent_since is None
     run.steps(20)
-    assert not run.armed[-1]
     assert run.exchange.silent_since == 99
+    run.steps(180)  # 480 ms: the controls are still held
+    assert all(run.armed)
+    run.steps(20)
+    assert not run.armed[-1]
 
 
 def test_a_silent_vehicle_ends_the_run_and_the_last_step_it_answered_is_named() -> None:

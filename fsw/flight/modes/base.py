@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fsw.flight.arming_health import ArmingHealth
+from fsw.flight.land_detector import feel_ground
 from fsw.flight.setpoint_generator import PositionGoal, SetpointGenerator
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.frozen import replace
@@ -175,3 +176,14 @@ class FlightMode:
 def moved(state: FlightState, estimate: StateEstimate) -> FlightState:
     """The state of a vehicle that moves: the land detector begins anew."""
     return replace(state, vehicle=replace(state.vehicle, moved_us=estimate.t_us))
+
+
+def touch_down(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate
+) -> tuple[FlightState, ModeResult]:
+    """The end of every landing: once the ground carries the vehicle, it disarms."""
+    state, landed = feel_ground(config, state, estimate)
+    if not landed:
+        return state, CONTINUE
+    state = replace(state, vehicle=replace(state.vehicle, landed=True))
+    return state, ModeResult(Mode.DISARMED, "touched down")

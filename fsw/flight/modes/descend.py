@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.flight.land_detector import is_low
-from fsw.flight.modes.base import CONTINUE, FlightMode, ModeResult, Px4Mode, moved
+from fsw.flight.modes.base import FlightMode, ModeResult, Px4Mode, touch_down
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.flight.state import FlightState, SetpointMemory
@@ -13,9 +12,6 @@ from fsw.mpc.reference import still_at
 from fsw.parameters.consistency import stand_off
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import EndEffectorTarget, Mode, MotionSetpoint, StateEstimate
-
-_PRESSING = 0.15  # m that the plan is below the vehicle: more than the loops leave in the air
-_CARRIED = 3.0  # m/s^2 that the accelerometer feels beyond what the rotors give; wind makes 1
 
 
 class Descend(FlightMode):
@@ -31,24 +27,8 @@ class Descend(FlightMode):
         self._room = stand_off(config.planner.walls)
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
-        """Touch-down: for a while, the ground carries, or the plan sinks and the vehicle does not.
-
-        The height is asked only while it is measured; without, the speed drifts as well.
-        """
-        limits = self.config.limits
-        measured = state.aiding.unaided_us < limits.aiding_loss_us
-        low = is_low(self.config, estimate) or not measured
-        if not (low and (_carried(state, estimate) or self._presses(state, estimate))):
-            return moved(state, estimate), CONTINUE
-        if estimate.t_us - state.vehicle.moved_us < limits.landed_time_us:
-            return state, CONTINUE
-        state = replace(state, vehicle=replace(state.vehicle, landed=True))
-        return state, ModeResult(Mode.DISARMED, "touched down")
-
-    def _presses(self, state: FlightState, estimate: StateEstimate) -> bool:
-        nominal = state.nominal
-        sinks = abs(estimate.v_WB[2]) > 0.5 * self.config.limits.land_speed
-        return not sinks and nominal is not None and nominal.p[2] - estimate.p_WB[2] > _PRESSING
+        """Down until the ground carries the vehicle."""
+        return touch_down(self.config, state, estimate)
 
     def aim(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """Where no position is measured, the place to draw back to.
@@ -67,9 +47,3 @@ class Descend(FlightMode):
         """Where it began: the planner, if there is one, is asked for the day it is needed again."""
         vehicle = state.vehicle
         return still_at(vehicle.mode_origin, t_us, vehicle.mode_yaw)
-
-
-def _carried(state: FlightState, estimate: StateEstimate) -> bool:
-    """Whether something holds the vehicle up that is not its rotors."""
-    cascade = state.cascade
-    return estimate.specific_force - sum(cascade.rotors) / cascade.mass > _CARRIED

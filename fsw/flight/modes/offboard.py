@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fsw.flight.land_detector import stands
-from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, ModeResult, Px4Mode, moved
+from fsw.flight.land_detector import feel_ground, in_the_air
+from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, ModeResult, Px4Mode
 from fsw.flight.offboard_setpoints import (
     Tilt,
     as_motion,
@@ -58,11 +58,12 @@ class Offboard(FlightMode):
             if self._asks_to_rise(state, estimate):
                 return state, ModeResult(lift_off=True)
             return state, CONTINUE
-        if not (stands(self.config, estimate) and _presses(state, estimate)):
-            return moved(state, estimate), CONTINUE
-        if estimate.t_us - vehicle.moved_us < self.config.limits.landed_time_us:
+        if not _presses(state, estimate):
+            return in_the_air(state, estimate), CONTINUE
+        state, landed = feel_ground(self.config, state, estimate)
+        if not landed:
             return state, CONTINUE
-        return replace(state, vehicle=replace(vehicle, landed=True)), CONTINUE
+        return replace(state, vehicle=replace(state.vehicle, landed=True)), CONTINUE
 
     def _asks_to_rise(self, state: FlightState, estimate: StateEstimate) -> bool:
         motion = self._motion(state, estimate)[0]

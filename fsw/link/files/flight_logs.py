@@ -3,8 +3,10 @@
 The list is made once, when the vehicle starts: a number must mean the same file for as long as a
 ground station may ask for it. Only erasing the finished logs changes it.
 
-The flights beside this one may be those of other vehicles, and still in the air. Whoever writes a
-log holds a lock on it (``messages/block_file.py``).
+A vehicle reaches its own logs and no others: that of this flight, and those of earlier flights
+beside it that it marked as its own. Its parameter file is what makes it the same vehicle again; one
+without such a file is another vehicle at each start. Whoever writes a log holds a lock on it
+(``messages/block_file.py``).
 """
 
 from __future__ import annotations
@@ -18,9 +20,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.bounded_file import read_bounded
 from fsw.link.files.served_file import DiskFile
 
 NAMES: Final = ("flight.ulg", "flight.tlog")  # the first that a flight has is *the* log of it
+MARK: Final = "vehicle.txt"  # of the directory of a flight: whose it is
+_MAX_MARK: Final = 4096  # bytes, of a path
 _MAX_FLIGHTS: Final = 1000  # the newest; more would take a ground station minutes to list
 
 
@@ -86,10 +91,17 @@ def _erase(log: LoggedFlight) -> None:
 class FlightLogs:
     """The list that all links share."""
 
-    def __init__(self, directory: Path) -> None:
-        """Find this flight's log, which must exist already, and those of the flights beside it."""
+    def __init__(self, directory: Path, parameter_file: Path | None = None) -> None:
+        """Find this flight's log, which must exist already, and those of the vehicle's others.
+
+        Raises:
+            OSError: The directory cannot be written, or be read.
+        """
         self._present = directory.absolute().name
-        self.all = flight_logs(directory)
+        own = None if parameter_file is None else bytes(parameter_file.resolve())
+        if own is not None:
+            (directory / MARK).write_bytes(own)
+        self.all = flight_logs(directory, own)
 
     def erase(self) -> Erasure:
         """Begin to delete the logs of finished flights; from now on only this one is listed.
@@ -101,20 +113,29 @@ class FlightLogs:
         return Erasure(others)
 
 
-def flight_logs(directory: Path) -> tuple[LoggedFlight, ...]:
-    """List this flight and those in the directories beside it, oldest first, this one last."""
+def flight_logs(directory: Path, own: bytes | None) -> tuple[LoggedFlight, ...]:
+    """List this flight, last, and those beside it with the ``own`` mark, oldest first."""
     directory = directory.absolute()
     dated = []
     with os.scandir(directory.parent) as entries:
-        for entry in entries:
+        for entry in entries if own is not None else ():
             # A link may lead anywhere, so it leads nowhere.
             if entry.is_dir(follow_symlinks=False) and entry.name != directory.name:
-                earlier = _flight(Path(entry.path))
+                folder = Path(entry.path)
+                earlier = _flight(folder) if _mark(folder) == own else None
                 if earlier is not None:
                     dated.append((earlier.log.status().st_mtime, entry.name, earlier))
     earlier_flights = [flight for _, _, flight in sorted(dated, key=lambda item: item[:2])]
     present = _flight(directory, present=True)
     return tuple([*earlier_flights, *([present] if present else [])][-_MAX_FLIGHTS:])
+
+
+def _mark(directory: Path) -> bytes | None:
+    """Whose flight a directory has; None if it does not say."""
+    try:
+        return read_bounded(directory / MARK, _MAX_MARK)
+    except OSError:
+        return None
 
 
 def _flight(directory: Path, *, present: bool = False) -> LoggedFlight | None:

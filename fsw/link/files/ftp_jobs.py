@@ -6,7 +6,15 @@ import zlib
 from collections.abc import Generator, Iterator
 from typing import Final, TypeAlias
 
-from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal, Reply, Request, refused
+from fsw.link.files.ftp_message import (
+    MAX_DATA,
+    MAX_FILE,
+    Opcode,
+    Refusal,
+    Reply,
+    Request,
+    refused,
+)
 from fsw.link.files.served_file import OpenFile, ServedFile
 
 Job: TypeAlias = Generator[Reply | None, None, None]
@@ -15,6 +23,11 @@ Job: TypeAlias = Generator[Reply | None, None, None]
 _BURST: Final = 256  # messages; then the client asks on: one that has gone is not served for long
 _CRC_PIECE: Final = 1 << 16  # bytes a tick, about 30 µs
 _ALL_ONES: Final = 0xFFFFFFFF
+
+
+def served_size(file: OpenFile) -> int:
+    """Bytes of an open file that can be read: its beginning, if it has more than fit the fields."""
+    return min(file.size, MAX_FILE)
 
 
 def read(request: Request, file: OpenFile) -> Job:
@@ -27,18 +40,19 @@ def burst(request: Request, file: OpenFile) -> Job:
     size = request.size or MAX_DATA
     for number in range(_BURST):
         offset = request.offset + number * size
-        last = number == _BURST - 1 or offset + size >= file.size
+        last = number == _BURST - 1 or offset + size >= served_size(file)
         yield from _piece(request, file, offset, burst_complete=last)
         if last:
             return
 
 
 def _piece(request: Request, file: OpenFile, offset: int, *, burst_complete: bool) -> Job:
-    if offset >= file.size:
+    left = served_size(file) - offset
+    if left <= 0:
         yield refused(Refusal.END_OF_FILE)
         return
     try:
-        for data in _delivered(file, offset, request.size or MAX_DATA):
+        for data in _delivered(file, offset, min(request.size or MAX_DATA, left)):
             if data is None:
                 yield None
             else:
@@ -48,7 +62,7 @@ def _piece(request: Request, file: OpenFile, offset: int, *, burst_complete: boo
 
 
 def checksum(served: ServedFile) -> Job:
-    """The CRC-32 of a whole file, without the inversions at both ends that zlib's has."""
+    """The CRC-32 of all that is served of a file, without zlib's inversions at both ends."""
     try:
         file = served.open()
     except OSError:
@@ -56,8 +70,9 @@ def checksum(served: ServedFile) -> Job:
         return
     try:
         crc = _ALL_ONES
-        for offset in range(0, file.size, _CRC_PIECE):
-            for data in _delivered(file, offset, _CRC_PIECE):
+        size = served_size(file)
+        for offset in range(0, size, _CRC_PIECE):
+            for data in _delivered(file, offset, min(_CRC_PIECE, size - offset)):
                 crc = crc if data is None else zlib.crc32(data, crc)
                 yield None
         yield Reply(Opcode.ACK, data=(crc ^ _ALL_ONES).to_bytes(4, "little"))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 MAX_DATA: Final = 239  # bytes in one message
+MAX_FILE: Final = 0xFFFFFFFF  # bytes of a file that its fields of 32 bits can name; more stays out
 _PAYLOAD: Final = 251
 _HEADER: Final = struct.Struct("<HBBBBBxI")
 

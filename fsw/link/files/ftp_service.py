@@ -177,8 +177,10 @@ class FtpService:
             file = node.open()
         except OSError:
             return refused(Refusal.FILE_NOT_FOUND)
+        # Clients read up to the size that they are told, which has 32 bits.
+        size = ftp_jobs.served_size(file).to_bytes(4, "little")
         self._sessions[client, number] = _Session(file, t_us)
-        return Reply(Opcode.ACK, session=number, data=file.size.to_bytes(4, "little"))
+        return Reply(Opcode.ACK, session=number, data=size)
 
     def _room(self, client: Client, wanted: int, t_us: int) -> int | None:
         """A number for a further session; None if there are as many as there may be.

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TypeAlias
 
-from fsw.link.files.ftp_message import MAX_DATA
+from fsw.link.files.ftp_message import MAX_DATA, MAX_FILE
 from fsw.link.files.served_file import ServedFile
 
 Node: TypeAlias = "ServedFile | Mapping[str, Node]"
@@ -40,8 +40,10 @@ def listing(directory: Directory, first: int) -> bytes:
     entries = b""
     for name in list(directory)[first:]:
         node = directory[name]
-        text = f"D{name}\0" if isinstance(node, Mapping) else f"F{name}\t{node.size()}\0"
-        entry = text.encode()
+        if isinstance(node, Mapping):
+            entry = f"D{name}\0".encode()
+        else:
+            entry = f"F{name}\t{min(node.size(), MAX_FILE)}\0".encode()
         if len(entries) + len(entry) > MAX_DATA:
             break
         entries += entry

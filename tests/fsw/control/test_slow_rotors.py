@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from fsw.control.gains import TrackingTuning, tracking_gains
-from fsw.control.tube import limits_used, tube
+from fsw.control.tube import WIND_COVERED, limits_used, tube
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import Array
 
@@ -47,14 +47,14 @@ def reach_and_torque(slower: float) -> tuple[float, float]:
     (base, snap), (in_wind, _) = responses(slower, wind=False), responses(slower, wind=True)
     loop = tube(AIRFRAME, TUNING, GAINS, 0.225, 0.1, DT)
     share = limits_used(AIRFRAME, TUNING, loop, PUSH)["rotor torque"]
-    reach = PUSH * np.abs(base).sum() + TUNING.wind_limit * np.abs(in_wind).sum()
+    reach = PUSH * np.abs(base).sum() + WIND_COVERED * np.abs(in_wind).sum()
     return float(reach), float(share * np.abs(snap).sum() / loop.snap)
 
 
 def test_rotors_as_configured_give_the_tube_itself() -> None:
     loop = tube(AIRFRAME, TUNING, GAINS, 0.225, 0.1, DT)
     reach, torque = reach_and_torque(1.0)
-    assert reach == pytest.approx(PUSH * loop.base + loop.base_wind, rel=1e-6)
+    assert reach == pytest.approx(PUSH * loop.base + loop.base_wind - loop.wind_beyond, rel=1e-6)
     assert torque == pytest.approx(limits_used(AIRFRAME, TUNING, loop, PUSH)["rotor torque"])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -20,10 +21,13 @@ from fsw.control.tracking import (
 )
 from fsw.control.tube import (
     CALM_HEIGHT,
+    WIND_COVERED,
     Tube,
     all_axes,
     all_axes_up_to,
+    beyond_covered,
     estimate_tube,
+    impulse_responses,
     limits_used,
     tube,
 )
@@ -85,9 +89,10 @@ def test_a_lasting_push_stays_inside_and_uses_much_of_it() -> None:
 def test_wind_within_the_limit_ends_without_an_offset() -> None:
     """And more than that with what the limit leaves."""
     limit = TUNING.wind_limit
-    assert abs(_position_under(np.full(15_000, 0.9 * limit))[-1]) < 0.5e-3
-    forgetful = _position_under(np.full(15_000, 0.5 - limit), replace(TUNING, wind_limit=0.0))
-    believed = _position_under(np.full(15_000, 0.5))
+    lasts = round(10.0 * TUNING.wind_time / DT)
+    assert abs(_position_under(np.full(lasts, 0.9 * limit))[-1]) < 0.5e-3
+    forgetful = _position_under(np.full(lasts, 0.8 - limit), replace(TUNING, wind_limit=0.0))
+    believed = _position_under(np.full(lasts, 0.8))
     assert believed[-1] == pytest.approx(forgetful[-1], abs=1e-5)
 
 
@@ -156,7 +161,10 @@ def test_every_figure_of_the_tube_is_that_of_the_loop_that_is_flown() -> None:
     assert got.end_effector == pytest.approx(np.abs(tip).sum(), **close)
     limit = QUICK.wind_limit
     assert got.base_wind == pytest.approx(limit * np.abs(wind_base).sum(), **close)
-    assert got.end_effector_wind == pytest.approx(limit * np.abs(wind_tip).sum(), **close)
+    covered = WIND_COVERED * np.abs(wind_tip).sum()
+    assert got.end_effector_wind == pytest.approx(covered, **close)
+    assert got.wind == pytest.approx(np.abs(wind_base).sum(), **close)
+    assert got.wind_beyond == pytest.approx(got.base_wind - WIND_COVERED * got.wind)
     pushes = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, 8000), round(0.1 / DT))
     for figure, response in (
         (got.base_expected, base),
@@ -387,3 +395,24 @@ def test_noise_of_the_gyro_moves_the_base_by_what_its_spectrum_says() -> None:
     noise = np.random.default_rng(4).standard_normal(4000)
     moved = _position_misled(3, noise)[500:]
     assert moved.std() == pytest.approx(tubes.jerk, rel=0.25)
+
+
+@pytest.mark.requirement("REQ-SAFE-2")
+@pytest.mark.parametrize("push", [0.3, 0.5, 0.8])
+@pytest.mark.parametrize("held", [3.0, 9.0, 30.0])
+@pytest.mark.parametrize("worst", [False, True])
+def test_a_push_that_turns_stays_within_what_clearances_have_grown_by(
+    push: float, held: float, worst: bool
+) -> None:
+    """By the memory in force when it turns: to a steady push, or to the worst one there is."""
+    gains, first = _gains(), np.full(round(held / DT), -push)
+    after = np.full(1500, 0.8)
+    if worst:
+        response = impulse_responses(AIRFRAME, TUNING, gains, DT, wind=False)[:1500, 0]
+        after = 0.8 * np.sign(response[::-1])
+    memory = min(push * (1.0 - math.exp(-held / TUNING.wind_time)), TUNING.wind_limit)
+    grown = beyond_covered(_tube(), (memory, 0.0))[0]
+    kept = 0.8 * _tube().base + _tube().base_wind - _tube().wind_beyond + grown
+    reach = np.abs(_position_under(np.concatenate((first, after)))[len(first) :]).max()
+    assert reach < kept
+    assert kept <= 0.8 * _tube().base + _tube().base_wind + 1e-9, "what is printed"

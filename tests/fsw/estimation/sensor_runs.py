@@ -160,7 +160,11 @@ class Suite:
 
 
 _QUIET = EstimatorTuning(
-    accel_noise=5e-3, gyro_noise=3e-4, accel_bias_walk=1e-3, gyro_bias_walk=5e-5
+    accel_noise=5e-3,
+    gyro_noise=3e-4,
+    accel_bias_walk=1e-3,
+    gyro_bias_walk=5e-5,
+    position_floor=2e-4,
 )
 MOCAP = Suite(_QUIET, pose=PoseSensor(120.0, 0.015, 5e-4, np.radians(0.2)))
 VIO = Suite(

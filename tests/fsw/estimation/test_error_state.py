@@ -18,11 +18,7 @@ from fsw.estimation.error_state import (
     DELAY,
     ERRORS,
     FILTER,
-    LOST,
-    NO_RATE,
     TH,
-    TIME,
-    advance,
     correct,
     distance,
     inject,
@@ -198,41 +194,3 @@ def test_integrating_exact_readings_follows_the_flight() -> None:
     np.testing.assert_allclose(p, truth.p[-1], atol=2e-5)
     np.testing.assert_allclose(v, truth.v[-1], atol=2e-5)
     assert abs(np.dot(q, truth.q[-1])) > 1.0 - 1e-10
-
-
-def stepping(step: tuple[float, float, float], largest: float, lost: int = 0) -> Records:
-    """A filter with ten readings to come, of which the gyro has stepped before the sixth."""
-    filter_ = some_state()
-    x = filter_[0]
-    x["first"], x["end"] = 1, 11
-    for k in range(11):
-        x["imu"][k][TIME] = TICK * k
-    x["imu"][6:, LOST] = lost
-    x["step"], x["largest_step"], x["stepped"] = step, largest, TICK * 6
-    return filter_
-
-
-def test_a_gyro_that_has_stepped_is_known_less_along_its_step_and_once() -> None:
-    step = (0.3, -0.2, 0.6)
-    told, other = stepping(step, 0.7), stepping((0.0, 0.0, 0.0), 0.0)
-    block = slice(BG, BG + 3)
-    for until, more in ((5, 0.0), (6, 1.0), (10, 1.0)):
-        for filter_ in (told, other):
-            advance(filter_[0], LAW, TICK * until + 1e-9)
-        added = told[0]["covariance"][block, block] - other[0]["covariance"][block, block]
-        np.testing.assert_allclose(added, more * np.outer(step, step), atol=1e-12)
-
-
-def test_many_small_steps_in_a_row_count_no_more_than_the_largest() -> None:
-    told, other = stepping((0.6, 0.0, 0.0), 0.08), stepping((0.0, 0.0, 0.0), 0.0)
-    for filter_ in (told, other):
-        advance(filter_[0], LAW, TICK * 10)
-    added = told[0]["covariance"] - other[0]["covariance"]
-    assert added[BG, BG] == pytest.approx(0.08**2)
-
-
-def test_the_step_of_a_gyro_that_is_not_believed_leaves_what_is_known_of_its_bias() -> None:
-    told, other = stepping((9.0, 0.0, 0.0), 9.0, NO_RATE), stepping((0.0,) * 3, 0.0, NO_RATE)
-    for filter_ in (told, other):
-        advance(filter_[0], LAW, TICK * 10)
-    assert told[0]["covariance"].tobytes() == other[0]["covariance"].tobytes()

@@ -18,10 +18,10 @@ from fsw.estimation.error_state import (
     NOTHING,
     RATE,
 )
-from fsw.estimation.imu import STAYS, STAYS_LONG, STEPS_APART, add_imu
+from fsw.estimation.imu import STAYS, STAYS_LONG, add_imu
 from fsw.estimation.sensor_fault import SensorFault
 from fsw.estimation.tuning import EstimatorTuning
-from fsw.signals import Vec3
+from fsw.signals import Vec3, Vec4
 
 LAW = packed(EstimatorTuning()).view(np.recarray)[0]
 TICK = 0.002
@@ -38,7 +38,10 @@ class Unit:
             self.read()
 
     def read(
-        self, force: Vec3 | None = None, rate: Vec3 | None = None, model: Vec3 = (0.0, 0.0, 0.0)
+        self,
+        force: Vec3 | None = None,
+        rate: Vec3 | None = None,
+        model: Vec4 = (0.0, 0.0, 0.0, 0.0),
     ) -> SensorFault:
         """A noisy reading, or what is said in place of it; what is wrong with it."""
         self.now += TICK
@@ -113,11 +116,11 @@ def test_what_is_no_number_loses_its_half_alone() -> None:
 
 
 def test_a_model_stands_in_for_the_half_that_is_lost_alone() -> None:
-    unit, none, model = Unit(), (float("nan"),) * 3, (3.0, -4.0, 9.5)
+    unit, none, model = Unit(), (float("nan"),) * 3, (3.0, -4.0, 0.5, 9.5)
     before = unit.last.copy()
     assert unit.read(rate=none, model=model) is SensorFault.NOT_FINITE
     assert unit.last[LOST] == NO_RATE + MODELLED
-    expected = before[RATE : RATE + 3] + TICK * np.array([3.0, -4.0, 0.0])
+    expected = before[RATE : RATE + 3] + TICK * np.array([3.0, -4.0, 0.5])
     np.testing.assert_allclose(unit.last[RATE : RATE + 3], expected, rtol=0.0, atol=1e-15)
     assert unit.last[FORCE + 2] != -9.5, "the accelerometer is believed"
     unit.read(force=none, model=model)
@@ -130,74 +133,42 @@ def test_a_model_stands_in_for_the_half_that_is_lost_alone() -> None:
     assert unit.last[LOST] == 0
 
 
-@pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize(
-    "size",
-    [-2.0, 0.15, 8.0, *(pytest.param(size, marks=pytest.mark.long) for size in (-0.15, 2.0))],
-)
-def test_a_step_of_the_gyro_is_noted_and_one_that_comes_back_is_none(
-    axis: int, size: float
-) -> None:
-    unit = Unit()
-    assert not unit.x.step.any(), "noise makes none"
-    off = np.zeros(3)
-    off[axis] = size
+FLIES: Vec4 = (0.0, 0.0, 0.0, 9.81)
 
-    def said(share: float) -> Vec3:
-        reading: Vec3 = tuple((share * off + 0.01 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
+
+@pytest.mark.parametrize(("half", "at", "size"), [(NO_FORCE, FORCE, 40.0), (NO_RATE, RATE, 8.0)])
+def test_what_stays_where_it_jumped_to_in_flight_is_believed_when_others_say_so(
+    half: int, at: int, size: float
+) -> None:
+    def said() -> Vec3:
+        middle = (size, 0.0, -9.81) if half == NO_FORCE else (size, 0.0, 0.0)
+        reading: Vec3 = tuple((middle + 0.01 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
         return reading
 
-    unit.read(rate=said(1.0))
-    stepped = unit.now
-    np.testing.assert_allclose(unit.x.step, off, atol=0.06)
-    for _ in range(100):
-        unit.read(rate=said(1.0))
-    assert unit.x.stepped == stepped, "it stays"
-    unit.read(rate=said(0.0))
-    np.testing.assert_allclose(unit.x.step, 0.0, atol=0.1)
-    for _ in range(round(STEPS_APART / TICK) + 1):
-        unit.read(rate=said(0.0))
-    unit.read(rate=said(-1.0))
-    np.testing.assert_allclose(unit.x.step, -off, atol=0.06)
-
-
-def test_the_largest_of_steps_that_follow_each_other_is_kept_with_their_sum() -> None:
+    name = "force" if half == NO_FORCE else "rate"
     unit = Unit()
-    for k in range(1, 9):
-        unit.read(rate=(0.1 * k, 0.0, 0.0))
-    np.testing.assert_allclose(unit.x.step, (0.8, 0.0, 0.0), atol=0.05)
-    assert unit.x.largest_step == pytest.approx(0.1, abs=0.05)
-    unit.read(rate=(0.5, 0.0, 0.0))
-    assert unit.x.largest_step == pytest.approx(0.3, abs=0.05)
-    for _ in range(round(STEPS_APART / TICK) + 1):
-        unit.read(rate=(0.5, 0.0, 0.01 * unit.random.standard_normal()))
-    unit.read(rate=(0.4, 0.0, 0.0))
-    assert unit.x.largest_step == pytest.approx(0.1, abs=0.05), "another one"
+    for _ in range(200):
+        assert unit.read(**{name: said()}, model=FLIES) is SensorFault.JUMP  # type: ignore[arg-type]
+    assert unit.last[LOST] == half | MODELLED
+    unit.x.believed = half
+    assert unit.read(**{name: said()}, model=FLIES) is SensorFault.NONE  # type: ignore[arg-type]
+    unit.x.believed = 0
+    assert unit.read(**{name: said()}, model=FLIES) is SensorFault.NONE, "and goes on"  # type: ignore[arg-type]
+    assert unit.last[at] == pytest.approx(size, abs=0.1)
 
 
-def test_a_body_that_turns_as_hard_as_rotors_can_makes_no_step() -> None:
-    unit, rate = Unit(), np.zeros(3)
-    for k in range(300):
-        rate = rate + TICK * 17.0 * np.array([1.0, -1.0, 0.0]) * (1 if k % 100 < 50 else -1)
-        noise = 0.005 * unit.random.standard_normal(3)
-        unit.read(rate=tuple((rate + noise).tolist()))  # type: ignore[arg-type]
-    assert not unit.x.step.any()
-
-
-def test_what_shakes_harder_for_a_while_is_no_step_any_more() -> None:
+@pytest.mark.parametrize(("half", "at"), [(NO_FORCE, FORCE), (NO_RATE, RATE)])
+def test_a_half_that_is_out_is_replaced_and_of_a_suspect_only_the_bias_is_unknown(
+    half: int, at: int
+) -> None:
     unit = Unit()
-    for _ in range(500):
-        noise: Vec3 = tuple((0.1 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
-        unit.read(rate=noise)
-    settled = unit.now
-    for _ in range(500):
-        noise = tuple((0.1 * unit.random.standard_normal(3)).tolist())  # type: ignore[assignment]
-        unit.read(rate=noise)
-    assert unit.x.stepped <= settled
-
-
-def test_readings_that_are_missing_make_no_step() -> None:
-    unit = Unit()
-    unit.now += 0.1
-    unit.read(rate=(1.0, 0.0, 0.0))
-    assert not unit.x.step.any(), "a vehicle turns so far meanwhile"
+    unit.x.suspect = half
+    assert unit.read(force=(1.0, 2.0, -9.0), rate=(0.1, 0.2, 0.3), model=FLIES) is SensorFault.NONE
+    assert unit.last[LOST] == half | MODELLED
+    np.testing.assert_array_equal(unit.last[FORCE : FORCE + 6], (1.0, 2.0, -9.0, 0.1, 0.2, 0.3))
+    unit.x.suspect, unit.x.out = 0, half
+    unit.read(force=(3.0, 2.0, -9.0), rate=(0.3, 0.2, 0.3), model=FLIES)
+    assert unit.last[LOST] == half | MODELLED
+    assert unit.last[at] != (3.0 if half == NO_FORCE else 0.3)
+    other = FORCE if half == NO_RATE else RATE
+    assert unit.last[other] == (3.0 if half == NO_RATE else 0.3), "the other half is used"

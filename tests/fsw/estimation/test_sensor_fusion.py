@@ -578,9 +578,9 @@ def replace_suite(flown: Run, suite: Suite) -> Run:
 
 
 def test_a_wider_gate_lets_a_farther_reading_in() -> None:
-    # A single one that is off by little may be the IMU's fault: that is said 0.7 s later.
-    aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.01, *s.position[1:])))
-    wide = replace(MOCAP, tuning=replace(MOCAP.tuning, pose_gate=20.0))
+    # One that is off by little may be the IMU's fault, and nothing is said of it.
+    aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.06, *s.position[1:])))
+    wide = replace(MOCAP, tuning=replace(MOCAP.tuning, pose_gate=200.0))
     narrow = Flown(run(MOCAP, 4, 2.0), aside)
     assert narrow.found == {(Sensor.POSE, SensorFault.JUMP)}
     assert not Flown(replace_suite(run(MOCAP, 4, 2.0), wide), aside).found
@@ -628,7 +628,7 @@ def test_half_an_inertial_unit_that_fails_leaves_the_place_to_the_pose(half: str
         return replace(sample, rate={"stuck": held[0].rate, "garbage": noise, "wrong": off}[how])
 
     flown = Flown(run(MOCAP, 8, 2.5), spoil)
-    assert flown.found, "told"
+    assert flown.found or how == "wrong", "told; what is off is told where there are rotors"
     assert flown.memory.reset.number == 0, "the frame has not moved"
     assert abs(flown.error()[:3]).max() < 0.02
     assert abs(flown.error()[3:6]).max() < 0.3
@@ -671,10 +671,12 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
     before, memory, now = flown.estimate, flown.memory, flown.now
     for _ in range(50):  # 0.1 s
         now += TICK
-        memory, estimate = flown.fusion.step(memory, (), now, model=(1.0, -2.0, 9.9), silent=True)
+        memory, estimate = flown.fusion.step(
+            memory, (), now, model=(1.0, -2.0, 0.5, 9.9), silent=True
+        )
     assert estimate is not None
     turned = [after - rate for after, rate in zip(estimate.w_WB_B, before.w_WB_B, strict=True)]
-    assert turned == pytest.approx([0.1, -0.2, 0.0], abs=0.03)
+    assert turned == pytest.approx([0.1, -0.2, 0.05], abs=0.03)
     assert estimate.specific_force == pytest.approx(9.9, abs=0.2)
     assert not memory.of(Sensor.IMU).fault, "it is silent, and says nothing wrong"
     _, held = flown.fusion.step(flown.memory, (), now, silent=True)
@@ -790,7 +792,9 @@ def test_satellites_that_came_once_too_seldom_do_not_confirm_each_other() -> Non
     assert flown.memory.reset.number == 0
 
 
-def test_satellites_that_come_twice_a_second_are_taken_back_after_a_jump() -> None:
+@pytest.mark.parametrize(("size", "taken"), [(0.8, 1), (8.0, 0)])
+def test_a_jump_is_believed_the_later_the_farther_it_is(size: float, taken: int) -> None:
+    """Satellites that come twice a second, for 1.6 s after the jump: a metre takes one second."""
     seen: list[float] = []
 
     def seldom_and_moved(now: float, sample: Sample) -> Sample | None:
@@ -800,11 +804,11 @@ def test_satellites_that_come_twice_a_second_are_taken_back_after_a_jump() -> No
             return None
         seen.append(sample.time)
         x, y, z = sample.position
-        return replace(sample, position=(x, y + 8.0, z)) if now - START > 2.0 else sample
+        return replace(sample, position=(x, y + size, z)) if now - START > 2.0 else sample
 
     flown = Flown(run(RTK, 2, 3.6), seldom_and_moved)
-    assert flown.memory.reset.number == 1
-    np.testing.assert_allclose(flown.memory.reset.position[:2], (0.0, 8.0), atol=0.3)
+    assert flown.memory.reset.number == taken
+    np.testing.assert_allclose(flown.memory.reset.position[:2], (0.0, taken * size), atol=0.3)
 
 
 def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> float:

@@ -10,7 +10,7 @@ import pytest
 from fsw.flight.descent import Descent
 from fsw.flight.modes.descend import Descend
 from fsw.flight.plan_exchange import nominal_at_rest
-from fsw.flight.state import Aiding, FlightState
+from fsw.flight.state import Aiding
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.shapes.half_space import wall
 from fsw.signals import Mode, SafeSet, StateEstimate, Vec3
@@ -138,55 +138,12 @@ def test_missed_ticks_are_made_up_for() -> None:
     assert nominal.p == pytest.approx(three.p)
 
 
-# ---------------------------------------------------------------- touch-down
-
-THERE = (0.0, 0.0, GROUND_Z)
-WEIGHT = 9.81
-
-
-def touching(
-    height: float = 0.0,
-    speed: float = 0.0,
-    lead: float = 0.0,
-    thrust: float = WEIGHT,
-    aiding: Aiding = AIDED,
-) -> tuple[FlightState, StateEstimate]:
-    """Low, with the plan ``lead`` [m] below and rotors that give ``thrust`` [m/s^2]."""
-    estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), (0.0, 0.0, speed))
-    state = replace(flying(Mode.DESCEND), aiding=aiding)
-    nominal = nominal_at_rest(estimate)._replace(p=(0.0, 0.0, estimate.p_WB[2] + lead))
-    mass = state.cascade.mass
-    cascade = state.cascade._replace(rotors=(0.25 * thrust * mass,) * 4)
-    return replace(state, nominal=nominal, cascade=cascade), estimate
-
-
-def ends(state: FlightState, estimate: StateEstimate) -> bool:
-    """Whether it is over after the time that a touch-down takes, and not before."""
-    for t_us in (1000, 1000 + LIMITS.landed_time_us - 1):
-        state, result = MODE.update(state, estimate._replace(t_us=t_us))
-        if result.next_mode is not None:
-            return False
-    later = estimate._replace(t_us=1000 + 2 * LIMITS.landed_time_us)
-    state, result = MODE.update(state, later)
-    return result.next_mode is Mode.DISARMED and state.vehicle.landed
-
-
 @pytest.mark.requirement("REQ-MODE-9")
-@pytest.mark.parametrize(
-    ("about", "touches"),
-    [
-        ({}, False),  # a hover
-        ({"lead": 0.16}, True),
-        ({"lead": 0.16, "speed": 0.2}, False),  # it sinks
-        ({"lead": 0.14}, False),
-        ({"thrust": 6.0}, True),  # the ground carries
-        ({"thrust": 7.0}, False),  # so does a gust
-        ({"thrust": 6.0, "height": 2.0}, False),  # not as high as this
-        ({"thrust": 6.0, "height": 2.0, "speed": -0.5, "aiding": BLIND}, True),  # heights drift
-        ({"lead": 0.16, "height": 2.0, "aiding": BLIND}, True),
-    ],
-)
-def test_a_touch_down_is_felt(about: dict[str, float], touches: bool) -> None:
-    state, estimate = touching(**about)  # type: ignore[arg-type]
-    moving = replace(state, vehicle=replace(state.vehicle, moved_us=1000))
-    assert ends(moving, estimate) is touches
+def test_it_ends_where_the_ground_carries() -> None:
+    state = flying(Mode.DESCEND, unloaded=(0, 0.0))
+    here = vehicle_at((0.0, 0.0, GROUND_Z), t_us=LIMITS.landed_time_us)
+    after, result = MODE.update(state, here)
+    assert result.next_mode is Mode.DISARMED
+    assert after.vehicle.landed
+    after, result = MODE.update(state, here._replace(v_WB=(0.0, 0.0, 4.0)))
+    assert result.next_mode is None, "it falls"

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from fsw.control.cascade import in_hover
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.flight.commander import nominal_at_rest
 from fsw.flight.jump import returned
+from fsw.flight.plan_exchange import nominal_at_rest
 from fsw.flight.state import FlightState
 from fsw.geometry.rotation import wrap_angle, yaw_of
 from fsw.model.airframe import AIRFRAME

@@ -285,3 +285,23 @@ def test_a_wall_far_off_takes_no_room() -> None:
     zones = SafeSet((wall(far, -50.0, 0.0), wall((0.0, -1.0, 0.0), 0.0, 0.0)))
     kept = clearance().keep(KeptSet(), zones, vehicle(), certain(y=0.1))
     assert kept.added == pytest.approx((0.3, 0.3), abs=STEP), "the vehicle can still draw back"
+
+
+# ---------------------------------------------------------------- wind
+
+
+def test_clearances_grow_by_what_wind_that_turns_can_do_along_each_normal() -> None:
+    set_, wind = SafeSet((NORTH, EAST)), (0.03, 0.01)
+    kept = clearance().keep(KeptSet(), set_, vehicle(), None, wind)
+    assert kept.added == pytest.approx((0.03, 0.01), abs=1.1e-3)
+    both = clearance().keep(KeptSet(), set_, vehicle(), certain(x=0.005), wind)
+    assert both.added == pytest.approx((0.045, 0.01), abs=1.1e-3)
+    calm = clearance().keep(kept, set_, vehicle(), None)
+    assert calm.safe_set is set_
+
+
+def test_a_sphere_without_room_for_wind_lacks_nothing_by_it() -> None:
+    set_ = SafeSet((target_sphere((0.0, 0.0, -0.2), stand_off(BARRIERS[1]) + 1e-3),))
+    kept = clearance().keep(KeptSet(), set_, vehicle(), None, (0.03, 0.0))
+    assert kept.added[0] < 2e-3
+    assert not kept.lacking > LACKING

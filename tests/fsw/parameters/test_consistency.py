@@ -72,7 +72,7 @@ def test_the_tube_finding_turns_where_the_stand_off_equals_the_reach() -> None:
     config = flight_config()
     tuning = config.planner.walls
     loop = loop_tube(config)
-    reach = 0.8 * loop.base + loop.base_wind
+    reach = 0.8 * loop.base + loop.base_wind - loop.wind_beyond
     for factor, holds in ((1.01, True), (0.99, False)):
         walls = replace(tuning, lambda_=factor * reach * tuning.slope)
         changed = replace(config, planner=replace(config.planner, walls=walls))

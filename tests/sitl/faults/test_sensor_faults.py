@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 
 from sitl.faults.active import Faults
-from sitl.faults.keys import EXACT, KINDS, SENSORS, Fault, Kind, Unit
+from sitl.faults.keys import EXACT, KINDS, SENSORS, Fault, Kind, Unit, problem
 from sitl.sensors.exact import SensorReadings
 from sitl.sensors.measurements import (
     GnssMeasurement,
@@ -89,8 +90,7 @@ def suite(fault: Fault) -> list[tuple[Measurement, ...]]:
     return sent
 
 
-@pytest.mark.parametrize("unit", EXACT)
-@pytest.mark.parametrize("kind", KINDS["gyro"])
+@pytest.mark.parametrize(("unit", "kind"), [(u, k) for u in EXACT for k in KINDS[u]])
 def test_exact_states_are_spoilt_for_as_long_as_the_fault_lasts(unit: Unit, kind: Kind) -> None:
     sent = frames(failing(unit, kind))
     healthy = [exact(step) for step in range(STEPS)]
@@ -100,8 +100,7 @@ def test_exact_states_are_spoilt_for_as_long_as_the_fault_lasts(unit: Unit, kind
     assert all(a.t_us == b.t_us for a, b in zip(sent, healthy, strict=True))
 
 
-@pytest.mark.parametrize("unit", SUITE)
-@pytest.mark.parametrize("kind", KINDS["gyro"])
+@pytest.mark.parametrize(("unit", "kind"), [(u, k) for u in SUITE for k in KINDS[u]])
 def test_a_suite_is_spoilt_for_as_long_as_the_fault_lasts(unit: Unit, kind: Kind) -> None:
     sent = suite(failing(unit, kind))
     healthy = [arrived(step) for step in range(STEPS)]
@@ -183,6 +182,85 @@ def test_a_wrong_attitude_is_one_all_the_same() -> None:
     for kind in ("wrong", "garbage"):
         for frame in frames(failing("vio", kind)):
             assert math.hypot(*frame.q_WB) == pytest.approx(1.0)
+
+
+def turn_of(frame: SensorReadings, step: int) -> tuple[float, V3]:
+    """Angle [rad] and axis (3,) [1, W] by which a frame's attitude is turned from the true one."""
+    (w, x, y, z), (a, b, c, d) = frame.q_WB, exact(step).q_WB
+    # q * conjugate(true): the rotation of W.
+    cos = w * a + x * b + y * c + z * d
+    axis = (
+        -w * b + x * a - y * d + z * c,
+        -w * c + x * d + y * a - z * b,
+        -w * d - x * c + y * b + z * a,
+    )
+    sin = math.hypot(*axis)
+    unit = (axis[0] / sin, axis[1] / sin, axis[2] / sin) if sin else (0.0, 0.0, 0.0)
+    return 2.0 * math.atan2(sin, cos), unit
+
+
+@pytest.mark.parametrize(
+    ("kind", "axis"), [("turning", (0.0, 0.0, 1.0)), ("tilting", (1.0, 0.0, 0.0))]
+)
+@pytest.mark.parametrize("unit", ["vio", "attitude"])
+def test_a_frame_that_turns_takes_the_positions_along_unless_it_is_the_attitude_alone(
+    unit: Unit, kind: Kind, axis: V3
+) -> None:
+    sent = frames(replace(failing(unit, kind), size=5.0))
+    for step in range(FIRST + 1, END, 37):
+        angle, about = turn_of(sent[step], step)
+        assert angle == pytest.approx(math.radians(5.0) * 0.002 * (step - FIRST))
+        assert about == pytest.approx(axis)
+        p, true = sent[step].p_WB, exact(step).p_WB
+        assert math.hypot(*p) == pytest.approx(math.hypot(*true))
+        along = sum(a * (b - c) for a, b, c in zip(axis, p, true, strict=True))
+        assert along == pytest.approx(0.0)
+        assert (p == true) == (unit == "attitude")
+
+
+def test_unstated_noise_of_poses_has_the_deviation_that_is_asked_for_in_mm() -> None:
+    sent = frames(replace(failing("vio", "noisy"), size=3.0))
+    off = [
+        a - b
+        for step in range(FIRST, END)
+        for a, b in zip(sent[step].p_WB, exact(step).p_WB, strict=True)
+    ]
+    assert statistics.pstdev(off) == pytest.approx(0.003, rel=0.1)
+    assert statistics.mean(off) == pytest.approx(0.0, abs=0.0005)
+    assert all(sent[step].q_WB == exact(step).q_WB for step in range(FIRST, END))
+
+
+def test_a_drift_grows_with_time_and_its_velocity_fits() -> None:
+    sent = frames(replace(failing("gps", "drifting"), axis=1.0, size=-2.0))
+    for step in range(FIRST, END):
+        off = [a - b for a, b in zip(sent[step].p_WB, exact(step).p_WB, strict=True)]
+        assert off == pytest.approx([-0.2 * 0.002 * (step - FIRST), 0.0, 0.0])
+        v = [a - b for a, b in zip(sent[step].v_WB, exact(step).v_WB, strict=True)]
+        assert v == pytest.approx([-0.2, 0.0, 0.0])
+
+
+def test_one_axis_is_off_by_a_constant_of_either_sign_and_the_others_are_not() -> None:
+    down = frames(replace(failing("accel", "wrong"), axis=3.0, size=-0.5))[FIRST]
+    off = [a - b for a, b in zip(down.accel_B, exact(FIRST).accel_B, strict=True)]
+    assert off == pytest.approx([0.0, 0.0, -1.0])
+    one = frames(replace(failing("vio", "wrong"), axis=1.0))[FIRST]
+    assert one.p_WB[1:] == exact(FIRST).p_WB[1:]
+    assert one.q_WB == exact(FIRST).q_WB
+
+
+@pytest.mark.parametrize(
+    ("fault", "sentence"),
+    [
+        (Fault("encoder", "wrong", axis=1.0), "axis = 1: must be 0, because encoder has none"),
+        (Fault("motor", "wrong", size=-1.0), "size = -1: must be at least 0 but of a sensor"),
+        (Fault("attitude", "off"), 'kind = "off": a attitude can be "stuck"'),
+        (Fault("gyro", "turning"), 'kind = "turning": a gyro can be "off"'),
+    ],
+)
+def test_what_a_unit_cannot_be_is_refused(fault: Fault, sentence: str) -> None:
+    found = problem(fault, EXACT, exact=True)
+    assert found is not None
+    assert found.startswith(sentence)
 
 
 def test_one_encoder_fails_and_the_other_does_not() -> None:

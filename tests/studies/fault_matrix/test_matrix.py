@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,14 @@ from typing import Any
 import pytest
 
 from fsw.flight.modes import MODES
-from fsw.signals import Mode, Severity
+from fsw.signals import ActuatorCommand, Mode, Severity
 from pandion.faults import main
-from sitl.faults.keys import KINDS
+from sitl.faults.keys import KINDS, Fault
+from studies.fault_matrix import matrix
 from studies.fault_matrix.expectations import (
     Expectation,
     ExpectationError,
+    Expected,
     differences,
     expectations,
 )
@@ -35,7 +38,7 @@ LAND_SOON = Expectation(then=("land",), told_within_s=0.5, names="pose|GNSS")
 def test_every_mode_and_every_way_to_fail_is_flown() -> None:
     # Descend is what a failsafe does; no command begins it.
     assert {one.mode for one in SITUATIONS.values()} == set(MODES) - {Mode.DESCEND}
-    flown = {(one.fault.unit, one.fault.kind) for one in expectations().values() if one.fault}
+    flown = {(it.unit, it.kind) for one in expectations().values() for it in one.faults}
     there = {(unit, kind) for unit, kinds in KINDS.items() for kind in kinds}
     # No suite has a camera for it.
     assert there - flown == {("optical flow", kind) for kind in KINDS["optical flow"]}
@@ -194,10 +197,13 @@ _MOTOR = '[[faults]]\nunits = ["motor"]\nkinds = ["weak"]\nthen = ["hold"]\n'
         (f"{_MOTOR}instances = [1.0]", "instances[0] = 1.0: must be"),
         (f"{_MOTOR}share = [nan]", "share = [nan]: must be a number (0 to 1)"),
         (f"{_MOTOR}share = nan", "share = nan: must be 0 to 1"),
-        (f'{_MOTOR}size = "big"', "size = 'big': must be a number (0 to 1000)"),
+        (f'{_MOTOR}size = "big"', "size = 'big': must be a number (-1000 to 1000)"),
         (f"{_MOTOR}delay_ms = 3", "delay_ms = 3: must be 0 to 10000 in steps of 2"),
         (f"{_MOTOR}duration_s = true", "duration_s = True: must be a number (0 to 86400)"),
         (f"{_MOTOR}jump_s = {'9' * 400}", "jump_s = 999"),
+        (f'{_MOTOR}name = "a"\nwith = [{{ unit = "gyro" }}]', 'missing key "with[0].kind"'),
+        (f'{_MOTOR}with = [{{ unit = "gyro", kind = "off" }}]', "needs a name"),
+        (f'{_MOTOR}name = "a"\nwith = 3', "with must be an array of tables"),
         (f"{_MOTOR}name = 5", "name = 5: must be a text"),
         (f'{_MOTOR}link = "no"', "link = 'no': must be true or false"),
         (f"{_MOTOR}why = 3", "why = 3: must be a text"),
@@ -237,7 +243,7 @@ def test_a_cell_is_flown_judged_and_written_down() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("mode", SITUATIONS)
 def test_without_a_fault_nothing_is_told_and_nothing_done(mode: str) -> None:
-    flight = fly(mode, None)
+    flight = fly(mode)
     assert (flight.warning, flight.actions, flight.contact, flight.problem) == (None, (), "", "")
     assert flight.least_m is not None
     assert flight.least_m > 0.0
@@ -257,12 +263,16 @@ def test_a_fault_over_the_real_link_is_seen_by_the_station(tmp_path: Path) -> No
     [
         (["hover", "vio-off"], "unknown mode hover"),
         (["hold", "vio-of"], "did you mean vio-off"),
-        (["hold"], "give MODE and FAULT, or --matrix"),
+        (["hold"], "give MODE and FAULT, --matrix"),
         (["workspace", "gps-off-rtk"], "workspace is not flown with rtk"),
-        ([], "give MODE and FAULT, or --matrix"),
+        ([], "give MODE and FAULT, --matrix"),
         (["hold", "vio-off", "--only", "vio"], "--only chooses cells of the matrix"),
         (["--matrix", "--only", "nothing like it"], "no fault and no mode contains"),
         (["hold", "vio-off", "--expect", "no/such.toml"], "no/such.toml"),
+        (["--matrix", "--pairs", "3"], "give MODE and FAULT, --matrix, --pairs or --pair"),
+        (["--pair", "0", "--only", "vio"], "--only chooses cells of the matrix, or pairs"),
+        (["--pairs", "3", "--seed", "0:2"], "pairs are drawn from one seed"),
+        (["--pairs", "3", "--only", "nothing like it"], "none of 3 pairs contains"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_in_a_sentence(
@@ -295,6 +305,40 @@ def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
     assert main([*words, "--expect", str(strict)]) == 1
     assert "descend; must be terminate" in capsys.readouterr().out
     assert flown == ["land"]
+
+
+def test_a_command_that_is_no_number_ends_the_flight_with_a_problem() -> None:
+    seen = Observer(SITUATIONS["hold"])
+    outputs = replace(outputs_at(0), actuators=ActuatorCommand((1.0,) * 4, (0.0, math.nan)))
+    seen.see(4.5, outputs)
+    assert seen.problem == "a command that is no number, 0.500 s after the fault"
+
+
+@pytest.mark.parametrize(
+    ("suite", "first", "flown"),
+    [
+        ("gnss", FaultFlight(problem="not armed"), 1_000_003),
+        ("gnss", FaultFlight(contact="wall"), 1_000_003),
+        ("rtk", FaultFlight(problem="not armed"), 1_000_003),
+        ("rtk", FaultFlight(contact="wall"), 0),  # a defect of the vehicle
+        ("mocap", FaultFlight(problem="not armed"), 0),
+    ],
+)
+def test_a_seed_with_which_satellites_give_no_flight_is_replaced(
+    suite: str, first: FaultFlight, flown: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seeds: list[int] = []
+
+    def fly_without(mode: str, faults: tuple[Fault, ...], suite: str, seed: int) -> FaultFlight:
+        if faults:
+            seeds.append(seed)
+        return FINE if faults or seed else first
+
+    monkeypatch.setattr(matrix, "fly", fly_without)
+    matrix._natural.cache_clear()
+    Cell("hold", Expected("off", (Fault("gyro", "off"),), suite, False, {}), 0).row()
+    matrix._natural.cache_clear()
+    assert seeds == [flown]
 
 
 @pytest.mark.parametrize(("failsafe", "actions"), [(True, ["land"]), (False, [])])

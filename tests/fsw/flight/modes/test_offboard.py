@@ -117,31 +117,32 @@ def test_a_standing_vehicle_flies_when_a_setpoint_asks_it_to_rise(
     assert not OFFBOARD.update(standing, silent)[1].lift_off
 
 
-def pressed(by: float, moved_us: int, *, of_end_effector: bool = False) -> FlightState:
+def pressed(by: float, since_us: int, *, of_end_effector: bool = False) -> FlightState:
+    """With the setpoint ``by`` [m] in the ground, and rotors that idle since then."""
     reference = ReferenceState(of_end_effector, (0.0, 0.0, GROUND_Z + by), HERE, 0.0)
     state = hearing(motion=MOTION, motion_us=NOW_US)
-    vehicle = replace(state.vehicle, moved_us=moved_us)
+    vehicle = replace(state.vehicle, unloaded=(since_us, 0.0))
     return replace(state, vehicle=vehicle, setpoint=SetpointMemory(reference))
 
 
-def test_a_setpoint_in_the_ground_lands_it_when_it_has_stood_for_a_while() -> None:
+def test_a_setpoint_in_the_ground_lands_it_when_the_ground_is_felt() -> None:
     standing = vehicle_at((0.0, 0.0, GROUND_Z), t_us=NOW_US)
-    landed, result = OFFBOARD.update(pressed(0.11, NOW_US - 500_000), standing)
+    landed, result = OFFBOARD.update(pressed(0.11, NOW_US - 400_000), standing)
     assert landed.vehicle.landed
     assert result.next_mode is None, "it stays in its mode"
-    waiting, _ = OFFBOARD.update(pressed(0.11, NOW_US - 499_999), standing)
+    waiting, _ = OFFBOARD.update(pressed(0.11, NOW_US - 399_999), standing)
     assert not waiting.vehicle.landed
-    assert waiting.vehicle.moved_us == NOW_US - 499_999
+    assert waiting.vehicle.unloaded is not None
     for state, estimate in (
         (pressed(0.09, 0), standing),
         (pressed(0.5, 0, of_end_effector=True), standing),
         (replace(pressed(0.5, 0), setpoint=SetpointMemory()), standing),
-        (pressed(0.5, 0), vehicle_at((0.0, 0.0, GROUND_Z), (0.0, 0.1, 0.0), NOW_US)),
-        (pressed(1.5, 0), vehicle_at((0.0, 0.0, GROUND_Z - 1.0), t_us=NOW_US)),
+        (pressed(0.5, NOW_US - 400_000), vehicle_at(HERE, (0.0, 0.0, 2.5), NOW_US)),
     ):
         after, _ = OFFBOARD.update(state, estimate)
         assert not after.vehicle.landed
         assert after.vehicle.moved_us == NOW_US
+        assert after.vehicle.unloaded is None
 
 
 def aimed(state: FlightState, age_us: int = 0) -> SetpointMemory:

@@ -372,3 +372,68 @@ def test_names_that_do_not_fit_a_message_are_left_out(tmp_path: Path) -> None:
     logs = tree["logs"]
     assert isinstance(logs, Mapping)
     assert list(logs) == ["plain"]
+
+
+GIB = 1 << 30
+LAST = 0xFFFFFFFF  # bytes of a file that the protocol's fields of 32 bits can name
+
+
+@dataclass
+class HugeFile:
+    """An open file in nobody's memory."""
+
+    size: int
+    closed: bool = False
+
+    def read(self, offset: int, count: int) -> bytes:
+        return bytes(max(0, min(count, self.size - offset)))
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@dataclass
+class Huge:
+    """What it is opened from."""
+
+    file: HugeFile
+
+    def size(self) -> int:
+        return self.file.size
+
+    def open(self) -> HugeFile:
+        return self.file
+
+
+@pytest.mark.requirement("REQ-LINK-9")
+@pytest.mark.parametrize("length", [LAST - 1, LAST, LAST + 1, 6 * GIB, 1 << 45])
+def test_of_a_log_of_any_size_what_the_protocol_can_name_is_served(length: int) -> None:
+    file = HugeFile(length)
+    client = Client(FtpService({"huge": Huge(file)}))  # type: ignore[dict-item]
+    served = min(length, LAST)
+    assert client.names("/") == [f"Fhuge\t{served}"]
+    session, size = client.open("huge")
+    assert size == served
+    (last,) = client.burst(session, served - 100)
+    assert (len(last.data), last.complete) == (100, True)
+    for offset in (served, LAST):
+        answer = client.ask(Opcode.READ_FILE, session=session, offset=offset, size=10)
+        assert answer.refusal == Refusal.END_OF_FILE
+    assert len(client.ask(Opcode.READ_FILE, session=session, offset=served - 3, size=9).data) == 3
+    assert client.ask(Opcode.TERMINATE_SESSION, session=session).opcode == Opcode.ACK
+    assert file.closed
+
+
+def test_a_sparse_log_beyond_4_gib_is_read_from_the_disk_up_to_there(tmp_path: Path) -> None:
+    log = tmp_path / "flight.ulg"
+    with log.open("wb") as file:
+        file.seek(LAST - 5)
+        file.write(b"nearly" + b"beyond")
+        file.truncate(5 * GIB)
+    client = Client(FtpService({"flight.ulg": DiskFile(log)}))
+    session, size = client.open("flight.ulg")
+    assert size == LAST
+    (last,) = client.burst(session, LAST - 5)
+    assert (last.data, last.complete) == (b"nearl", True)
+    client.send(Opcode.BURST_READ_FILE, session=session, offset=LAST - 500, size=MAX_DATA)
+    assert sum(len(piece.data) for piece in client.polled()) == 500

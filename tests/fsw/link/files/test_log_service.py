@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.files.flight_logs import FlightLogs, flight_logs
+from fsw.link.files.flight_logs import MARK, FlightLogs, flight_logs
 from fsw.link.files.log_service import CHUNK, LogService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.wire import message_ids as ids
@@ -26,9 +26,13 @@ FRAMES_A_TICK = 6
 FRAMES_A_DATAGRAM = 13
 
 
-def flight(runs: Path, name: str, content: bytes, suffix: str = "tlog") -> Path:
+OWN = Path("/var/vehicle.params")  # what makes earlier flights those of the same vehicle
+
+
+def flight(runs: Path, name: str, content: bytes, suffix: str = "tlog", of: Path = OWN) -> Path:
     directory = runs / name
     directory.mkdir(exist_ok=True)
+    (directory / MARK).write_bytes(bytes(of))
     (directory / f"flight.{suffix}").write_bytes(content)
     return directory
 
@@ -85,7 +89,7 @@ class Client:
 @pytest.mark.parametrize("count", [ALL, 0x7FFFFFFF])
 def test_a_download_is_the_file_byte_for_byte(tmp_path: Path, size: int, count: int) -> None:
     content = random.Random(size).randbytes(size)
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content), OWN)))
     client.download(0, count=count)
     assert bytes(client.log) == content
 
@@ -94,21 +98,21 @@ def test_a_download_is_the_file_byte_for_byte(tmp_path: Path, size: int, count: 
 def test_a_download_without_an_end_closes_with_a_message_that_is_not_full(
     tmp_path: Path, size: int
 ) -> None:
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(size)))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(size)), OWN)))
     client.download(0)
     assert [count < CHUNK for count in client.counts] == [False] * (size // 90) + [True]
 
 
 def test_a_piece_ends_where_it_was_asked_to_end(tmp_path: Path) -> None:
     content = bytes(range(250)) * 8
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content), OWN)))
     client.download(0, offset=180, count=270)
     assert client.counts == [90, 90, 90]
     assert bytes(client.log[180:]) == content[180:450]
 
 
 def test_behind_the_end_there_is_nothing(tmp_path: Path) -> None:
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(180)))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(180)), OWN)))
     client.download(0, offset=180)
     client.download(0, offset=5000, count=90)
     assert client.counts == [0, 0]
@@ -116,7 +120,7 @@ def test_behind_the_end_there_is_nothing(tmp_path: Path) -> None:
 
 def test_lost_pieces_are_asked_for_again_many_at_a_time(tmp_path: Path) -> None:
     content = random.Random(1).randbytes(90 * 100)
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", content), OWN)))
     numbers = iter(range(1000))
     client.download(0, lose=lambda: next(numbers) % 5 == 0)
     assert bytes(client.log) != content
@@ -129,7 +133,7 @@ def test_lost_pieces_are_asked_for_again_many_at_a_time(tmp_path: Path) -> None:
 def test_the_size_is_the_listed_one_while_the_file_grows(tmp_path: Path) -> None:
     content = random.Random(2).randbytes(5000)
     directory = flight(tmp_path, "run-1", content)
-    client = Client(LogService(FlightLogs(directory)))
+    client = Client(LogService(FlightLogs(directory, OWN)))
     assert client.entries() == [(0, 5000, 1, 0)]
     with (directory / "flight.tlog").open("ab") as log:
         log.write(b"more of the flight" * 100)
@@ -145,14 +149,14 @@ def test_flights_are_listed_oldest_first_and_this_one_last(tmp_path: Path) -> No
         log = flight(tmp_path, name, bytes(age)) / "flight.tlog"
         os.utime(log, (1e9 - age, 1e9 - age))
     present = flight(tmp_path, "ground-1", bytes(5))
-    client = Client(LogService(FlightLogs(present)))
+    client = Client(LogService(FlightLogs(present, OWN)))
     assert client.entries() == [(0, 30, 4, 3), (1, 20, 4, 3), (2, 10, 4, 3), (3, 5, 4, 3)]
 
 
 def test_the_ulog_stands_for_its_flight(tmp_path: Path) -> None:
     directory = flight(tmp_path, "run-1", b"telemetry")
     flight(tmp_path, "run-1", b"everything", "ulg")
-    client = Client(LogService(FlightLogs(directory)))
+    client = Client(LogService(FlightLogs(directory, OWN)))
     client.download(0)
     assert bytes(client.log) == b"everything"
 
@@ -168,9 +172,9 @@ def test_a_link_to_elsewhere_is_no_log(tmp_path: Path) -> None:
     flight(tmp_path, "elsewhere", b"secret")
     (runs / "run-3").symlink_to(tmp_path / "elsewhere")
     os.mkfifo(runs / "run-2" / "flight.ulg")
-    logs = flight_logs(present)
+    logs = flight_logs(present, bytes(OWN))
     assert [log.flight for log in logs] == ["run-1"]
-    client = Client(LogService(FlightLogs(present)))
+    client = Client(LogService(FlightLogs(present, OWN)))
     # Put there later, it cannot be opened either.
     (present / "flight.tlog").unlink()
     (present / "flight.tlog").symlink_to(secret)
@@ -196,7 +200,7 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
         flight(tmp_path, name, b"finished")
     present = flight(tmp_path, "run-3", b"kept")
     (tmp_path / "run-1" / "result.json").write_text("{}")
-    logs = FlightLogs(present)
+    logs = FlightLogs(present, OWN)
     client, other = Client(LogService(logs)), Client(LogService(logs))
     assert len(other.entries()) == 3
     other.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
@@ -204,11 +208,34 @@ def test_finished_logs_are_erased_this_flight_s_is_kept_and_the_operator_is_told
     reported = wait_for(lambda: list(client.service.poll(0)))
     assert reported == [StatusText(Severity.INFO, "2 logs erased, this flight's is kept")]
     assert client.entries() == [(0, 4, 1, 0)]
-    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
+    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.*[gn]"))
     assert left == ["run-1/result.json", "run-3/flight.tlog"]
     other.download(0)
     assert bytes(other.log) == b"kept", "numbers of another list mean nothing any more"
     assert list(vehicle_files(logs)["logs"]) == ["run-3"]  # type: ignore[call-overload]
+
+
+@pytest.mark.requirement("REQ-LINK-9")
+@pytest.mark.parametrize("own", [None, OWN])
+def test_only_logs_that_this_vehicle_has_marked_are_listed_served_and_erased(
+    tmp_path: Path, own: Path | None
+) -> None:
+    """A folder of runs has those of other vehicles and other studies too."""
+    flight(tmp_path, "mine", b"of this vehicle")
+    flight(tmp_path, "other", b"of another", of=Path("/var/other.params"))
+    (flight(tmp_path, "unmarked", b"of a study", suffix="ulg") / MARK).unlink()
+    huge = flight(tmp_path, "huge", b"of nobody") / MARK
+    os.truncate(huge, 1 << 40)
+    (flight(tmp_path, "empty", b"of nobody") / MARK).write_bytes(b"")
+    logs = FlightLogs(flight(tmp_path, "run", b"kept"), own)
+    reached = ["run"] if own is None else ["mine", "run"]
+    assert [log.flight for log in logs.all] == reached
+    assert list(vehicle_files(logs)["logs"]) == reached  # type: ignore[call-overload]
+    erasure = logs.erase()
+    wait_for(lambda: erasure.done)
+    assert (erasure.erased, erasure.failed) == (len(reached) - 1, 0)
+    left = {path.parent.name for path in tmp_path.glob("*/flight.*")}
+    assert left == {"mine", "other", "unmarked", "huge", "empty", "run"} - {*reached[:-1]}
 
 
 def test_the_log_of_another_vehicle_that_flies_is_kept_and_told(tmp_path: Path) -> None:
@@ -216,15 +243,15 @@ def test_the_log_of_another_vehicle_that_flies_is_kept_and_told(tmp_path: Path) 
     flying = flight(tmp_path, "flying", b"of another day", suffix="ulg")
     telemetry = BlockFile(flying / "flight.tlog")
     telemetry.put(b"so far")
-    client = Client(LogService(FlightLogs(flight(tmp_path, "here", b"kept"))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "here", b"kept"), OWN)))
     client.ask(ids.LOG_ERASE, 1, 1)
     reported = wait_for(lambda: list(client.service.poll(0)))
     kept = "1 log erased, this flight's is kept and 1 of flights that are not over"
     assert reported == [StatusText(Severity.INFO, kept)]
-    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*"))
+    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*.*[gn]"))
     assert left == ["flying/flight.tlog", "flying/flight.ulg", "here/flight.tlog"]
     telemetry.close()
-    logs = FlightLogs(tmp_path / "here")
+    logs = FlightLogs(tmp_path / "here", OWN)
     erasure = logs.erase()
     wait_for(lambda: erasure.done)
     assert erasure.erased == 1, "a flight that is over has given its lock back"
@@ -232,7 +259,7 @@ def test_the_log_of_another_vehicle_that_flies_is_kept_and_told(tmp_path: Path) 
 
 def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
     earlier = flight(tmp_path, "run-1", b"finished")
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"kept"), OWN)))
     (earlier / "flight.tlog").unlink()  # another client was faster
     client.ask(ids.LOG_ERASE, 1, 1)
     reported = wait_for(lambda: list(client.service.poll(0)))
@@ -246,12 +273,12 @@ def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
 def test_an_empty_log_of_an_earlier_flight_is_not_listed(tmp_path: Path) -> None:
     """QGroundControl never comes to the end of a download of nothing."""
     flight(tmp_path, "run-1", b"")
-    logs = FlightLogs(flight(tmp_path, "run-2", b""))
+    logs = FlightLogs(flight(tmp_path, "run-2", b""), OWN)
     assert [log.flight for log in logs.all] == ["run-2"]
 
 
 def test_a_client_that_stops_gets_no_more(tmp_path: Path) -> None:
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(90_000)))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", bytes(90_000)), OWN)))
     client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
     assert len(client.polled()) == FRAMES_A_TICK
     client.ask(ids.LOG_REQUEST_END, 1, 1)
@@ -260,7 +287,7 @@ def test_a_client_that_stops_gets_no_more(tmp_path: Path) -> None:
 
 def test_a_request_for_another_log_ends_the_download_of_the_first(tmp_path: Path) -> None:
     flight(tmp_path, "run-1", bytes(90_000))
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"the other"))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-2", b"the other"), OWN)))
     client.ask(ids.LOG_REQUEST_DATA, 0, 0x7FFFFFFF, 0, 1, 1)
     client.polled()
     client.download(1)
@@ -269,7 +296,7 @@ def test_a_request_for_another_log_ends_the_download_of_the_first(tmp_path: Path
 
 @pytest.mark.parametrize("target", [(2, 1), (1, 100)])
 def test_what_is_for_another_vehicle_is_left_to_it(tmp_path: Path, target: tuple[int, int]) -> None:
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", b"log"))))
+    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", b"log"), OWN)))
     client.ask(ids.LOG_REQUEST_LIST, 0, 0xFFFF, *target)
     client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, *target)
     assert client.ask(ids.LOG_ERASE, *target) == []

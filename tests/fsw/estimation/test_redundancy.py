@@ -1,0 +1,240 @@
+"""Who is named wrong when sensors contradict each other, and who is not."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from fsw.estimation import redundancy
+from fsw.estimation.error_state import FILTER
+from fsw.estimation.redundancy import (
+    EVERY,
+    EVIDENCE,
+    NO_AID,
+    UNDECIDED,
+    Aid,
+    Source,
+    Verdict,
+    judged,
+    look,
+)
+from fsw.geometry.quaternion import turned
+from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
+from fsw.signals import Vec3, Vec4
+
+TICK = 0.002
+G = 9.81
+FIELD = (0.2148, 0.0109, 0.4321)  # Gauss, NED
+SETTLED = 4.0  # s, before anything is wrong
+NONE: Vec3 = (0.0, 0.0, 0.0)
+
+
+class Wrong(NamedTuple):
+    """By how much a source is off from ``SETTLED`` on, for good."""
+
+    gyro: Vec3 = NONE  # rad/s
+    accelerometer: Vec3 = NONE  # m/s^2
+    push: Vec3 = NONE  # m/s^2, NED, that the model does not know
+    blow: Vec3 = NONE  # rad/s, at once, that the model does not know
+    turning: Vec3 = NONE  # rad/s, of the pose's attitude
+    gaining: Vec3 = NONE  # m/s^2, of the measured place
+    magnetic: Vec3 = NONE  # rad/s, of the field
+
+
+def flown(wrong: Wrong, suite: str, seconds: float, seed: int = 1) -> list[Verdict]:
+    """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added."""
+    random = np.random.default_rng(seed)
+    x: Any = np.zeros(1, FILTER)
+    evidence, verdict, found = np.zeros(1, EVIDENCE), Verdict(), []
+    evidence["began"] = -1.0
+    p, v, q, spun = np.array([0.0, 0.0, -1.2]), np.zeros(3), (1.0, 0.0, 0.0, 0.0), np.zeros(3)
+    place_off, turn_off, field_off = np.zeros(3), np.zeros(3), np.zeros(3)
+    speed_off = np.zeros(3)
+    for tick in range(round((SETTLED + seconds) / TICK)):
+        now, late = TICK * tick, TICK * tick > SETTLED
+        w = 0.1 * np.sin(now * np.array([1.3, 1.7, 0.9]) + (0.0, 1.0, 2.0))
+        rates = w + (np.array(wrong.blow) if late else 0.0)
+        alpha = (w - spun) / TICK
+        spun = w
+        q = turned(q, *(TICK * rates))
+        R = matrix_from_quaternion(q)
+        gust = 0.4 * random.uniform(-1.0, 1.0, 3) + (np.array(wrong.push) if late else 0.0)
+        thrust = G + 0.3 * math.sin(now)
+        a = np.array(rotate(R, (0.0, 0.0, -thrust))) + (0.0, 0.0, G) + gust
+        p, v = p + TICK * v, v + TICK * a
+        force = np.array(rotate_back(R, tuple(gust))) - (0.0, 0.0, thrust)
+        said = rates + 0.01 * random.standard_normal(3)
+        felt = force + 0.5 * random.standard_normal(3)
+        if late:
+            said, felt = said + wrong.gyro, felt + wrong.accelerometer
+            turn_off += TICK * np.array(wrong.turning)
+            field_off += TICK * np.array(wrong.magnetic)
+            speed_off += TICK * np.array(wrong.gaining)
+            place_off += TICK * speed_off
+        s = x.view(np.recarray)[0]
+        s.newest[:3], s.newest[3:] = felt, said
+        s.suspect = int(verdict.is_on or bool(verdict.wrong))
+        redundancy.witness(s, R, TICK, (*alpha.tolist(), thrust))  # type: ignore[arg-type]
+        if tick % round(EVERY / TICK):
+            continue
+        pose: Aid = NO_AID
+        fix: Aid = NO_AID
+        field: Aid = NO_AID
+        if suite == "pose":
+            noisy = turned(q, *(turn_off + 2e-3 * random.standard_normal(3)))
+            where = tuple((p + place_off + 1e-3 * random.standard_normal(3)).tolist())
+            pose = (True, now, where, noisy, 2e-3, 2e-3)  # type: ignore[assignment]
+        else:
+            if tick % 50 == 0:
+                where = tuple((p + place_off + 0.01 * random.standard_normal(3)).tolist())
+                fast = (v + speed_off + 0.03 * random.standard_normal(3)).tolist()
+                fix = (True, now, where, (*fast, 0.0), 0.015, 0.1)  # type: ignore[assignment]
+            seen = matrix_from_quaternion(turned(q, *field_off))
+            body = np.array(rotate_back(seen, FIELD)) + 3e-3 * random.standard_normal(3)
+            field = (True, now, tuple(body.tolist()), (1.0, 0.0, 0.0, 0.0), 0.01, 0.0)  # type: ignore[assignment]
+        look(evidence, x, now, pose, fix, field, not verdict.is_on)
+        ratios = tuple(evidence[0]["ratio"].tolist())
+        verdict = judged(verdict, ratios, now, holds_attitude=suite == "pose")
+        found.append(verdict)
+    return found
+
+
+def named(verdicts: list[Verdict]) -> Source:
+    """All that was named, the rotors' model included."""
+    total = Source(0)
+    for one in verdicts:
+        total |= one.wrong | one.named
+    return total
+
+
+def suspected(verdicts: list[Verdict]) -> Source:
+    total = Source(0)
+    for one in verdicts:
+        total |= one.suspects | one.wrong
+    return total
+
+
+directions = st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, 0.6, 0.52)])
+suites = st.sampled_from(["pose", "satellites"])
+
+
+def along(direction: Vec3, size: float) -> Vec3:
+    x, y, z = direction
+    return size * x, size * y, size * z
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("suite", ["pose", "satellites"])
+def test_nobody_is_suspected_while_all_are_well(suite: str) -> None:
+    for seed in range(3):
+        assert not suspected(flown(Wrong(), suite, 6.0, seed))
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=6, phases=[Phase.generate])
+@given(suite=suites, direction=directions, size=st.floats(0.3, 8.0), seed=st.integers(0, 99))
+def test_a_gyro_that_is_off_is_named_whatever_its_size(
+    suite: str, direction: Vec3, size: float, seed: int
+) -> None:
+    verdicts = flown(Wrong(gyro=along(direction, size)), suite, 1.2, seed)
+    assert named(verdicts) == Source.GYRO
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=6, phases=[Phase.generate])
+@given(suite=suites, direction=directions, size=st.floats(2.5, 30.0), seed=st.integers(0, 99))
+def test_an_accelerometer_that_is_off_is_named_whatever_its_size(
+    suite: str, direction: Vec3, size: float, seed: int
+) -> None:
+    verdicts = flown(Wrong(accelerometer=along(direction, size)), suite, 2.5, seed)
+    assert named(verdicts) == Source.ACCELEROMETER
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=5, phases=[Phase.generate])
+@given(suite=suites, size=st.floats(2.5, 8.0), seed=st.integers(0, 99))
+def test_a_gust_is_no_sensor_s_fault(suite: str, size: float, seed: int) -> None:
+    verdicts = flown(Wrong(push=(size, 0.0, 0.0)), suite, 3.0, seed)
+    assert named(verdicts) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-7")
+@settings(deadline=None, max_examples=5, phases=[Phase.generate])
+@given(size=st.floats(0.5, 4.0), seed=st.integers(0, 99))
+def test_a_blow_is_no_gyro_s_fault(size: float, seed: int) -> None:
+    verdicts = flown(Wrong(blow=(0.0, size, 0.0)), "pose", 1.0, seed)
+    assert named(verdicts) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=5, phases=[Phase.generate])
+@given(direction=directions, size=st.floats(1.0, 6.0), seed=st.integers(0, 99))
+def test_a_frame_that_turns_is_suspected_and_the_accelerometer_is_not(
+    direction: Vec3, size: float, seed: int
+) -> None:
+    """Degrees a second: nothing but the gyro says otherwise, so both stay suspects."""
+    turning = along(direction, math.radians(size))
+    verdicts = flown(Wrong(turning=turning), "pose", 5.0, seed)
+    assert suspected(verdicts) & Source.POSE
+    assert not named(verdicts) & ~(Source.POSE | Source.GYRO)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_frame_that_gains_speed_is_named() -> None:
+    verdicts = flown(Wrong(gaining=(0.0, 3.0, 0.0)), "pose", 3.0)
+    assert named(verdicts) == Source.POSE
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_slow_turn_stays_undecided_for_long_and_is_over_when_it_ends() -> None:
+    verdicts = flown(Wrong(turning=(0.0, 0.0, math.radians(1.0))), "pose", 6.0)
+    last = verdicts[-1]
+    assert last.contradicts
+    assert last.suspects == Source.POSE | Source.GYRO
+    now = EVERY * len(verdicts)
+    assert now - last.since > UNDECIDED
+
+
+def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
+    fires = [0.0] * redundancy.COUNT
+    fires[redundancy.GM], fires[redundancy.GP] = 5.0, 5.0
+    agrees = tuple(0.2 for _ in range(redundancy.COUNT))
+    verdict, now = Verdict(), 10.0
+    for _ in range(3):
+        verdict, now = judged(verdict, tuple(fires), now, holds_attitude=True), now + EVERY
+    assert verdict.wrong == Source.GYRO
+    back: float | None = None
+    began = now
+    while back is None and now < began + 10.0:
+        verdict, now = judged(verdict, agrees, now, holds_attitude=True), now + EVERY
+        back = now - began if not verdict.wrong else None
+    assert back == pytest.approx(5.0, abs=0.1)
+    verdict = judged(verdict, tuple(fires), now, holds_attitude=True)
+    assert verdict.wrong == Source.GYRO, "and it can be named again"
+
+
+@given(st.lists(st.floats(0.0, 20.0), min_size=redundancy.COUNT, max_size=redundancy.COUNT))
+def test_who_is_named_has_fired_and_nobody_is_while_nothing_does(ratios: list[float]) -> None:
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True)
+    fired = Source(0)
+    for k, ratio in enumerate(ratios):
+        fired |= redundancy.OF[k] if ratio > 1.0 else Source(0)
+    assert not verdict.wrong & ~fired
+    assert bool(verdict.is_on or verdict.wrong) == (max(ratios) > 1.0)
+
+
+def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    level: NDArray[np.float64] = np.eye(3).ravel()
+    model: Vec4 = (0.1, 0.0, 0.0, G)
+    R = tuple(level.tolist())
+    redundancy.witness(x, R, TICK, model)  # type: ignore[arg-type]
+    assert x.witness.any()
+    redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0))  # type: ignore[arg-type]
+    assert not x.witness[:4].any()
