@@ -242,16 +242,20 @@ def test_the_fastest_landing_that_can_be_set_does_not_fight_the_ground(
     flight.run(1.0)
     flight.step(command(LAND))
     flight.run(1.4)
-    felt_s = None
+    felt_s = idle_s = None
     for k in range(400):
         flight.run(0.01)
         if felt_s is None and -flight.sim.truth().p_WB[2] < 0.33:
             felt_s = 0.01 * k
+        if idle_s is None and flight.state.vehicle.unloaded is not None:
+            idle_s = 0.01 * k
         if flight.mode is Mode.DISARMED:
             break
     assert flight.mode is Mode.DISARMED
     assert felt_s is not None
-    assert 0.01 * k - felt_s < 0.3
+    assert idle_s is not None
+    assert idle_s - felt_s < 0.35, "loops are open, and rotors idle"
+    assert 0.01 * k - felt_s < 0.7
     flight.run(1.0)
     assert flight.snapshot.failures == ()
     assert flight.snapshot.estimate.R_WB[8] > math.cos(math.radians(5.0))
