@@ -64,6 +64,7 @@ def names(sources: Source) -> str:
     return " or ".join([name for source, name in _NAMES.items() if source & sources])
 
 
+NOBODY: Final = Source(0)
 G, A, M, P, N, B = Source
 # Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
 # into the world is the gyro's as well: see ``_sources``.
@@ -586,12 +587,13 @@ class Verdict(NamedTuple):
     evidence: Evidence | None = None
     since: float = -1.0  # of the trial that is on; -1: none
     fired: float = -math.inf  # when a residual did last
-    suspects: Source = Source(0)
-    leader: Source = Source(0)  # the one that is named once that is sure
+    suspects: Source = NOBODY
+    leader: Source = NOBODY  # the one that is named once that is sure
     sum: float = 0.0  # of its leads
-    wrong: Source = Source(0)  # not used
+    wrong: Source = NOBODY  # not used
     agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
-    named: Source = Source(0)  # by the last look
+    named: Source = NOBODY  # by the last look
+    lost_until: float = -math.inf  # how long windows contain times without an inertial unit
     seen: tuple[object, ...] = (None, None, None)  # the last samples of pose, satellites, compass
 
     @property
@@ -602,42 +604,48 @@ class Verdict(NamedTuple):
     @property
     def contradicts(self) -> bool:
         """Whether that is so, and not because the rotors do not give what the model says."""
-        return self.is_on and self.suspects not in (Source(0), Source.MODEL)
+        return self.is_on and self.suspects not in (NOBODY, Source.MODEL)
 
 
 def judged(
-    verdict: Verdict, ratios: tuple[float, ...], now: float, *, holds_attitude: bool
+    verdict: Verdict,
+    ratios: tuple[float, ...],
+    now: float,
+    *,
+    holds_attitude: bool,
+    lost: Source = NOBODY,
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
-    Where nothing that is used ``holds_attitude``, the gyro does.
+    Where nothing that is used ``holds_attitude``, the gyro does. What is ``lost`` says nothing, and
+    is known to be of no use without this law.
     """
     of = _sources(holds_attitude)
-    used = [k for k in range(COUNT) if not of[k] & verdict.wrong]
+    used = [k for k in range(COUNT) if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]
-    verdict = _with_return(verdict, ratios, of, now)
+    verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:
         if verdict.is_on and now - verdict.fired > _QUIET:
             return verdict._replace(
-                since=-1.0, suspects=Source(0), leader=Source(0), sum=0.0, named=Source(0)
+                since=-1.0, suspects=NOBODY, leader=NOBODY, sum=0.0, named=NOBODY
             )
-        return verdict._replace(leader=Source(0), sum=0.0, named=Source(0))
+        return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
     cost = {}
     for one in Source:
-        if one & verdict.wrong or not any(of[k] & one and ratios[k] > 0.0 for k in used):
+        if one & (verdict.wrong | lost) or not any(of[k] & one and ratios[k] > 0.0 for k in used):
             continue
         cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in used if not of[k] & one)
     first, *others = sorted(cost, key=cost.__getitem__)
     lead = cost[others[0]] - cost[first] if others else math.inf
-    suspects = Source(0)
+    suspects = NOBODY
     for one in cost:
         if cost[one] - cost[first] < _LEAD:
             suspects |= one
-    leader = first if lead > _LEAD else Source(0)
+    leader = first if lead > _LEAD else NOBODY
     total = lead if leader else 0.0
     if leader and leader is verdict.leader:
         total += verdict.sum
-    named = leader if total > _SURE else Source(0)
+    named = leader if total > _SURE else NOBODY
     since = verdict.since if verdict.is_on else now
     verdict = verdict._replace(
         since=since, fired=now, suspects=suspects, leader=leader, sum=total, named=named
@@ -646,9 +654,8 @@ def judged(
         return verdict
     agreed = list(verdict.agreed)
     agreed[list(Source).index(named)] = math.inf
-    return verdict._replace(
-        wrong=verdict.wrong | named, agreed=tuple(agreed), since=-1.0, suspects=Source(0), sum=0.0
-    )
+    wrong = verdict.wrong | named
+    return verdict._replace(wrong=wrong, agreed=tuple(agreed), since=-1.0, suspects=NOBODY, sum=0.0)
 
 
 def _sources(holds_attitude: bool) -> tuple[Source, ...]:
@@ -658,7 +665,11 @@ def _sources(holds_attitude: bool) -> tuple[Source, ...]:
 
 
 def _with_return(
-    verdict: Verdict, ratios: tuple[float, ...], of: tuple[Source, ...], now: float
+    verdict: Verdict,
+    ratios: tuple[float, ...],
+    of: tuple[Source, ...],
+    now: float,
+    lost: Source,
 ) -> Verdict:
     """The verdict with what was named and has agreed with all others for long believed again."""
     if not verdict.wrong:
@@ -667,7 +678,7 @@ def _with_return(
     for place, one in enumerate(Source):
         if not one & wrong:
             continue
-        others = wrong & ~one
+        others = (wrong | lost) & ~one
         heard = [ratios[k] for k in range(COUNT) if of[k] & one and not of[k] & others]
         if max(heard, default=0.0) > 1.0 or not any(heard):
             agreed[place] = math.inf

@@ -42,7 +42,7 @@ from fsw.estimation.fusion_memory import (
 )
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.measurement_update import MeasurementUpdate, attitude
-from fsw.estimation.redundancy import EVIDENCE, NO_AID, Aid, Source, Verdict
+from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
 from fsw.estimation.sensor_checks import (
     SENSOR_OF,
     Aiding,
@@ -283,21 +283,22 @@ class SensorFusion:
         for sample, last in zip(newest, before.seen, strict=True):
             aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
             seen.append(sample)
-        redundancy.look(evidence, memory.numbers, now, *aids, not before.is_on)
+        lost = _lost(memory, before, now)
+        learns = not (before.is_on or before.wrong or lost)
+        redundancy.look(evidence, memory.numbers, now, *aids, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
         verdict = before._replace(evidence=evidence, seen=tuple(seen))
+        if now - memory.imu_came > IMU_TOO_OLD:
+            verdict = verdict._replace(lost_until=now + redundancy.WINDOWS[-1])
         if before.is_on or before.wrong or max(ratios) > 1.0:
             pose = memory.of(Sensor.POSE).came
             held = now - pose <= self.tuning.stale_time and not before.wrong & Source.POSE
-            verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held)
-        elif not memory.trail or now - memory.trail.began >= _TRAIL:
-            start = memory._replace(trail=None, trail_before=None)
-            return memory._replace(
-                verdict=verdict, trail_before=memory.trail, trail=Trail(start, now)
-            ), found
-        if not (verdict.is_on or verdict.wrong or before.is_on or before.wrong):
-            return memory._replace(verdict=verdict), found
-        return self._convicted(memory._replace(verdict=verdict), before, now, found)
+            verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held, lost=lost)
+        memory = memory._replace(verdict=verdict)
+        state: StateEstimate | None = found
+        if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
+            memory, state = self._convicted(memory, before, now, found)
+        return _with_trail(memory, now), state
 
     def _aid(self, memory: FusionMemory, sample: Aiding) -> Aid:
         """What a measurement says to the law for who is wrong."""
@@ -550,7 +551,7 @@ class SensorFusion:
         others = memory.without(health.sensor)
         if not fault:
             memory = memory.hearing(sample)
-            if memory.verdict.wrong & _SOURCES.get(type(sample), Source(0)):
+            if memory.verdict.wrong & _SOURCES.get(type(sample), NOBODY):
                 fault = SensorFault.DISAGREES
                 health = health.with_fault(fault, now)
         if fault:
@@ -707,6 +708,31 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         trail=None,
         trail_before=None,
     )
+
+
+def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory with a new trail where the newest one is long enough.
+
+    None is begun while it may have to be said soon who is wrong.
+    """
+    newest, verdict = memory.trail, memory.verdict
+    if newest is not None:
+        decides = verdict.is_on and now - verdict.since < redundancy.UNDECIDED
+        if decides or now - newest.began < _TRAIL:
+            return memory
+    start = memory._replace(trail=None, trail_before=None)
+    return memory._replace(trail_before=newest, trail=Trail(start, now))
+
+
+def _lost(memory: FusionMemory, verdict: Verdict, now: float) -> Source:
+    """What says nothing of how the vehicle moves, because it is silent or stuck."""
+    if now < verdict.lost_until:
+        return Source.GYRO | Source.ACCELEROMETER
+    found, same = NOBODY, memory.numbers[0]["same"]
+    for place, (source, _) in enumerate(_HALVES):
+        if same[place] >= STUCK_READINGS:
+            found |= source
+    return found
 
 
 def _halves(sources: Source) -> int:
