@@ -588,6 +588,8 @@ class Verdict(NamedTuple):
     since: float = -1.0  # of the trial that is on; -1: none
     fired: float = -math.inf  # when a residual did last
     suspects: Source = NOBODY
+    accused: Source = NOBODY  # all that have been suspects in this trial
+    explained: bool = False  # in this trial the rotors' model was named
     leader: Source = NOBODY  # the one that is named once that is sure
     sum: float = 0.0  # of its leads
     wrong: Source = NOBODY  # not used
@@ -600,6 +602,18 @@ class Verdict(NamedTuple):
     def is_on(self) -> bool:
         """Whether sensors, or one and the rotors' model, contradict each other."""
         return self.since >= 0.0
+
+    def acquitted(self) -> Verdict:
+        """The verdict after the trial is over."""
+        return self._replace(
+            since=-1.0,
+            suspects=NOBODY,
+            accused=NOBODY,
+            explained=False,
+            leader=NOBODY,
+            sum=0.0,
+            named=NOBODY,
+        )
 
     @property
     def contradicts(self) -> bool:
@@ -626,9 +640,7 @@ def judged(
     verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:
         if verdict.is_on and now - verdict.fired > _QUIET:
-            return verdict._replace(
-                since=-1.0, suspects=NOBODY, leader=NOBODY, sum=0.0, named=NOBODY
-            )
+            return verdict.acquitted()
         return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
     cost = {}
     for one in Source:
@@ -646,16 +658,24 @@ def judged(
     if leader and leader is verdict.leader:
         total += verdict.sum
     named = leader if total > _SURE else NOBODY
-    since = verdict.since if verdict.is_on else now
+    # What the rotors have been named for shows in some windows for longer than in others.
+    explained = verdict.explained or named is M
     verdict = verdict._replace(
-        since=since, fired=now, suspects=suspects, leader=leader, sum=total, named=named
+        since=verdict.since if verdict.is_on else now,
+        fired=now,
+        suspects=M if explained else suspects,
+        accused=verdict.accused | suspects,
+        explained=explained,
+        leader=leader,
+        sum=total,
+        named=named,
     )
     if not named or named is M:
         return verdict
     agreed = list(verdict.agreed)
     agreed[list(Source).index(named)] = math.inf
-    wrong = verdict.wrong | named
-    return verdict._replace(wrong=wrong, agreed=tuple(agreed), since=-1.0, suspects=NOBODY, sum=0.0)
+    convicted = verdict._replace(wrong=verdict.wrong | named, agreed=tuple(agreed))
+    return convicted.acquitted()._replace(named=named)
 
 
 def _sources(holds_attitude: bool) -> tuple[Source, ...]:

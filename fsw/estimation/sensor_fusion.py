@@ -20,6 +20,8 @@ from fsw.compiled import machine_code, packed
 from fsw.estimation import kernels, redundancy
 from fsw.estimation.confirmation import Confirmation, Run
 from fsw.estimation.error_state import (
+    BA,
+    BG,
     DELAY,
     ERRORS,
     FILTER,
@@ -28,8 +30,10 @@ from fsw.estimation.error_state import (
     NO_RATE,
     NOTHING,
     ON_TRIAL,
+    TH,
     Array,
     Filter,
+    V,
 )
 from fsw.estimation.filter_start import FilterStart
 from fsw.estimation.fusion_memory import (
@@ -77,6 +81,11 @@ _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
+# Of a suspect, standard deviations of its bias, and of what it may have led to by then.
+_SUSPECTED_FORCE: Final = 3.0  # m/s^2
+_SUSPECTED_SPEED: Final = 0.3  # m/s
+_SUSPECTED_RATE: Final = 0.5  # rad/s
+_SUSPECTED_TURN: Final = 0.03  # rad
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _SOURCES: Final = {
     PoseSample: Source.POSE,
@@ -322,14 +331,14 @@ class SensorFusion:
         verdict = memory.verdict
         x = memory.numbers.copy()
         memory = memory._replace(numbers=x)
-        doubted = bool(x["doubted"][0].any())
-        new = verdict.wrong & ~before.wrong
-        believes = doubted and verdict.named is Source.MODEL
-        if not verdict.is_on and doubted and not verdict.wrong:
-            believes = before.is_on  # who has jumped agrees with all others
+        new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
+        # A half that has jumped is believed where the rotors are named for it, and where it agrees.
+        agrees = back or (before.is_on and not verdict.is_on and not verdict.wrong)
+        believes = bool(x["doubted"][0].any() and (agrees or verdict.named is Source.MODEL))
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
+            _widen(x[0]["covariance"], verdict.accused & ~before.accused)
         if not (new or believes):
             return memory, found
         x["believed"] = NOTHING if believes else 0
@@ -733,6 +742,21 @@ def _lost(memory: FusionMemory, verdict: Verdict, now: float) -> Source:
         if same[place] >= STUCK_READINGS:
             found |= source
     return found
+
+
+def _widen(M: Array, suspects: Source) -> None:
+    """Know little of the biases of new ``suspects``, and of what they have led to; M (17, 17) [SI].
+
+    A bias that may walk alone takes too long to be found.
+    """
+    k = np.arange(3)
+    for source, bias, most, state, led in (
+        (Source.ACCELEROMETER, BA, _SUSPECTED_FORCE, V, _SUSPECTED_SPEED),
+        (Source.GYRO, BG, _SUSPECTED_RATE, TH, _SUSPECTED_TURN),
+    ):
+        if source & suspects:
+            M[bias + k, bias + k] += most**2
+            M[state + k, state + k] += led**2
 
 
 def _halves(sources: Source) -> int:

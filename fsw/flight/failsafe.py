@@ -230,9 +230,10 @@ FAILSAFES: Final = (
         lambda c: wording.suspects(c) if c.state.aiding.disputed_us else wording.lost_sensor(c),
         of_vehicle=True,
         slow=True,
-        detected="in flight, the same for 2 s; or the inertial unit was of no use for so long, and "
-        "no pose holds the attitude",
+        detected="in flight, the next row for 2 s; or no pose holds the attitude, and the inertial "
+        "unit has been silent for `COM_SENS_LOSS_T`, or a half of it was of no use for 1 s",
         within_us=_TWICE,
+        parameters=("COM_SENS_LOSS_T",),
         does="land",
     ),
     Failsafe(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.estimation.redundancy import UNDECIDED
-from fsw.estimation.sensor_fault import Sensor
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.conditions import Condition
 from fsw.flight.state import FlightState, LostSensor
 from fsw.flight.uncertain_clearance import LACKING
@@ -22,6 +21,7 @@ BLIND_TICKS: Final = 125  # 0.25 s: a filter that starts anew has poses that agr
 MISSED_TICKS: Final = 10
 JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
+_HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be believed again
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 
 
@@ -141,13 +141,18 @@ def sensors_contradict(context: FailsafeContext, seconds: float) -> bool:
 
 
 def imu_alone_is_lost(context: FailsafeContext) -> bool:
-    """In flight, the inertial unit was of no use for long, and no pose holds the attitude."""
+    """In flight, the inertial unit was of no use for a while, and no pose holds the attitude.
+
+    Satellites and rotors hold it for longer where only one half of the unit is lost.
+    """
     aiding, now_us = context.state.aiding, context.estimate.t_us
     if aiding.pose is Sensor.POSE and not is_unaided(context):
         return False
-    since = [one.since_us for one in aiding.lost if one.sensor is Sensor.IMU]
-    lasts = bool(since) and now_us - since[0] > 1e6 * UNDECIDED
-    return lasts and context.state.vehicle.flies
+    return context.state.vehicle.flies and any(
+        one.sensor is Sensor.IMU
+        and now_us - one.since_us > (0 if one.fault is SensorFault.STALE else _HALF_LOST_US)
+        for one in lost_sensors(context)
+    )
 
 
 def tilt_is_lost(context: FailsafeContext) -> bool:

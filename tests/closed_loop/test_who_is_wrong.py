@@ -1,0 +1,39 @@
+"""An inertial unit that is wrong in some way, drawn at random, beside a wall."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sitl.faults.keys import Fault
+from sitl.scenario_file import parse_scenario
+from studies.fault_matrix.flights import beside_the_wall_text
+from tests.closed_loop.harness import ARM, Flight, command
+
+SECONDS = 9.0  # from the fault on; a landing takes five
+
+in_long = pytest.mark.long
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("suite", ["mocap", "vio", "rtk"])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=in_long) for k in range(1, 20))])
+def test_whatever_is_wrong_with_it_is_told_and_nothing_is_touched(suite: str, seed: int) -> None:
+    random = np.random.default_rng((seed, len(suite)))
+    fault = Fault(
+        unit=random.choice(["gyro", "accel"]),
+        kind=random.choice(["stuck", "garbage", "wrong"]),
+        start_s=float(random.uniform(4.0, 6.0)),
+        axis=float(random.integers(0, 4)),
+        size=float(random.choice([-1.0, 1.0]) * random.uniform(1.0, 5.0)),
+    )
+    scenario = parse_scenario(beside_the_wall_text("airborne", "none"), "wall", suite)
+    flight = Flight(replace(scenario, faults=(fault,)), seed=900 + seed)
+    flight.step(command(ARM, 1.0, 21196.0))
+    flight.run(fault.start_s)
+    said = len(flight.texts)
+    flight.run(SECONDS)
+    assert flight.sim.ended is None, f"{fault}: {flight.sim.ended}"
+    assert len(flight.texts) > said, f"{fault} is told"
