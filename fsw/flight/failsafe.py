@@ -230,8 +230,8 @@ FAILSAFES: Final = (
         lambda c: wording.suspects(c) if c.state.aiding.disputed_us else wording.lost_sensor(c),
         of_vehicle=True,
         slow=True,
-        detected="in flight, sensors have contradicted each other for 2 s; or the inertial unit was "
-        "of no use for so long, and no pose holds the attitude",
+        detected="in flight, sensors have contradicted each other for 2 s; or the inertial unit "
+        "was of no use for so long, and no pose holds the attitude",
         within_us=_TWICE,
         does="land",
     ),
