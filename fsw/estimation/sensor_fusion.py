@@ -234,17 +234,21 @@ class SensorFusion:
         samples: Sequence[Sample],
         now: float,
         estimate: StateEstimate | None,
+        *,
+        aloft: bool = True,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
 
         The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
         there is nothing to fuse the state is the ``estimate`` of ``take_in``. Every 20 ms it is
-        asked whether all sensors agree.
+        asked whether all sensors agree, unless the vehicle is so low that the ground may hold it.
         """
         memory, found = self._caught_up(memory, samples, now, estimate)
         evidence = memory.verdict.evidence
         if not memory.started or found is None or evidence is None:
             return self._with_evidence(memory) if memory.started else memory, found
+        if not aloft:
+            return _near_the_ground(memory), found
         if now - evidence[0]["looked"] < redundancy.EVERY - _EYE:
             return memory, found
         return self._looked(memory, now, found)
@@ -717,6 +721,17 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         trail=None,
         trail_before=None,
     )
+
+
+def _near_the_ground(memory: FusionMemory) -> FusionMemory:
+    """The memory without what has been compared so far: rotors do not explain what legs feel."""
+    evidence, verdict = memory.verdict.evidence, memory.verdict
+    if evidence is None or not (evidence[0]["count"] or verdict.is_on):
+        return memory
+    x = memory.numbers.copy()
+    x["suspect"] = 0
+    verdict = verdict.acquitted()._replace(evidence=np.zeros(1, EVIDENCE))
+    return memory._replace(numbers=x, verdict=verdict, trail=None, trail_before=None)
 
 
 def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:

@@ -38,6 +38,7 @@ _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held 
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
+_LOW = 0.1  # m of the legs above the ground, below which they may touch it
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
@@ -129,7 +130,8 @@ class SensedState:
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
-        memory, found = self._fusion.catch_up(memory, inputs.samples, now, known)
+        aloft = self._is_aloft(state, now)
+        memory, found = self._fusion.catch_up(memory, inputs.samples, now, known, aloft=aloft)
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
@@ -168,6 +170,19 @@ class SensedState:
         report = estimator_report(memory, covariance, lasting, estimate, memory.now, self._stale)
         drifted = math.sqrt(max(0.0, *covariance.diagonal()[P : P + 3].tolist()))
         return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
+
+    def _is_aloft(self, state: FlightState, now: float) -> bool:
+        """Whether the vehicle flies so high at ``now`` [s] that its legs cannot touch the ground.
+
+        By the rangefinder where there is one: the estimate may be what is wrong.
+        """
+        estimate, vehicle = state.estimate, state.vehicle
+        if estimate is None or not vehicle.flies:
+            return False
+        legs, seen = self._cascade.law.airframe.leg_length, vehicle.range
+        if seen is not None and 0.0 <= now - seen.time < self._stale:
+            return seen.distance * estimate.R_WB[8] - legs > _LOW
+        return -estimate.p_WB[2] - legs > _LOW
 
     def _told(
         self,
