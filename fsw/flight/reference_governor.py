@@ -316,7 +316,10 @@ class ReferenceGovernor:
         safe_set: SafeSet,
         lowest: float = -math.inf,
     ) -> EndEffectorTarget:
-        """The target from outside of this instant; the others as in ``limit_external``."""
+        """The target from outside of this instant.
+
+        ``p_WE`` [m, NED], ``v_WE`` [m/s, NED] and ``lowest`` [m, NED] as in ``limit_external``.
+        """
         floor, highest, fastest = self._limits_from(lowest)
         if (
             highest <= target.p_WE[2] <= floor
