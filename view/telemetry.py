@@ -95,6 +95,8 @@ class Telemetry:
     refusals: deque[str] = field(default_factory=lambda: deque(maxlen=20))
     """Critical texts, the reasons of refusals among them."""
     at: float = math.nan  # s, on the listener's clock, of the newest message
+    left_out: int = 0  # zones that cannot be shown, each time that they were sent
+    _unshown: dict[int, str] = field(default_factory=dict)  # what was listed of them, by index
     _values: dict[int, tuple[float, tuple[Any, ...]]] = field(default_factory=dict)
     _timings: dict[int, Timing] = field(default_factory=dict)
     _zones: dict[int, Zone] = field(default_factory=dict)
@@ -243,7 +245,10 @@ class Telemetry:
     def _forget(self) -> None:
         """Know nothing any more of a flight that is over; its messages and events stay listed."""
         self.t, self._safe_set, self._mode, self._plan, self._led = math.nan, None, "", None, None
-        for kept in (self._values, self._timings, self._zones, self._pieces, self._conditions):
+        for kept in (
+            *(self._values, self._timings, self._zones, self._unshown, self._pieces),
+            self._conditions,
+        ):
             kept.clear()
 
     def read_zone(self, values: tuple[Any, ...]) -> None:
@@ -252,8 +257,13 @@ class Telemetry:
             self._zones, self._safe_set = {}, SafeSet()
             self.whole_sets += 1
             return
-        indexed = decode.obstacle_shape(cast("tuple[float, ...]", values))
+        index, problem = int(values[23]), "it is of no known kind or has no place in its set"
+        try:
+            indexed = decode.obstacle_shape(cast("tuple[float, ...]", values))
+        except decode.RefusedError as error:
+            indexed, problem = None, str(error)
         if indexed is None:
+            self._leave_out(index, f"zone {index + 1} is not shown: {problem}")
             return
         if any(index >= indexed.count for index in self._zones):
             self._zones.clear()
@@ -261,6 +271,13 @@ class Telemetry:
         if len(self._zones) == indexed.count:
             self._safe_set = SafeSet(tuple(self._zones[k] for k in range(indexed.count)))
             self.whole_sets += indexed.index == indexed.count - 1
+
+    def _leave_out(self, index: int, sentence: str) -> None:
+        """Count a zone that cannot be shown; what is said again and again is listed once."""
+        self.left_out += 1
+        if self._unshown.get(index) != sentence:
+            self._unshown[index] = sentence
+            self.note(EventKind.WARNING, sentence)
 
     def read_beat(self, values: tuple[Any, ...]) -> None:
         """Take a HEARTBEAT."""

@@ -61,6 +61,8 @@ class TlogFlight:
         heard = sum(one.count for one in telemetry.heard.values())
         self.unusable: tuple[str, ...] = ()
         self.facts: tuple[tuple[str, str], ...] = (("file", str(path)), ("messages", f"{heard}"))
+        if telemetry.left_out:
+            self.facts += (("zones not shown", f"{telemetry.left_out} messages"),)
         self.events = tuple(
             one if math.isfinite(one.t) else one._replace(t=self.begin) for one in telemetry.events
         )

@@ -411,6 +411,7 @@ class Commander:
             mode_origin=origin.p_WE,
             mode_yaw=origin.yaw,
             mode_begin_us=estimate.t_us,
+            is_up=False,
             failsafe_from=vehicle.failsafe_from if completed else None,
         )
         if not vehicle.armed:

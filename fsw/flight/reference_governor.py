@@ -292,27 +292,51 @@ class ReferenceGovernor:
         return limit_reference(targets, p_WE, v_WE, safe_set, self._barrier)
 
     def limit_external(
-        self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
+        self,
+        targets: tuple[EndEffectorTarget, ...],
+        p_WE: Vec3,
+        v_WE: Vec3,
+        safe_set: SafeSet,
+        lowest: float = -math.inf,
     ) -> tuple[tuple[EndEffectorTarget, ...], str]:
         """The same of targets from outside, limited in height and speed, and why they were.
 
-        The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED].
+        The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED]; ``lowest``
+        [m, NED] is where it came up from, if it is on its way from below the lowest height.
         """
-        limited, left = _limit_all(targets, p_WE, v_WE, safe_set, self._barrier, self._limits)
-        return limited, self.reason(left)
+        limits = self._limits_from(lowest)
+        limited, left = _limit_all(targets, p_WE, v_WE, safe_set, self._barrier, limits)
+        return limited, self.reason(left, limits)
 
     def limit_now(
-        self, target: EndEffectorTarget, p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
+        self,
+        target: EndEffectorTarget,
+        p_WE: Vec3,
+        v_WE: Vec3,
+        safe_set: SafeSet,
+        lowest: float = -math.inf,
     ) -> EndEffectorTarget:
-        """The target from outside of this instant; ``p_WE`` [m, NED], ``v_WE`` [m/s] as above."""
-        lowest, highest, fastest = self._limits
+        """The target from outside of this instant.
+
+        ``p_WE`` [m, NED], ``v_WE`` [m/s, NED] and ``lowest`` [m, NED] as in ``limit_external``.
+        """
+        floor, highest, fastest = self._limits_from(lowest)
         if (
-            highest <= target.p_WE[2] <= lowest
+            highest <= target.p_WE[2] <= floor
             and norm(target.v_WE) <= fastest
             and norm(subtract(target.p_WE, p_WE)) <= _NEAR
         ):
             return target
-        return self.limit_external((target,), p_WE, v_WE, safe_set)[0][0]
+        return self.limit_external((target,), p_WE, v_WE, safe_set, lowest)[0][0]
+
+    def is_up(self, target: EndEffectorTarget) -> bool:
+        """Whether a target is at the lowest height or above: what came up from below is up."""
+        return target.p_WE[2] <= self._limits[0]
+
+    def _limits_from(self, lowest: float) -> Limits:
+        """The limits, with the lowest z [m, NED] no higher than ``lowest``."""
+        usual, highest, fastest = self._limits
+        return max(usual, lowest), highest, fastest
 
     def left_by(self, motion: MotionSetpoint) -> str:
         """Which limits of a generated setpoint a motion leaves, in words; empty: none.
@@ -327,11 +351,11 @@ class ReferenceGovernor:
             left |= _HIGH
         if motion.v is not None and norm(motion.v) > fastest + _TOLD:
             left |= _FAST
-        return self.reason(left)
+        return self.reason(left, self._limits)
 
-    def reason(self, left: int) -> str:
-        """Which limits have been left, in words; empty: none."""
-        lowest, highest, fastest = self._limits
+    def reason(self, left: int, limits: Limits) -> str:
+        """Which of the ``limits`` have been left, in words; empty: none."""
+        lowest, highest, fastest = limits
         said = []
         if left & _LOW:
             said.append(f"a target is below {-lowest:.2f} m")

@@ -53,7 +53,8 @@ class ReferenceHorizon:
         p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
         safe_set, why = state.kept.safe_set, ""
         if mode.external_reference:
-            targets, why = self._governor.limit_external(targets, p_WE, v_WE, safe_set)
+            state, lowest = self._came_up(state, targets[0])
+            targets, why = self._governor.limit_external(targets, p_WE, v_WE, safe_set, lowest)
         else:
             targets = self._governor.limit_horizon(targets, p_WE, v_WE, safe_set)
             if goal is not None:
@@ -71,7 +72,19 @@ class ReferenceHorizon:
         if not mode.external_reference:
             return target
         p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
-        return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set)
+        _, lowest = self._came_up(state, target)
+        return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, lowest)
+
+    def _came_up(self, state: FlightState, target: EndEffectorTarget) -> tuple[FlightState, float]:
+        """The state, and the lowest z [m, NED] of a reference from outside besides the usual one.
+
+        One that takes off comes up from where its mode began. Once it was up it goes no lower.
+        """
+        vehicle = state.vehicle
+        if not vehicle.is_up and self._governor.is_up(target):
+            vehicle = replace(vehicle, is_up=True)
+            state = replace(state, vehicle=vehicle)
+        return state, -math.inf if vehicle.is_up else vehicle.mode_origin[2]
 
     def _generated(
         self,

@@ -67,6 +67,7 @@ class VehicleMemory:
     mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     mode_yaw: float = 0.0  # rad, there
     mode_begin_us: int = 0
+    is_up: bool = False  # whether the mode's reference was above the lowest height
     climb: float = 0.0  # m, of a takeoff
     conditions: tuple[Condition, ...] = ()  # that are active
     failsafe: FailsafeMemory = FailsafeMemory()  # what is being done about them

@@ -55,9 +55,6 @@ SUITES, AIR, FAULTS, MODELS = (
 # When the path of Case I has a second left to its nearest place to a wall: the front at 13, 53 and
 # 93 s, the right one at 18 and 78 s, the left one at 48 s.
 BESIDE_S: Final = (12.0, 17.0, 47.0, 52.0, 77.0, 92.0)
-# m/s² an axis, of wind that is cancelled: what the tube still has room for beside walls
-# (docs/concepts/tube.md).
-WIND_MAX: Final = 0.25
 _REST_S: Final = 5.0  # of the flight, after a fault that lasts no longer than two
 
 
@@ -294,12 +291,9 @@ def config_of(cell: Cell, settings: Settings) -> FlightConfig:
     config = replace(config, planner=planner, soft=False)
     if cell.section != AIR:
         return config
-    # Known are the joints' motors and that there may be wind, nothing else of air and actuators.
-    known = {
-        "JNT_ARMATURE": cell.flown.actuators.motor_inertia_kg_m2,
-        "TRK_WIND_MAX": WIND_MAX,
-    }
-    return tuned(config, tuple((BY_NAME[name].path, value) for name, value in known.items()))
+    # Known are the joints' motors, nothing else of air and actuators.
+    inertia = cell.flown.actuators.motor_inertia_kg_m2
+    return tuned(config, ((BY_NAME["JNT_ARMATURE"].path, inertia),))
 
 
 def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.vehicle import Vehicle, standing_vehicle
+from fsw.link.files.flight_logs import MARK
+from tests.interop.vehicle import Vehicle, parameter_file, standing_vehicle
 
 EARLIER = random.Random(4).randbytes(90 * 1000)  # of the size that ends with a full LOG_DATA
 
@@ -30,6 +31,7 @@ def stand(
                 earlier = folder / "earlier"
                 earlier.mkdir()
                 (earlier / "flight.tlog").write_bytes(EARLIER)
+                (earlier / MARK).write_bytes(bytes(parameter_file(folder)))  # of this vehicle
                 standing[pacing] = running.enter_context(standing_vehicle(folder, *pacing))
             return standing[pacing]
 

@@ -45,16 +45,21 @@ class Vehicle:
         return self.out.parent / "reported.txt"
 
 
+def parameter_file(folder: Path) -> Path:
+    """Where a vehicle with its logs in ``folder`` keeps its parameters: what marks its flights."""
+    return folder.resolve() / "vehicle.params"
+
+
 @contextlib.contextmanager
 def standing_vehicle(folder: Path, *pacing: str) -> Iterator[Vehicle]:
     """``pandion fly ground``, until the block ends.
 
     Args:
-        folder: For the logs; earlier flights may lie there.
+        folder: For the logs and parameters; earlier flights may lie there.
         *pacing: Options such as ``--realtime``.
     """
     vehicle = Vehicle(free_port(), free_port(), folder / "present")
-    reported, parameters = vehicle.reported, folder / "vehicle.params"
+    reported, parameters = vehicle.reported, parameter_file(folder)
     if pacing == FAST:
         lines = [f"1\t1\t{name}\t{value:g}\t9\n" for name, value in PATIENT.items()]
         parameters.write_text("# Pandion\n" + "".join(lines), encoding="ascii")

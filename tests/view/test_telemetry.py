@@ -124,6 +124,33 @@ def test_a_safe_set_that_is_gone_is_not_shown() -> None:
     assert telemetry.scene(0.0).safe_set == SafeSet()
 
 
+@pytest.mark.parametrize(
+    ("field", "number", "words"),
+    [
+        (1, 11.0, "clearance of 11 m"),  # what is announced is within 10 m
+        (1, math.nan, "clearance of nan m"),
+        (2, 1e9, "moves at"),
+        (5, math.inf, "half-space refused: "),
+        (25, 99, "no known kind"),
+        (23, 200, "no place in its set"),
+    ],
+)
+def test_a_zone_that_nobody_can_believe_is_counted_and_listed_once(
+    field: int, number: float, words: str
+) -> None:
+    """A viewer shows what a log or a peer says; whoever says it may say anything."""
+    telemetry = Telemetry()
+    take(telemetry, *everything())
+    first = messages_now(ids.OBSTACLE_SHAPE, 0.0, FLYING, CONTEXT)[0]
+    bad = replace(first, values=(*first.values[:field], number, *first.values[field + 1 :]))
+    for _ in range(3):
+        take(telemetry, bad)
+    assert telemetry.left_out == 3
+    (said,) = [event.text for event in telemetry.events if "not shown" in event.text]
+    assert words in said
+    assert telemetry.scene(0.0).safe_set == WALLS
+
+
 def test_half_a_safe_set_does_not_replace_a_whole_one() -> None:
     telemetry = Telemetry()
     take(telemetry, *everything())

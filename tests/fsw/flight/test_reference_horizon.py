@@ -145,6 +145,37 @@ def test_a_reference_from_outside_is_governed_and_one_of_the_vehicles_own_is_not
     assert max(target.p_WE[0] for target in behind) == pytest.approx(0.2)
 
 
+class UpAndDown(FlightMode):
+    """From outside: at rest on the ground, up past the lowest height, and to the ground again."""
+
+    mode = Mode.MISSION
+    px4 = Px4Mode(0)
+    external_reference = True
+
+    def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        t = 1e-6 * t_us
+        up = 0.5 * min(max(t - 1.0, 0.0), max(6.0 - t, 0.0))
+        x, y, z = state.vehicle.mode_origin
+        return still_at((x, y, z - up), t_us, 0.0)
+
+
+def test_a_reference_that_comes_up_from_the_ground_is_limited_once_it_was_up() -> None:
+    mode = UpAndDown(CONFIG)
+    origin, _ = point_in_flight(vehicle_at((0.0, 0.0, GROUND_Z)), CONFIG.airframe.link_length)
+    state = flying(Mode.MISSION, mode_origin=origin)
+    for t_us in range(0, 6_000_000, CONFIG.mpc_period_us):
+        up = origin[2] - mode.reference(state, t_us).p_WE[2]
+        estimate = vehicle_at((0.0, 0.0, GROUND_Z - up))
+        state, (targets, _) = HORIZON(mode, state, estimate, t_us)
+        shown = HORIZON.target(mode, state, estimate, t_us)
+        if t_us < 3_500_000:  # on the ground and on the way up nothing is changed, nor told
+            assert state.limited == ""
+            assert shown == mode.reference(state, t_us)
+            assert all(one == mode.reference(state, one.t_us) for one in targets)
+    assert "below 0.40 m" in state.limited
+    assert -targets[-1].p_WE[2] == pytest.approx(-shown.p_WE[2]) == pytest.approx(0.4, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("mode", "governed"), [(Mission, True), (Trajectory, True), (Takeoff, False), (Hold, False)]
 )

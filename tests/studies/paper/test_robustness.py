@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.control.tube import beyond_covered
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.parameters.registry import BY_NAME
 from fsw.signals import SensorFrame
 from sitl.mission_clock import MissionClock
 from sitl.scenario import AirKeys
@@ -133,9 +135,12 @@ def test_real_air_has_every_effect() -> None:
     assert min(actuators.dead_time_ms, actuators.battery_a_h, actuators.backlash_deg) > 0.0
     config = config_of(row, Settings())
     assert config.airframe.joint_armature == actuators.motor_inertia_kg_m2 > 0.0
-    room = stand_off(config.planner.walls)
-    reach = base_reach(loop_tube(config), config.surroundings)
-    assert room - 0.005 < reach < room, "all the wind that the tube has room for, and no more"
+    wind, loop = config.tuning.tracking.wind_limit, loop_tube(config)
+    assert wind == BY_NAME["TRK_WIND_MAX"].default, "as every vehicle flies, not tuned for the row"
+    room, reach = stand_off(config.planner.walls), base_reach(loop, config.surroundings)
+    grown, _ = beyond_covered(loop, (wind, 0.0))
+    assert grown == pytest.approx(loop.wind_beyond)
+    assert reach < room < reach + grown, "what the plan has no room for, clearances grow by"
     assert Job("full", replace(row.flown, disturbances=()), config_of(row, Settings()), 1).random
 
 
