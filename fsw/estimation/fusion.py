@@ -43,10 +43,7 @@ _DOUBTED_RATE = 0.5  # rad/s
 # from what differences of innovations are beyond which are expected.
 _SCALE_RATE = 0.06
 _SCALE_MOST = 6.0
-_SCALE_FROM = 1.5
-# A place may be noisier than it states, by so much in variance, until its innovations have told:
-# two poses 8 ms apart make a velocity of their noise.
-SCALE_AT_START = 9.0
+_SCALE_FROM = 2.0
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
 

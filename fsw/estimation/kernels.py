@@ -298,7 +298,7 @@ def _begin(
     M[BARO, BARO] = t.baro_bias * t.baro_bias
     M[DELAY, DELAY] = t.pose_delay_sigma * t.pose_delay_sigma
     s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose_delay, 0
-    s.noise_scale[fusion.POSE] = fusion.SCALE_AT_START
+    s.noise_scale[fusion.POSE] = t.pose_noise_at_start * t.pose_noise_at_start
     s.time = time - t.pose_delay
     while s.first < s.end - 1 and s.imu[s.first % IMU_CAPACITY, TIME] <= s.time:
         s.first += 1

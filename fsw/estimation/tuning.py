@@ -58,6 +58,9 @@ class EstimatorTuning:
     # The least standard deviations that sensors are believed, or theirs where they state none.
     position_floor: float = 2e-3  # m, of a pose; no motion capture is better while it flies
     attitude_floor: float = 1e-3  # rad
+    # Times its deviation that a pose's place may be noisy at the start, until innovations have
+    # told: two poses 8 ms apart make a velocity of their noise.
+    pose_noise_at_start: float = 3.0
     gnss_position_floor: float = 0.01  # m
     gnss_velocity_floor: float = 0.1  # m/s
     pressure_floor: float = 0.2  # m: noise of a small barometer, 0.1 m, and gusts

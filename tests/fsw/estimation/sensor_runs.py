@@ -165,6 +165,7 @@ _QUIET = EstimatorTuning(
     accel_bias_walk=1e-3,
     gyro_bias_walk=5e-5,
     position_floor=2e-4,
+    pose_noise_at_start=1.0,
 )
 MOCAP = Suite(_QUIET, pose=PoseSensor(120.0, 0.015, 5e-4, np.radians(0.2)))
 VIO = Suite(
@@ -173,6 +174,7 @@ VIO = Suite(
         gyro_noise=3e-4,
         accel_bias_walk=1e-3,
         gyro_bias_walk=5e-5,
+        pose_noise_at_start=1.0,
     ),
     pose=PoseSensor(30.0, 0.045, 3e-3, np.radians(0.5), drift=5e-3, turn=np.radians(0.05)),
 )
