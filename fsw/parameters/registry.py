@@ -520,6 +520,7 @@ NO_PARAMETERS: Final[dict[str, str]] = {
     "estimator.lost_": "what the airframe does while the inertial unit is lost",
     "estimator.modelled_": "the same where the rotors' commands stand in for it",
     "estimator.velocity": "of use in the first second alone",
+    "estimator.pose_noise_at_start": "of use in the first second alone",
     "estimator.start_heading": "of use in the first second alone",
     "estimator.baro_bias": "the weather",
     "estimator.pose_delay_walk": "of clocks",
