@@ -92,7 +92,7 @@ _SOURCES: Final = {
     GnssSample: Source.GNSS,
     MagneticSample: Source.COMPASS,
 }
-_EYE: Final = 1e-9  # s
+_ROUNDING: Final = 1e-9  # s
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
@@ -249,7 +249,7 @@ class SensorFusion:
             return self._with_evidence(memory) if memory.started else memory, found
         if not aloft:
             return _near_the_ground(memory), found
-        if now - evidence[0]["looked"] < redundancy.EVERY - _EYE:
+        if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
             return memory, found
         return self._looked(memory, now, found)
 
@@ -366,7 +366,7 @@ class SensorFusion:
             numbers[name] = x[name]
         numbers["believed"] = believed
         verdict = memory.verdict._replace(evidence=None)
-        back = back._replace(numbers=numbers, verdict=verdict, started=back.started)
+        back = back._replace(numbers=numbers, verdict=verdict)
         for trail in trails:
             for samples, time, u, model, silent in trail.inputs():
                 back, state = self.take_in(back, samples, time, u, None, model, silent=silent)
