@@ -35,9 +35,6 @@ _BELIEVED: Final = (1.0, 0.3)  # m/s, rad/s
 _ANNOUNCED: Final = (0.5, 0.2)  # m, rad
 
 
-_PLACES: Final = (PoseSample, GnssSample)
-
-
 class Run(NamedTuple):
     """Samples of one kind in a row that were refused and agree; times are those of the samples."""
 
@@ -62,8 +59,9 @@ class Run(NamedTuple):
 
         Where the sensor has ``announced`` that it jumps, by little, two samples are enough.
         """
-        parts = self.innovation[:3], self.innovation[3:] if self.kind is PoseSample else ()
-        sizes = [norm(part) for part in parts] if self.kind in _PLACES else [0.0, 0.0]  # type: ignore[arg-type]
+        place = self.innovation[:3] if self.kind in (PoseSample, GnssSample) else ()
+        turn = self.innovation[3:] if self.kind is PoseSample else ()
+        sizes = [math.hypot(*place), math.hypot(*turn)]
         if announced:
             least = 0.0
             if all(size <= most for size, most in zip(sizes, _ANNOUNCED, strict=True)):
