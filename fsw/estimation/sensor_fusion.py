@@ -304,8 +304,7 @@ class SensorFusion:
         ratios = tuple(evidence[0]["ratio"].tolist())
         verdict = verdict._replace(evidence=evidence, seen=tuple(seen))
         if before.is_on or before.wrong or max(ratios) > 1.0:
-            pose = memory.of(Sensor.POSE).came
-            held = now - pose <= self.tuning.stale_time and not before.wrong & Source.POSE
+            held = Source.POSE in self._aided(memory, now)
             verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held, lost=lost)
         memory = memory._replace(verdict=verdict)
         state: StateEstimate | None = found
@@ -328,6 +327,14 @@ class SensorFusion:
         assert isinstance(sample, MagneticSample)
         return True, time, sample.field, NO_TURN, self.tuning.mag_noise, 0.0
 
+    def _aided(self, memory: FusionMemory, now: float) -> Source:
+        """Who measures places at ``now`` [s] and is not named."""
+        found = NOBODY
+        for sensor, source in ((Sensor.POSE, Source.POSE), (Sensor.GNSS, Source.GNSS)):
+            if now - memory.of(sensor).came <= self.tuning.stale_time:
+                found |= source
+        return found & ~memory.verdict.wrong
+
     def _convicted(
         self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -342,7 +349,8 @@ class SensorFusion:
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
-            _widen(x[0]["covariance"], verdict.accused & ~before.accused)
+            if self._aided(memory, now):  # else nothing would find the bias, and all would be lost
+                _widen(x[0]["covariance"], verdict.accused & ~before.accused)
         if not (new or believes):
             return memory, found
         x["believed"] = NOTHING if believes else 0
