@@ -87,6 +87,7 @@ _SUSPECTED_SPEED: Final = 0.3  # m/s
 _SUSPECTED_RATE: Final = 0.5  # rad/s
 _SUSPECTED_TURN: Final = 0.03  # rad
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
+_UNIT: Final = Source.GYRO | Source.ACCELEROMETER
 _SOURCES: Final = {
     PoseSample: Source.POSE,
     GnssSample: Source.GNSS,
@@ -296,13 +297,12 @@ class SensorFusion:
         for sample, last in zip(newest, before.seen, strict=True):
             aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
             seen.append(sample)
-        lost = _lost(memory, before, now)
+        verdict = before.hearing_nothing_of(_silent(memory, now), now)
+        lost = verdict.lost(now) | _stuck(memory)
         learns = not (before.is_on or before.wrong or lost)
         redundancy.look(evidence, memory.numbers, now, *aids, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
-        verdict = before._replace(evidence=evidence, seen=tuple(seen))
-        if now - memory.imu_came > IMU_TOO_OLD:
-            verdict = verdict._replace(lost_until=now + redundancy.WINDOWS[-1])
+        verdict = verdict._replace(evidence=evidence, seen=tuple(seen))
         if before.is_on or before.wrong or max(ratios) > 1.0:
             pose = memory.of(Sensor.POSE).came
             held = now - pose <= self.tuning.stale_time and not before.wrong & Source.POSE
@@ -346,7 +346,7 @@ class SensorFusion:
         if not (new or believes):
             return memory, found
         x["believed"] = NOTHING if believes else 0
-        if new & (Source.GYRO | Source.ACCELEROMETER):
+        if new & _UNIT:
             memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
         return self._replayed(memory, now, found)
 
@@ -663,13 +663,12 @@ class SensorFusion:
         shown = innovation if len(ratio) > 1 else innovation[:1]
         health = health.with_fused(fused, ratio, shown)
         counter, memory = memory.reset_counter, memory.after(one, health, runs)
-        if announced and run is not None and not run.is_confirmed:
+        believed = run is not None and run.is_believable(
+            self.tuning.reset_time, announced=announced
+        )
+        if announced and run is not None and not believed:
             memory = memory._replace(reset_counter=counter)
-        if (
-            run is not None
-            and max(ratio) > 1.0
-            and (run.is_confirmed if announced else run.is_believable(self.tuning.reset_time))
-        ):
+        if believed and max(ratio) > 1.0:
             memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
@@ -748,10 +747,20 @@ def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
     return memory._replace(trail_before=newest, trail=Trail(start, now))
 
 
-def _lost(memory: FusionMemory, verdict: Verdict, now: float) -> Source:
-    """What says nothing of how the vehicle moves, because it is silent or stuck."""
-    if now < verdict.lost_until:
-        return Source.GYRO | Source.ACCELEROMETER
+def _silent(memory: FusionMemory, now: float) -> Source:
+    """What has said nothing of how the vehicle moves at ``now`` [s].
+
+    Rotors explain it only where it is known how the arm moves.
+    """
+    unit = now - memory.imu_came > IMU_TOO_OLD
+    encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
+    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault is not SensorFault.SELDOM
+    arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
+    return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
+
+
+def _stuck(memory: FusionMemory) -> Source:
+    """Halves of the inertial unit that repeat themselves."""
     found, same = NOBODY, memory.numbers[0]["same"]
     for place, (source, _) in enumerate(_HALVES):
         if same[place] >= STUCK_READINGS:

@@ -33,6 +33,7 @@ from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.jump import moved_along
+from fsw.flight.land_detector import with_range
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
@@ -386,7 +387,7 @@ class Autopilot:
             state = self._believe(state, inputs, texts)
         ranges = [one for one in inputs.samples if type(one) is RangeSample]
         if ranges:
-            state = replace(state, vehicle=replace(state.vehicle, range=ranges[-1]))
+            state = replace(state, vehicle=with_range(state.vehicle, ranges[-1]))
         if inputs.battery is not None:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)

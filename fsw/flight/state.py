@@ -63,7 +63,8 @@ class VehicleMemory:
     moved_us: int = 0  # when the vehicle last moved, for the land detector
     # On contact with the ground rotors idle: since when, and the velocity down [m/s] at that time.
     unloaded: tuple[int, float] | None = None
-    range: RangeSample | None = None  # the rangefinder's last one
+    range: RangeSample | None = None  # of the rangefinder's last two the longer: dust is too close
+    range_newest: RangeSample | None = None
     mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     mode_yaw: float = 0.0  # rad, there
     mode_begin_us: int = 0
@@ -230,6 +231,7 @@ class Aiding(NamedTuple):
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
+    attitude_held: bool = True  # by inertial unit or pose; False: rotors' thrusts stand in
     disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
     suspects: str = ""  # of which one is wrong then
 
