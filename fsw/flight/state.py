@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from fsw.control.actuator_watch import Watch
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
-from fsw.estimation.frame_trust import FrameTrust
+from fsw.estimation.frame_dropout import Dropout
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.accuracy_watch import AccuracyMemory
@@ -241,6 +241,7 @@ class Aiding(NamedTuple):
 
 
 AIDED: Final = Aiding()
+COMPLETE: Final = Dropout()
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +275,7 @@ class FlightState:
     fusion: FusionMemory | None = None  # where sensors have times of their own
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
-    trust: FrameTrust = FrameTrust()  # where states are exact
+    dropout: Dropout = COMPLETE  # where states are exact
     kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)
