@@ -7,15 +7,20 @@ meanwhile is there when the flight software goes on.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
+from fsw.measurements import Sample
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
-from fsw.signals import Plan, PlanFailure, TickInputs, TickOutputs
+from fsw.signals import (
+    EndEffectorTarget,
+    Plan,
+    PlanFailure,
+    SafeSetAnnouncement,
+    TickInputs,
+)
 from sitl.result import EndKind
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US, Controls, Simulation
@@ -56,7 +61,6 @@ def fly_paused(
     *,
     sensors: str = "mocap",
     planner_only: bool = False,
-    stand_in: Callable[[Any], StandIn] = StandIn,
 ) -> Outcome:
     """Fly a scenario until ``AFTER_S`` [s] after a pause of ``pause_s`` [s] at ``at_s`` [s]."""
     flown = load_scenario(scenario, sensors)
@@ -68,22 +72,28 @@ def fly_paused(
     stands = (begin * STEP_US + start_us, (end if planner_only else begin) * STEP_US + start_us)
     planner, autopilot = StandingPlanner(inner, *stands), Autopilot(config)
     loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
-    drives, outcome = stand_in(simulation.vehicle), Outcome()
+    drives, outcome = StandIn(simulation.vehicle), Outcome()
     sent = Controls((0.0,) * 4, (0.0, 0.0), armed=False)
-    waiting: dict[str, tuple[Any, ...]] = {"targets": (), "announced": (), "samples": ()}
+    targets: tuple[EndEffectorTarget, ...] = ()
+    announced: tuple[SafeSetAnnouncement, ...] = ()
+    samples: tuple[Sample, ...] = ()
     while simulation.ended is None and simulation.time_s < at_s + pause_s + AFTER_S:
         step = simulation.step
-        sensed, samples = loop.observe()
-        came = {"targets": loop.targets(), "announced": loop.announced(), "samples": samples}
-        waiting = {name: (*waiting[name], *new) for name, new in came.items()}
+        sensed, measured = loop.observe()
+        targets += loop.targets()
+        announced += loop.announced()
+        samples += measured
         if begin <= step < end and not planner_only:
             held_s = (step + 1 - begin) * _STEP_S
             simulation.advance(drives.applied(sent, held_s, simulation.healthy()))
         else:
             commands = FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else ()
-            inputs = TickInputs(sensed, planner.take(sensed.t_us), commands=commands, **waiting)
-            waiting = dict.fromkeys(waiting, ())
-            outputs: TickOutputs = loop.step(inputs)
+            plan = planner.take(sensed.t_us)
+            inputs = TickInputs(
+                sensed, plan, commands, targets=targets, announced=announced, samples=samples
+            )
+            targets, announced, samples = (), (), ()
+            outputs = loop.step(inputs)
             sent = loop.controls(outputs.actuators, armed=outputs.snapshot.armed)
             drives.applied(sent, 0.0, simulation.healthy())
             outcome.texts += [(simulation.time_s, one.text) for one in outputs.texts]
