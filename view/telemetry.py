@@ -218,7 +218,9 @@ class Telemetry:
         names = [_margin_name(k, count, self._safe_set) for k in range(count)]
         margins = tuple(Margin(n, values[1 + k], values[17 + k]) for k, n in enumerate(names))
         added = max(values[42:58], default=0.0)
-        return margins, values[34], added, Safety(*values[39:42], refusals=refusals)
+        breaches, departures, interventions = values[39:42]
+        safety = Safety(breaches, departures, interventions, refusals)
+        return margins, values[34], added, safety
 
     def _sigma(self) -> Vec3 | None:
         values = self._newest(ids.ESTIMATOR_STATUS, lasts=3.0)

@@ -13,6 +13,7 @@ from typing import Final
 
 from fsw.control.cascade import CascadeMemory
 from fsw.control.joints import joints_at_rest
+from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.flight.plan_exchange import measured_state, with_arm_in_bounds, without_plan
 from fsw.flight.state import FlightState
 from fsw.frozen import replace
@@ -21,7 +22,8 @@ from fsw.model.rotors import MotionState
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import StateEstimate, TickInputs
 
-READ_LATE_US: Final = 10_000  # since the last tick; readings of longer ago are taken one by one
+# Since the last tick. The filter takes what is so old at once, and nothing that is older.
+READ_LATE_US: Final = round(1e6 * IMU_TOO_OLD)
 _STEP_US: Final = 4_000  # in which they are: the filter has room for more, but takes it for jitter
 
 
