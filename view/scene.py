@@ -78,6 +78,7 @@ class Safety(NamedTuple):
     breaches: int = 0
     departures: int = 0
     interventions: int = 0
+    refusals: int = 0  # of what was announced, streamed or uploaded, each message counted
 
 
 _SAFE = Safety()

@@ -210,13 +210,17 @@ class Telemetry:
 
     def _margins(self) -> tuple[tuple[Margin, ...], float, float, Safety]:
         values = self._newest(ids.BARRIER_MARGIN, lasts=2.0 * _SHORT_S)
+        setpoints = self._newest(ids.SETPOINT_STATUS)
+        refusals = 0 if setpoints is None else setpoints[5]
         if values is None:
-            return (), math.nan, math.nan, Safety()
+            return (), math.nan, math.nan, Safety(refusals=refusals)
         count = min(int(values[37]), 16)
         names = [_margin_name(k, count, self._safe_set) for k in range(count)]
         margins = tuple(Margin(n, values[1 + k], values[17 + k]) for k, n in enumerate(names))
         added = max(values[42:58], default=0.0)
-        return margins, values[34], added, Safety(*values[39:42])
+        breaches, departures, interventions = values[39:42]
+        safety = Safety(breaches, departures, interventions, refusals)
+        return margins, values[34], added, safety
 
     def _sigma(self) -> Vec3 | None:
         values = self._newest(ids.ESTIMATOR_STATUS, lasts=3.0)
@@ -447,6 +451,7 @@ _READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
     ids.ARM_JOINT_STATE: _clock(us=True),
     ids.END_EFFECTOR_TARGET: _nothing,
     ids.BARRIER_MARGIN: _clock(us=True),
+    ids.SETPOINT_STATUS: _nothing,
     ids.MPC_STATUS: _nothing,
     ids.LOOP_TIMING: Telemetry.read_timing,
     ids.OBSTACLE_SHAPE: Telemetry.read_zone,

@@ -116,7 +116,7 @@ TELLING: dict[int, dict[str, Any]] = {
     ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
     ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
     ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
-    ids.SETPOINT_STATUS: {"accepted": 5, "refused": 2, "age_us": 40_000, "kind": 0},
+    ids.SETPOINT_STATUS: {"accepted": 5, "refused": 2, "age_us": 40_000, "kind": 0, "refusals": 4},
     ids.BARRIER_MARGIN: {
         "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
         "active_mask": 0b010, "slack_max": 0.25,
