@@ -95,7 +95,7 @@ _LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
 _MODEL_SIGMAS: Final = 5.0  # of them, that are nominal
 _NOISE_SIGMAS: Final = 4.0  # of the noise of measurements
-_BEND_SIGMAS: Final = 5.5  # the same of places' second differences, of which two in a row share much
+_BEND_SIGMAS: Final = 5.5  # the same of second differences of places: two in a row share noise
 # The least thresholds, by window [SI]. A gust is a force of 1 to 2 m/s^2 and no turn.
 _TURN_OFF: Final = 0.2  # rad/s
 _TURN_OFF_AIDED: Final = 0.15  # rad/s
