@@ -14,7 +14,7 @@ from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.parameters.float32 import nearest_decimal
+from fsw.parameters.param_type import value_of
 from fsw.signals import CommandResult, PlanInput, PredictionState, SafeSet, Vec3, Vec4, Zone
 from messages import dialect
 from messages.frames import Frame, wire_fields
@@ -324,12 +324,14 @@ class Telemetry:
 
     def read_parameter(self, values: tuple[Any, ...]) -> None:
         """Take a PARAM_VALUE."""
-        value, count, index, name, _ = values
+        field, count, index, name, type_ = values
+        value = value_of(field, type_)
         if index < count:
             self.parameter_count = count
         known = _text(name)
-        if known in self.parameters or len(self.parameters) < _MOST_PARAMETERS:
-            self.parameters[known] = nearest_decimal(value)
+        room = known in self.parameters or len(self.parameters) < _MOST_PARAMETERS
+        if room and value is not None:
+            self.parameters[known] = value
 
     def read_timing(self, values: tuple[Any, ...]) -> None:
         """Take a LOOP_TIMING."""

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME, PARAMETERS, Parameter
 from fsw.tuning import Tuning
 
@@ -70,13 +69,18 @@ class ParameterStore:
         """Every parameter in use, by name."""
         return self._values
 
+    def is_changing(self, name: str) -> bool:
+        """Whether a change of a parameter is under way, its value not decided yet."""
+        under_way = (*self._waiting, *((self._change,) if self._change is not None else ()))
+        return any(change.parameter.name == name for change in under_way)
+
     def restore(self, values: Mapping[str, float]) -> int:
         """Take values within their ranges over before the first tick; how many are not the default.
 
         Raises:
             ValueError: They contradict each other.
         """
-        wanted = self._values | {name: nearest_decimal(value) for name, value in values.items()}
+        wanted = self._values | {name: BY_NAME[name].kept(value) for name, value in values.items()}
         tuning = self._tuning(wanted)
         if tuning:
             self._prepare(tuning)
@@ -106,7 +110,7 @@ class ParameterStore:
         if refusal is not None:
             asker.changed[name] = None
             return refusal
-        self._waiting.append(_Change(parameter, nearest_decimal(value), asker))
+        self._waiting.append(_Change(parameter, parameter.kept(value), asker))
         return None
 
     def take_tuning(self) -> Tuning | None:

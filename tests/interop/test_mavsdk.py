@@ -69,7 +69,8 @@ def test_every_stream_of_telemetry_arrives(telemetry: Telemetry) -> None:
 def test_all_parameters_arrive_within_a_second(system: System) -> None:
     parameters = Param(system)
     tried = [seconds(parameters.get_all_params) for _ in range(3)]
-    listed = {each.name: each.value for each in parameters.get_all_params().float_params}
+    found = parameters.get_all_params()
+    listed = {each.name: each.value for each in (*found.float_params, *found.int_params)}
     assert listed == pytest.approx(LISTED | PATIENT, rel=1e-6, abs=1e-9)
     assert min(tried) < 1.0, tried
 

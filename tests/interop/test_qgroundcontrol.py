@@ -20,6 +20,7 @@ import pytest
 
 from fsw.link.events.event_table import event_document
 from fsw.parameters.metadata import metadata_crc, parameter_document
+from fsw.parameters.param_type import value_of
 from fsw.parameters.registry import PARAMETERS
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station
@@ -119,7 +120,9 @@ def test_its_parameters(station: Station) -> None:
     for message in station.messages(5.0):
         if message.get_type() == "PARAM_VALUE":
             if message.param_index != 65535:  # the checksum of all
-                found[message.param_id] = message.param_value
+                value = value_of(message.param_value, message.param_type)
+                assert value is not None
+                found[message.param_id] = value
             if len(found) == message.param_count:
                 break
     station.took["parameters"] = time.monotonic() - begin
