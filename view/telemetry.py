@@ -49,6 +49,8 @@ _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
 _WARNING: Final = 4  # MAV_SEVERITY
+# Of SYS_STATUS, as fsw.link.wire.encode_health has them.
+_LOSSES: Final = ("damaged", "echoes", "unsigned", "overflowed")
 
 
 @dataclass(slots=True)
@@ -157,6 +159,7 @@ class Telemetry:
             failures=self._failures(beat),
             battery=self._battery(),
             link_age=now - self.at,
+            dropped=self._dropped(),
             solver=None if solver is None else _solver(solver),
             timing=tuple(self._timings[group] for group in sorted(self._timings)),
             safety=safety,
@@ -230,6 +233,11 @@ class Telemetry:
         if values is None or values[12] < 0:
             return None
         return Battery(1e-3 * values[4], 0.01 * values[12])
+
+    def _dropped(self) -> str:
+        values = self._newest(ids.SYS_STATUS)
+        counts = (0,) * len(_LOSSES) if values is None else (values[7], *values[8:10], values[11])
+        return ", ".join(f"{n} {what}" for n, what in zip(counts, _LOSSES, strict=True) if n)
 
     def note(self, kind: EventKind, text: str) -> None:
         """Add an event of now."""

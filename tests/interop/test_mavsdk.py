@@ -172,7 +172,7 @@ def test_private_messages_are_read_with_our_xml(system: System, name: str) -> No
 
     direct.subscribe_message(name, note)
     assert done.wait(5.0)
-    assert heard[0].component_id == 191
+    assert heard[0].component_id == 25
     fields = json.loads(heard[0].fields_json)
     if name == "ARM_JOINT_STATE":
         assert all(abs(angle) < math.pi for angle in fields["position"])

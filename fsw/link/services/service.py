@@ -64,10 +64,15 @@ class Dispatch:
         self._polls = tuple(service.poll for service in services)
         self._bulky = tuple(service for service in services if isinstance(service, BulkService))
         self._sourced = tuple(one for one in services if isinstance(one, SourcedService))
-        self._wanting: dict[int, tuple[LinkService, ...]] = {}
+        self._wanting: dict[int, tuple[LinkService, ...]] = {}  # by message
         for service in services:
             for id_ in service.message_ids:
                 self._wanting[id_] = (*self._wanting.get(id_, ()), service)
+
+    @property
+    def message_ids(self) -> frozenset[int]:
+        """What any service wants to hear."""
+        return frozenset(self._wanting)
 
     def handle(self, frame: Frame, t_us: int, source: MessageSource | None = None) -> None:
         """Let every service that wants the frame answer it."""

@@ -90,6 +90,8 @@ JOINT_ENCODERS: Final = 60212
 
 SYSTEM_ID: Final = 1  # the vehicle
 AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1: speaks common.xml
-PANDION: Final = 191  # MAV_COMP_ID_ONBOARD_COMPUTER: speaks the dialect, with its own sequence
+# MAV_COMP_ID_USER1, for private use, so that no companion computer has it: speaks the dialect, with
+# its own sequence.
+PANDION: Final = 25
 PATH_PLANNER: Final = 195  # MAV_COMP_ID_PATHPLANNER: the scenario's pilot, on the simulator link
 SIMULATOR: Final = 200  # component of the simulated sensors, which also lets them fail
