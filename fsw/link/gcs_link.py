@@ -40,7 +40,13 @@ _MESSAGE_ID: Final = slice(7, 10)  # in a frame
 # Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
 # Neither remembered, for they would fill the memory and do nothing when they come back.
 _FILE_DATA: Final = frozenset(
-    id_.to_bytes(3, "little") for id_ in (message_ids.LOG_DATA, message_ids.FILE_TRANSFER_PROTOCOL)
+    id_.to_bytes(3, "little")
+    for id_ in (
+        message_ids.LOG_DATA,
+        message_ids.LOGGING_DATA,
+        message_ids.LOGGING_DATA_ACKED,
+        message_ids.FILE_TRANSFER_PROTOCOL,
+    )
 )
 
 
@@ -96,7 +102,7 @@ class GcsLink:
         self._context = context
         self._clock = clock
         self._record = record
-        self._commands = LinkCommands(self.rates, context)
+        self._commands = LinkCommands(self.rates, context, services)
         self._snapshot: FlightSnapshot | None = None
         self._speakers: dict[tuple[int, int], None] = {}  # the one heard last is the last
         self._housekeeping_us = 0

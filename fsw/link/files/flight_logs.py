@@ -106,6 +106,12 @@ class FlightLogs:
             (directory / MARK).write_bytes(own)
         self.all = flight_logs(directory, own)
 
+    @property
+    def present_ulog(self) -> DiskFile | None:
+        """The ULog of this flight; None if it writes none."""
+        files = (file for log in self.all if log.flight == self._present for file in log.files)
+        return next((file for file in files if file.path.suffix == ".ulg"), None)
+
     def erase(self) -> Erasure:
         """Begin to delete the logs of finished flights; from now on only this one is listed.
 

@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Sequence
 from typing import Final, cast
 
+from fsw.link.services.service import Outcome
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
@@ -23,7 +24,7 @@ from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.param_type import as_bytes, field_of, value_of
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.store import ParameterStore
-from fsw.signals import Severity, StatusText
+from fsw.signals import CommandRequest, CommandResult, Severity, StatusText
 from messages.frames import Frame
 
 BURST: Final = 10  # values at once: one datagram
@@ -33,6 +34,8 @@ _NO_INDEX: Final = 0xFFFF
 _BY_NAME: Final = -1  # in place of an index
 # MAV_PARAM_ERROR
 _DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY, _TYPE_UNSUPPORTED, _TYPE_MISMATCH = 1, 2, 5, 6, 7
+_PREFLIGHT_STORAGE: Final = 245  # MAV_CMD
+_LOAD, _SAVE, _RESET = 0.0, 1.0, 2.0  # its first parameter
 _HASH: Final = "_HASH_CHECK"  # what QGroundControl asks for, to see whether it knows all values
 _Peer = tuple[int, int]  # system and component
 # In the order of their index on the wire, which is that of their names: clients sort so too.
@@ -45,6 +48,7 @@ class ParameterService:
     """Parameters on one link."""
 
     message_ids = frozenset({ids.PARAM_REQUEST_READ, ids.PARAM_REQUEST_LIST, ids.PARAM_SET})
+    commands = frozenset({_PREFLIGHT_STORAGE})
 
     def __init__(self, store: ParameterStore) -> None:
         """Listen to a store that all links share."""
@@ -69,6 +73,21 @@ class ParameterService:
         wanted = cast("tuple[float, int, int, bytes, int]", frame.payload_values)
         value, _, _, text, type_ = wanted
         return self._set(_name(text), value, type_, asker)
+
+    def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
+        """PREFLIGHT_STORAGE: a change is stored when it is made, so only a reset is to be done."""
+        if armed:
+            return CommandResult.TEMPORARILY_REJECTED, "parameters not stored: the vehicle is armed"
+        wish = request.params[0]
+        if wish == _RESET:
+            refusal = self._store.reset(self._news)
+            if refusal is not None:
+                return CommandResult.TEMPORARILY_REJECTED, refusal
+            return CommandResult.ACCEPTED, "parameters reset to the values of the start"
+        if wish in (_LOAD, _SAVE):
+            return CommandResult.ACCEPTED, ""
+        known = "0 load, 1 save or 2 reset"
+        return CommandResult.DENIED, f"parameters not stored: param1 = {wish:g} must be {known}"
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
         """Report what has changed, and continue a list."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, Protocol, runtime_checkable
 
 from fsw.link.wire.outgoing import ServiceOutput
-from fsw.signals import MessageSource
+from fsw.signals import CommandRequest, MessageSource
 from messages.frames import Frame
 
 
@@ -47,6 +47,21 @@ class SourcedService(LinkService, Protocol):
     """A service whose answer depends on who asks."""
 
     source: MessageSource | None  # of the frame that is handled now
+
+
+Outcome = tuple[int, str]
+"""MAV_RESULT of a command, and in a sentence why it is refused."""
+
+
+@runtime_checkable
+class CommandedService(LinkService, Protocol):
+    """A service that carries out commands, which do not reach the tick then."""
+
+    commands: frozenset[int]  # MAV_CMD
+
+    def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
+        """Do it at once, or begin to."""
+        ...
 
 
 _BUSY_US: Final = 100_000  # after a question or an answer; the slowest pace is 20 ms

@@ -12,6 +12,7 @@ from typing import Any
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
+from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
@@ -151,6 +152,7 @@ def whole_vehicle(folder: Path) -> Iterator[Ground]:
         ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
         MissionService(MissionStore(Site(_nowhere, _as_it_is, lambda: 0.1, lambda *_: 0.0))),
         LogService(logs),
+        LogStreamService(logs),
         FtpService(vehicle_files(logs)),
         TimeService(),
     )

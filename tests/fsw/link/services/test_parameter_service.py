@@ -15,7 +15,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.param_type import field_of, value_of
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.store import ParameterStore
-from fsw.signals import StatusText
+from fsw.signals import CommandRequest, StatusText
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 from tests.fsw.parameters.test_store import ticks
@@ -375,3 +375,48 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
 
 def test_idle_it_says_nothing(service: ParameterService) -> None:
     assert service.poll(0) == ()
+
+
+def storage(service: ParameterService, wish: float, *, armed: bool = False) -> tuple[int, str]:
+    request = CommandRequest(245, (wish, *(float("nan"),) * 6), 255, 190)
+    return service.carry_out(request, 0, armed)
+
+
+@pytest.mark.parametrize(
+    ("wish", "armed", "result", "why"),
+    [
+        (0.0, False, 0, ""),
+        (1.0, False, 0, ""),
+        (2.0, False, 0, "parameters reset to the values of the start"),
+        (3.0, False, 2, "parameters not stored: param1 = 3 must be 0 load, 1 save or 2 reset"),
+        (float("nan"), False, 2, "parameters not stored: param1 = nan must be 0 load, 1 save or"),
+        (1.0, True, 1, "parameters not stored: the vehicle is armed"),
+        (2.0, True, 1, "parameters not stored: the vehicle is armed"),
+    ],
+)
+def test_storage_is_answered_as_px4_answers_it(
+    service: ParameterService, wish: float, armed: bool, result: int, why: str
+) -> None:
+    found, told = storage(service, wish, armed=armed)
+    assert found == result
+    assert told.startswith(why)
+
+
+def test_a_reset_changes_every_parameter_back_at_once_and_tells_every_link(
+    store: ParameterStore, service: ParameterService
+) -> None:
+    other = ParameterService(store)
+    for name, value in ((b"PID_YAW_P", 5.0), (b"NAV_DLL_ACT", 3.0)):
+        service.handle(setting(name, value), 0)
+        ticks(store)
+    for link in (service, other):
+        later(link, 3)
+    assert storage(service, 2.0)[0] == 0
+    assert service.handle(reading(b"PID_YAW_P"), 0) == (), "it is about to change"
+    assert len(ticks(store)) == 1, "one tick takes it whole"
+    assert store.values == store.defaults
+    for link in (service, other):
+        told = {value["param_id"] for value in later(link, 3)}
+        assert told == {b"PID_YAW_P", b"NAV_DLL_ACT"}
+    assert storage(service, 2.0)[0] == 0
+    assert ticks(store) == [], "nothing to reset"
