@@ -109,7 +109,12 @@ EXTERNAL := tests/interop/external
 	@cd .interop/node && npm ci --silent --no-audit --no-fund --ignore-scripts
 	@touch $@
 
-interop: setup .interop/mavproxy/ready .interop/node/ready ## fly by MAVProxy and node-mavlink (needs npm)
+.interop/companions/ready: $(EXTERNAL)/companions.lock | $(READY)
+	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .interop/companions
+	@$(UV) pip sync --quiet --python .interop/companions --require-hashes --only-binary :all: $<
+	@touch $@
+
+interop: setup .interop/mavproxy/ready .interop/companions/ready .interop/node/ready ## other people's clients (needs npm)
 	PANDION_INTEROP=.interop $(BIN)/pytest $(EXTERNAL)
 
 # Sphinx has an environment and a lock of its own; the API pages import the code from .venv.
@@ -174,11 +179,12 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 	@$(COMPILE) pyproject.toml --group dev --constraints requirements.lock \
 		--output-file requirements-dev.lock
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
+	@$(COMPILE) --group companions --output-file $(EXTERNAL)/companions.lock
 	@$(COMPILE) --group docs --constraints requirements-dev.lock --output-file requirements-docs.lock
 	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
 	@$(COMPILE) --group fuzz --no-deps --output-file $(FUZZ)/tool.lock
 	@git diff --stat -- requirements.lock requirements-dev.lock requirements-docs.lock \
-		$(EXTERNAL)/mavproxy.lock $(MUTATION) $(FUZZ)
+		$(EXTERNAL)/*.lock $(MUTATION) $(FUZZ)
 
 clean: ## remove the environment, generated files and caches
 	rm -rf .venv .boot .docs .interop .mutation .fuzz build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \

@@ -109,6 +109,7 @@ class Scene:
     failures: str = ""  # names of the active failsafes
     battery: Battery | None = None
     link_age: float = math.nan  # s since something came; NaN for a log
+    dropped: str = ""  # what the vehicle has dropped of all that it was sent
     solver: Solver | None = None
     timing: tuple[Timing, ...] = ()
     safety: Safety = _SAFE

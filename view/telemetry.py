@@ -14,7 +14,7 @@ from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.parameters.float32 import nearest_decimal
+from fsw.parameters.param_type import value_of
 from fsw.signals import CommandResult, PlanInput, PredictionState, SafeSet, Vec3, Vec4, Zone
 from messages import dialect
 from messages.frames import Frame, wire_fields
@@ -49,6 +49,8 @@ _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
 _WARNING: Final = 4  # MAV_SEVERITY
+# Of SYS_STATUS, as fsw.link.wire.encode_health has them.
+_LOSSES: Final = ("damaged", "echoes", "unsigned", "overflowed")
 
 
 @dataclass(slots=True)
@@ -157,6 +159,7 @@ class Telemetry:
             failures=self._failures(beat),
             battery=self._battery(),
             link_age=now - self.at,
+            dropped=self._dropped(),
             solver=None if solver is None else _solver(solver),
             timing=tuple(self._timings[group] for group in sorted(self._timings)),
             safety=safety,
@@ -234,6 +237,11 @@ class Telemetry:
         if values is None or values[12] < 0:
             return None
         return Battery(1e-3 * values[4], 0.01 * values[12])
+
+    def _dropped(self) -> str:
+        values = self._newest(ids.SYS_STATUS)
+        counts = (0,) * len(_LOSSES) if values is None else (values[7], *values[8:10], values[11])
+        return ", ".join(f"{n} {what}" for n, what in zip(counts, _LOSSES, strict=True) if n)
 
     def note(self, kind: EventKind, text: str) -> None:
         """Add an event of now."""
@@ -328,12 +336,14 @@ class Telemetry:
 
     def read_parameter(self, values: tuple[Any, ...]) -> None:
         """Take a PARAM_VALUE."""
-        value, count, index, name, _ = values
+        field, count, index, name, type_ = values
+        value = value_of(field, type_)
         if index < count:
             self.parameter_count = count
         known = _text(name)
-        if known in self.parameters or len(self.parameters) < _MOST_PARAMETERS:
-            self.parameters[known] = nearest_decimal(value)
+        room = known in self.parameters or len(self.parameters) < _MOST_PARAMETERS
+        if room and value is not None:
+            self.parameters[known] = value
 
     def read_timing(self, values: tuple[Any, ...]) -> None:
         """Take a LOOP_TIMING."""

@@ -29,7 +29,7 @@ STEP = PlanInput((0.5, 0.0, 0.0), 0.0, (0.0, 0.0))
 FLYING = replace(
     SNAPSHOT, safe_set=WALLS, mode=Mode.HOLD, plan=replace(SNAPSHOT.plan, inputs=(STEP,) * 5)
 )
-WRITERS = {component: FrameWriter(1, component) for component in (1, 191)}
+WRITERS = {component: FrameWriter(1, component) for component in (1, 25)}
 
 
 def take(telemetry: Telemetry, *sent: Outgoing, at: float = 0.0) -> None:

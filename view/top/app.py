@@ -238,6 +238,7 @@ def headline(scene: Scene) -> str:
     if scene.solver is not None:
         timed = "" if math.isnan(scene.solver.total) else f" in {1e3 * scene.solver.total:.1f} ms"
         parts.append(f"plan {scene.solver.status}{timed}")
+    parts += [f"dropped {scene.dropped}"] if scene.dropped else []
     return "  ".join(parts)
 
 

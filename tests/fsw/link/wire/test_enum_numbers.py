@@ -163,7 +163,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (fence_items, "CIRCLE_INCLUSION", "MAV_CMD", "NAV_FENCE_CIRCLE_INCLUSION"),
     (fence_items, "CIRCLE_EXCLUSION", "MAV_CMD", "NAV_FENCE_CIRCLE_EXCLUSION"),
     (fsw_ids, "AUTOPILOT", "MAV_COMP_ID", "AUTOPILOT1"),
-    (fsw_ids, "PANDION", "MAV_COMP_ID", "ONBOARD_COMPUTER"),
+    (fsw_ids, "PANDION", "MAV_COMP_ID", "USER1"),
     (fsw_ids, "PATH_PLANNER", "MAV_COMP_ID", "PATHPLANNER"),
     (mission_items, "NAV_WAYPOINT", "MAV_CMD", "NAV_WAYPOINT"),
     (mission_items, "NAV_LOITER_UNLIMITED", "MAV_CMD", "NAV_LOITER_UNLIM"),
