@@ -4,6 +4,9 @@
 PYTHON ?= python3
 UV_VERSION := 0.13.8
 BIN := .venv/bin
+# Tests and tools read and write UTF-8 whatever the terminal shows; a flight prints what it can show.
+UTF8 := PYTHONUTF8=1 PYTHONIOENCODING=
+PYTEST = $(UTF8) $(BIN)/pytest
 
 # What the shell says about Python, pip and uv is for other environments: modules of a ROS workspace,
 # a pip that installs for the user. Kept is where packages come from, and how text is printed.
@@ -40,7 +43,7 @@ $(shell .venv/bin/python -I -c '' 2>/dev/null || rm -f .venv/ready*; \
 READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_hook.py Makefile)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long faults soak code-checks tests-of-processes tests-of-the-rest \
+.PHONY: help setup run test test-long nightly faults soak code-checks tests-of-processes tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -73,15 +76,15 @@ code-checks: sitl-kernels
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
 tests-of-processes: code-checks
-	$(call check,processes,$(BIN)/pytest -m "not long" $(OF_PROCESSES))
+	$(call check,processes,$(PYTEST) -m "not long" $(OF_PROCESSES))
 tests-of-the-rest: fsw-kernels
-	$(call check,the rest,$(BIN)/pytest -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
+	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
 fsw-kernels sitl-kernels: %-kernels:
 	@$(BIN)/python -m studies.flight.kernels $*
 
 test-long: setup ## the tests that make test leaves out for its four minutes, and properties with more examples
-	$(BIN)/pytest -m long
-	PROPERTIES=thorough $(BIN)/pytest -m hypothesis
+	$(PYTEST) -m long
+	PROPERTIES=thorough $(PYTEST) -m hypothesis
 
 faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
 	@mkdir -p build
@@ -94,8 +97,11 @@ soak: setup ## an hour in real time with random failures and a busy client: MINU
 	$(BIN)/python -m benchmarks soak --minutes $(or $(MINUTES),60) --seed $(or $(SEED),0) \
 		--json build/soak.json
 
+nightly: setup ## every long target, and a table of what passed (hours): ONLY="docs fuzz" or LEAVE=interop
+	@$(UTF8) $(BIN)/python -m tests.nightly $(if $(ONLY),--only $(ONLY)) $(if $(LEAVE),--leave $(LEAVE))
+
 # cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
-# files and folders, SAMPLE mutants of each file, drawn with SEED, BUDGET the seconds that the tests of
+# files and folders, MODULES drawn of them, SAMPLE mutants of each, drawn with SEED, BUDGET the seconds that the tests of
 # a file may take; none of them: every mutant, 20 s.
 MUTATION := tests/mutation
 MUTATE := $(call ready,.mutation/tool,$(MUTATION)/tool.lock)
@@ -104,8 +110,8 @@ $(MUTATE): | $(READY)
 	@$(done)
 
 mutate: setup $(MUTATE) ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
-	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
-		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
+	@$(UTF8) PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
+		$(if $(MODULES),--modules $(MODULES)) $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
 
 # libFuzzer for Python, in a folder of its own; the readers are those of .venv. TARGETS are names of
 # tests/fuzz/fuzz.py, SECONDS for each of them; KEEP=1 keeps inputs that reach something new.
@@ -116,7 +122,7 @@ $(FUZZER): | $(READY)
 	@$(done)
 
 fuzz: setup $(FUZZER) ## new inputs for every reader of files and datagrams: TARGETS=scenario SECONDS=600 KEEP=1
-	@PYTHONPATH=.:$$(echo .fuzz/lib/python*/site-packages) $(BIN)/python -m tests.fuzz.fuzz $(TARGETS) \
+	@$(UTF8) PYTHONPATH=.:$$(echo .fuzz/lib/python*/site-packages) $(BIN)/python -m tests.fuzz.fuzz $(TARGETS) \
 		--seconds $(or $(SECONDS),60) $(if $(KEEP),--keep)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
@@ -133,7 +139,7 @@ $(NODE): | $(READY)
 	@$(done)
 
 interop: setup $(MAVPROXY) $(NODE) ## fly by MAVProxy and node-mavlink (needs npm)
-	PANDION_INTEROP=.interop $(BIN)/pytest $(EXTERNAL)
+	PANDION_INTEROP=.interop $(PYTEST) $(EXTERNAL)
 
 # Sphinx has an environment and a lock of its own; the API pages import the code from .venv.
 DOCS := $(call ready,.docs,requirements-docs.lock)
@@ -142,17 +148,17 @@ $(DOCS): | $(READY)
 	@$(done)
 
 docs: setup $(DOCS) ## build the documentation site into build/docs (warnings are errors)
-	@.docs/bin/python -m sphinx -q -n -W --keep-going -b html docs build/docs
+	@$(UTF8) .docs/bin/python -m sphinx -q -n -W --keep-going -b html docs build/docs
 	@echo "docs: open build/docs/index.html"
 
 docs-test: setup ## run every command and example of the documentation, flights included
-	$(BIN)/pytest tests/docs
+	$(PYTEST) tests/docs
 
 pictures: setup ## fly and draw docs/images again
-	$(BIN)/python -m docs.figures
+	$(UTF8) $(BIN)/python -m docs.figures
 
 pages: setup ## write the generated pages of docs/reference again
-	@$(BIN)/python -m docs.pages
+	@$(UTF8) $(BIN)/python -m docs.pages
 
 # A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
 # into .boot with `pip download` alone: a fresh Debian has neither ensurepip nor a pip that may install,
@@ -186,7 +192,7 @@ $(READY): | .boot/uv
 
 # The install has generated it; this is for an edit of the XML.
 messages/dialect.py: messages/pandion.xml messages/upstream.xml messages/generate.py | $(READY)
-	@$(BIN)/python -m messages.generate
+	@$(UTF8) $(BIN)/python -m messages.generate
 
 # Hashes only: no index, no download address, nothing of the machine that made the file.
 COMPILE = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

@@ -9,8 +9,12 @@ import sys
 from importlib import import_module
 from typing import Final
 
-from command_line.output import complain
-from command_line.parser import COULD_NOT_START, unknown_name
+from pandion.own_modules import put_first
+
+put_first()
+
+from command_line.output import complain, print_anything  # noqa: E402
+from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
 
 # Module, and what the verb does; without that it is not in the list.
 VERBS: Final[dict[str, tuple[str, str]]] = {
@@ -135,6 +139,7 @@ def _run(words: list[str]) -> int:
 
 def program() -> int:
     """``main`` as a program of its own, which a batch system ends as Ctrl-C does."""
+    print_anything()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     return main()
 
