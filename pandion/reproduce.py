@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, say, write_text
 from command_line.parser import COULD_NOT_START
@@ -17,6 +18,7 @@ from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
+from pandion.gate_options import junit
 from sitl.scenario_file import SUITE_NAMES
 from studies.paper.catalogue import STUDIES, study
 
@@ -84,6 +86,7 @@ class ReproduceOptions:
         "--only TEXT", "robustness: only the rows with this in their section, case or name"
     )
     cluster: ClusterOptions = group(ClusterOptions)
+    junit: str | None = junit()
     json: str | None = json_file("the rows")
     out: Path | None = option(
         "--out DIR",
@@ -139,6 +142,7 @@ def _run(options: ReproduceOptions) -> int:
     _show(found, console)
     say(f"page {page}", console)
     write_text(options.json, rows_text(found))
+    write_text(options.junit, junit_xml(options.what, _cases(found)))
     for error in found.errors:
         complain("pandion reproduce", error)
     return BROKEN if found.errors else DONE
@@ -171,6 +175,21 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     if options.tracking != "lqr":
         command += f" --tracking {options.tracking}"
     return (f"Command: {command}", f"Pandion {version()}, code {sources()[:12]}")
+
+
+def _cases(report: Report) -> list[Case]:
+    """A test a row, failed where the paper prints another mark; and one a flight that broke."""
+    cases = []
+    for k, row in enumerate(report.rows):
+        named = list(row)[: list(row).index("passed")] if "passed" in row else []
+        name = ", ".join(f"{key} {row[key]}" for key in named) or f"row {k}"
+        printed, flown = row.get("paper_completed"), row.get("passed") == row.get("total")
+        failure = ""
+        if printed is not None and printed != flown:
+            mark = "completed" if printed else "not completed"
+            failure = f"the paper prints {mark}; {row['passed']} of {row['total']} are completed"
+        cases.append(Case(report.title, name, failure=failure))
+    return cases + [Case(report.title, f"error {k}", error=e) for k, e in enumerate(report.errors)]
 
 
 def _show(report: Report, stream: TextIO) -> None:

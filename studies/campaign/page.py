@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 
 from command_line.html_page import document, items, table
+from command_line.html_page import verdict as html_verdict
 from studies.campaign.flight import CampaignRow
 from studies.campaign.store import CampaignResult
-from studies.campaign.summary import CaseSummary, summaries, worst
+from studies.campaign.summary import CaseSummary, summaries, verdict, worst
 from studies.drawing import BASE, BOUND, WALL, NoMatplotlibError, drawable, sheet
 from studies.table_text import metres, millimetres
 
@@ -22,11 +23,18 @@ _MOST_MAPS: Final = 8
 _CASE: Final = ("scenario", "sensors", "controller", "fault")
 
 
-def page(result: CampaignResult, sentences: Sequence[str], where: Path) -> str:
-    """The page of the campaign in a directory."""
+def page(
+    result: CampaignResult,
+    sentences: Sequence[str],
+    where: Path,
+    required: Sequence[tuple[bool, str]] = (),
+) -> str:
+    """The page of the campaign in a directory; of what was ``required``, whether it is met."""
     rows, plan = result.rows, result.plan
     title = f"Campaign {plan.name}"
-    parts = [f"<h1>{html.escape(title)}</h1>", items(_facts(result, sentences))]
+    verdicts = required or (verdict(rows, result.asked),)
+    parts = [f"<h1>{html.escape(title)}</h1>", *(html_verdict(*one) for one in verdicts)]
+    parts.append(items(_facts(result, sentences)))
     parts += ["<h2>What varied</h2>", items([str(one) for one in plan.varied] or ["nothing"])]
     parts.append(_cases(summaries(rows)))
     parts.append(_worst(worst(rows), where))

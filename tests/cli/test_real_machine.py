@@ -42,8 +42,8 @@ def make(*words: str, cwd: Path = ROOT, **shell: str) -> str:
     done = subprocess.run(
         ["make", "--no-print-directory", *words],
         # Named, the index is not asked for: pip takes half a second to answer.
-        cwd=cwd, env={**os.environ, "MAKEFLAGS": "", "UV_DEFAULT_INDEX": "kept", **shell}, capture_output=True, text=True,
-        check=False,
+        cwd=cwd, env={**os.environ, "MAKEFLAGS": "", "UV_DEFAULT_INDEX": "kept", **shell},
+        capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
