@@ -20,7 +20,7 @@ from fsw.parameters.control_choice import ControlChoice
 from pandion.display import Display
 from pandion.join_truth import join_truth
 from pandion.processor import ANYWHERE, lockstep_places
-from pandion.result import FlightReports, as_json, table_rows
+from pandion.result import FlightReports, as_json, first_rows, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from pandion.view_beside import ViewBeside
 from sitl.arguments import RunOptions, SitlOptions
@@ -192,7 +192,9 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
     result = as_json(reports)
     text = json_text(result, 2) + "\n"
     lost = unwritten(out / "result.json", text)
-    display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
+    tracking_max_m = (flown.sitl or {}).get("tracking_error_max_m")
+    first = first_rows(result, tracking_max_m)
+    display.result(result, first, table_rows(result, tracking_max_m)[len(first) :])
     lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
     lost += _report(flight, display)
     if lost:

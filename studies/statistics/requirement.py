@@ -29,7 +29,7 @@ _FORM: Final = re.compile(
 _UNITS: Final = {None: 1.0, "%": 100.0, "m": 1.0, "mm": 1000.0}  # in one of 1 or metres
 _HELP: Final = (
     "write p<0.01@95%, p-each<0.05@95% or contact<1e-3@99% for probabilities, margin>=0.01 or "
-    "margin>=10mm for the least margin, te<=0.05 for the largest tracking error"
+    "margin>=10mm for the minimum margin, te<=0.05 for the largest tracking error"
 )
 
 
@@ -131,7 +131,7 @@ def _length(wanted: Requirement, rows: Sequence[CampaignRow]) -> Verdict:
         return Verdict(wanted.text, False, f"{unflown} of {len(rows)} flights were not flown")
     if wanted.name == "margin":
         found = [(row.margin_m, row.flight) for row in rows if row.margin_m is not None]
-        what = "least margin"
+        what = "minimum margin"
     else:
         found = [(row.te_m, row.flight) for row in rows if row.te_m is not None]
         what = "largest tracking error"

@@ -224,7 +224,7 @@ def test_a_campaign_gives_a_server_its_flights_and_fails_where_it_must(
     junit = tmp_path / "flights.xml"
     words = [str(file), "--workers=0", f"--out={out}", f"--junit={junit}"]
     assert main([*words, "--require=margin>=0.001"]) == 0
-    assert "PASS margin>=0.001: least margin" in capsys.readouterr().out
+    assert "PASS margin>=0.001: minimum margin" in capsys.readouterr().out
     suite = ET.parse(junit).find("testsuite")
     assert suite is not None
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "0", "0")

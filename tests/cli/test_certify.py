@@ -229,7 +229,7 @@ def test_a_requirement_decides_the_exit_code_and_is_in_the_certificate(
     code, directory = required(tmp_path, "margin>=0.01", "p<0.9@90%")
     assert code == 0
     said = capsys.readouterr().out
-    assert "met: margin>=0.01; least margin 0.1000 m, flight 0" in said
+    assert "met: margin>=0.01; minimum margin 0.1000 m, flight 0" in said
     page = (directory / "certificate.html").read_text(encoding="utf-8")
     assert page.count(">PASS<") == 2
     assert main([str(directory), "--verify", str(directory / "certificate.html")]) == 0

@@ -181,7 +181,7 @@ def test_a_result_is_printed_whatever_the_terminal_shows(
     display = Display(stream)
     display.say("✓ ready, ×19.3, λ ≥ 0.2, Größe, 漢字")
     result = {"completed": True, "end_reason": "flew 2.0 s – done", "logs": {}}
-    display.result(result, [("error", "±1.0 mm …")])
+    display.result(result, [("minimum margin", "±1.0 mm …")], [("error", "±1.0 mm …")])
     stream.flush()
     text = shown.getvalue().decode(encoding)
     assert "ready" in text
