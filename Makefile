@@ -43,7 +43,7 @@ $(shell .venv/bin/python -I -c '' 2>/dev/null || rm -f .venv/ready*; \
 READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_hook.py Makefile)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long nightly faults soak code-checks tests-of-processes tests-of-the-rest \
+.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-processes tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -140,6 +140,9 @@ $(NODE): | $(READY)
 
 interop: setup $(MAVPROXY) $(NODE) ## fly by MAVProxy and node-mavlink (needs npm)
 	PANDION_INTEROP=.interop $(PYTEST) $(EXTERNAL)
+
+wheel: setup ## build dist/pandion-*.whl, which pip installs anywhere
+	@$(BIN)/python -m hatchling build -t wheel
 
 # Sphinx has an environment and a lock of its own; the API pages import the code from .venv.
 DOCS := $(call ready,.docs,requirements-docs.lock)

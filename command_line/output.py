@@ -123,4 +123,4 @@ def unwritten(target: str | Path | None, text: str) -> list[str]:
 
 def without(error: ModuleNotFoundError, extra: str) -> str:
     """What to install where an optional package is missing."""
-    return f"the package {error.name} is missing; install pandion[{extra}]"
+    return f"the package {error.name} is missing; pip install {error.name} (of the extra {extra})"

@@ -156,7 +156,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     shown = [(one["met"], f"{one['text']}: {one['found']}") for one in judged]
     (folder / PAGE).write_text(page(result, sentences, folder, shown), encoding="utf-8")
     if write_table(folder, rows) is None:
-        display.say("no rows.parquet: install pandion[parquet] for it; the journal has the rows")
+        display.say("no rows.parquet: pip install pyarrow for it; the journal has the rows")
     for one in cases:
         least = one.margin_m.get("0")
         margin = "" if least is None else f", minimum margin {1e3 * least:+.1f} mm"

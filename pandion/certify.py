@@ -54,8 +54,8 @@ class CertifyOptions:
     cluster: ClusterOptions = group(ClusterOptions)
     require: tuple[Requirement, ...] = required()
     json: str | None = json_file("the statement")
-    out: Path | None = option(
-        "--out FILE.html", f"where the page goes (default {PAGE} in the directory)", Path
+    html: Path | None = option(
+        "--html FILE", f"the page (default {PAGE} in the directory)", Path, old="--out"
     )
 
 
@@ -150,7 +150,7 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
         display.say(sentence)
     if result.left_out:
         display.say(left_out(result.left_out))
-    written = options.out or options.campaign / PAGE
+    written = options.html or options.campaign / PAGE
     lost = unwritten(options.json, json_text(stated, 1) + "\n")
     lost += unwritten(written, page(stated, result))
     display.say(f"page {written}; {stated['commands'][0]} --verify {written}")

@@ -38,7 +38,9 @@ class DialectOptions:
         one_of("target", "install", "wireshark", "xml"),
         required=True,
     )
-    to: Path | None = option("--to DIR", "write there (default a directory of the user's)", Path)
+    out: Path | None = option(
+        "--out DIR", "write there (default a directory of the user's)", Path, old="--to"
+    )
     path: bool = switch("--path", "with xml: print where the file is")
 
 
@@ -51,7 +53,7 @@ def main(argv: list[str]) -> int:
         return 0
     install = {"install": _install, "wireshark": _wireshark}[options.what]
     try:
-        print(install(options.to), end="")
+        print(install(options.out), end="")
     except (GenerationError, OSError) as error:
         complain("pandion dialect", _reason(error))
         return COULD_NOT_START

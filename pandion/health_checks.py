@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from fsw.parameters.control_choice import ControlChoice
+from pandion.own_modules import our_modules
 
 OK, WARN, FAIL = "ok", "warn", "fail"
 
@@ -181,10 +182,11 @@ def extras() -> Check:
     """Packages that only some verbs need."""
     from importlib.util import find_spec
 
-    missing = sorted({extra for name, extra in _EXTRAS.items() if find_spec(name) is None})
+    lacking = [name for name in _EXTRAS if find_spec(name) is None]
+    missing = sorted({_EXTRAS[name] for name in lacking})
     if not missing:
         return Check("extras", OK, "view, report, top and mcap can be used")
-    remedy = f"pip install 'pandion[{','.join(missing)}]' where they are wanted"
+    remedy = f"pip install {' '.join(lacking)} where they are wanted"
     return Check("extras", OK, f"not installed: {', '.join(missing)}", remedy)
 
 
@@ -192,11 +194,11 @@ def modules() -> Check:
     """Whether our own modules are found, and those of this environment."""
     from importlib.util import find_spec
 
-    ours = {str(_found(name)) for name in ("pandion", "fsw", "sitl", "messages", "view")}
-    if len(ours) > 1:
-        found = f"modules come from several places: {', '.join(sorted(ours))}"
+    root = str(our_modules())
+    others = {str(_found(name)) for name in ("fsw", "sitl", "messages", "view")} - {root}
+    if others:
+        found = f"modules come from {', '.join(sorted(others))} as well as from {root}"
         return Check("modules", FAIL, found, "take what is not Pandion's out of PYTHONPATH")
-    (root,) = ours
     beside = Path(sys.prefix).parent
     brought = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     if (

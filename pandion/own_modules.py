@@ -16,7 +16,7 @@ _PACKAGE: Final = Path(__file__).resolve().parent
 
 def put_first() -> None:
     """Order the search of this process, and of those that it starts."""
-    ours = _ours()
+    ours = our_modules()
     brought = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
     last = {Path(path).absolute() for path in brought}
     # Python puts the working directory first where a module is run.
@@ -27,7 +27,7 @@ def put_first() -> None:
         os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
 
 
-def _ours() -> Path:
-    """A wheel carries the other packages inside this one, a checkout beside it."""
+def our_modules() -> Path:
+    """Where our other packages are: inside this one in a wheel, beside it in a checkout."""
     inside = _PACKAGE / "packages"
     return inside if inside.is_dir() else _PACKAGE.parent

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Final, TextIO
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read
@@ -29,6 +29,8 @@ PLANTS = ("double-integrator", "full")
 TRACKING = KNOWN["tracking"]
 
 DONE, BROKEN = 0, 1  # exit codes
+WIDTH: Final = 100  # of a table on the terminal, in characters
+KEYS: Final = 2  # columns that name a row
 
 
 def seeds(text: str) -> range:
@@ -78,9 +80,10 @@ class ReproduceOptions:
         old="--inner",
     )
     suite: str | None = option(
-        "--suite NAME",
-        "robustness: only the rows flown with this suite of sensors",
+        "--sensors SUITE",
+        "robustness: only the rows flown with these sensors",
         one_of("suite", *SUITE_NAMES),
+        old="--suite",
     )
     only: str | None = option(
         "--only TEXT", "robustness: only the rows with this in their section, case or name"
@@ -110,7 +113,7 @@ def main(argv: list[str]) -> int:
 
     try:
         if options.what != "robustness" and (options.suite or options.only):
-            raise NoCellError(f"{options.what} has no rows to choose by --suite or --only")
+            raise NoCellError(f"{options.what} has no rows to choose by --sensors or --only")
         return _run(options)
     except (NoMatplotlibError, NoCellError, CampaignError, SchedulerGoneError, OSError) as error:
         complain("pandion reproduce", error)
@@ -169,7 +172,7 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     if options.duration_s is not None:
         command += f" --duration {options.duration_s:g}"
     if options.suite is not None:
-        command += f" --suite {options.suite}"
+        command += f" --sensors {options.suite}"
     if options.only is not None:
         command += f" --only '{options.only}'"
     if options.tracking != "lqr":
@@ -193,14 +196,41 @@ def _cases(report: Report) -> list[Case]:
 
 
 def _show(report: Report, stream: TextIO) -> None:
+    from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(file=stream, highlight=False, width=None if stream.isatty() else 160)
+    terminal = Console(file=stream).width if stream.isatty() else WIDTH
+    console = Console(file=stream, highlight=False, width=min(terminal, WIDTH))
     for table in report.tables:
-        drawn = Table(title=table.caption, title_justify="left")
-        for k, name in enumerate(table.headers):
-            drawn.add_column(name, justify="left" if k < 2 else "right")
-        for row in table.rows:
-            drawn.add_row(*row)
-        console.print(drawn)
+        title: str | None = table.caption
+        for block in blocks([table.headers, *table.rows], console.width):
+            drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
+            drawn.show_edge, title = False, None
+            headers, *rows = block
+            for k, name in enumerate(headers):
+                widest = max(len(word) for line in block for word in line[k].split() or [""])
+                drawn.add_column(name, justify="left" if k < KEYS else "right", min_width=widest)
+            for row in rows:
+                drawn.add_row(*row)
+            console.print(drawn)
+
+
+def blocks(lines: list[tuple[str, ...]], width: int) -> list[list[tuple[str, ...]]]:
+    """A table as blocks of columns that fit a width, each with the columns that name a row.
+
+    Args:
+        lines: The headers, then the rows.
+        width: Of the terminal, in characters. A column may be as narrow as its longest word.
+    """
+    need = [
+        max(len(word) for line in lines for word in line[k].split() or [""]) + 1
+        for k in range(len(lines[0]))
+    ]
+    names = list(range(min(KEYS, len(need))))
+    chosen: list[list[int]] = []
+    for k in range(len(names), len(need)):
+        if not chosen or sum(need[j] for j in (*chosen[-1], k)) > width:
+            chosen.append([*names])
+        chosen[-1].append(k)
+    return [[tuple(line[k] for k in of) for line in lines] for of in chosen or [names]]

@@ -199,7 +199,9 @@ def _welch(
 def newcombe(
     one: tuple[int, int], other: tuple[int, int], confidence: float
 ) -> tuple[float, float]:
-    """Interval of the difference of two probabilities [1], each given as ``(count, total)``.
+    """Interval of the difference of two probabilities [1], at a ``confidence`` [1].
+
+    Each is given as ``(count, total)``.
 
     Source: Newcombe: Interval estimation for the difference between independent proportions:
     comparison of eleven methods, Statistics in Medicine 17, 1998, method 10.

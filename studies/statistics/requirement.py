@@ -44,7 +44,7 @@ class Requirement:
     confidence: float | None  # [1], of a probability; None: that of the certificate
 
     def holds(self, value: float | None) -> bool:
-        """Whether a value, none if there is none, is as it must be; NaN is not."""
+        """Whether a ``value`` [1] or [m], None if there is none, is as it must be; NaN is not."""
         return value is not None and _SIGNS[self.sign](value, self.limit)
 
 
