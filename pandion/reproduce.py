@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -208,12 +209,27 @@ def _show(report: Report, stream: TextIO) -> None:
             drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
             drawn.show_edge, title = False, None
             headers, *rows = block
-            for k, name in enumerate(headers):
-                widest = max(len(word) for line in block for word in line[k].split() or [""])
-                drawn.add_column(name, justify="left" if k < KEYS else "right", min_width=widest)
+            widths = _widths(block, console.width)
+            for k, (name, width) in enumerate(zip(headers, widths, strict=True)):
+                drawn.add_column(name, justify="left" if k < KEYS else "right", width=width)
             for row in rows:
                 drawn.add_row(*row)
             console.print(drawn)
+
+
+def _widths(lines: list[tuple[str, ...]], width: int) -> list[int]:
+    """Of columns: their longest words, and what is left to those whose cells would break."""
+    columns = list(zip(*lines, strict=True))
+    found = [_narrowest(column) for column in columns]
+    wanted = [max(map(len, column)) for column in columns]
+    for _ in range(width - sum(found) - len(found)):
+        k = max(range(len(found)), key=lambda k: wanted[k] - found[k])
+        found[k] += found[k] < wanted[k]
+    return found
+
+
+def _narrowest(column: Sequence[str]) -> int:
+    return max(len(word) for cell in column for word in cell.split() or [""])
 
 
 def blocks(lines: list[tuple[str, ...]], width: int) -> list[list[tuple[str, ...]]]:
@@ -223,10 +239,7 @@ def blocks(lines: list[tuple[str, ...]], width: int) -> list[list[tuple[str, ...
         lines: The headers, then the rows.
         width: Of the terminal, in characters. A column may be as narrow as its longest word.
     """
-    need = [
-        max(len(word) for line in lines for word in line[k].split() or [""]) + 1
-        for k in range(len(lines[0]))
-    ]
+    need = [_narrowest(column) + 1 for column in zip(*lines, strict=True)]
     names = list(range(min(KEYS, len(need))))
     chosen: list[list[int]] = []
     for k in range(len(names), len(need)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +15,7 @@ from studies.paper.settings import Report, Table
 HEADERS = ("case", "controller", *summary.HEADERS, "c_s", "c_e", "paper", "paper TE m", "paper c_s")
 ROW = (
     "II", "hc like-for-like", "20/20 (one flight)", "0.84–1.00", "+141.3", "20/20", "45.2, 60.1",
-    "0.0731", "0.1559", "0.2304", "✓", "0.0716", "0.1559",
+    "0.0731", "0.1559", "0.2304", "✓", "0.0716", "0.1234",
 )  # fmt: skip
 
 
@@ -24,10 +25,9 @@ def test_the_widest_table_fits_and_is_whole() -> None:
     _show(Report("Table IV", [], (table,)), stream)
     lines = stream.getvalue().splitlines()
     assert max(map(len, lines)) <= WIDTH
-    words = stream.getvalue().split()
-    for text in (*HEADERS, *ROW):
-        assert set(text.split()) <= set(words), text
-    assert "…" not in stream.getvalue()
+    words = Counter(stream.getvalue().split())
+    wanted = Counter(word for text in (*HEADERS, *ROW, *ROW) for word in text.split())
+    assert wanted <= words, wanted - words
 
 
 WORDS = st.text(st.characters(categories=["L", "N"]), min_size=0, max_size=20)
