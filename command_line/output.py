@@ -121,6 +121,12 @@ def unwritten(target: str | Path | None, text: str) -> list[str]:
     return []
 
 
+def unwritable(error: Exception) -> str:
+    """Why something could not be started, without the system's number of the error."""
+    named = isinstance(error, OSError) and error.strerror and error.filename
+    return f"cannot write {error.filename}: {error.strerror}" if named else str(error)  # type: ignore[attr-defined]
+
+
 def without(error: ModuleNotFoundError, extra: str) -> str:
     """What to install where an optional package is missing."""
     return f"the package {error.name} is missing; pip install {error.name} (of the extra {extra})"

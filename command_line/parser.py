@@ -28,6 +28,8 @@ class Parser(argparse.ArgumentParser):
         arguments, unknown = self.parse_known_args(argv)
         if unknown:
             first = next((word for word in unknown if word.startswith("-")), unknown[0])
+            if not first.startswith("-"):
+                self.error(f"'{first}' is one word too many; --help shows what is expected")
             self.error(unknown_name("option", first.partition("=")[0], self._option_names()))
         return arguments
 

@@ -126,10 +126,12 @@ def _run(words: list[str]) -> int:
         from pandion.completion import complete
 
         words = complete(VERBS)
+    if words[:1] == ["help"] and len(words) > 1:
+        words = [words[1], "--help"]
     if not words or words[0] in ("-h", "--help", "help"):
         print(HELP, end="")
         return 0
-    if words[0] == "--version":
+    if words[0] in ("--version", "-V", "version"):
         from command_line.version import version
 
         print(f"pandion {version()}")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read, switch
-from command_line.output import complain, json_text, typed, unwritten, without
+from command_line.output import complain, json_text, typed, unwritable, unwritten, without
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
@@ -53,6 +53,10 @@ class FlyOptions(RunOptions):
     )
     report: bool = switch("--report", "write the flight's report.html beside its log")
 
+    def __post_init__(self) -> None:
+        """Refuse a contradictory choice; raises ContradictionError."""
+        self.control.check()
+
 
 @dataclass(frozen=True, slots=True)
 class PlannedFlight:
@@ -73,7 +77,7 @@ def main(argv: list[str]) -> int:
     try:
         flight = planned(options)
     except (ScenarioError, LinkError, OSError) as error:
-        complain("pandion fly", error)
+        complain("pandion fly", unwritable(error))
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
@@ -128,6 +132,11 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
         f"Pandion {version()}: {flight.name}, seed {options.seed}, {flight.sensors} sensors, "
         f"{length}, {options.control.controller} controller, {pacing}"
     )
+    if options.control.body not in (None, flight.body):
+        display.say(
+            f"note: --body {options.control.body} keeps clear, the scenario is for {flight.body}; "
+            "it may start outside its safe set"
+        )
     port = parse_address(options.links.gcs)[1]
     display.say(f"telemetry to {options.links.gcs}: QGroundControl connects on UDP {port}")
     if options.links.api != NO_LINK:
