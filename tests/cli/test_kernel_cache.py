@@ -114,3 +114,21 @@ def test_a_flight_with_every_kernel_on_disk_keeps_as_many_as_the_sources_have() 
         cache = half.cache()
         if cache.folder is not None and not cache.is_due("campaign"):
             assert abs(kept_in(cache.folder) - cache.kernels) <= 5
+
+
+def test_compiling_is_announced_with_its_kernels_and_where_they_can_be_watched(
+    tmp_path: Path,
+) -> None:
+    said: list[tuple[str, str, dict[str, object]]] = []
+
+    class Listener:
+        def report(self, name: str, sentence: str, **details: object) -> None:
+            said.append((name, sentence, details))
+
+    KernelCache(tmp_path, 84, "numba").announce("fsw", Listener())
+    KernelCache(None, 84, "numba").announce("fsw", Listener())
+    assert said[0] == (
+        "compiling", "fsw: compiling 84 kernels", {"kernels": 84, "folder": str(tmp_path)},
+    )  # fmt: skip
+    assert "nowhere can they be kept" in said[1][1]
+    assert said[1][2]["folder"] is None
