@@ -11,6 +11,15 @@ from command_line.version import version
 
 _SOURCE: Final = Path(__file__).resolve().parents[2]
 _PATIENCE_S: Final = 5.0
+_OF_A_REPOSITORY: Final = (
+    "GIT_DIR",
+    "GIT_WORK_TREE",
+    "GIT_INDEX_FILE",
+    "GIT_COMMON_DIR",
+    "GIT_OBJECT_DIRECTORY",
+    "GIT_NAMESPACE",
+    "GIT_PREFIX",
+)
 
 
 def revision() -> str:
@@ -31,8 +40,7 @@ def revision() -> str:
                 text=True,
                 timeout=_PATIENCE_S,
                 check=True,
-                # Reading must not lock the index of the work tree.
-                env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"},
+                env=_environment(),
             )
             return described.stdout.strip()
         except subprocess.CalledProcessError as error:
@@ -40,6 +48,13 @@ def revision() -> str:
         except (OSError, subprocess.SubprocessError) as error:
             why = f", commit unknown: {_first_line(str(error))}"
     return f"version {version()}{why}"
+
+
+def _environment() -> dict[str, str]:
+    """For git: a hook of another repository says which one is meant, and it is not this one."""
+    kept = {name: value for name, value in os.environ.items() if name not in _OF_A_REPOSITORY}
+    # Reading must not lock the index of the work tree.
+    return {**kept, "GIT_OPTIONAL_LOCKS": "0"}
 
 
 def _first_line(text: str) -> str:

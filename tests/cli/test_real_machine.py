@@ -249,6 +249,17 @@ def test_the_commit_of_another_users_checkout_is_known(monkeypatch: pytest.Monke
     assert len(ours.partition("-")[0]) == 40
 
 
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a repository")
+def test_the_commit_is_that_of_this_checkout_in_a_hook_of_another_repository(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    ours = revision.revision()
+    subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
+    monkeypatch.setenv("GIT_DIR", str(tmp_path / ".git"))
+    monkeypatch.setenv("GIT_INDEX_FILE", str(tmp_path / ".git" / "index"))
+    assert revision.revision() == ours
+
+
 def test_a_commit_that_cannot_be_read_is_said_to_be_unknown(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
