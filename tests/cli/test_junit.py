@@ -56,7 +56,7 @@ def test_a_table_of_the_paper_fails_where_the_paper_has_another_mark() -> None:
     assert [(one.name, bool(one.failure), bool(one.error)) for one in found] == [
         ("case I, controller blf", False, False),
         ("case I, controller hc", True, False),
-        ("case I, controller hc+80", False, False),
+        ("case I, controller hc + 80 mm", False, False),
         ("error 0", False, True),
     ]
     assert found[1].failure == "the paper prints not completed; 20 of 20 are completed"
