@@ -73,7 +73,7 @@ class Display:
             refresh_per_second=4,
         )
         with bar:
-            bar.add_task("waiting", total=None, state="")
+            bar.add_task("starting", total=None, state="")
             self._bar = bar
             try:
                 yield
