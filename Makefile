@@ -4,7 +4,20 @@
 PYTHON ?= python3
 UV_VERSION := 0.13.8
 BIN := .venv/bin
-READY := .venv/ready
+# Tests and tools read and write UTF-8 whatever the terminal shows; a flight prints what it can show.
+UTF8 := PYTHONUTF8=1 PYTHONIOENCODING=
+PYTEST = $(UTF8) $(BIN)/pytest
+
+# What the shell says about Python, pip and uv is for other environments: modules of a ROS workspace,
+# a pip that installs for the user. Kept is where packages come from, and how text is printed.
+# PYTHONDONTWRITEBYTECODE would compile the imports of each process of a flight anew, for two seconds.
+KEPT := PYTHON PYTHONUTF8 PYTHONIOENCODING PYTHONUNBUFFERED \
+	$(addprefix PIP_,CONFIG_FILE INDEX_URL EXTRA_INDEX_URL FIND_LINKS NO_INDEX TRUSTED_HOST CERT \
+		CLIENT_CERT PROXY RETRIES TIMEOUT DEFAULT_TIMEOUT CACHE_DIR KEYRING_PROVIDER) \
+	$(addprefix UV_,CONFIG_FILE DEFAULT_INDEX INDEX INDEX_URL EXTRA_INDEX_URL FIND_LINKS NO_INDEX \
+		INDEX_STRATEGY INSECURE_HOST KEYRING_PROVIDER SYSTEM_CERTS NATIVE_TLS OFFLINE NO_CACHE \
+		CACHE_DIR LINK_MODE HTTP_TIMEOUT HTTP_RETRIES CONCURRENT_DOWNLOADS VERSION)
+unexport $(filter-out $(KEPT) UV_INDEX_%,$(filter PYTHON% PIP_% UV_%,$(.VARIABLES))) VIRTUAL_ENV
 
 # uv trusts the system's certificates and asks the index that pip is configured for, unless
 # UV_DEFAULT_INDEX names another one.
@@ -14,11 +27,23 @@ export UV_PYTHON_PREFERENCE := only-system
 PIP_INDEX = $${PIP_INDEX_URL:-$$($(PYTHON) -m pip config get global.index-url 2>/dev/null || true)}
 UV = UV_DEFAULT_INDEX="$${UV_DEFAULT_INDEX:-$(PIP_INDEX)}" .boot/uv
 
-# Where it is set, each of a flight's processes would compile its imports anew: two seconds a start.
-unexport PYTHONDONTWRITEBYTECODE
+# A folder with an environment is ready when a file in it says that it was made of these very files:
+# dates say nothing after git, cp or rsync. $(call ready,FOLDER,FILES) is that file.
+ready = $(1)/ready-$(shell cat $(2) | cksum | cut -d ' ' -f 1)
+# An environment is made so that it can be moved and copied; one whose Python is gone is made anew.
+fresh = { grep -qs 'relocatable = true' $(1)/pyvenv.cfg && $(1)/bin/python -I -c '' 2>/dev/null || \
+	rm -rf $(1); } && .boot/uv venv --quiet --relocatable --allow-existing --no-project --python $(2) $(1)
+# The last line of a recipe that makes a folder: ready for these files, and for no earlier ones.
+done = rm -f $(@D)/ready* && touch $@
+# $(call tool,FOLDER,LOCK): an environment with what a lock names, wheels only, hashes checked.
+tool = $(call fresh,$(1),.venv/bin/python) && \
+	$(UV) pip sync --quiet --python $(1) --require-hashes --only-binary :all: $(2)
+$(shell .venv/bin/python -I -c '' 2>/dev/null || rm -f .venv/ready*; \
+	.boot/uv --version >/dev/null 2>&1 || rm -f .boot/uv)
+READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_hook.py Makefile)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long faults soak code-checks tests-of-processes tests-of-the-rest \
+.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-processes tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -51,15 +76,15 @@ code-checks: sitl-kernels
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
 tests-of-processes: code-checks
-	$(call check,processes,$(BIN)/pytest -m "not long" $(OF_PROCESSES))
+	$(call check,processes,$(PYTEST) -m "not long" $(OF_PROCESSES))
 tests-of-the-rest: fsw-kernels
-	$(call check,the rest,$(BIN)/pytest -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
+	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
 fsw-kernels sitl-kernels: %-kernels:
 	@$(BIN)/python -m studies.flight.kernels $*
 
 test-long: setup ## the tests that make test leaves out for its four minutes, and properties with more examples
-	$(BIN)/pytest -m long
-	PROPERTIES=thorough $(BIN)/pytest -m hypothesis
+	$(PYTEST) -m long
+	PROPERTIES=thorough $(PYTEST) -m hypothesis
 
 faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
 	@mkdir -p build
@@ -72,72 +97,80 @@ soak: setup ## an hour in real time with random failures and a busy client: MINU
 	$(BIN)/python -m benchmarks soak --minutes $(or $(MINUTES),60) --seed $(or $(SEED),0) \
 		--json build/soak.json
 
+nightly: setup ## every long target, and a table of what passed (hours): ONLY="docs fuzz" or LEAVE=interop
+	@$(UTF8) $(BIN)/python -m tests.nightly $(if $(ONLY),--only $(ONLY)) $(if $(LEAVE),--leave $(LEAVE))
+
 # cosmic-ray in an environment of its own; the tests run in .venv, on a copy of the checkout. FILES are
-# files and folders, SAMPLE mutants of each file, drawn with SEED, BUDGET the seconds that the tests of
+# files and folders, MODULES drawn of them, SAMPLE mutants of each, drawn with SEED, BUDGET the seconds that the tests of
 # a file may take; none of them: every mutant, 20 s.
 MUTATION := tests/mutation
-.mutation/ready: $(MUTATION)/tool.lock | $(READY)
-	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .mutation/tool
-	@$(UV) pip sync --quiet --python .mutation/tool --require-hashes --only-binary :all: $<
-	@touch $@
+MUTATE := $(call ready,.mutation/tool,$(MUTATION)/tool.lock)
+$(MUTATE): | $(READY)
+	@$(call tool,$(@D),$(MUTATION)/tool.lock)
+	@$(done)
 
-mutate: setup .mutation/ready ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
-	@PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
-		$(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
+mutate: setup $(MUTATE) ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
+	@$(UTF8) PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
+		$(if $(MODULES),--modules $(MODULES)) $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
 
 # libFuzzer for Python, in a folder of its own; the readers are those of .venv. TARGETS are names of
 # tests/fuzz/fuzz.py, SECONDS for each of them; KEEP=1 keeps inputs that reach something new.
 FUZZ := tests/fuzz
-.fuzz/ready: $(FUZZ)/tool.lock | $(READY)
-	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .fuzz
-	@$(UV) pip sync --quiet --python .fuzz --require-hashes --only-binary :all: $<
-	@touch $@
+FUZZER := $(call ready,.fuzz,$(FUZZ)/tool.lock)
+$(FUZZER): | $(READY)
+	@$(call tool,$(@D),$(FUZZ)/tool.lock)
+	@$(done)
 
-fuzz: setup .fuzz/ready ## new inputs for every reader of files and datagrams: TARGETS=scenario SECONDS=600 KEEP=1
-	@PYTHONPATH=.:$$(echo .fuzz/lib/python*/site-packages) $(BIN)/python -m tests.fuzz.fuzz $(TARGETS) \
+fuzz: setup $(FUZZER) ## new inputs for every reader of files and datagrams: TARGETS=scenario SECONDS=600 KEEP=1
+	@$(UTF8) PYTHONPATH=.:$$(echo .fuzz/lib/python*/site-packages) $(BIN)/python -m tests.fuzz.fuzz $(TARGETS) \
 		--seconds $(or $(SECONDS),60) $(if $(KEEP),--keep)
 
 # Of other people's clients; each has a lock of its own, and none is needed to fly or to test.
 EXTERNAL := tests/interop/external
-.interop/mavproxy/ready: $(EXTERNAL)/mavproxy.lock | $(READY)
-	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .interop/mavproxy
-	@$(UV) pip sync --quiet --python .interop/mavproxy --require-hashes --only-binary :all: $<
-	@touch $@
+MAVPROXY := $(call ready,.interop/mavproxy,$(EXTERNAL)/mavproxy.lock)
+$(MAVPROXY): | $(READY)
+	@$(call tool,$(@D),$(EXTERNAL)/mavproxy.lock)
+	@$(done)
 
-.interop/node/ready: $(wildcard $(EXTERNAL)/node/*) | $(READY)
-	@mkdir -p .interop/node && cp $(EXTERNAL)/node/* .interop/node
-	@cd .interop/node && npm ci --silent --no-audit --no-fund --ignore-scripts
-	@touch $@
+NODE := $(call ready,.interop/node,$(wildcard $(EXTERNAL)/node/*))
+$(NODE): | $(READY)
+	@mkdir -p $(@D) && cp $(EXTERNAL)/node/* $(@D)
+	@cd $(@D) && npm ci --silent --no-audit --no-fund --ignore-scripts
+	@$(done)
 
-.interop/companions/ready: $(EXTERNAL)/companions.lock | $(READY)
-	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .interop/companions
-	@$(UV) pip sync --quiet --python .interop/companions --require-hashes --only-binary :all: $<
-	@touch $@
+COMPANIONS := $(call ready,.interop/companions,$(EXTERNAL)/companions.lock)
+$(COMPANIONS): | $(READY)
+	@$(call tool,$(@D),$(EXTERNAL)/companions.lock)
+	@$(done)
 
-interop: setup .interop/mavproxy/ready .interop/companions/ready .interop/node/ready ## other people's clients (needs npm)
-	PANDION_INTEROP=.interop $(BIN)/pytest $(EXTERNAL)
+interop: setup $(MAVPROXY) $(COMPANIONS) $(NODE) ## other people's clients (needs npm)
+	PANDION_INTEROP=.interop $(PYTEST) $(EXTERNAL)
+
+wheel: setup ## build dist/pandion-*.whl, which pip installs anywhere
+	@$(BIN)/python -m hatchling build -t wheel
 
 # Sphinx has an environment and a lock of its own; the API pages import the code from .venv.
-.docs/ready: requirements-docs.lock | $(READY)
-	@.boot/uv venv --quiet --allow-existing --no-project --python .venv/bin/python .docs
-	@$(UV) pip sync --quiet --python .docs --require-hashes --only-binary :all: $<
-	@touch $@
+DOCS := $(call ready,.docs,requirements-docs.lock)
+$(DOCS): | $(READY)
+	@$(call tool,$(@D),requirements-docs.lock)
+	@$(done)
 
-docs: setup .docs/ready ## build the documentation site into build/docs (warnings are errors)
-	@.docs/bin/python -m sphinx -q -n -W --keep-going -b html docs build/docs
+docs: setup $(DOCS) ## build the documentation site into build/docs (warnings are errors)
+	@$(UTF8) .docs/bin/python -m sphinx -q -n -W --keep-going -b html docs build/docs
 	@echo "docs: open build/docs/index.html"
 
 docs-test: setup ## run every command and example of the documentation, flights included
-	$(BIN)/pytest tests/docs
+	$(PYTEST) tests/docs
 
 pictures: setup ## fly and draw docs/images again
-	$(BIN)/python -m docs.figures
+	$(UTF8) $(BIN)/python -m docs.figures
 
 pages: setup ## write the generated pages of docs/reference again
-	@$(BIN)/python -m docs.pages
+	@$(UTF8) $(BIN)/python -m docs.pages
 
 # A uv that is there is used if it understands what is asked of it; else the pinned one is fetched
-# into .boot with pip alone, because a fresh Debian has neither ensurepip nor a pip that may install.
+# into .boot with `pip download` alone: a fresh Debian has neither ensurepip nor a pip that may install,
+# and a user's pip may be told to install elsewhere.
 .boot/uv:
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
 		{ echo "python 3.11, 3.12 or 3.13 is needed; choose one with: make PYTHON=python3.12"; exit 1; }
@@ -147,27 +180,27 @@ pages: setup ## write the generated pages of docs/reference again
 		ln -sf "$$(command -v uv)" .boot/uv; \
 	else \
 		echo "setup: fetching uv $(UV_VERSION) into .boot"; \
-		$(PYTHON) -m venv --without-pip .boot/python && \
-		$(PYTHON) -m pip --python .boot/python/bin/python install --quiet --no-input \
+		PIP_REQUIRE_VIRTUALENV=0 $(PYTHON) -m pip download --quiet --no-input --no-deps --dest .boot/wheel \
 			--disable-pip-version-check --only-binary :all: uv==$(UV_VERSION) && \
-		ln -sf python/bin/uv .boot/uv; \
+		$(PYTHON) -m zipfile -e .boot/wheel/uv-*.whl .boot/wheel && \
+		mv .boot/wheel/uv-*.data/scripts/uv .boot/uv && chmod +x .boot/uv && rm -r .boot/wheel; \
 	fi
 
 # Order-only: a newer uv is no reason to install again.
-$(READY): requirements-dev.lock pyproject.toml Makefile messages/build_hook.py | .boot/uv
+$(READY): | .boot/uv
 	@echo "setup: creating .venv"
-	@.boot/uv venv --quiet --allow-existing --no-project --python \
-		"$$($(PYTHON) -c 'import sys; print(sys.executable)')" .venv
+	@$(call fresh,.venv,"$$($(PYTHON) -c 'import sys; print(sys.executable)')")
 	@echo "setup: installing the locked packages (wheels only, hashes checked)"
 	@$(UV) pip sync --quiet --python .venv --require-hashes --only-binary :all: \
 		requirements-dev.lock
 	@echo "setup: generating the MAVLink dialect and installing pandion"
 	@.boot/uv pip install --quiet --python .venv --no-build-isolation --no-deps --no-index --editable .
-	@touch $@
+	@for found in .venv/lib/python*/site-packages/_pandion.pth; do echo ../../../.. >"$$found"; done
+	@$(done)
 
 # The install has generated it; this is for an edit of the XML.
 messages/dialect.py: messages/pandion.xml messages/upstream.xml messages/generate.py | $(READY)
-	@$(BIN)/python -m messages.generate
+	@$(UTF8) $(BIN)/python -m messages.generate
 
 # Hashes only: no index, no download address, nothing of the machine that made the file.
 COMPILE = $(UV) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

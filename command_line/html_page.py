@@ -21,6 +21,12 @@ def document(title: str, parts: Iterable[str], style: str = "", head: str = "") 
     )
 
 
+def verdict(passed: bool, sentence: str) -> str:
+    """What a page comes down to, in plain text."""
+    word, style = ("PASS", "passed") if passed else ("FAIL", "failed")
+    return f'<p class="verdict {style}"><b>{word}</b> {html.escape(sentence)}</p>'
+
+
 def items(sentences: Iterable[str]) -> str:
     """A list of sentences in plain text."""
     return "<ul>" + "".join(f"<li>{html.escape(line)}</li>" for line in sentences) + "</ul>"

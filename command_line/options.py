@@ -48,6 +48,7 @@ class Option:
     old: str = ""  # the option's name until the last release
     one_of: OneOf | None = None
     required: bool = False  # of a positional argument
+    repeated: bool = False  # may be given again: the value is a tuple of all
 
     def field(self) -> Any:
         """A field of a dataclass that holds the option's value."""
@@ -70,6 +71,8 @@ class Option:
         """The words of a command line that give this value."""
         if value == self.default:
             return []
+        if self.repeated:
+            return [f"{self.flag}={(self.text or str)(one)}" for one in value]
         if isinstance(value, bool):
             return [self.flag if value else self.off]
         text = (self.text or (repr if isinstance(value, float) else str))(value)
@@ -85,30 +88,37 @@ class Option:
                 )
             into = groups[self.one_of]
         flag, _, value = self.spec.partition(" ")
+        action = self._added(name, parser, into, flag, value)
+        if (names := getattr(self.parse, "names", None)) is not None:
+            action.completer = lambda **_: names
+
+    def _added(self, name: str, parser: Parser, into: Any, flag: str, value: str) -> Any:
         if self.positional:
             many: dict[str, Any] = (
                 {"nargs": "+"} if value else {} if self.required else {"nargs": "?"}
             )
-            parser.add_argument(name, metavar=flag, **self._valued(), **many)
-        elif value:
-            into.add_argument(flag, dest=name, metavar=value, **self._valued())
+            return parser.add_argument(name, metavar=flag, **self._valued(), **many)
+        if value:
+            more = {"action": _Collect} if self.repeated else {}
+            action = into.add_argument(flag, dest=name, metavar=value, **self._valued(), **more)
             if self.old:
                 self._declare_old(into, name, nargs=None, type=self._parsed)
-        else:
-            if self.off:
-                into = parser.add_mutually_exclusive_group()
-                into.add_argument(
-                    self.off,
-                    dest=name,
-                    action="store_false",
-                    default=self.default,
-                    help=f"the opposite of {flag} (default)",
-                )
+            return action
+        if self.off:
+            into = parser.add_mutually_exclusive_group()
             into.add_argument(
-                flag, dest=name, action="store_true", default=self.default, help=self._help()
+                self.off,
+                dest=name,
+                action="store_false",
+                default=self.default,
+                help=f"the opposite of {flag} (default)",
             )
-            if self.old:
-                self._declare_old(into, name, nargs=0)
+        action = into.add_argument(
+            flag, dest=name, action="store_true", default=self.default, help=self._help()
+        )
+        if self.old:
+            self._declare_old(into, name, nargs=0)
+        return action
 
     def _valued(self) -> dict[str, Any]:
         return {"type": self._parsed, "default": self.default, "help": self._help()}
@@ -121,7 +131,12 @@ class Option:
 
     def _help(self) -> str:
         text = self.help
-        obvious = self.default is None or isinstance(self.default, bool) or self.default == ""
+        obvious = (
+            self.repeated
+            or self.default is None
+            or isinstance(self.default, bool)
+            or self.default == ""
+        )
         if not obvious and "(default" not in text:
             shown = f"{self.default:g}" if isinstance(self.default, float) else self.default
             text += f" (default {self.text(shown) if self.text else shown})"
@@ -149,6 +164,15 @@ class Option:
             help=argparse.SUPPRESS,
             **more,
         )
+
+
+class _Collect(argparse.Action):
+    """Takes in one more value of an option that may be given again."""
+
+    def __call__(
+        self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
+    ) -> None:
+        setattr(namespace, self.dest, (*getattr(namespace, self.dest), values))
 
 
 def option(spec: str, help: str, parse: Callable[[str], Any] = str, **more: Any) -> Any:

@@ -2,16 +2,52 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import json
 import math
 import os
 import shlex
 import shutil
 import sys
+import unicodedata
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Final, TextIO
 
 from command_line.printable import printable
+
+# What the field writes and not every terminal shows; other characters lose their accents.
+_PLAIN: Final = {
+    "×": "x", "–": "-", "—": "-", "−": "-", "…": "...", "✓": "+", "✗": "x", "→": "->", "°": " deg ",
+    "ß": "ss",
+    "≤": "<=", "≥": ">=", "±": "+/-", "λ": "lambda", "σ": "sigma", "μ": "u", "µ": "u", "·": "*",
+}  # fmt: skip
+
+
+def print_anything() -> None:
+    """Let standard output and error take every character, whatever the terminal's encoding.
+
+    What it does not know becomes plain ASCII: a result must not be lost for a sign.
+    """
+    codecs.register_error("plain", _plain)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="plain")
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lost = error.object[error.start : error.end]
+    return "".join(map(_plain_character, lost)), error.end
+
+
+def _plain_character(character: str) -> str:
+    known = _PLAIN.get(character)
+    if known is not None:
+        return known
+    parts = unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode("ascii")
+    return parts or ("" if unicodedata.combining(character) else "?")
 
 
 def console_beside(target: str | None) -> TextIO:
@@ -85,6 +121,12 @@ def unwritten(target: str | Path | None, text: str) -> list[str]:
     return []
 
 
+def unwritable(error: Exception) -> str:
+    """Why something could not be started, without the system's number of the error."""
+    named = isinstance(error, OSError) and error.strerror and error.filename
+    return f"cannot write {error.filename}: {error.strerror}" if named else str(error)  # type: ignore[attr-defined]
+
+
 def without(error: ModuleNotFoundError, extra: str) -> str:
     """What to install where an optional package is missing."""
-    return f"the package {error.name} is missing; install pandion[{extra}]"
+    return f"the package {error.name} is missing; pip install {error.name} (of the extra {extra})"

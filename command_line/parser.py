@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import os
 from collections.abc import Iterable
 from typing import NoReturn
 
@@ -19,10 +20,16 @@ class Parser(argparse.ArgumentParser):
         super().__init__(prog=prog, description=description, allow_abbrev=False)
 
     def read(self, argv: list[str] | None) -> argparse.Namespace:
-        """Parse or exit with code 2."""
+        """Parse or exit with code 2; a shell that completes a line gets its answer instead."""
+        if "_ARGCOMPLETE" in os.environ:
+            import argcomplete
+
+            argcomplete.autocomplete(self)
         arguments, unknown = self.parse_known_args(argv)
         if unknown:
             first = next((word for word in unknown if word.startswith("-")), unknown[0])
+            if not first.startswith("-"):
+                self.error(f"'{first}' is one word too many; --help shows what is expected")
             self.error(unknown_name("option", first.partition("=")[0], self._option_names()))
         return arguments
 

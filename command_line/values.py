@@ -56,6 +56,7 @@ def one_of(what: str, *names: str, old: Mapping[str, str] | None = None) -> Call
             raise ArgumentTypeError(hint + known)
         return name
 
+    parse.names = names  # type: ignore[attr-defined]  # for a shell that completes them
     return parse
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -64,7 +65,7 @@ ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
 def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
     """Fly once, the flight software proper or what ``load`` makes; returns the exit code."""
     events = events_of(options.events)
-    session = _Session(options, events, load or load_flight_software)
+    session = _Session(options, events, load or partial(load_flight_software, events=events))
     return run_reported("fsw", events, (LinkError,), session.run)
 
 
@@ -82,9 +83,7 @@ class _Session:
         simulator = parse_address(options.sim)
         addresses(options.links)  # what is no address is refused before a minute of compiling
         directory = _output_directory(options.out)
-        self._events.report(
-            "preparing", "fsw: preparing (the first start compiles, which takes a minute)"
-        )
+        self._events.report("preparing", "fsw: preparing")
         program = self._load(options)
         facts = program.facts
         record = FlightRecord(
@@ -232,14 +231,14 @@ class _Session:
             release_real_time()
 
 
-def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
-    """Build and warm up the flight software.
+def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[Any]:
+    """Build and warm up the flight software; compiling takes long and is reported.
 
     Raises:
         CouldNotStart: A controller or inner loop of that name does not exist.
     """
     # Imported here because SciPy, Clarabel and numba take a second, which a refusal need not wait.
-    from fsw.compiled import compiling_is_due, note_compiled
+    from fsw.compiled import cache
     from fsw.runtime.assembly import flight_software
 
     def load() -> FlightProgram[Any]:
@@ -247,9 +246,12 @@ def load_flight_software(options: FswOptions) -> FlightProgram[Any]:
 
     def compile_first() -> None:
         load()
-        note_compiled(options.control.kernels)
+        cache().note(options.control.kernels)
 
-    if compiling_is_due(options.control.kernels):
+    due = cache().is_due(options.control.kernels)
+    if due or cache().folder is None:
+        cache().announce("fsw", events)
+    if due:
         in_a_child(compile_first)  # the compiler leaves 150 MB behind where it has run
     try:
         return load()

@@ -45,3 +45,7 @@ class FswOptions:
         "--scenario-digest HEX", "digest of its file, noted in the flight log", default=""
     )
     seed: int | None = option("--seed N", "the simulator's seed, noted in the flight log", whole())
+
+    def __post_init__(self) -> None:
+        """Refuse a contradictory choice; raises ContradictionError."""
+        self.control.check()

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import hashlib
-import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 from numpy.typing import NDArray
+
+from command_line.kernel_cache import KernelCache, kernel_cache
 
 # The shapes' kernels are called by a table of functions (fsw/shapes/zones.py), which numba has had
 # for years and still calls new.
@@ -26,48 +25,14 @@ warnings.filterwarnings(
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_PACKAGE = Path(__file__).parent
+_CACHE: Final = kernel_cache(
+    Path(__file__).parent, numba.config.CACHE_DIR, f"{numba.__version__}-{get_host_cpu_name()}"
+)
 
 
-def _cache_directory() -> str:
-    """A cache directory per state of the sources.
-
-    numba stamps a cached kernel with its own file only: after an edit in a callee of another
-    file the caller would still run the old machine code.
-    """
-    sources = (path.read_bytes() for path in sorted(_PACKAGE.rglob("*.py")))
-    digest = hashlib.sha256(b"".join(text for text in sources if b"fsw.compiled" in text))
-    root = Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
-    return str(root / f"numba-{digest.hexdigest()[:12]}")
-
-
-_CACHE = _cache_directory()
-
-
-def kernel_directory() -> Path:
-    """Where the kernels of this state of the sources are kept."""
-    return Path(_CACHE)
-
-
-def compiling_is_due(what: str, directory: Path | None = None) -> bool:
-    """Whether a kernel of ``what`` flies may not be on disk yet, and would be kept there.
-
-    That some are there says nothing: another command, or one that was interrupted, has left them.
-    """
-    cache = directory or kernel_directory()
-    nearest = next(one for one in (cache, *cache.parents) if one.is_dir())
-    return not _mark(cache, what).exists() and os.access(nearest, os.W_OK)
-
-
-def note_compiled(what: str, directory: Path | None = None) -> None:
-    """Keep in mind, on disk, that all kernels of ``what`` flies are there."""
-    with contextlib.suppress(OSError):  # then it is looked for again
-        _mark(directory or kernel_directory(), what).touch()
-
-
-def _mark(cache: Path, what: str) -> Path:
-    # numba keeps what it compiled by its own version and processor.
-    return cache / f"{what}-{numba.__version__}-{get_host_cpu_name()}.complete"
+def cache() -> KernelCache:
+    """Where the kernels of the flight software are kept."""
+    return _CACHE
 
 
 def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
@@ -88,9 +53,10 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, _CACHE
+    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_CACHE.folder)
+    kept = _CACHE.folder is not None
     try:
-        compile_it = numba.njit(cache=True, fastmath=False, error_model="numpy", **more)
+        compile_it = numba.njit(cache=kept, fastmath=False, error_model="numpy", **more)
         dispatcher = compile_it(kernel)
     finally:
         numba.config.CACHE_DIR = before

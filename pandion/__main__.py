@@ -9,66 +9,77 @@ import sys
 from importlib import import_module
 from typing import Final
 
-from command_line.output import complain
-from command_line.parser import COULD_NOT_START, unknown_name
+from pandion.own_modules import put_first
 
-# Module, and what the verb does; without that it is not in the list.
-VERBS: Final[dict[str, tuple[str, str]]] = {
-    "fly": (
-        "pandion.fly",
-        "start the simulator and the flight software, fly a scenario, print the result",
-    ),
-    "sitl": ("sitl.__main__", "run the simulator alone"),
-    "fsw": ("fsw.__main__", "run the flight software alone"),
-    "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
-    "campaign": (
-        "pandion.campaign",
-        "fly many flights from one file, here or on a cluster: margins, failures, the worst",
-    ),
-    "falsify": (
-        "pandion.falsify",
-        "search for the disturbance that pushes the vehicle furthest off its plan",
-    ),
-    "certify": (
-        "pandion.certify",
-        "state what a campaign shows: exact bounds, margins, what was varied; or verify it",
-    ),
-    "splitting": (
-        "pandion.splitting",
-        "estimate how rare a small margin is, where plain flights never show one",
-    ),
-    "tune": (
-        "pandion.tune",
-        "improve parameters against a cost and a chance constraint, judged on other flights",
-    ),
-    "faults": (
-        "pandion.faults",
-        "let something fail in flight, in one mode or in all, and compare with what must happen",
-    ),
-    "param": (
-        "pandion.param",
-        "list, set, import and export the parameters of a vehicle or a file",
-    ),
-    "dialect": ("pandion.dialect", "teach MAVProxy, Wireshark and others the private messages"),
-    "replay": (
-        "pandion.replay",
-        "feed a flight log through the flight software again and compare",
-    ),
-    "view": ("pandion.view", "show a flight in the browser, from its log or live"),
-    "top": ("pandion.top", "inspect a running vehicle in the terminal: rates, fields, margins"),
-    "report": ("pandion.report", "write one or several flights as a self-contained HTML page"),
-    "export": ("pandion.export", "write a flight log as CSV or MCAP, or layouts that show it"),
-    "doctor": ("pandion.doctor", "check this machine: privileges, ports, versions, disk, clock"),
-    "bench": ("pandion.moved_bench", ""),
+put_first()
+
+from command_line.output import complain, print_anything  # noqa: E402
+from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
+
+# Module, and what the verb does, by what it is for.
+GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
+    "fly": {
+        "fly": (
+            "pandion.fly",
+            "fly a scenario with both processes, print the result",
+        ),
+        "sitl": ("sitl.__main__", "run the simulator alone"),
+        "fsw": ("fsw.__main__", "run the flight software alone"),
+        "param": (
+            "pandion.param",
+            "list, set, import and export parameters of a vehicle or a file",
+        ),
+    },
+    "look": {
+        "view": ("pandion.view", "show a flight in the browser, from its log or live"),
+        "report": ("pandion.report", "write one or several flights as a self-contained HTML page"),
+        "top": ("pandion.top", "inspect a running vehicle in the terminal: rates, fields, margins"),
+        "replay": (
+            "pandion.replay",
+            "feed a flight log through the flight software again, compare",
+        ),
+        "export": ("pandion.export", "write a flight log as CSV or MCAP, or layouts that show it"),
+    },
+    "study": {
+        "campaign": ("pandion.campaign", "fly many flights from one file, here or on a cluster"),
+        "certify": (
+            "pandion.certify",
+            "state what a campaign shows, with exact bounds; or verify it",
+        ),
+        "compare": ("pandion.compare", "compare two campaigns: plans, margins, violations"),
+        "falsify": (
+            "pandion.falsify",
+            "search for the disturbance that pushes furthest off the plan",
+        ),
+        "splitting": ("pandion.splitting", "estimate how rare a small margin is"),
+        "tune": ("pandion.tune", "improve parameters on some flights, judge them on others"),
+        "faults": ("pandion.faults", "let something fail in flight, compare with what must happen"),
+        "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
+    },
+    "tools": {
+        "doctor": ("pandion.doctor", "check this machine and this set-up"),
+        "dialect": ("pandion.dialect", "teach MAVProxy, Wireshark and others the private messages"),
+        "completion": ("pandion.completion", "print what lets a shell complete verbs and options"),
+    },
 }
+VERBS: Final = {name: verb for group in GROUPS.values() for name, verb in group.items()}
+_MOVED: Final = {"bench": "pandion.moved_bench"}  # which is a verb no more
 
-HELP: Final = """\
+
+def _listed() -> str:
+    """The verbs by groups."""
+    return "\n".join(
+        f"{title}:\n" + "\n".join(f"  {name:11} {what}" for name, (_, what) in verbs.items())
+        for title, verbs in GROUPS.items()
+    )
+
+
+HELP: Final = f"""\
 usage: pandion VERB [options]
 
 Flight software for aerial manipulators, with a simulator, over MAVLink.
 
-verbs:
-{verbs}
+{_listed()}
 
 options:
   --version   print the version
@@ -81,7 +92,7 @@ examples:
   pandion fsw --sim udp:127.0.0.1:4560 --gcs udp:127.0.0.1:14550
   pandion replay runs/walls-seed0-1 --verify
   pandion reproduce table4 --plant double-integrator --seeds 100:120
-""".format(verbs="\n".join(f"  {name:11} {what}" for name, (_, what) in VERBS.items() if what))
+"""
 
 _INTERRUPTED: Final = 1  # exit code
 
@@ -111,21 +122,27 @@ def _silence_stdout() -> None:
 
 
 def _run(words: list[str]) -> int:
+    if "_ARGCOMPLETE" in os.environ:
+        from pandion.completion import complete
+
+        words = complete(VERBS)
+    if words[:1] == ["help"] and len(words) > 1:
+        words = [words[1], "--help"]
     if not words or words[0] in ("-h", "--help", "help"):
         print(HELP, end="")
         return 0
-    if words[0] == "--version":
+    if words[0] in ("--version", "-V", "version"):
         from command_line.version import version
 
         print(f"pandion {version()}")
         return 0
     name, *options = words
-    if name not in VERBS:
+    if name not in VERBS and name not in _MOVED:
         what = "option" if name.startswith("-") else "verb"
         known = ("--help", "--version") if what == "option" else VERBS
         complain("pandion", unknown_name(what, name, known))
         return COULD_NOT_START
-    module, _ = VERBS[name]
+    module = VERBS[name][0] if name in VERBS else _MOVED[name]
     entry = import_module(module).main
     # The two processes have programs of their own, which call themselves by another name.
     return int(
@@ -135,6 +152,7 @@ def _run(words: list[str]) -> int:
 
 def program() -> int:
     """``main`` as a program of its own, which a batch system ends as Ctrl-C does."""
+    print_anything()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     return main()
 

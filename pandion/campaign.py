@@ -5,8 +5,9 @@ from __future__ import annotations
 import shlex
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from command_line.junit import junit_xml
 from command_line.options import as_words, group, json_file, option, read, switch
 from command_line.output import complain, console_beside, json_text, say, typed, unwritten
 from command_line.parser import COULD_NOT_START
@@ -15,11 +16,14 @@ from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
+from pandion.gate_options import junit, required
 
 if TYPE_CHECKING:
     from studies.campaign.plan import CampaignPlan
+    from studies.statistics.requirement import Requirement
 
 FLOWN, BROKEN = 0, 1  # exit codes
+_CONFIDENCE: Final = 0.95  # of a requirement that names none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +47,8 @@ class CampaignOptions:
         "resumed (default a new one in runs/)",
         Path,
     )
+    require: tuple[Requirement, ...] = required()
+    junit: str | None = junit()
     json: str | None = json_file("the summary")
 
 
@@ -65,6 +71,8 @@ def main(argv: list[str]) -> int:
             raise CampaignError("give a campaign file; `pandion campaign --example` prints one")
         plan = load_plan(options.file)
         if options.flight is not None:
+            if options.require or options.junit:
+                raise CampaignError("--require and --junit are of all flights: leave out --flight")
             return _again(options, plan)
         return _fly(options, options.file, plan)
     except (CampaignError, SchedulerGoneError, OSError) as error:
@@ -125,9 +133,11 @@ def _all(
 
 def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     """Page, table and summary of what is in the journal now."""
+    from studies.campaign.junit_cases import junit_cases
     from studies.campaign.page import again, page
     from studies.campaign.store import PAGE, left_out, read, write_facts, write_table
-    from studies.campaign.summary import summaries, worst
+    from studies.campaign.summary import summaries, verdict, worst
+    from studies.statistics.certificate import verdicts
 
     result = read(folder)
     rows = result.rows
@@ -142,9 +152,11 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     }
     facts = write_facts(folder, result.plan, result.asked, result.seal, more)
     sentences = (f"Pandion {version()}", f"Command: pandion campaign {folder / 'campaign.toml'}")
-    (folder / PAGE).write_text(page(result, sentences, folder), encoding="utf-8")
+    judged = verdicts(result, _CONFIDENCE, options.require)
+    shown = [(one["met"], f"{one['text']}: {one['found']}") for one in judged]
+    (folder / PAGE).write_text(page(result, sentences, folder, shown), encoding="utf-8")
     if write_table(folder, rows) is None:
-        display.say("no rows.parquet: install pandion[parquet] for it; the journal has the rows")
+        display.say("no rows.parquet: pip install pyarrow for it; the journal has the rows")
     for one in cases:
         least = one.margin_m.get("0")
         margin = "" if least is None else f", minimum margin {1e3 * least:+.1f} mm"
@@ -156,15 +168,19 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         )
     if result.left_out:
         display.say(left_out(result.left_out))
+    for passed, sentence in shown or [verdict(rows, result.asked)]:
+        display.say(f"{'PASS' if passed else 'FAIL'} {sentence}")
     display.say(f"page {folder / PAGE}")
     lost = unwritten(options.json, json_text(facts, 1) + "\n")
+    lost += unwritten(options.junit, junit_xml(result.plan.name, junit_cases(result, judged)))
     for what in lost:
         complain("pandion campaign", f"cannot write {what}")
     for row in rows:
         if row.error:
             complain("pandion campaign", f"flight {row.flight} broke: {row.reason}")
             break
-    return BROKEN if lost or more["errors"] else FLOWN
+    met = all(passed for passed, _ in shown)
+    return FLOWN if met and not (lost or more["errors"]) else BROKEN
 
 
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:

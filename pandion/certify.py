@@ -17,10 +17,12 @@ from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
+from pandion.gate_options import required
 
 if TYPE_CHECKING:
     from studies.campaign.flight import CampaignRow
     from studies.campaign.store import CampaignResult
+    from studies.statistics.requirement import Requirement
 
 CERTIFIED, DIFFERS = 0, 1  # exit codes
 _INTERRUPTED: Final = 1  # as well
@@ -50,9 +52,10 @@ class CertifyOptions:
         default=0,
     )
     cluster: ClusterOptions = group(ClusterOptions)
+    require: tuple[Requirement, ...] = required()
     json: str | None = json_file("the statement")
-    out: Path | None = option(
-        "--out FILE.html", f"where the page goes (default {PAGE} in the directory)", Path
+    html: Path | None = option(
+        "--html FILE", f"the page (default {PAGE} in the directory)", Path, old="--out"
     )
 
 
@@ -61,7 +64,7 @@ class NoCertificateError(ValueError):
 
 
 def main(argv: list[str]) -> int:
-    """Certify, or verify; returns the exit code."""
+    """Certify, or verify; returns the exit code, 1 if a requirement is not met."""
     what = "State what a campaign shows: exact bounds, margins, what was varied and what was not."
     options = read(CertifyOptions, "pandion certify", what, argv)
     from fsw.runtime.process import pin_numerics_to_one_thread
@@ -76,6 +79,10 @@ def main(argv: list[str]) -> int:
         if options.refly and not _flown_again(options, result):
             return DIFFERS
         if options.verify is not None:
+            if options.require:
+                raise NoCertificateError(
+                    "--verify computes what the certificate requires; leave out --require"
+                )
             return _verify(options, result, options.verify)
         return _certify(options, result)
     except KeyboardInterrupt:
@@ -137,19 +144,20 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
     from studies.statistics.certificate import certificate
     from studies.statistics.certificate_page import page, sentences
 
-    stated = certificate(result, options.campaign, options.confidence)
+    stated = certificate(result, options.campaign, options.confidence, required=options.require)
     display = Display(console_beside(options.json))
     for sentence in sentences(stated):
         display.say(sentence)
     if result.left_out:
         display.say(left_out(result.left_out))
-    written = options.out or options.campaign / PAGE
+    written = options.html or options.campaign / PAGE
     lost = unwritten(options.json, json_text(stated, 1) + "\n")
     lost += unwritten(written, page(stated, result))
     display.say(f"page {written}; {stated['commands'][0]} --verify {written}")
     for what in lost:
         complain("pandion certify", f"cannot write {what}")
-    return DIFFERS if lost else CERTIFIED
+    met = all(one["met"] for one in stated.get("required", ()))
+    return CERTIFIED if met and not lost else DIFFERS
 
 
 def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
@@ -157,7 +165,9 @@ def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
 
     stated = _statement(path)
     display = Display(console_beside(options.json))
-    found = certificate(result, options.campaign, stated["confidence"], stated["refits"])
+    found = certificate(
+        result, options.campaign, stated["confidence"], stated["refits"], _stated_required(stated)
+    )
     wrong = differences(stated, found)
     if tampered(stated):
         wrong.insert(0, "the certificate was changed: its digest is not that of its statement")
@@ -169,6 +179,15 @@ def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
     for what in unwritten(options.json, text):
         complain("pandion certify", f"cannot write {what}")
     return DIFFERS if wrong else CERTIFIED
+
+
+def _stated_required(stated: dict[str, Any]) -> list[Requirement]:
+    from studies.statistics.requirement import requirement
+
+    try:
+        return [requirement(one["text"]) for one in stated.get("required", ())]
+    except (TypeError, KeyError, ValueError) as error:
+        raise NoCertificateError(f"what the certificate requires cannot be read: {error}") from None
 
 
 def _statement(path: Path) -> dict[str, Any]:

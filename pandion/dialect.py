@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.folders import data_folder, home
 from command_line.options import option, read, switch
 from command_line.output import complain
 from command_line.parser import COULD_NOT_START
@@ -38,7 +38,9 @@ class DialectOptions:
         one_of("target", "install", "wireshark", "xml"),
         required=True,
     )
-    to: Path | None = option("--to DIR", "write there (default a directory of the user's)", Path)
+    out: Path | None = option(
+        "--out DIR", "write there (default a directory of the user's)", Path, old="--to"
+    )
     path: bool = switch("--path", "with xml: print where the file is")
 
 
@@ -51,7 +53,7 @@ def main(argv: list[str]) -> int:
         return 0
     install = {"install": _install, "wireshark": _wireshark}[options.what]
     try:
-        print(install(options.to), end="")
+        print(install(options.out), end="")
     except (GenerationError, OSError) as error:
         complain("pandion dialect", _reason(error))
         return COULD_NOT_START
@@ -59,23 +61,19 @@ def main(argv: list[str]) -> int:
 
 
 def _install(wanted: Path | None) -> str:
-    folder = (wanted or _data_home() / "pandion" / "message_definitions").absolute()
+    folder = (wanted or data_folder() / "pandion" / "message_definitions").absolute()
     export.write_definitions(folder)
     return _MAVPROXY.format(folder=folder)
 
 
 def _wireshark(wanted: Path | None) -> str:
-    folder = wanted or Path.home() / ".local" / "lib" / "wireshark" / "plugins"
+    folder = wanted or home() / ".local" / "lib" / "wireshark" / "plugins"
     path = folder.absolute() / "pandion.lua"
     export.write_wireshark_plugin(path)
     return _WIRESHARK.format(path=path)
 
 
-def _data_home() -> Path:
-    return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
-
-
 def _reason(error: Exception) -> str:
-    if isinstance(error, OSError):
+    if isinstance(error, OSError) and error.filename is not None:
         return f"cannot write {error.filename}: {error.strerror}"
     return str(error)

@@ -73,7 +73,7 @@ class Display:
             refresh_per_second=4,
         )
         with bar:
-            bar.add_task("waiting", total=None, state="")
+            bar.add_task("starting", total=None, state="")
             self._bar = bar
             try:
                 yield
@@ -122,8 +122,13 @@ class Display:
         state = f"{time_s:6.1f} s  ×{real_time_factor:.1f}{margin}"
         self.report("flying", time_s, duration_s, state)
 
-    def result(self, result: dict[str, Any], rows: list[tuple[str, str]]) -> None:
-        """Print the table and PASS or FAIL."""
+    def result(
+        self,
+        result: dict[str, Any],
+        first: list[tuple[str, str]],
+        rows: list[tuple[str, str]],
+    ) -> None:
+        """Print PASS or FAIL and the ``first`` rows as lines, then the others as a table."""
         from rich.console import Console
         from rich.table import Table
         from rich.text import Text
@@ -134,11 +139,13 @@ class Display:
         table.add_column("value", justify="right")
         for name, value in rows:
             table.add_row(Text(printable(name)), Text(printable(value)))
-        console.print(table)
         passed = result["completed"]
         style = "bold green" if passed else "bold red"
         console.print("PASS" if passed else "FAIL", style=style, end=" ")
         console.print(printable(result["end_reason"]), markup=False, soft_wrap=True)
+        for name, value in first:
+            console.print(printable(f"{name:20}{value}"), markup=False, soft_wrap=True)
+        console.print(table)
         for name, path in result["logs"].items():
             console.print(printable(f"{name:12} {path}"), markup=False, soft_wrap=True)
         self._stream.flush()  # what follows may go to another stream

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read, switch
 from command_line.output import complain, console_beside, json_text, unwritten
 from command_line.parser import COULD_NOT_START, unknown_name
@@ -15,6 +16,7 @@ from command_line.values import output_file, whole
 from command_line.version import version
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
+from pandion.gate_options import junit
 from pandion.reproduce import seeds
 
 if TYPE_CHECKING:
@@ -58,6 +60,7 @@ class FaultsOptions:
     journal: Path | None = option(
         "--journal FILE", "keep each flight here; one that is here is not flown again", Path
     )
+    junit: str | None = junit()
     json: str | None = json_file("the cells")
     html: str | None = option("--html FILE", "write the matrix as a page", output_file)
 
@@ -176,11 +179,19 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
     text = json_text([row.as_json() for row in rows], 1) + "\n"
     lost = unwritten(options.json, text)
+    lost += unwritten(options.junit, junit_xml("faults", [_case(row) for row in rows]))
     if options.html is not None:
         lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
     for what in lost:
         complain("pandion faults", f"cannot write {what}")
     return DIFFERS if wrong or lost else AS_EXPECTED
+
+
+def _case(row: Judged) -> Case:
+    name = f"{row.cell.expected.name}, seed {row.cell.seed}"
+    broke = row.flight.problem if row.flight.error else ""
+    failure = "" if broke else "; ".join(row.differs)
+    return Case(row.cell.mode, name, failure=failure, error=broke)
 
 
 def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[Judged]:

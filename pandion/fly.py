@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read, switch
-from command_line.output import complain, json_text, typed, unwritten, without
+from command_line.output import complain, json_text, typed, unwritable, unwritten, without
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
@@ -20,7 +20,7 @@ from fsw.parameters.control_choice import ControlChoice
 from pandion.display import Display
 from pandion.join_truth import join_truth
 from pandion.processor import ANYWHERE, lockstep_places
-from pandion.result import FlightReports, as_json, table_rows
+from pandion.result import FlightReports, as_json, first_rows, table_rows
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from pandion.view_beside import ViewBeside
 from sitl.arguments import RunOptions, SitlOptions
@@ -53,6 +53,10 @@ class FlyOptions(RunOptions):
     )
     report: bool = switch("--report", "write the flight's report.html beside its log")
 
+    def __post_init__(self) -> None:
+        """Refuse a contradictory choice; raises ContradictionError."""
+        self.control.check()
+
 
 @dataclass(frozen=True, slots=True)
 class PlannedFlight:
@@ -73,7 +77,7 @@ def main(argv: list[str]) -> int:
     try:
         flight = planned(options)
     except (ScenarioError, LinkError, OSError) as error:
-        complain("pandion fly", error)
+        complain("pandion fly", unwritable(error))
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
@@ -128,6 +132,11 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
         f"Pandion {version()}: {flight.name}, seed {options.seed}, {flight.sensors} sensors, "
         f"{length}, {options.control.controller} controller, {pacing}"
     )
+    if options.control.body not in (None, flight.body):
+        display.say(
+            f"note: --body {options.control.body} keeps clear, the scenario is for {flight.body}; "
+            "it may start outside its safe set"
+        )
     port = parse_address(options.links.gcs)[1]
     display.say(f"telemetry to {options.links.gcs}: QGroundControl connects on UDP {port}")
     if options.links.api != NO_LINK:
@@ -192,7 +201,9 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
     result = as_json(reports)
     text = json_text(result, 2) + "\n"
     lost = unwritten(out / "result.json", text)
-    display.result(result, table_rows(result, (flown.sitl or {}).get("tracking_error_max_m")))
+    tracking_max_m = (flown.sitl or {}).get("tracking_error_max_m")
+    first = first_rows(result, tracking_max_m)
+    display.result(result, first, table_rows(result, tracking_max_m)[len(first) :])
     lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
     lost += _report(flight, display)
     if lost:

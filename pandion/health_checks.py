@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from fsw.parameters.control_choice import ControlChoice
+from pandion.own_modules import our_modules
 
 OK, WARN, FAIL = "ok", "warn", "fail"
 
@@ -65,6 +66,10 @@ def all_checks(out: Path) -> list[Check]:
         clock(),
         versions(),
         extras(),
+        modules(),
+        code(),
+        output(),
+        home(),
         compile_cache(),
         *(port(*row) for row in _PORTS),
         disk(out),
@@ -177,11 +182,81 @@ def extras() -> Check:
     """Packages that only some verbs need."""
     from importlib.util import find_spec
 
-    missing = sorted({extra for name, extra in _EXTRAS.items() if find_spec(name) is None})
+    lacking = [name for name in _EXTRAS if find_spec(name) is None]
+    missing = sorted({_EXTRAS[name] for name in lacking})
     if not missing:
         return Check("extras", OK, "view, report, top and mcap can be used")
-    remedy = f"pip install 'pandion[{','.join(missing)}]' where they are wanted"
+    remedy = f"pip install {' '.join(lacking)} where they are wanted"
     return Check("extras", OK, f"not installed: {', '.join(missing)}", remedy)
+
+
+def modules() -> Check:
+    """Whether our own modules are found, and those of this environment."""
+    from importlib.util import find_spec
+
+    root = str(our_modules())
+    others = {str(_found(name)) for name in ("fsw", "sitl", "messages", "view")} - {root}
+    if others:
+        found = f"modules come from {', '.join(sorted(others))} as well as from {root}"
+        return Check("modules", FAIL, found, "take what is not Pandion's out of PYTHONPATH")
+    beside = Path(sys.prefix).parent
+    brought = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    if (
+        (beside / "pandion" / "fly.py").is_file()
+        and not beside.samefile(root)
+        and root not in brought
+    ):
+        return Check(
+            "modules", WARN, f"{beside} runs the code of {root}", f"make setup in {beside}"
+        )
+    numpy = find_spec("numpy")
+    if numpy is None or numpy.origin is None or not numpy.origin.startswith(sys.prefix):
+        return Check(
+            "modules",
+            WARN,
+            f"NumPy is not this environment's: {numpy and numpy.origin}",
+            "unset PYTHONPATH, or run make setup",
+        )
+    return Check("modules", OK, f"Pandion from {root}, packages from {sys.prefix}")
+
+
+def _found(name: str) -> Path | None:
+    from importlib.util import find_spec
+
+    spec = find_spec(name)
+    return None if spec is None or spec.origin is None else Path(spec.origin).parents[1]
+
+
+def code() -> Check:
+    """Which code flies, as flight logs say it."""
+    from fsw.log.revision import revision
+
+    known = revision()
+    if "unknown" in known:
+        return Check("code", WARN, known, "flight logs will not say which commit flew")
+    return Check("code", OK, known)
+
+
+def output() -> Check:
+    """Whether the terminal shows every character."""
+    encoding = (sys.stdout.encoding or "unknown").lower()
+    if encoding in ("utf-8", "utf8"):
+        return Check("output", OK, "UTF-8")
+    return Check("output", OK, f"{encoding}: signs that it does not know are shown in ASCII")
+
+
+def home() -> Check:
+    """Where keys of signed links are kept."""
+    from command_line.folders import NoHomeError, state_folder
+
+    try:
+        folder = state_folder()
+    except NoHomeError as error:
+        return Check("home", WARN, str(error), "signed links need it, or --keys; flights do not")
+    nearest = next(one for one in (folder, *folder.parents) if one.exists())
+    if not os.access(nearest, os.W_OK):
+        return Check("home", WARN, f"{nearest} cannot be written", "signed links need --keys DIR")
+    return Check("home", OK, f"keys of signed links in {folder}")
 
 
 def compile_cache() -> Check:
@@ -189,16 +264,17 @@ def compile_cache() -> Check:
     from fsw import compiled as fsw
     from sitl import compiled as sitl
 
-    halves = {"fsw": Path(fsw.__file__), "sitl": Path(sitl.__file__)}
-    closed = [half for half, file in halves.items() if not os.access(file.parent, os.W_OK)]
-    due = fsw.compiling_is_due(ControlChoice().kernels)
-    if closed and not os.environ.get("NUMBA_CACHE_DIR"):
+    caches = fsw.cache(), sitl.cache()
+    folders = [cache.folder.parent for cache in caches if cache.folder is not None]
+    if len(folders) < len(caches):
         remedy = "set NUMBA_CACHE_DIR to a folder that can be written"
-        found = f"{', '.join(closed)} cannot be written: every flight would compile for a minute"
+        found = "nowhere can kernels be kept: every flight compiles for a minute"
         return Check("compile cache", WARN, found, remedy)
-    if due:
-        return Check("compile cache", OK, "not complete: the first flight compiles for a minute")
-    return Check("compile cache", OK, "the kernels are compiled")
+    where = f"in {' and '.join(map(str, dict.fromkeys(folders)))}"
+    if caches[0].is_due(ControlChoice().kernels) or caches[1].is_due("flight"):
+        number = sum(cache.kernels for cache in caches)
+        return Check("compile cache", OK, f"the first flight compiles {number} kernels, {where}")
+    return Check("compile cache", OK, f"the kernels are compiled, {where}")
 
 
 def port(number: int, whose: str, remedy: str) -> Check:

@@ -24,7 +24,9 @@ class ReportOptions:
     """One page."""
 
     logs: list[Path] = option("LOG ...", "flight.ulg, or its directory", Path, required=True)
-    out: Path | None = option("--out FILE", "the page (default report.html beside the log)", Path)
+    html: Path | None = option(
+        "--html FILE", "the page (default report.html beside the log)", Path, old="--out"
+    )
 
 
 def main(argv: list[str]) -> int:
@@ -34,7 +36,7 @@ def main(argv: list[str]) -> int:
     from messages.ulog_reader import UlogError
 
     try:
-        written = write_report(options.logs, options.out)
+        written = write_report(options.logs, options.html)
     except (UlogError, ValueError, OSError) as error:
         complain("pandion report", error)
         return COULD_NOT_START

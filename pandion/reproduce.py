@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Final, TextIO
 
+from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, say, write_text
 from command_line.parser import COULD_NOT_START
@@ -17,6 +19,7 @@ from fsw.log.run_directory import new_run_directory
 from fsw.parameters.control_choice import KNOWN
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
+from pandion.gate_options import junit
 from sitl.scenario_file import SUITE_NAMES
 from studies.paper.catalogue import STUDIES, study
 
@@ -27,6 +30,8 @@ PLANTS = ("double-integrator", "full")
 TRACKING = KNOWN["tracking"]
 
 DONE, BROKEN = 0, 1  # exit codes
+WIDTH: Final = 100  # of a table on the terminal, in characters
+KEYS: Final = 2  # columns that name a row
 
 
 def seeds(text: str) -> range:
@@ -76,14 +81,16 @@ class ReproduceOptions:
         old="--inner",
     )
     suite: str | None = option(
-        "--suite NAME",
-        "robustness: only the rows flown with this suite of sensors",
+        "--sensors SUITE",
+        "robustness: only the rows flown with these sensors",
         one_of("suite", *SUITE_NAMES),
+        old="--suite",
     )
     only: str | None = option(
         "--only TEXT", "robustness: only the rows with this in their section, case or name"
     )
     cluster: ClusterOptions = group(ClusterOptions)
+    junit: str | None = junit()
     json: str | None = json_file("the rows")
     out: Path | None = option(
         "--out DIR",
@@ -107,7 +114,7 @@ def main(argv: list[str]) -> int:
 
     try:
         if options.what != "robustness" and (options.suite or options.only):
-            raise NoCellError(f"{options.what} has no rows to choose by --suite or --only")
+            raise NoCellError(f"{options.what} has no rows to choose by --sensors or --only")
         return _run(options)
     except (NoMatplotlibError, NoCellError, CampaignError, SchedulerGoneError, OSError) as error:
         complain("pandion reproduce", error)
@@ -139,6 +146,7 @@ def _run(options: ReproduceOptions) -> int:
     _show(found, console)
     say(f"page {page}", console)
     write_text(options.json, rows_text(found))
+    write_text(options.junit, junit_xml(options.what, _cases(found)))
     for error in found.errors:
         complain("pandion reproduce", error)
     return BROKEN if found.errors else DONE
@@ -165,7 +173,7 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     if options.duration_s is not None:
         command += f" --duration {options.duration_s:g}"
     if options.suite is not None:
-        command += f" --suite {options.suite}"
+        command += f" --sensors {options.suite}"
     if options.only is not None:
         command += f" --only '{options.only}'"
     if options.tracking != "lqr":
@@ -173,15 +181,69 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     return (f"Command: {command}", f"Pandion {version()}, code {sources()[:12]}")
 
 
+def _cases(report: Report) -> list[Case]:
+    """A test a row, failed where the paper prints another mark; and one a flight that broke."""
+    cases = []
+    for k, row in enumerate(report.rows):
+        named = list(row)[: list(row).index("passed")] if "passed" in row else []
+        name = ", ".join(f"{key} {row[key]}" for key in named) or f"row {k}"
+        printed, flown = row.get("paper_completed"), row.get("passed") == row.get("total")
+        failure = ""
+        if printed is not None and printed != flown:
+            mark = "completed" if printed else "not completed"
+            failure = f"the paper prints {mark}; {row['passed']} of {row['total']} are completed"
+        cases.append(Case(report.title, name, failure=failure))
+    return cases + [Case(report.title, f"error {k}", error=e) for k, e in enumerate(report.errors)]
+
+
 def _show(report: Report, stream: TextIO) -> None:
+    from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(file=stream, highlight=False, width=None if stream.isatty() else 160)
+    terminal = Console(file=stream).width if stream.isatty() else WIDTH
+    console = Console(file=stream, highlight=False, width=min(terminal, WIDTH))
     for table in report.tables:
-        drawn = Table(title=table.caption, title_justify="left")
-        for k, name in enumerate(table.headers):
-            drawn.add_column(name, justify="left" if k < 2 else "right")
-        for row in table.rows:
-            drawn.add_row(*row)
-        console.print(drawn)
+        title: str | None = table.caption
+        for block in blocks([table.headers, *table.rows], console.width):
+            drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
+            drawn.show_edge, title = False, None
+            headers, *rows = block
+            widths = _widths(block, console.width)
+            for k, (name, width) in enumerate(zip(headers, widths, strict=True)):
+                drawn.add_column(name, justify="left" if k < KEYS else "right", width=width)
+            for row in rows:
+                drawn.add_row(*row)
+            console.print(drawn)
+
+
+def _widths(lines: list[tuple[str, ...]], width: int) -> list[int]:
+    """Of columns: their longest words, and what is left to those whose cells would break."""
+    columns = list(zip(*lines, strict=True))
+    found = [_narrowest(column) for column in columns]
+    wanted = [max(map(len, column)) for column in columns]
+    for _ in range(width - sum(found) - len(found)):
+        k = max(range(len(found)), key=lambda k: wanted[k] - found[k])
+        found[k] += found[k] < wanted[k]
+    return found
+
+
+def _narrowest(column: Sequence[str]) -> int:
+    return max(len(word) for cell in column for word in cell.split() or [""])
+
+
+def blocks(lines: list[tuple[str, ...]], width: int) -> list[list[tuple[str, ...]]]:
+    """A table as blocks of columns that fit a width, each with the columns that name a row.
+
+    Args:
+        lines: The headers, then the rows.
+        width: Of the terminal, in characters. A column may be as narrow as its longest word.
+    """
+    need = [_narrowest(column) + 1 for column in zip(*lines, strict=True)]
+    names = list(range(min(KEYS, len(need))))
+    chosen: list[list[int]] = []
+    for k in range(len(names), len(need)):
+        if not chosen or sum(need[j] for j in (*chosen[-1], k)) > width:
+            chosen.append([*names])
+        chosen[-1].append(k)
+    return [[tuple(line[k] for k in of) for line in lines] for of in chosen or [names]]

@@ -76,16 +76,25 @@ def _end_reason(reports: FlightReports) -> str:
 Rows = list[tuple[str, str]]
 
 
-def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
-    """What a flight comes down to, as text; ``tracking_max_m`` is not in the JSON."""
+def first_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
+    """What a flight comes down to, as text; ``tracking_max_m`` [m] is not in the JSON."""
+    margins = {name: value for name, value in result["margins_m"].items() if value is not None}
+    of = f", {min(margins, key=margins.__getitem__)}" if margins else ""
     return [
+        ("minimum margin", f"{_mm(result['min_margin_m'])}{of}"),
+        ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
+    ]
+
+
+def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
+    """All of a flight, as text; ``tracking_max_m`` [m] is not in the JSON."""
+    return [
+        *first_rows(result, tracking_max_m),
         ("flown", f"{result['duration_s']:.1f} s"),
         ("sensors", result["sensors"] or "unknown"),
         *[(f"margin {name}", _mm(value)) for name, value in _shown(result["margins_m"]).items()],
-        ("minimum margin", _mm(result["min_margin_m"])),
         *[(f"limit {name.replace('_', ' ')}", _use(use)) for name, use in result["limits"].items()],
         ("longest beyond a surface", f"{max(result['beyond_s'].values(), default=0.0):.3f} s"),
-        ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
         ("control effort, sum / mean", _sum_and_mean(result["control_effort"])),
         ("control smoothness, sum / mean", _sum_and_mean(result["control_smoothness"])),
         ("breaches / off plan / filter", _counts(result["safety"])),

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
+from command_line.compile_progress import CompileProgress
 from command_line.parser import COULD_NOT_START
 from pandion.child import GRACE_S, UNFLOWN_GRACE_S, Child, Event
 from pandion.display import Display
@@ -85,6 +86,7 @@ class Supervisor:
         self._flown = Flown()
         self._children: list[Child] = []
         self._faults = ProcessFaults()
+        self._compiling = CompileProgress()
         self._selector = selectors.DefaultSelector()
 
     def run(self, sitl: list[str], fsw: Callable[[int], list[str]]) -> Flown:
@@ -138,6 +140,8 @@ class Supervisor:
                 for event in events or ():
                     self._handle(child, event)
             self._faults.go_on()
+            if (seen := self._compiling.look()) is not None:
+                self._display.report("compiling", *seen)
             for child in self._children:
                 child.escalate()
 
@@ -158,12 +162,8 @@ class Supervisor:
             )
         elif kind == "error":
             self._note_error(child, event)
-        elif kind == "listening":
-            endless = event["duration_s"] is None  # JSON knows no infinity
-            flown.port = event["port"]
-            flown.duration_s = math.inf if endless else event["duration_s"]
-        elif kind == "flying":
-            flown.started = True
+        elif kind in ("listening", "compiling", "flying"):
+            self._note_start(event)
         elif kind == "ended":
             self._note_result(child, event)
         elif kind == "unwritten":
@@ -172,8 +172,29 @@ class Supervisor:
             self._faults.begin(event, self._children)
         elif kind == "links" and self._found is not None:
             self._found(event["ports"]["gcs"])
-        if kind in ("listening", "preparing", "warning", "parameters", "fault", "text"):
+        if kind in (
+            "listening",
+            "preparing",
+            "compiling",
+            "warning",
+            "parameters",
+            "fault",
+            "text",
+        ):
             self._display.say(event["message"])
+
+    def _note_start(self, event: Event) -> None:
+        """Take in how far a process is on its way to the flight."""
+        flown = self._flown
+        if event["event"] == "listening":
+            endless = event["duration_s"] is None  # JSON knows no infinity
+            flown.port = event["port"]
+            flown.duration_s = math.inf if endless else event["duration_s"]
+        elif event["event"] == "flying":
+            flown.started = True
+            self._compiling.end()
+        elif event["folder"] is not None:
+            self._compiling.add(Path(event["folder"]), event["kernels"])
 
     def _note_error(self, child: Child, event: Event) -> None:
         """Keep the reason; before the flight, what an interrupted process says is none."""

@@ -8,6 +8,8 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Final
 
@@ -41,7 +43,16 @@ class ViewBeside:
                 start_new_session=True,  # Ctrl-C is for the flight, which ends it
                 preexec_fn=die_with(os.getpid(), None),
             )
-        self._display.say(f"view: open http://127.0.0.1:{page}")
+        threading.Thread(target=self._tell, args=(page,), daemon=True).start()
+
+    def _tell(self, page: int) -> None:
+        """Say where the page is, once it is served: loading what serves it takes seconds."""
+        process = self._process
+        while process is not None and process.poll() is None:
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", page), 1.0):
+                self._display.say(f"view: open http://127.0.0.1:{page}")
+                return
+            time.sleep(0.1)
 
     def close(self) -> None:
         """End it; safe to call without a start."""

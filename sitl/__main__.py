@@ -6,6 +6,7 @@ import os
 import sys
 
 from command_line.interrupts import end_at_once
+from command_line.output import print_anything
 
 
 def main(argv: list[str] | None = None, prog: str = "sitl") -> int:
@@ -23,4 +24,5 @@ def main(argv: list[str] | None = None, prog: str = "sitl") -> int:
 
 if __name__ == "__main__":
     end_at_once()
+    print_anything()
     sys.exit(main())

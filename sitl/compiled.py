@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
+from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
+
+from command_line.kernel_cache import KernelCache, kernel_cache
 
 # The shapes' kernels are called by a table of functions (sitl/distance.py), which numba has had for
 # years and still calls new.
@@ -20,28 +22,14 @@ warnings.filterwarnings(
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_PACKAGE = Path(__file__).parent
+_CACHE: Final = kernel_cache(
+    Path(__file__).parent, numba.config.CACHE_DIR, f"{numba.__version__}-{get_host_cpu_name()}"
+)
 
 
-def _sources_digest() -> str:
-    """Digest of every source file of the package that holds kernels."""
-    digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        source = path.read_bytes()
-        if b"from sitl.compiled import" in source or path == Path(__file__):
-            digest.update(source)
-    return digest.hexdigest()[:12]
-
-
-# numba stamps a cached kernel with its own file only: after an edit in a callee the caller
-# would still run the old machine code. A cache directory per state of the sources cannot.
-_ROOT = Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
-_CACHE_DIR = str(_ROOT / f"numba-{_sources_digest()}")
-
-
-def kernel_directory() -> Path:
-    """Where the kernels of this state of the sources are kept."""
-    return Path(_CACHE_DIR)
+def cache() -> KernelCache:
+    """Where the kernels of the simulator are kept."""
+    return _CACHE
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -82,10 +70,10 @@ def compilable(function: Callable[P, R]) -> Callable[P, R]:
 
 def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE_DIR
+    numba.config.CACHE_DIR = str(_CACHE.folder)
     try:
         machine_code: Callable[P, R] = numba.njit(
-            cache=True,
+            cache=_CACHE.folder is not None,
             fastmath=False,
             nogil=True,
             error_model="numpy",

@@ -13,6 +13,7 @@ from command_line.output import json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
+from sitl.compiled import cache
 from sitl.faults.keys import LINKS, Fault
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime
@@ -31,6 +32,7 @@ from sitl.truth_log import TruthLog
 COMPLETED: Final = 0  # exit code
 
 _FIFO_PRIORITY: Final = 50
+_KERNELS: Final = "flight"  # of which all but a few are the same for every scenario
 
 
 class Flight:
@@ -47,8 +49,11 @@ class Flight:
         self._options = options
         self._endpoint = endpoint
         self._events = events
+        if cache().folder is None or cache().is_due(_KERNELS):
+            cache().announce("sitl", events)
         self._simulation = Simulation(scenario, options.seed, origin=options.origin)
         rehearse(Simulation(scenario, options.seed))
+        cache().note(_KERNELS)
 
     def run(self, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""

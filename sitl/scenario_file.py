@@ -11,20 +11,24 @@ import types
 import typing
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
-from sitl.scenario import Range, Scenario, ScenarioZone, Sensors
+from sitl.scenario import V3, Range, Scenario, ScenarioWall, ScenarioZone, Sensors
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
 _MOST_BYTES = 256 * 1024  # of a file: 64 zones with their way points are a tenth of it
 _SHOWN = 80  # characters of a value in a sentence
+_UNIT, _ROUNDED = 1e-6, 0.05  # [1] by which a normal's length is off 1: not at all; by rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
 SUITE_NAMES: tuple[str, ...] = get_args(SuiteName)
+
+
+Plane = TypeVar("Plane", ScenarioWall, ScenarioZone)
 
 
 class ScenarioError(ValueError):
@@ -120,7 +124,25 @@ def _parsed(text: str, name: str, suite: str | None) -> Scenario:
         same = isinstance(given, dict) and given.get("suite", PERFECT) == suite
         table["sensors"] = {**(given if same else {}), "suite": suite}
     scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
-    return scenario
+    return dataclasses.replace(
+        scenario,
+        walls=tuple(map(_with_unit_normal, scenario.walls)),
+        zones=tuple(map(_with_unit_normal, scenario.zones)),
+    )
+
+
+def _with_unit_normal(zone: Plane) -> Plane:
+    """A plane whose normal was written with a few digits, with it as a unit vector [1]."""
+    normal: V3 | None = getattr(zone, "normal", None)
+    if normal is None:
+        return zone
+    length = math.hypot(*normal)
+    # Nearer to 1 it is a unit vector as it is written; further off it is some other vector.
+    if abs(length - 1.0) <= _UNIT or abs(length - 1.0) > _ROUNDED:
+        return zone
+    changed: Any = zone  # whichever of the two it is
+    unit = tuple(part / length for part in normal)
+    return dataclasses.replace(changed, normal=unit)  # type: ignore[no-any-return]
 
 
 def _nearest(word: object, known: Iterable[str]) -> str:

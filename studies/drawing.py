@@ -59,7 +59,7 @@ def sheet(rows: int, columns: int, width: float, height: float, **options: Any) 
         from matplotlib.figure import Figure
     except ImportError as error:
         raise NoMatplotlibError(
-            "figures need matplotlib: install pandion[report], or ask for a table"
+            "figures need matplotlib: pip install matplotlib, or ask for a table"
         ) from error
     canvas = Figure(figsize=(width, height), layout="constrained")
     axes = canvas.subplots(rows, columns, squeeze=False, **options)

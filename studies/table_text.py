@@ -13,6 +13,11 @@ def metres(value: float | None) -> str:
     return "–" if value is None else f"{value:.4f}"
 
 
+def error_mm(value: float | None) -> str:
+    """A tracking error ``value`` [m] for a table, in millimetres."""
+    return "–" if value is None else f"{1000.0 * value:.1f}"
+
+
 def millimetres(value: float | None) -> str:
     """A margin ``value`` [m] for a table, in millimetres and with its sign."""
     return "–" if value is None else f"{1000.0 * value:+.1f}"

@@ -6,6 +6,11 @@ import tempfile
 
 from hypothesis import settings
 
+from pandion.own_modules import put_first
+
+# What a shell of ROS brings must not be taken for ours.
+put_first()
+
 # The same examples on every machine and in every run: a failure on one is a failure on all. No
 # deadline per example, because the first one may compile a kernel or wait for a busy core.
 settings.register_profile("reproducible", derandomize=True, deadline=None)

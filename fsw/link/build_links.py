@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from command_line.folders import NoHomeError, state_folder
 from fsw.link.gcs_link import GcsLink, LinkSetup, RecordFrame
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.link_choice import LinkChoice, addresses, default_keys
+from fsw.link.link_choice import LinkChoice, addresses
 from fsw.link.sent_frames import SentFrames
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
-from fsw.link.signing.key_file import KeyFile
+from fsw.link.signing.key_file import KeyFile, NoKeyFile
 from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
@@ -41,7 +42,6 @@ def build_links(
     """
     gcs, api = addresses(choice)
     now_us, unix_us = clocks
-    keys = choice.keys or default_keys()
     setups = [
         LinkSetup(
             name="gcs",
@@ -70,7 +70,7 @@ def build_links(
             setup,
             inbox,
             context,
-            Signing(number, unix_us, KeyFile(keys / f"signing-{setup.name}.json"), times),
+            Signing(number, unix_us, _key_file(choice, setup.name), times),
             now_us,
             record if number == 0 else None,
             (TimeService(), *services()),
@@ -79,3 +79,11 @@ def build_links(
         for number, setup in enumerate(setups)
     ]
     return GroundLinks(links, context.facts.tick_period_us, now_us)
+
+
+def _key_file(choice: LinkChoice, link: str) -> KeyFile:
+    """Where the signing key of a link of this name is kept."""
+    try:
+        return KeyFile((choice.keys or state_folder()) / f"signing-{link}.json")
+    except NoHomeError:
+        return NoKeyFile()

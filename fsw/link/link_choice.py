@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -77,9 +76,3 @@ def addresses(choice: LinkChoice) -> tuple[Address, Address | None]:
     if api == gcs:
         raise LinkError(f"--gcs and --api are both {choice.gcs}; give them different ports")
     return gcs, api
-
-
-def default_keys() -> Path:
-    """Default directory of signing keys."""
-    state = os.environ.get("XDG_STATE_HOME")
-    return (Path(state) if state else Path.home() / ".local" / "state") / "pandion"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from command_line.options import option, switch
+from command_line.options import ContradictionError, option, switch
 from command_line.values import one_of
 
 # What can be chosen, by the name of the choice; a test holds it against what can be built.
@@ -61,6 +61,20 @@ class ControlChoice:
         "fly a configuration that cannot keep its safe set, with a warning",
         old="--soft",
     )
+
+    def check(self) -> None:
+        """Refuse a lambda that the vehicle would refuse to arm with, before anything starts.
+
+        Raises:
+            ContradictionError: It needs --allow-inconsistent.
+        """
+        # Only this controller has a barrier, and with it a lambda.
+        named = self.controller == "blf" and self.lambda_ != "consistent"
+        if named and not self.allow_inconsistent:
+            raise ContradictionError(
+                f"--lambda {self.lambda_} contradicts the limits of the vehicle, which would not "
+                "arm: add --allow-inconsistent to fly it all the same"
+            )
 
     @property
     def kernels(self) -> str:

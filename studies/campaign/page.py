@@ -10,11 +10,12 @@ from typing import Final
 import numpy as np
 
 from command_line.html_page import document, items, table
+from command_line.html_page import verdict as html_verdict
 from studies.campaign.flight import CampaignRow
 from studies.campaign.store import CampaignResult
-from studies.campaign.summary import CaseSummary, summaries, worst
+from studies.campaign.summary import CaseSummary, summaries, verdict, worst
 from studies.drawing import BASE, BOUND, WALL, NoMatplotlibError, drawable, sheet
-from studies.table_text import metres, millimetres
+from studies.table_text import error_mm, millimetres
 
 _MOST_CASES: Final = 12  # that are drawn
 _MOST_POINTS: Final = 4000  # of a map
@@ -22,11 +23,18 @@ _MOST_MAPS: Final = 8
 _CASE: Final = ("scenario", "sensors", "controller", "fault")
 
 
-def page(result: CampaignResult, sentences: Sequence[str], where: Path) -> str:
-    """The page of the campaign in a directory."""
+def page(
+    result: CampaignResult,
+    sentences: Sequence[str],
+    where: Path,
+    required: Sequence[tuple[bool, str]] = (),
+) -> str:
+    """The page of the campaign in a directory; of what was ``required``, whether it is met."""
     rows, plan = result.rows, result.plan
     title = f"Campaign {plan.name}"
-    parts = [f"<h1>{html.escape(title)}</h1>", items(_facts(result, sentences))]
+    verdicts = required or (verdict(rows, result.asked),)
+    parts = [f"<h1>{html.escape(title)}</h1>", *(html_verdict(*one) for one in verdicts)]
+    parts.append(items(_facts(result, sentences)))
     parts += ["<h2>What varied</h2>", items([str(one) for one in plan.varied] or ["nothing"])]
     parts.append(_cases(summaries(rows)))
     parts.append(_worst(worst(rows), where))
@@ -64,8 +72,8 @@ def _cases(found: Sequence[CaseSummary]) -> str:
         "minimum margin mm",
         "1 %",
         "median",
-        "TE m, median",
-        "TE m, 99 %",
+        "TE mm, median",
+        "TE mm, 99 %",
     )
     lines = [
         (
@@ -76,7 +84,7 @@ def _cases(found: Sequence[CaseSummary]) -> str:
             *(str(n) for n in (one.flights, one.completed, one.violated, one.contacts)),
             *(str(n) for n in (one.refused, one.errors)),
             *(millimetres(one.margin_m.get(share)) for share in ("0", "0.01", "0.5")),
-            *(metres(one.te_m.get(share)) for share in ("0.5", "0.99")),
+            *(error_mm(one.te_m.get(share)) for share in ("0.5", "0.99")),
         )
         for one in found
     ]
@@ -84,7 +92,7 @@ def _cases(found: Sequence[CaseSummary]) -> str:
 
 
 def _worst(rows: Sequence[CampaignRow], where: Path) -> str:
-    headers = ("flight", "configuration", "margin mm", "of", "at s", "TE m", "varied")
+    headers = ("flight", "configuration", "margin mm", "of", "at s", "TE mm", "varied")
     lines = [
         (
             str(row.flight),
@@ -92,7 +100,7 @@ def _worst(rows: Sequence[CampaignRow], where: Path) -> str:
             millimetres(row.margin_m),
             row.margin_of or "–",
             "–" if row.margin_time_s is None else f"{row.margin_time_s:.2f}",
-            metres(row.te_m),
+            error_mm(row.te_m),
             ", ".join(f"{key} {value:.4g}" for key, value in row.values.items()) or "–",
         )
         for row in rows
@@ -113,7 +121,7 @@ def again(row: CampaignRow, where: Path) -> str:
 def _figures(result: CampaignResult) -> list[str]:
     flown = [row for row in result.rows if not row.error]
     return [
-        _figure(_distributions(flown, result), "Minimum margin [mm] and tracking error TE [m]"),
+        _figure(_distributions(flown, result), "Minimum margin [mm] and tracking error TE [mm]"),
         *_maps(flown, result),
     ]
 
@@ -131,7 +139,7 @@ def _distributions(rows: Sequence[CampaignRow], result: CampaignResult) -> str:
     drawn = sheet(max(len(cases), 1), 2, 11.0, max(1.6 * len(cases), 1.6))
     for (left, right), (name, of) in zip(drawn.axes, cases.items(), strict=False):
         margins = drawable(1e3 * row.margin_m for row in of if row.margin_m is not None)
-        errors = drawable(row.te_m for row in of if row.te_m is not None)
+        errors = drawable(1e3 * row.te_m for row in of if row.te_m is not None)
         left.hist(margins, bins=40, color=BASE)
         left.axvline(0.0, color=WALL, linewidth=1.0)
         right.hist(errors, bins=40, color=BOUND)

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from command_line.bounded_file import read_bounded
 from command_line.bounded_json import read_json
 from command_line.output import json_text
 from command_line.version import version
@@ -48,6 +50,16 @@ class Digests:
 
 
 @dataclass(frozen=True, slots=True)
+class KeptRows:
+    """The rows of a campaign, whatever code has flown them."""
+
+    rows: tuple[CampaignRow, ...]  # in the order of the flights; one a flight
+    digests: Digests
+    facts: dict[str, Any]  # campaign.json
+    file: str  # campaign.toml
+
+
+@dataclass(frozen=True, slots=True)
 class CampaignResult:
     """A campaign as it lies in its directory."""
 
@@ -76,14 +88,7 @@ def read(directory: Path) -> CampaignResult:
         CampaignError: It is none, or one of another version.
         JournalError: The journal does not verify, or has lost lines.
     """
-    kept = _facts(directory)
-    if kept is None:
-        raise CampaignError(
-            f"{directory} is no directory of a campaign: {FACTS} is not there, is damaged or of "
-            "another version; give what `pandion campaign --out` was given, or mend it with that "
-            "command"
-        )
-    facts, digests, asked, sealed = kept
+    facts, digests, asked, sealed = _known_facts(directory)
     plan = replace(load_plan(directory / PLAN), name=str(facts.get("name", directory.name)))
     if plan.digest != digests.plan:
         if digests.code != code():
@@ -93,9 +98,38 @@ def read(directory: Path) -> CampaignResult:
                 f"{facts.get('version', 'of that day')}"
             )
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
-    rows, left_out, seal = _rows(directory / JOURNAL, plan, digests, sealed)
+    rows, left_out, seal = _rows(directory / JOURNAL, partial(row_of, plan), digests, sealed)
     asked = max([asked, *(row.flight + 1 for row in rows[-1:])])
     return CampaignResult(plan, rows, asked, digests, facts, left_out, seal)
+
+
+def read_rows(directory: Path) -> KeptRows:
+    """The rows of a campaign that other code may have flown, whose plan cannot be drawn again here.
+
+    Raises:
+        CampaignError: It is none, one of another version, or one without a row.
+        JournalError: The journal does not verify, or has lost lines.
+    """
+    facts, digests, _, sealed = _known_facts(directory)
+    rows, _, _ = _rows(directory / JOURNAL, partial(kept_row, CampaignRow), digests, sealed)
+    if not rows:
+        raise CampaignError(f"{directory} has no row that this version of Pandion can read")
+    try:
+        file = read_bounded(directory / PLAN, _MOST_BYTES).decode("utf-8", "replace")
+    except OSError as error:
+        raise CampaignError(f"{directory / PLAN} cannot be read: {error.strerror}") from None
+    return KeptRows(rows, digests, facts, file)
+
+
+def _known_facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal]:
+    kept = _facts(directory)
+    if kept is None:
+        raise CampaignError(
+            f"{directory} is no directory of a campaign: {FACTS} is not there, is damaged or of "
+            "another version; give what `pandion campaign --out` was given, or mend it with that "
+            "command"
+        )
+    return kept
 
 
 def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal] | None:
@@ -197,7 +231,7 @@ def _there(directory: Path, plan: CampaignPlan) -> int:
         return found.asked
     # A crash or a full disk left no facts. They follow from the file and the rows, if both are
     # those of this plan and this code.
-    rows, _, _ = _rows(directory / JOURNAL, plan, own, Seal())
+    rows, _, _ = _rows(directory / JOURNAL, partial(row_of, plan), own, Seal())
     if not rows and any(lines(directory / JOURNAL)):
         raise CampaignError(f"{directory} has a journal of something else; give another --out")
     if rows and (not (directory / PLAN).exists() or load_plan(directory / PLAN).digest != own.plan):
@@ -259,7 +293,10 @@ def _check_same(directory: Path, there: CampaignResult, own: Digests) -> None:
 
 
 def _rows(
-    journal: Path, plan: CampaignPlan, digests: Digests, sealed: Seal
+    journal: Path,
+    row_in: Callable[[dict[str, Any]], CampaignRow],
+    digests: Digests,
+    sealed: Seal,
 ) -> tuple[tuple[CampaignRow, ...], int, Seal]:
     """One row a flight, the last that was written, in their order; how many lines are none.
 
@@ -272,7 +309,7 @@ def _rows(
         kept = kept or seal == sealed
         key = line.pop("key", None)
         try:
-            row = row_of(plan, line)
+            row = row_in(line)
         except TypeError:
             left_out += 1
             continue

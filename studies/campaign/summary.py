@@ -120,6 +120,26 @@ def _quantiles(values: Iterable[float | None]) -> dict[str, float]:
     }
 
 
+def verdict(rows: Sequence[CampaignRow], asked: int) -> tuple[bool, str]:
+    """Whether all flights that were asked for were flown and completed, and a sentence."""
+    counts = (
+        (asked - len(rows), "missing"),
+        (sum(row.error for row in rows), "broke"),
+        (sum(row.refused for row in rows), "refused by the vehicle"),
+        (sum(row.violated for row in rows), "with a violation"),
+        (
+            sum(not (row.completed or row.violated or row.error or row.refused) for row in rows),
+            "not completed",
+        ),
+    )
+    wrong = [f"{count} {what}" for count, what in counts if count]
+    if not wrong:
+        return True, f"{len(rows)} of {asked} flights completed without a violation"
+    first = worst([row for row in rows if not row.completed], 1)
+    named = f"; worst: flight {first[0].flight}, {first[0].reason}" if first else ""
+    return False, f"of {asked} flights {', '.join(wrong)}{named}"
+
+
 def worst(rows: Sequence[CampaignRow], count: int = WORST) -> list[CampaignRow]:
     """Flights that broke, those that touched something, then the least margins."""
 

@@ -267,12 +267,24 @@ def simulate(
             recorder.modes.append(mode.value)
             # As the scenario's pilot would, who looks on.
             why = f"the vehicle left the trajectory for {mode.value}"
+            why += _other_body(scenario, config)
             simulation.leave_trajectory(sensors.t_us, why)
         if step % steps_per_plan == 0 and outputs.snapshot.plan_input is not None:
             recorder.metrics.add(outputs.snapshot.plan_input)
         if outputs.plan_request is not None and asked is not None:
             asked(outputs.plan_request)
     return FlightResult(simulation.result(), recorder, touched(simulation.ended))
+
+
+def _other_body(scenario: Scenario, config: FlightConfig) -> str:
+    """What may be the reason where another body keeps clear than the scenario is made for."""
+    body = config.planner.body
+    if body == scenario.body:
+        return ""
+    return (
+        f" (body {body!r} keeps clear, the scenario is for {scenario.body!r}: "
+        f"flight_config(body={scenario.body!r}))"
+    )
 
 
 def _trace_point(simulation: Simulation) -> TracePoint:

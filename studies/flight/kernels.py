@@ -6,14 +6,17 @@ compiler leaves behind for as long as it flies.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final
 
+from command_line.compile_progress import CompileProgress
+from command_line.kernel_cache import KernelCache
 from fsw.parameters.control_choice import ControlChoice
 
 HALVES: Final = ("fsw", "sitl")
@@ -21,6 +24,8 @@ _CAMPAIGN: Final = "campaign"
 # Compiling leaves much behind that is not garbage yet: as often as Python looks by itself, looking
 # takes 7 % of the time; so, 2.5 %.
 _YOUNG: Final = 100_000
+_LOOK_S: Final = 0.5
+_SAY_S: Final = 10.0
 
 
 def compile_first(say: Callable[[str], None]) -> None:
@@ -28,10 +33,14 @@ def compile_first(say: Callable[[str], None]) -> None:
 
     ``say`` takes a sentence. If a half cannot be compiled, the first flight will say why.
     """
-    due = [half for half in HALVES if _is_due(half)]
+    due = [half for half in HALVES if _cache(half).is_due(_CAMPAIGN)]
     if not due:
         return
-    say("compiling before the first flight, which takes a minute")
+    progress = CompileProgress()
+    for cache in map(_cache, due):
+        if cache.folder is not None:
+            progress.add(cache.folder, cache.kernels)
+    say(f"compiling {sum(_cache(half).kernels for half in due)} kernels before the first flight")
     # In sessions of their own: an interrupt is for this process, which ends them silently.
     running = [
         subprocess.Popen(
@@ -44,35 +53,41 @@ def compile_first(say: Callable[[str], None]) -> None:
         for half in due
     ]
     try:
-        for one in running:
-            one.wait()
+        _wait(running, progress, say)
     finally:
         for one in running:
             one.kill()
             one.wait()
 
 
+def _wait(
+    running: list[subprocess.Popen[bytes]], progress: CompileProgress, say: Callable[[str], None]
+) -> None:
+    said_s = time.monotonic()
+    for one in running:
+        while True:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                one.wait(_LOOK_S)
+                break
+            seen = progress.look()
+            if seen is not None and time.monotonic() - said_s >= _SAY_S:
+                say(f"compiling: {seen[2]}")
+                said_s = time.monotonic()
+
+
 def compile_half(half: str) -> None:
     """Build what flies, or what simulates; either compiles all that it calls."""
-    from fsw.compiled import note_compiled
-
     _build(half)
-    note_compiled(_CAMPAIGN, _directory(half))
-    if half == "fsw":
-        note_compiled(ControlChoice().kernels)
+    cache = _cache(half)
+    cache.note(_CAMPAIGN)
+    cache.note(ControlChoice().kernels if half == "fsw" else "flight")
 
 
-def _is_due(half: str) -> bool:
-    from fsw.compiled import compiling_is_due
-
-    return compiling_is_due(_CAMPAIGN, _directory(half))
-
-
-def _directory(half: str) -> Path:
+def _cache(half: str) -> KernelCache:
     from fsw import compiled as fsw
     from sitl import compiled as sitl
 
-    return {"fsw": fsw.kernel_directory, "sitl": sitl.kernel_directory}[half]()
+    return {"fsw": fsw.cache, "sitl": sitl.cache}[half]()
 
 
 def _build(half: str) -> None:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -35,9 +35,10 @@ from studies.campaign.store import PLAN, CampaignResult
 from studies.campaign.values import grid_size
 from studies.statistics.binomial import bounds
 from studies.statistics.extremes import NoFitError, fit_tail
+from studies.statistics.requirement import Requirement, judge
+from studies.statistics.violations import ANY, VIOLATIONS, violates
 
 FORMAT: Final = "pandion-certificate-2"
-ANY: Final = "any of these"
 _DIGITS: Final = 10  # of what is computed, so that the last bits of another machine do not count
 _QUANTILES: Final = (0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0)
 _MOST_FITS: Final = 8
@@ -45,16 +46,7 @@ _MOST_POINTS: Final = 20  # of a grid that are listed, for each key
 _FIRST_FLIGHTS: Final = 20  # of a configuration, that are looked at for random numbers
 _CUT_S: Final = 0.01  # by which a flight may end before its time
 
-# A flight that could not be flown counts in each: nothing is known of it that would clear it.
-_UNFLOWN: Final = "not flown"
-_OBSERVED: Final[dict[str, Callable[[CampaignRow], bool]]] = {
-    "contact": lambda row: row.contact,
-    "margin below 0": lambda row: row.beyond,
-    "a limit broken": lambda row: not row.limits_kept,
-    "not completed": lambda row: not row.completed,
-}
-VIOLATIONS: Final = (*_OBSERVED, _UNFLOWN, ANY)
-
+_NO_PROOF: Final = "no proof"  # is in every sentence about flights that bounds do not hold for
 _ASSUMED: Final = {
     "random": (
         "Flights are drawn independently of each other, as the bounds assume. Where several "
@@ -75,9 +67,15 @@ _ASSUMED: Final = {
 
 
 def certificate(
-    result: CampaignResult, directory: Path, confidence: float, refits: int = 399
+    result: CampaignResult,
+    directory: Path,
+    confidence: float,
+    refits: int = 399,
+    required: Sequence[Requirement] = (),
 ) -> dict[str, Any]:
     """The statement about a campaign at a ``confidence`` [1], with its digest.
+
+    What is ``required`` is in it with what was found.
 
     Raises:
         CampaignError: Flights are missing, or there are none.
@@ -115,6 +113,7 @@ def certificate(
             "file": hashlib.sha256((directory / PLAN).read_bytes()).hexdigest(),
             "rows": rows_digest,
         },
+        **_required(result, confidence, required),
         "commands": [
             f"pandion certify {directory} --confidence {confidence!r}",
             f"pandion campaign {directory / PLAN} --flights {result.asked} --out AGAIN",
@@ -122,6 +121,22 @@ def certificate(
     }
     rounded = _rounded(statement)
     return {**rounded, "digest": digest(_signed(rounded))}
+
+
+def verdicts(
+    result: CampaignResult, confidence: float, required: Sequence[Requirement]
+) -> list[dict[str, Any]]:
+    """Each requirement, whether it is met, at a ``confidence`` [1], and what was found."""
+    assumed = _assumed(result)
+    no_proof = assumed if _NO_PROOF in assumed else ""
+    cases = list(_of_cases(result))
+    return [judge(one, cases, confidence, no_proof).as_json() for one in required]
+
+
+def _required(
+    result: CampaignResult, confidence: float, required: Sequence[Requirement]
+) -> dict[str, Any]:
+    return {"required": verdicts(result, confidence, required)} if required else {}
 
 
 def differences(stated: Any, found: Any, path: str = "") -> list[str]:
@@ -175,15 +190,6 @@ def _findings(rows: Sequence[CampaignRow], confidence: float) -> dict[str, Any]:
     total = len(rows)
     counted = _counted(rows)
     return {name: asdict(bounds(counted[name], total, confidence)) for name in VIOLATIONS}
-
-
-def violates(row: CampaignRow, name: str) -> bool:
-    """Whether a flight counts as a violation of a name; one that was not flown always does."""
-    if row.error or row.refused:
-        return True
-    if name == ANY:
-        return any(test(row) for test in _OBSERVED.values())
-    return name in _OBSERVED and _OBSERVED[name](row)
 
 
 def _counted(rows: Sequence[CampaignRow]) -> dict[str, int]:

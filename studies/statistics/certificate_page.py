@@ -8,11 +8,11 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final
 
-from command_line.html_page import document, items, table
+from command_line.html_page import document, items, table, verdict
 from command_line.output import json_text
 from studies.campaign.store import CampaignResult
 from studies.drawing import BASE, WALL, NoMatplotlibError, drawable, sheet
-from studies.statistics.certificate import ANY, VIOLATIONS
+from studies.statistics.violations import ANY, VIOLATIONS
 
 _HOLDER: Final = ('<script type="application/json" id="certificate">', "</script>")
 _MOST_DRAWN: Final = 8
@@ -43,9 +43,19 @@ def headline(stated: dict[str, Any]) -> str:
     )
 
 
+def _verdicts(stated: dict[str, Any]) -> list[dict[str, Any]]:
+    """What was required; without that, that no violation was seen."""
+    found = stated["findings"][ANY]
+    seen = f"{found['count']} of {found['total']} flights"
+    none = {"text": "no violation was seen", "met": found["count"] == 0, "found": seen}
+    return stated.get("required") or [none]
+
+
 def sentences(stated: dict[str, Any]) -> Iterator[str]:
     """The statement, line by line."""
     yield headline(stated)
+    for one in stated.get("required", ()):
+        yield f"{'met' if one['met'] else 'NOT met'}: {one['text']}; {one['found']}"
     for name, found in stated["findings"].items():
         low, high = found["interval"]
         yield (
@@ -87,7 +97,9 @@ def tail_sentence(tail: dict[str, Any]) -> str:
 def page(stated: dict[str, Any], result: CampaignResult) -> str:
     """The certificate as a page without links to anything; the statement is in it, as data."""
     title = f"Certificate of campaign {stated['campaign']}"
-    parts = [f"<h1>{html.escape(title)}</h1>", f"<p><b>{html.escape(headline(stated))}</b></p>"]
+    parts = [f"<h1>{html.escape(title)}</h1>"]
+    parts += [verdict(one["met"], f"{one['text']}: {one['found']}") for one in _verdicts(stated)]
+    parts.append(f"<p><b>{html.escape(headline(stated))}</b></p>")
     parts.append(_findings(stated))
     parts.append(f"<p>{html.escape(stated['assumed'])}</p>")
     parts += [_configurations(stated), "<h2>Minimum margins</h2>"]

@@ -7,6 +7,7 @@ import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -214,3 +215,25 @@ def test_a_flight_that_cannot_be_flown_is_refused_in_a_sentence(
     said = capsys.readouterr().err
     assert "flight 1 cannot be flown" in said
     assert len(said.strip().splitlines()) == 1
+
+
+def test_a_campaign_gives_a_server_its_flights_and_fails_where_it_must(
+    campaign: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = campaign
+    junit = tmp_path / "flights.xml"
+    words = [str(file), "--workers=0", f"--out={out}", f"--junit={junit}"]
+    assert main([*words, "--require=margin>=0.001"]) == 0
+    assert "PASS margin>=0.001: minimum margin" in capsys.readouterr().out
+    suite = ET.parse(junit).find("testsuite")
+    assert suite is not None
+    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("4", "0", "0")
+    assert suite.find("testcase").get("classname").startswith("walls-calm")  # type: ignore[union-attr]
+    assert main([*words, "--require=margin>=9", "--require=p<0.1"]) == 1
+    assert "FAIL p<0.1: 0 of 3 flights, at most 0.632 at 95 %" in capsys.readouterr().out
+    assert (out / "campaign.html").read_text(encoding="utf-8").count(">FAIL<") == 2
+    failed = ET.parse(junit).findall("testsuite/testcase/failure")
+    assert len(failed) == 2
+    assert main(words) == 0
+    assert "PASS 3 of 3 flights completed without a violation" in capsys.readouterr().out
+    assert main([*words, "--flight=1"]) == 2

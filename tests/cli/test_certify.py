@@ -16,7 +16,8 @@ from pandion.campaign import main as campaign
 from pandion.certify import main
 from studies.campaign.journal import Journal
 from studies.campaign.page import page as campaign_page
-from studies.campaign.store import FACTS, JOURNAL, read
+from studies.campaign.plan import load_plan
+from studies.campaign.store import FACTS, JOURNAL, begin, read
 from studies.search.tune import EXAMPLE
 from studies.statistics.certificate import certificate, digest
 from tests.cli.command import one_sentence
@@ -213,3 +214,60 @@ def test_the_margin_of_a_flight_that_diverged_has_a_digest(tmp_path: Path) -> No
     assert stated["flights"] == 4
     assert json.loads(json.dumps(stated, allow_nan=False)) == stated
     assert digest([0.1, float("nan")]) != digest([0.1, None])
+
+
+def required(tmp_path: Path, *texts: str, **changed: object) -> tuple[int, Path]:
+    """The exit code of a certificate that requires something, and the campaign's directory."""
+    _, directory, plan = begun(tmp_path)
+    put(directory, plan, range(4), **changed)
+    return main([str(directory), *(f"--require={text}" for text in texts)]), directory
+
+
+def test_a_requirement_decides_the_exit_code_and_is_in_the_certificate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, directory = required(tmp_path, "margin>=0.01", "p<0.9@90%")
+    assert code == 0
+    said = capsys.readouterr().out
+    assert "met: margin>=0.01; minimum margin 0.1000 m, flight 0" in said
+    page = (directory / "certificate.html").read_text(encoding="utf-8")
+    assert page.count(">PASS<") == 2
+    assert main([str(directory), "--verify", str(directory / "certificate.html")]) == 0
+    assert main([str(directory), "--require=p<0.01@95%"]) == 1
+    assert "NOT met: p<0.01@95%; 0 of 4 flights, at most 0.527 at 95 %" in capsys.readouterr().out
+    assert main([str(directory), "--verify", str(directory / "certificate.html")]) == 0
+
+
+def test_a_requirement_is_not_met_by_flights_that_prove_nothing(tmp_path: Path) -> None:
+    source, directory = tmp_path / "small.toml", tmp_path / "out"
+    source.write_text('design = "sobol"\n' + FILE, encoding="utf-8")
+    plan = load_plan(source)
+    begin(directory, source, plan, 4)
+    put(directory, plan, range(4))
+    assert main([str(directory), "--require=p<0.9@60%"]) == 1
+    assert main([str(directory), "--require=margin>=0.01"]) == 0
+
+
+@pytest.mark.parametrize("text", ["p>0.1", "speed<3", "margin"])
+def test_what_is_no_requirement_is_refused(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([str(tmp_path), f"--require={text}"])
+    assert ended.value.code == 2
+    assert one_sentence(capsys.readouterr().err)
+
+
+def test_a_changed_requirement_of_a_certificate_is_seen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, directory = required(tmp_path, "p<0.01")
+    page = directory / "certificate.html"
+    text = page.read_text(encoding="utf-8")
+    changed = text.replace('"text":"p\\u003c0.01"', '"text":"p\\u003c0.9"')
+    assert changed != text
+    page.write_text(changed, encoding="utf-8")
+    assert main([str(directory), "--verify", str(page)]) == 1
+    assert "its digest is not that of its statement" in capsys.readouterr().out
+    page.write_text(text.replace('"text":"p\\u003c0.01"', '"text":7'), encoding="utf-8")
+    assert main([str(directory), "--verify", str(page)]) == 2

@@ -19,6 +19,18 @@ def test_a_long_operation_says_something_every_tenth_and_every_minute() -> None:
     assert max(gaps) <= 72.0
 
 
+def test_a_result_begins_with_three_lines() -> None:
+    stream = io.StringIO()
+    result = {"completed": False, "end_reason": "hit the front wall", "logs": {"ulog": "f.ulg"}}
+    first = [("minimum margin", "-3.0 mm, front/base"), ("tracking RMS / max", "1.0 mm / 2.0 mm")]
+    Display(stream).result(result, first, [("flown", "3.0 s")])
+    lines = stream.getvalue().splitlines()
+    assert lines[0] == "FAIL hit the front wall"
+    assert lines[1].split(maxsplit=2)[:2] == ["minimum", "margin"]
+    assert lines[2].startswith("tracking RMS / max")
+    assert lines[-1].endswith("f.ulg")
+
+
 def test_a_short_one_says_each_tenth_only() -> None:
     stream = io.StringIO()
     display = Display(stream, clock=lambda: 0.0)

@@ -24,10 +24,13 @@ from fsw.arguments import FswOptions
 from fsw.link.link_choice import LinkChoice
 from fsw.parameters.control_choice import ControlChoice
 from fsw.signals import Origin
+from pandion.certify import CertifyOptions
+from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions
 from pandion.falsify import FalsifyOptions
 from pandion.fly import FlyOptions
 from pandion.replay import ReplayOptions
+from pandion.report import ReportOptions
 from pandion.reproduce import ReproduceOptions
 from sitl.arguments import SitlOptions, speed
 from tests.cli.command import one_sentence
@@ -176,3 +179,48 @@ def test_a_result_goes_to_a_file_that_can_be_made() -> None:
     for text in ("no/such/file", "."):
         with pytest.raises(ArgumentTypeError, match=f"cannot write {re.escape(text)}"):
             output_file(text)
+
+
+@pytest.mark.parametrize("kind", [FlyOptions, FswOptions])
+def test_a_lambda_that_would_not_arm_is_refused_before_anything_starts(
+    kind: type[Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("paper-1", "paper-5"):
+        assert "add --allow-inconsistent" in refused(kind, f"--lambda={name}", capsys=capsys)
+        allowed = read(kind, "test", "Test.", [f"--lambda={name}", "--allow-inconsistent"])
+        assert allowed.control.lambda_ == name
+        # Another controller has no barrier.
+        read(kind, "test", "Test.", [f"--lambda={name}", "--controller=hc"])
+
+
+def test_a_word_too_many_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "'extra' is one word too many" in refused(FlyOptions, "walls", "extra", capsys=capsys)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Several:
+    names: tuple[str, ...] = option("--name N", "names", str, default=(), repeated=True)
+
+
+@given(st.lists(st.text(st.characters(categories=["L"]), min_size=1), max_size=4))
+def test_an_option_that_may_be_given_again_keeps_all(names: list[str]) -> None:
+    value = Several(names=tuple(names))
+    assert read(Several, "test", "Test.", as_words(value)) == value
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new", "words"),
+    [
+        (ReproduceOptions, "--suite=mocap", "--sensors=mocap", ["robustness"]),
+        (ReportOptions, "--out=a.html", "--html=a.html", ["log"]),
+        (CertifyOptions, "--out=a.html", "--html=a.html", ["folder"]),
+        (DialectOptions, "--to=a", "--out=a", ["xml"]),
+    ],
+)
+def test_names_of_the_last_release_still_work(
+    kind: type[Any], old: str, new: str, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert read(kind, "test", "Test.", [*words, old]) == read(kind, "test", "Test.", [*words, new])
+    said = capsys.readouterr().err
+    assert f"{old.partition('=')[0]} is now {new.partition('=')[0]};" in said
+    assert len(said.splitlines()) == 1

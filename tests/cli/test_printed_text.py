@@ -41,7 +41,7 @@ def test_sentences_and_tables_show_escapes_as_text(capsys: pytest.CaptureFixture
     display = Display(stream)
     display.say(f"text {ESCAPE}")
     result = {"completed": False, "end_reason": ESCAPE, "logs": {"ulg": ESCAPE}}
-    display.result(result, [(f"margin {ESCAPE}", ESCAPE)])
+    display.result(result, [(ESCAPE, ESCAPE)], [(f"margin {ESCAPE}", ESCAPE)])
     for printed in (capsys.readouterr().err, stream.getvalue()):
         assert printed.replace("\n", "").isprintable()
         assert "\\x1b[2J" in printed

@@ -93,3 +93,25 @@ def test_a_warning_of_the_vehicle_is_a_line_between_those_of_the_progress(tmp_pa
         "fsw: 0.5 s: zone \\x1b[2J too close"
     ]
     assert "flying    0.5 s  ×2.0  margin 100 mm" in lines
+
+
+def test_kernels_that_are_compiled_are_counted_until_the_flight_begins(tmp_path: Path) -> None:
+    folder, stream = tmp_path / "numba-0", io.StringIO()
+    folder.mkdir()
+    for name in ("one.nbi", "two.nbi", "two.1.nbc"):
+        (folder / name).touch()
+    compiling = event("compiling", kernels=4, folder=str(folder))
+    supervisor = Supervisor(Display(stream), tmp_path, runner="tests.cli.fake_processes")
+    sitl = [LISTENING, compiling, *["short"] * 4, FLYING, "short", FLEW, "0"]
+    supervisor.run(sitl, lambda port: [*["short"] * 5, SHUT_DOWN, "0"])
+    lines = stream.getvalue().splitlines()
+    assert lines.count("compiling 2 of 4 kernels") == 1
+    assert "compiling said" in lines
+
+
+def test_nothing_is_said_of_compiling_where_nothing_is_compiled(tmp_path: Path) -> None:
+    stream = io.StringIO()
+    supervisor = Supervisor(Display(stream), tmp_path, runner="tests.cli.fake_processes")
+    sitl = [LISTENING, *["short"] * 2, FLYING, FLEW, "0"]
+    supervisor.run(sitl, lambda port: ["short", "short", SHUT_DOWN, "0"])
+    assert "compil" not in stream.getvalue()

@@ -28,7 +28,18 @@ from studies.paper.catalogue import STUDIES
 from tests.docs.fences import PAGES, ROOT, Fence, commands, fences, named
 
 BLOCKS = [fence for page in PAGES for fence in fences(page)]
-LANGUAGES = {"console", "diff", "json", "math", "python", "text", "toml", "{include}", "{toctree}"}
+LANGUAGES = {
+    "bash",
+    "console",
+    "diff",
+    "json",
+    "math",
+    "python",
+    "text",
+    "toml",
+    "{include}",
+    "{toctree}",
+}
 OPTION = re.compile(r"--[a-z][a-z-]*")
 BIN = Path(sys.executable).parent
 

@@ -50,7 +50,7 @@ def test_the_definition_is_printed(tmp_path: Path) -> None:
 
 
 def test_pymavlink_makes_a_dialect_of_what_is_installed(tmp_path: Path) -> None:
-    reported = pandion("dialect", "install", "--to", "definitions", cwd=tmp_path)
+    reported = pandion("dialect", "install", "--out", "definitions", cwd=tmp_path)
     assert reported.returncode == 0
     folder = tmp_path / "definitions"
     assert f"MDEF={folder} mavproxy.py --dialect=pandion" in reported.stdout
@@ -82,14 +82,14 @@ def test_the_place_is_the_user_s_if_none_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("what", ["install", "wireshark"])
 def test_a_place_that_cannot_be_written_is_said(tmp_path: Path, what: str) -> None:
     (tmp_path / "file").write_text("")
-    refused = pandion("dialect", what, "--to", "file", cwd=tmp_path)
+    refused = pandion("dialect", what, "--out", "file", cwd=tmp_path)
     assert refused.returncode == 2
     assert "cannot write" in refused.stderr
     assert one_sentence(refused.stderr)
 
 
 def test_the_wireshark_plugin_names_every_private_message(tmp_path: Path) -> None:
-    pandion("dialect", "wireshark", "--to", "plugins", cwd=tmp_path)
+    pandion("dialect", "wireshark", "--out", "plugins", cwd=tmp_path)
     plugin = (tmp_path / "plugins" / "pandion.lua").read_text(encoding="utf-8")
     named = dict(re.findall(r"\[(\d+)\] = '(\w+)'", plugin))
     assert {id_: named.get(str(id_)) for id_ in PRIVATE} == PRIVATE
@@ -99,7 +99,7 @@ def test_the_wireshark_plugin_names_every_private_message(tmp_path: Path) -> Non
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
 def test_tshark_shows_what_the_vehicle_sends(tmp_path: Path) -> None:
     sent = capture(tmp_path / "flight.pcap")
-    pandion("dialect", "wireshark", "--to", ".", cwd=tmp_path)
+    pandion("dialect", "wireshark", "--out", ".", cwd=tmp_path)
     tshark = ["tshark", "-r", "flight.pcap", "-X", "lua_script:pandion.lua", "-V"]
     shown = subprocess.run(tshark, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
     assert re.findall(r"^ +Message id: (\w+) ", shown, re.M) == sent

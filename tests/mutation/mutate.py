@@ -140,6 +140,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Mutation testing of the flight software.")
     parser.add_argument("files", nargs="*", help="files, folders (default: those of mutation.toml)")
     parser.add_argument("--sample", type=int, help="mutants of each file (default: all)")
+    parser.add_argument("--modules", type=int, help="files drawn of these (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default: 1)")
     parser.add_argument(
         "--budget", type=float, default=20.0, help="of the tests of a module [s] (default: 20)"
@@ -171,7 +172,10 @@ class Run:
         self._copy = Copy(work)
         self._extra = config["extra_tests"]
         self._equivalents = _equivalents(self._copy, config.get("equivalent", []))
-        self.modules = self._copy.modules(options.files or config["folders"])
+        modules = self._copy.modules(options.files or config["folders"])
+        if options.modules is not None and options.modules < len(modules):
+            modules = sorted(random.Random(options.seed).sample(modules, options.modules))
+        self.modules = modules
         self._tests = Tests(work, self._copy, options.budget)
         self._results = Results(work, self._copy)
         self.report = Report()

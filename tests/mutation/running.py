@@ -31,7 +31,7 @@ class Copy:
     def __init__(self, work: Path) -> None:
         self.path = work / "copy"
         files = subprocess.run(
-            ["git", "ls-files", "-co", "--exclude-standard"],
+            ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard"],
             cwd=ROOT, check=True, capture_output=True, text=True,
         ).stdout.splitlines()  # fmt: skip
         shutil.rmtree(self.path, ignore_errors=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import typing
 from pathlib import Path
@@ -288,6 +289,26 @@ def test_every_shape_says_what_is_wrong_with_its_numbers(shape: str) -> None:
     with pytest.raises(ScenarioError) as refusal:
         check(parse_scenario(BASE + table, "test"))
     assert all(part in str(refusal.value) for part in ["zones[0].", *reported])
+
+
+@pytest.mark.parametrize("normal", [(-0.98, 0.28, 0.0), (-0.9487, 0.3162, 0.0), (0.0, 0.6, -0.77)])
+def test_a_normal_that_was_rounded_is_a_unit_vector(normal: tuple[float, ...]) -> None:
+    wall = WALL.replace("[-1.0, 0.0, 0.0]", str(list(normal)))
+    zone = (
+        '[[zones]]\nname = "one"\nshape = "half-space"\nclearance_m = 0.2\n'
+        f"normal = {list(normal)}\noffset_m = -1.0\n"
+    )
+    scenario = parse_scenario(BASE + wall + zone, "test")
+    length = math.hypot(*normal)
+    for plane in (scenario.walls[0], scenario.zones[0]):
+        assert plane.normal == pytest.approx([part / length for part in normal])  # type: ignore[union-attr]
+        assert math.hypot(*plane.normal) == pytest.approx(1.0, abs=1e-12)  # type: ignore[union-attr]
+
+
+def test_a_unit_normal_stays_to_the_bit() -> None:
+    normal = (-0.6000001, 0.8, 0.0)
+    scenario = parse_scenario(BASE + WALL.replace("[-1.0, 0.0, 0.0]", str(list(normal))), "test")
+    assert scenario.walls[0].normal == normal
 
 
 def test_all_shapes_have_been_tried() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from command_line.bounded_json import read_json
+from command_line.folders import NoHomeError
 from fsw.link.udp_endpoint import LinkError
 
 _MODE: Final = 0o600
@@ -143,6 +144,24 @@ class KeyFile:
         self.close()
         self._open = (handle, len(head))
         return True
+
+
+class NoKeyFile(KeyFile):
+    """For a user without a home directory: there is no key, and none can be set."""
+
+    def __init__(self) -> None:
+        super().__init__(Path(os.devnull))
+
+    def read(self, latest: int) -> SigningKey | None:
+        """None; ``latest`` [10 us]."""
+        return None
+
+    def write(self, key: SigningKey) -> None:
+        """Raise OSError: a link would be unsigned again after the next start."""
+        raise NoHomeError
+
+    def remove(self) -> None:
+        """Nothing is there."""
 
 
 def _head(key: bytes) -> bytes:

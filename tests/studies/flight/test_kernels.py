@@ -13,6 +13,7 @@ import pytest
 
 import fsw.compiled
 import sitl.compiled
+from command_line.kernel_cache import KernelCache
 from studies.flight import kernels
 from tests.waiting import wait_for
 
@@ -35,7 +36,8 @@ def folders(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
         folder = tmp_path / half.__name__
         folder.mkdir()
         (folder / "some.nbc").touch()
-        monkeypatch.setattr(half, "kernel_directory", lambda folder=folder: folder)
+        cache = KernelCache(folder, 90, "numba")
+        monkeypatch.setattr(half, "cache", lambda cache=cache: cache)
         found.append(folder)
     return found
 
@@ -70,7 +72,7 @@ def test_what_is_not_on_disk_is_compiled_and_an_interrupt_ends_it(
             kernels.compile_first(said.append)
     finally:
         signal.signal(signal.SIGALRM, before)
-    assert said == ["compiling before the first flight, which takes a minute"]
+    assert said == ["compiling 180 kernels before the first flight"]
     started = dict(line.split() for line in asked.read_text().splitlines())
     assert sorted(started.values()) == ["fsw", "sitl"]
     for process in started:

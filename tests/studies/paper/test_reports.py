@@ -134,7 +134,7 @@ def test_default_seeds_are_fresh() -> None:
         (["table4", "--seeds=-3:5"], "A:B"),
         (["table4", "--duration", "nan"], "duration"),
         (["table4", "--workers=-1"], "from 0 to 1024"),
-        (["robustness", "--suite", "mokap"], "did you mean mocap"),
+        (["robustness", "--sensors", "mokap"], "did you mean mocap"),
         (["table4", "--sedes", "1:2"], "did you mean --seeds"),
     ],
 )
