@@ -32,6 +32,10 @@ MAX_RATE: Final = 10.0  # rad/s
 MAX_YAW: Final = 4.0 * math.pi  # rad
 MAX_STAY: Final = 3600.0  # s, at a place of a mission, and ahead of now of a target
 _AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
+_AXES: Final = ("north", "east", "down")
+_WHAT: Final = ("position", "velocity", "acceleration")
+_UNITS: Final = ("m", "m/s", "m/s^2")
+_MOST: Final = (MAX_DISTANCE, MAX_SPEED, MAX_ACCELERATION)
 
 
 def safe_set_problem(safe_set: SafeSet, max_speed: float = math.inf) -> str | None:
@@ -72,25 +76,39 @@ def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
 
 def target_problem(target: EndEffectorTarget, now_us: int) -> str | None:
     """Why a target of a stream cannot be believed at a time."""
-    motion = MotionSetpoint(True, target.p_WE, target.v_WE, target.a_WE, target.yaw)
     if abs(target.t_us - now_us) > 1e6 * MAX_STAY:
         return f"its time is more than {MAX_STAY:g} s from now"
-    return motion_refusal(motion)
+    return point_problem(target.p_WE, target.v_WE, target.a_WE, target.yaw)
+
+
+def point_problem(p: Vec3, v: Vec3, a: Vec3, yaw: float) -> str | None:
+    """Why a point of a trajectory is out of range; none of its axes may be open.
+
+    It has a place ``p`` [m], a velocity ``v`` [m/s] and an acceleration ``a`` [m/s^2], all NED, and
+    a heading ``yaw`` [rad].
+    """
+    if not all(map(math.isfinite, (*p, *v, *a, yaw))):
+        return "a number is not finite"
+    return motion_refusal(MotionSetpoint(True, p, v, a, yaw))
 
 
 def motion_refusal(setpoint: MotionSetpoint) -> str | None:
-    """Why a motion setpoint is out of range."""
-    for vector, most, what in (
-        (setpoint.p, MAX_DISTANCE, "position"),
-        (setpoint.v, MAX_SPEED, "velocity"),
-        (setpoint.a, MAX_ACCELERATION, "acceleration"),
-    ):
-        if vector is not None and not math.hypot(*vector) <= most:
-            return f"{what} out of range"
+    """Why a motion setpoint is out of range, or has vectors that all leave one axis open."""
+    vectors = setpoint.p, setpoint.v, setpoint.a
+    for vector, most, what, unit in zip(vectors, _MOST, _WHAT, _UNITS, strict=True):
+        if vector is None:
+            continue
+        size = math.hypot(*[0.0 if math.isnan(x) else x for x in vector])
+        if not size <= most:
+            return f"{what} out of range: {size:g} {unit}, at most {most:g} {unit}"
+    given = [vector for vector in vectors if vector is not None]
+    for axis, name in enumerate(_AXES):
+        if given and all(math.isnan(vector[axis]) for vector in given):
+            return f"{name} has no position, velocity or acceleration"
     if setpoint.yaw is not None and not abs(setpoint.yaw) <= MAX_YAW:
-        return "yaw out of range"
+        return f"yaw out of range: {setpoint.yaw:g} rad, at most {MAX_YAW:.2f} rad"
     if setpoint.yaw_rate is not None and not abs(setpoint.yaw_rate) <= MAX_RATE:
-        return "yaw rate out of range"
+        return f"yaw rate out of range: {setpoint.yaw_rate:g} rad/s, at most {MAX_RATE:g} rad/s"
     return None
 
 
