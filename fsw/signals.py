@@ -451,6 +451,9 @@ class MissionAction(Enum):
     LAND = "land"
     RETURN = "return"
     LOOK_AT = "look at"  # from now on: a place, or nothing
+    CIRCLE = "circle"  # some turns about a position, then stay for hold_s
+    JUMP = "jump"  # to another step, some times
+    SKIP = "skip"  # it is for a payload that this vehicle does not have
 
 
 @dataclass(frozen=True, slots=True)
@@ -465,6 +468,11 @@ class MissionStep:
     acceptance: float = 0.1  # m, end-effector to position
     speed: float | None = None  # m/s; None: the usual
     stop_after: bool = False  # hold until commanded to continue
+    radius: float = 0.0  # m, of a circle; negative: anticlockwise as seen from above
+    turns: float = 0.0
+    target: int = 0  # of a jump: the step to go on with
+    repeats: int = 0  # of a jump: how often it is taken; negative: without end
+    here: bool = False  # position gives the height alone: north and east stay as they are
 
 
 @dataclass(frozen=True, slots=True)

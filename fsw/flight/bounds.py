@@ -31,6 +31,12 @@ MAX_ACCELERATION: Final = 20.0  # m/s^2, the same
 MAX_RATE: Final = 10.0  # rad/s
 MAX_YAW: Final = 4.0 * math.pi  # rad
 MAX_STAY: Final = 3600.0  # s, at a place of a mission, and ahead of now of a target
+CIRCLE_RADII: Final = (0.5, 100.0)  # m
+MAX_TURNS: Final = 100.0
+MAX_REPEATS: Final = 1000  # of a jump
+MOVES_NOTHING: Final = frozenset(
+    {MissionAction.SPEED, MissionAction.LOOK_AT, MissionAction.JUMP, MissionAction.SKIP}
+)
 _AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
 _AXES: Final = ("north", "east", "down")
 _WHAT: Final = ("position", "velocity", "acceleration")
@@ -84,8 +90,8 @@ def target_problem(target: EndEffectorTarget, now_us: int) -> str | None:
 def point_problem(p: Vec3, v: Vec3, a: Vec3, yaw: float) -> str | None:
     """Why a point of a trajectory is out of range; none of its axes may be open.
 
-    It has a place ``p`` [m], a velocity ``v`` [m/s] and an acceleration ``a`` [m/s^2], all NED, and
-    a heading ``yaw`` [rad].
+    It has a place ``p`` [m, NED], a velocity ``v`` [m/s, NED], an acceleration ``a`` [m/s^2, NED]
+    and a heading ``yaw`` [rad].
     """
     if not all(map(math.isfinite, (*p, *v, *a, yaw))):
         return "a number is not finite"
@@ -124,16 +130,39 @@ def bounded_update(update: MissionUpdate | None) -> tuple[MissionUpdate | None, 
     if update is None:
         return None, []
     kept, against = update, []
-    for number, step in enumerate(update.steps or ()):
-        problem = step_problem(step)
-        if problem is not None:
-            kept = replace(kept, steps=None, current=None)
-            against.append(f"mission refused: step {number}: {problem}")
-            break
+    wrong = mission_problem(update.steps or ())
+    if wrong is not None:
+        kept = replace(kept, steps=None, current=None)
+        against.append(f"mission refused: step {wrong[0]}: {wrong[1]}")
     if not all(math.hypot(*place) <= MAX_DISTANCE for place in update.rally or ()):
         kept = replace(kept, rally=None)
         against.append(f"rally points refused: one is more than {MAX_DISTANCE:g} m away")
     return kept, against
+
+
+def mission_problem(steps: tuple[MissionStep, ...]) -> tuple[int, str] | None:
+    """The first step of a mission that cannot be flown, and why."""
+    for number, step in enumerate(steps):
+        problem = step_problem(step)
+        if problem is None and step.action is MissionAction.JUMP:
+            problem = _jump_problem(steps, number)
+        if problem is not None:
+            return number, problem
+    return None
+
+
+def _jump_problem(steps: tuple[MissionStep, ...], number: int) -> str | None:
+    """Why a jump cannot be taken: it leads nowhere, or back to itself before anything is flown."""
+    if not 0 <= steps[number].target < len(steps):
+        return f"a jump to item {steps[number].target} of 0 to {len(steps) - 1}"
+    seen, at = set[int](), number
+    while at < len(steps) and steps[at].action in MOVES_NOTHING:
+        if at in seen:
+            return "a jump without end past nothing that is flown"
+        seen.add(at)
+        endless = steps[at].action is MissionAction.JUMP and steps[at].repeats < 0
+        at = steps[at].target if endless else at + 1
+    return None
 
 
 def step_problem(step: MissionStep) -> str | None:
@@ -147,4 +176,18 @@ def step_problem(step: MissionStep) -> str | None:
     stays = step.hold_s == math.inf and step.action is MissionAction.GO
     if not (stays or 0.0 <= step.hold_s <= MAX_STAY):
         return f"a stay of {step.hold_s:g} s is outside 0 to {MAX_STAY:g} s"
+    if step.action is MissionAction.CIRCLE:
+        return circle_problem(step.radius, step.turns)
+    if step.action is MissionAction.JUMP and not -1 <= step.repeats <= MAX_REPEATS:
+        return f"{step.repeats} jumps are outside 0 to {MAX_REPEATS}, or -1 without end"
     return None if step.acceptance >= 0.0 else "the acceptance is less than 0"
+
+
+def circle_problem(radius: float, turns: float) -> str | None:
+    """Why a circle of a ``radius`` [m], negative anticlockwise, and some turns cannot be flown."""
+    least, most = CIRCLE_RADII
+    if not least <= abs(radius) <= most:
+        return f"a radius of {abs(radius):g} m is outside {least:g} to {most:g} m"
+    if not 0.0 < turns <= MAX_TURNS:
+        return f"{turns:g} turns are outside 0 to {MAX_TURNS:g}"
+    return None

@@ -89,6 +89,6 @@ def finite_or_zero(vector: Vec3) -> Vec3:
 
 
 def turn_level(ahead: Vec3, yaw: float) -> Vec3:
-    """A vector ahead, right and down [any unit] as north, east and down, of the ``yaw`` [rad]."""
+    """A vector ``ahead`` [any unit, ahead, right, down] in NED, of a vehicle at ``yaw`` [rad]."""
     c, s = math.cos(yaw), math.sin(yaw)
     return c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1], ahead[2]
