@@ -184,7 +184,7 @@ def step_problem(step: MissionStep) -> str | None:
 
 
 def circle_problem(radius: float, turns: float) -> str | None:
-    """Why a circle of a ``radius`` [m], negative anticlockwise, and some turns cannot be flown."""
+    """Why ``turns`` [1] of a ``radius`` [m], negative anticlockwise, cannot be flown."""
     least, most = CIRCLE_RADII
     if not least <= abs(radius) <= most:
         return f"a radius of {abs(radius):g} m is outside {least:g} to {most:g} m"

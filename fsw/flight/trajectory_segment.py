@@ -130,8 +130,8 @@ def circle_from(
 ) -> CircleSegment:
     """The fastest circle within limits from ``start`` on it, taken at rest, to rest.
 
-    It goes about ``centre`` [m, NED] with ``radius`` [m], negative anticlockwise, and points at
-    ``look_at`` [m, NED].
+    It goes ``turns`` [1] about ``centre`` [m, NED] with ``radius`` [m], negative anticlockwise, and
+    points at ``look_at`` [m, NED].
     """
     x, y, z = start.p_WE[0] - centre[0], start.p_WE[1] - centre[1], start.p_WE[2]
     r = abs(radius)

@@ -65,6 +65,7 @@ class Flown:
     texts: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     next_mode: Mode | None = None
+    look_at: Vec3 | None = None
 
     def fly(self, seconds: float = math.inf) -> Flown:
         end_us = self.t_us + min(seconds, 2e4) * 1e6
@@ -74,13 +75,20 @@ class Flown:
             here = project(self.flight.segment.at(self.t_us), self.safe_set)
             self.points.append(here)
             where = MissionContext(
-                self.t_us, self.blocked(here.p_WE), self.height, self.home_z, self.safe_set
+                self.t_us,
+                self.blocked(here.p_WE),
+                self.height,
+                self.home_z,
+                self.safe_set,
+                self.look_at,
             )
             count = self.flight.progress.reached_count
             self.flight, event = advance(self.flight, where, PACE)
             if self.flight.progress.reached_count > count:
                 self.reached.append(self.flight.progress.reached)
             self.next_mode = event.next_mode
+            if event.looks:
+                self.look_at = event.look_at
             if event.text:
                 self.texts.append(event.text)
         return self
