@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -23,6 +24,17 @@ _POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:"
 )
+_PAIR: Final = 2  # flights of which the second is compared with the first
+# A number with its unit, and perhaps the limit that both flights share.
+_NUMBER: Final = re.compile(
+    r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d]*)?|%)"
+)
+# A rotor from above, as the page's icon.
+_ICON: Final = (
+    "data:image/svg+xml,%3Csvg xmlns=%22http://www.w3.org/2000/svg%22 viewBox=%220 0 16 16%22%3E"
+    "%3Ccircle cx=%228%22 cy=%228%22 r=%227%22 fill=%22%230969da%22/%3E%3Cpath d=%22M3 8h10M8 3v10"
+    "%22 stroke=%22white%22 stroke-width=%222%22/%3E%3C/svg%3E"
+)
 Rows = Sequence[tuple[str, str]]
 
 
@@ -33,6 +45,8 @@ def page(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<link rel='icon' href='{_ICON}'>\n"
     )
     parts = [
         f"<header><h1>{html.escape(title)}</h1>",
@@ -101,14 +115,29 @@ def _summary(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
     found = {label: dict(rows) for label, rows in summaries.items()}
     rows = [[name, *(found[f.label].get(name, "") for f in flights)] for name in names]
     heads = ["", *(flight.label if len(flights) > 1 else "" for flight in flights)]
+    if len(flights) == _PAIR:
+        heads.append("difference")
+        rows = [[*row, difference(row[1], row[2])] for row in rows]
     return table(heads, rows, "Result") if rows else ""
+
+
+def difference(one: str, other: str) -> str:
+    """The second number minus the first, in their unit; empty where they are not alike."""
+    found = [_NUMBER.fullmatch(cell.strip()) for cell in (one, other)]
+    if found[0] is None or found[1] is None or found[0]["unit"] != found[1]["unit"]:
+        return ""
+    digits = max(len(each["digits"] or "") for each in found if each is not None)
+    change = float(found[1]["number"]) - float(found[0]["number"])
+    return f"{change:+.{digits}f} {found[0]['unit'].strip()}".strip()
 
 
 def _figure(chart: Chart) -> str:
     title, note = html.escape(chart.title), html.escape(chart.note)
     return (
         f'<section><h2 id="{chart.name}-title">{title}</h2><figure><figcaption>{note} '
-        f'<button class="numbers" data-figure="{chart.name}">numbers as JSON</button></figcaption>'
+        f'<button class="numbers" data-figure="{chart.name}">numbers as JSON</button> '
+        f'<button class="numbers" data-svg="{chart.name}">SVG</button> '
+        f'<button class="numbers" data-pdf="{chart.name}">PDF</button></figcaption>'
         f'<div class="chart" id="{chart.name}" style="height:{chart.layout["height"]}px"></div>'
         "</figure></section>"
     )
