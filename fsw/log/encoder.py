@@ -24,7 +24,7 @@ from fsw.flight.estimator_report import (
 )
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.geometry.rotation import quaternion_from_matrix
-from fsw.log import px4_topics, samples, topics
+from fsw.log import samples, topics
 from fsw.log.json_codec import JsonCodec
 from fsw.log.packed import Packed
 from fsw.log.px4_records import Px4Records, validity
@@ -98,8 +98,7 @@ _DETAIL: Final = Packed(
 )
 _ATTITUDE, _POSITION, _MOTORS, _ARM = _DETAIL.heads
 # What tools look at the spectrum of.
-_FAST: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY, px4_topics.VEHICLE_TORQUE_SETPOINT)
-_RATES, _TORQUE = _FAST.heads
+_RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
 _IN_FLIGHT: Final = Packed(
     topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
 )
@@ -190,7 +189,7 @@ class LogEncoder:
             out += self._in_flight(snapshot)
         if snapshot.t_us // self._fast_us != self._fast:
             self._fast = snapshot.t_us // self._fast_us
-            out += self._fast_records(snapshot)
+            out += _RATES.pack((*_RATES.heads, snapshot.t_us, *snapshot.estimate.w_WB_B))
 
     def _add_status(
         self, snapshot: FlightSnapshot, last: FlightSnapshot | None, out: bytearray
@@ -235,13 +234,6 @@ class LogEncoder:
                 _ARM, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
             )
         )  # fmt: skip
-
-    def _fast_records(self, snapshot: FlightSnapshot) -> bytes:
-        t_us, k = snapshot.t_us, self._per_newton
-        rear, left, front, right = snapshot.actuators.rotor_thrust
-        along, across = rear + front, left + right
-        torque = (k * (left - right), k * (front - rear), 0.5 * k * (along - across))
-        return _FAST.pack((_RATES, t_us, *snapshot.estimate.w_WB_B, _TORQUE, t_us, *torque))
 
     def _in_flight(self, snapshot: FlightSnapshot) -> bytes:
         t_us, x, u = snapshot.t_us, snapshot.plan_state, snapshot.plan_input

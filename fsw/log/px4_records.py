@@ -19,6 +19,7 @@ from fsw.measurements import ImuSample
 from fsw.model.airframe import GRAVITY
 from fsw.signals import FlightSnapshot, Origin, PlanInput, PredictionState, TickInputs, Vec3, Vec4
 
+_TORQUE_US: Final = 10_000
 _SETPOINTS_US: Final = 50_000
 _PLACE_US: Final = 200_000
 _SECOND_US: Final = 1_000_000
@@ -31,6 +32,7 @@ _POSITION_LOST: Final = frozenset(
 _ATTITUDE_LOST: Final = frozenset({Condition.ESTIMATE_INVALID.value, Condition.ATTITUDE_LOST.value})
 _ROTOR: Final = frozenset({Condition.ROTOR_LOST.value, Condition.ROTOR_FAILED.value})
 
+_TORQUE: Final = Packed(topics.VEHICLE_TORQUE_SETPOINT)
 _THRUST: Final = Packed(topics.VEHICLE_THRUST_SETPOINT)
 _ATTITUDE: Final = Packed(topics.VEHICLE_ATTITUDE_SETPOINT, topics.VEHICLE_RATES_SETPOINT)
 _PLACE: Final = Packed(topics.VEHICLE_GLOBAL_POSITION, topics.VEHICLE_GPS_POSITION)
@@ -46,7 +48,8 @@ class Px4Records:
         """Start a log; a rotor's thrust times ``per_newton`` [1/N] is its share of the largest."""
         self._per_newton = per_newton
         self._origin = origin
-        self._setpoints = self._place = self._second = -1  # numbers of intervals
+        # Numbers of the intervals that were written last.
+        self._torque = self._setpoints = self._place = self._second = -1
         self._failures: tuple[str, ...] = ()
         self._accel: Vec3 | None = None
         self._gyro: Vec3 | None = None
@@ -56,6 +59,9 @@ class Px4Records:
         """Append what is due in this tick."""
         self._feel(inputs)
         t_us = snapshot.t_us
+        if t_us // _TORQUE_US != self._torque:
+            self._torque = t_us // _TORQUE_US
+            out += self._torques(snapshot)
         interval = t_us // _SETPOINTS_US
         if interval == self._setpoints and snapshot.failures is self._failures:
             return
@@ -86,6 +92,12 @@ class Px4Records:
                     if math.isfinite(change):
                         self._vibration[k] += _VIBRATION_SHARE * (change - self._vibration[k])
             self._accel, self._gyro = accel, gyro
+
+    def _torques(self, snapshot: FlightSnapshot) -> bytes:
+        k, (rear, left, front, right) = self._per_newton, snapshot.actuators.rotor_thrust
+        yaw = 0.5 * k * (rear + front - left - right)
+        torque = (k * (left - right), k * (front - rear), yaw)
+        return _TORQUE.pack((*_TORQUE.heads, snapshot.t_us, *torque))
 
     def _setpoint_records(self, snapshot: FlightSnapshot) -> bytes:
         t_us = snapshot.t_us

@@ -13,6 +13,7 @@ from typing import Final
 from messages.ulog import Field, Topic
 
 FAST: Final = "100 Hz; every tick with `LOG_PROFILE` 1"
+TORQUE: Final = "100 Hz"
 SETPOINTS: Final = "20 Hz"
 SETPOINTS_IN_FLIGHT: Final = "in flight, 20 Hz"
 PLACE: Final = "5 Hz"
@@ -30,7 +31,7 @@ def _bools(*names: str, note: str = "") -> tuple[Field, ...]:
 VEHICLE_TORQUE_SETPOINT: Final = Topic(
     "vehicle_torque_setpoint",
     "Torque that the rotor commands give",
-    FAST,
+    TORQUE,
     (Field("xyz", "float", 3, "-1 to 1 of the largest, body"),),
 )
 VEHICLE_THRUST_SETPOINT: Final = Topic(

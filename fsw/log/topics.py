@@ -22,7 +22,7 @@ from fsw.measurements import (
 )
 from messages.ulog import Field, Topic, doubles
 
-TEXT_SIZE: Final = 200  # characters of an input's text in one record
+TEXT_SIZE: Final = 140  # characters of an input's text in one record
 MARGINS: Final = 16
 SAMPLED: Final = "timestamp_sample"
 

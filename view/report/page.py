@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from command_line.html_page import document, table
+from command_line.html_page import ICON, document, table
 from command_line.output import json_text
 from view.report.chart import Chart
 from view.report.charts import charts, worst_sentence
@@ -29,12 +29,6 @@ _PAIR: Final = 2  # flights of which the second is compared with the first
 _NUMBER: Final = re.compile(
     r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d]*)?|%)"
 )
-# A rotor from above, as the page's icon.
-_ICON: Final = (
-    "data:image/svg+xml,%3Csvg xmlns=%22http://www.w3.org/2000/svg%22 viewBox=%220 0 16 16%22%3E"
-    "%3Ccircle cx=%228%22 cy=%228%22 r=%227%22 fill=%22%230969da%22/%3E%3Cpath d=%22M3 8h10M8 3v10"
-    "%22 stroke=%22white%22 stroke-width=%222%22/%3E%3C/svg%3E"
-)
 Rows = Sequence[tuple[str, str]]
 
 
@@ -46,7 +40,7 @@ def page(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f"<link rel='icon' href='{_ICON}'>\n"
+        f"<link rel='icon' href='{ICON}'>\n"
     )
     parts = [
         f"<header><h1>{html.escape(title)}</h1>",
