@@ -29,7 +29,10 @@ _GAINS: Final = 2.0  # m/s^2, of a velocity's
 _NO_CHANCE: Final = 3
 _APART: Final = 0.25  # s; readings farther apart do not confirm each other
 _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
-_BELIEVED: Final = 1.0  # m/s: how far a run may move the estimate for each second that it lasts
+# How far a run may move and turn the estimate for each second that it lasts, and how far at once if
+# the sensor has announced it: it may be wrong in that as well.
+_BELIEVED: Final = (1.0, 0.3)  # m/s, rad/s
+_ANNOUNCED: Final = (0.5, 0.2)  # m, rad
 
 
 class Run(NamedTuple):
@@ -51,10 +54,20 @@ class Run(NamedTuple):
         """Whether so many samples say so that it is no chance."""
         return self.samples >= _NO_CHANCE
 
-    def is_believable(self, least: float) -> bool:
-        """Whether it has lasted for ``least`` [s], and for as long as its size asks for."""
-        size = norm(self.innovation[:3]) if self.kind in (PoseSample, GnssSample) else 0.0  # type: ignore[arg-type]
-        return self.is_confirmed and self.last - self.since >= max(least, size / _BELIEVED)
+    def is_believable(self, least: float, *, announced: bool = False) -> bool:
+        """Whether it has lasted for ``least`` [s], and for as long as its size asks for.
+
+        Where the sensor has ``announced`` that it jumps, by little, two samples are enough.
+        """
+        place = self.innovation[:3] if self.kind in (PoseSample, GnssSample) else ()
+        turn = self.innovation[3:] if self.kind is PoseSample else ()
+        sizes = [math.hypot(*place), math.hypot(*turn)]
+        if announced:
+            least = 0.0
+            if all(size <= most for size, most in zip(sizes, _ANNOUNCED, strict=True)):
+                sizes = [0.0, 0.0]
+        takes = [size / speed for size, speed in zip(sizes, _BELIEVED, strict=True)]
+        return self.is_confirmed and self.last - self.since >= max(least, *takes)
 
 
 class Confirmation:

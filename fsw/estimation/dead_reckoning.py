@@ -1,4 +1,4 @@
-"""A state that is moved on by its own rates, for the few ticks in which no sensor frame came."""
+"""A state that is moved on by its own rates, where no sensor frame came or not all of one."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from fsw.model.airframe import GRAVITY
 from fsw.signals import Mat3, StateEstimate, Vec3
 
 
-def moved_on(x: StateEstimate, seconds: float) -> StateEstimate:
-    """The estimate a few ``seconds`` [s] later: the specific force and all rates are held."""
+def moved_on(x: StateEstimate, seconds: float, felt: Vec3 | None = None) -> StateEstimate:
+    """The estimate a few ``seconds`` [s] later: the specific force and all rates are held.
+
+    The force is the estimate's, which is along one axis alone, or that ``felt`` [m/s^2, FRD].
+    """
     t, R = seconds, x.R_WB
-    a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])
+    if felt is None:
+        a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])
+    else:
+        a = add_scaled(rotate(R, felt), (0.0, 0.0, 1.0), GRAVITY)
     (q1, q2), (qd1, qd2) = x.q_arm, x.qd_arm
     turned = _turned(R, (t * x.w_WB_B[0], t * x.w_WB_B[1], t * x.w_WB_B[2]))
     return x._replace(

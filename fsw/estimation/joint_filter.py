@@ -24,6 +24,7 @@ from fsw.estimation.imu import doubt
 from fsw.estimation.sensor_fault import SensorFault
 from fsw.signals import Vec2
 
+ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
 _RATE_AT_START: Final = 1.0  # rad/s, standard deviation
 _DISTURBANCE_AT_START: Final = 30.0  # rad/s^2
 # How far a reading may be from what is expected, besides this many standard deviations; friction

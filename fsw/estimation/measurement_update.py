@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from fsw.estimation import kernels
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, Waiting
+from fsw.estimation.sensor_checks import Aiding
 from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.quaternion import conjugate, multiply, normalised
@@ -29,7 +30,7 @@ class MeasurementUpdate:
     def __init__(self, tuning: EstimatorTuning, law: Any, stated: StatedVariance) -> None:
         self._law = law
         self._stated = stated
-        self._gnss_delay = tuning.gnss_delay
+        self._pose_delay, self._gnss_delay = tuning.pose_delay, tuning.gnss_delay
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
             PoseSample: self.fuse_pose,
             GnssSample: self._fuse_gnss,
@@ -55,6 +56,13 @@ class MeasurementUpdate:
             normalised(sample.attitude),
             *self.noise(memory, sample),
         )
+
+    def measured_at(self, memory: FusionMemory, sample: Aiding) -> float:
+        """When a ``sample`` was measured [s]: its time stamp, less what that leaves out."""
+        if isinstance(sample, PoseSample):
+            delay = float(memory.numbers["pose_delay"][0])
+            return sample.time - (delay if memory.started else self._pose_delay)
+        return sample.time - (self._gnss_delay if isinstance(sample, GnssSample) else 0.0)
 
     def noise(self, memory: FusionMemory, sample: PoseSample) -> tuple[Vec3, Vec3]:
         """Variances [m^2, NED] and [rad^2, FRD] of a pose in its own frame."""

@@ -73,9 +73,9 @@ OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N)
 COUNT: Final = len(OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
-# makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], and what
-# is felt beside the rotors [m/s, FRD].
-SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
+# makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], what is
+# felt beside the rotors [m/s, FRD], and the time itself [s].
+SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN, AGE = 0, 4, 7, 10, 13, 16, 19, 22, 25, 28
 WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
 EVERY: Final = 0.02  # s, between looks
 _LONG: Final = 3.0  # s, over which means of half a second are compared
@@ -86,6 +86,7 @@ _MEASURED: Final = 1  # column of what is measured, after the time: place and at
 _AT: Final = 8  # column of the integrals at its time
 _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
+_BASELINE_SHARE: Final = 0.3  # of the time since the vehicle flies, if that is less: biases settle
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 _LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
@@ -171,7 +172,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
     b = x.baseline
     felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
     made = rotate(R, (0.0, 0.0, -model[3]))
-    share = dt / _BASELINE
+    W[AGE] += dt
+    share = dt / min(max(_BASELINE_SHARE * W[AGE], dt), _BASELINE)
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
         W[FELT + i] += dt * (felt[i] + down)
@@ -595,7 +597,8 @@ class Verdict(NamedTuple):
     wrong: Source = NOBODY  # not used
     agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
     named: Source = NOBODY  # by the last look
-    lost_until: float = -math.inf  # how long windows contain times without an inertial unit
+    # How long windows contain times in which each of them said nothing.
+    lost_until: tuple[float, ...] = (-math.inf,) * len(Source)
     seen: tuple[object, ...] = (None, None, None)  # the last samples of pose, satellites, compass
 
     @property
@@ -614,6 +617,22 @@ class Verdict(NamedTuple):
             sum=0.0,
             named=NOBODY,
         )
+
+    def hearing_nothing_of(self, silent: Source, now: float) -> Verdict:
+        """The verdict with what says nothing at ``now`` [s]."""
+        if not silent:
+            return self
+        over = now + WINDOWS[-1]
+        until = zip(Source, self.lost_until, strict=True)
+        return self._replace(lost_until=tuple([over if one & silent else t for one, t in until]))
+
+    def lost(self, now: float) -> Source:
+        """What has said nothing for some of the time that is compared at ``now`` [s]."""
+        found = NOBODY
+        for one, until in zip(Source, self.lost_until, strict=True):
+            if now < until:
+                found |= one
+        return found
 
     @property
     def contradicts(self) -> bool:

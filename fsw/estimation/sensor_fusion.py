@@ -18,46 +18,40 @@ import numpy as np
 
 from fsw.compiled import machine_code, packed
 from fsw.estimation import kernels, redundancy
+from fsw.estimation.arbitration import Arbitration, begun
 from fsw.estimation.confirmation import Confirmation, Run
 from fsw.estimation.error_state import (
-    BA,
-    BG,
     DELAY,
     ERRORS,
     FILTER,
     FRAME,
-    NO_FORCE,
-    NO_RATE,
-    NOTHING,
-    ON_TRIAL,
-    TH,
     Array,
     Filter,
-    V,
 )
 from fsw.estimation.filter_start import FilterStart
 from fsw.estimation.fusion_memory import (
     NO_TURN,
     EncoderWatch,
     FusionMemory,
+    TickInputs,
     Trail,
     Waiting,
     at_start,
 )
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
+from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.estimation.measurement_update import MeasurementUpdate, attitude
-from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
+from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
 from fsw.estimation.sensor_checks import (
     SENSOR_OF,
     Aiding,
-    Health,
     arrived,
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.frozen import made
-from fsw.geometry.quaternion import conjugate, multiply, normalised
+from fsw.geometry.quaternion import conjugate, multiply
 from fsw.geometry.vectors import norm
 from fsw.measurements import (
     GnssSample,
@@ -74,25 +68,16 @@ from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
 _FARTHEST_BEHIND: Final = 0.1  # s, that the filter stays behind while there is nothing to fuse
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
 _MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
-ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
 _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 # A pose that is refused by no more says nothing of itself at first: the inertial unit may have been
 # wrong by as much before it is found out.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
-_TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
-# Of a suspect, standard deviations of its bias, and of what it may have led to by then.
-_SUSPECTED_FORCE: Final = 3.0  # m/s^2
-_SUSPECTED_SPEED: Final = 0.3  # m/s
-_SUSPECTED_RATE: Final = 0.5  # rad/s
-_SUSPECTED_TURN: Final = 0.03  # rad
-_HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _SOURCES: Final = {
     PoseSample: Source.POSE,
     GnssSample: Source.GNSS,
     MagneticSample: Source.COMPASS,
 }
-_ROUNDING: Final = 1e-9  # s
 _FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
@@ -124,6 +109,7 @@ class SensorFusion:
         self._confirmation = Confirmation(tuning, self._stated)
         self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
         self._update = MeasurementUpdate(tuning, self.law, self._stated)
+        self._arbitration = Arbitration(tuning, self._stated, self._update, self._again)
         x, none = at_start().numbers, (0.0, 0.0)
         asked = Asked(x, kernels.COPY, none, none)
         pose = (0.0, 0.0, _REST, NO_TURN, _REST, _REST)
@@ -244,14 +230,18 @@ class SensorFusion:
         asked whether all sensors agree, unless the vehicle is so low that the ground may hold it.
         """
         memory, found = self._caught_up(memory, samples, now, estimate)
-        evidence = memory.verdict.evidence
-        if not memory.started or found is None or evidence is None:
-            return self._with_evidence(memory) if memory.started else memory, found
-        if not aloft:
-            return _near_the_ground(memory), found
-        if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
+        if not memory.started:
             return memory, found
-        return self._looked(memory, now, found)
+        if found is None:
+            return begun(memory), None
+        return self._arbitration.step(memory, now, found, aloft=aloft)
+
+    def _again(
+        self, memory: FusionMemory, tick: TickInputs
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        samples, now, u, model, silent = tick
+        memory, found = self.take_in(memory, samples, now, u, None, model, silent=silent)
+        return self._caught_up(memory, samples, now, found)
 
     def _caught_up(
         self,
@@ -279,118 +269,6 @@ class SensorFusion:
         if known is None:
             return (_anew(memory) if ready else memory), None
         return memory, made(StateEstimate, (round(1e6 * now), *known))
-
-    def _with_evidence(self, memory: FusionMemory) -> FusionMemory:
-        """The memory of a filter that has just begun: what sensors say is compared from now on."""
-        verdict = memory.verdict._replace(evidence=np.zeros(1, EVIDENCE))
-        return memory._replace(verdict=verdict, trail=None, trail_before=None)
-
-    def _looked(
-        self, memory: FusionMemory, now: float, found: StateEstimate
-    ) -> tuple[FusionMemory, StateEstimate | None]:
-        """The memory after a look at whether all sensors agree, and the state with it."""
-        before = memory.verdict
-        evidence, aids, seen = np.empty(1, EVIDENCE), [], []
-        evidence[:] = before.evidence
-        newest = memory.newest_pose, memory.gnss, memory.newest_field
-        for sample, last in zip(newest, before.seen, strict=True):
-            aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
-            seen.append(sample)
-        lost = _lost(memory, before, now)
-        learns = not (before.is_on or before.wrong or lost)
-        redundancy.look(evidence, memory.numbers, now, *aids, learns)
-        ratios = tuple(evidence[0]["ratio"].tolist())
-        verdict = before._replace(evidence=evidence, seen=tuple(seen))
-        if now - memory.imu_came > IMU_TOO_OLD:
-            verdict = verdict._replace(lost_until=now + redundancy.WINDOWS[-1])
-        if before.is_on or before.wrong or max(ratios) > 1.0:
-            pose = memory.of(Sensor.POSE).came
-            held = now - pose <= self.tuning.stale_time and not before.wrong & Source.POSE
-            verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held, lost=lost)
-        memory = memory._replace(verdict=verdict)
-        state: StateEstimate | None = found
-        if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
-            memory, state = self._convicted(memory, before, now, found)
-        return _with_trail(memory, now), state
-
-    def _aid(self, memory: FusionMemory, sample: Aiding) -> Aid:
-        """What a measurement says to the law for who is wrong."""
-        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)
-        time = self._measured_at(memory, sample)
-        if isinstance(sample, PoseSample):
-            place, about = self._update.noise(memory, sample)
-            sigma, angle = math.sqrt(max(place) * scale[0]), math.sqrt(max(about) * scale[1])
-            return True, time, sample.position, normalised(sample.attitude), sigma, angle
-        if isinstance(sample, GnssSample):
-            place, speed = self._stated.of_gnss(sample)
-            sigma, fast = math.sqrt(max(place) * scale[2]), math.sqrt(max(speed) * scale[3])
-            return True, time, sample.position, (*sample.velocity, 0.0), sigma, fast
-        assert isinstance(sample, MagneticSample)
-        return True, time, sample.field, NO_TURN, self.tuning.mag_noise, 0.0
-
-    def _convicted(
-        self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
-    ) -> tuple[FusionMemory, StateEstimate | None]:
-        """The memory with a filter that knows the verdict, and the state with it."""
-        verdict = memory.verdict
-        x = memory.numbers.copy()
-        memory = memory._replace(numbers=x)
-        new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
-        # A half that has jumped is believed where the rotors are named for it, and where it agrees.
-        agrees = back or (before.is_on and not verdict.is_on and not verdict.wrong)
-        believes = bool(x["doubted"][0].any() and (agrees or verdict.named is Source.MODEL))
-        x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
-        if verdict.is_on:
-            x["suspect"] |= ON_TRIAL
-            _widen(x[0]["covariance"], verdict.accused & ~before.accused)
-        if not (new or believes):
-            return memory, found
-        x["believed"] = NOTHING if believes else 0
-        if new & (Source.GYRO | Source.ACCELEROMETER):
-            memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
-        return self._replayed(memory, now, found)
-
-    def _replayed(
-        self, memory: FusionMemory, now: float, found: StateEstimate
-    ) -> tuple[FusionMemory, StateEstimate | None]:
-        """Go back to before sensors contradicted, and do without what is wrong since then."""
-        trails = [one for one in (memory.trail_before, memory.trail) if one is not None]
-        x = memory.numbers[0]
-        believed = int(x["believed"])
-        x["believed"] = 0
-        if not trails:
-            return memory, found
-        back, state = trails[0].start, None
-        numbers = back.numbers.copy()
-        for name in ("out", "suspect"):
-            numbers[name] = x[name]
-        numbers["believed"] = believed
-        verdict = memory.verdict._replace(evidence=None)
-        back = back._replace(numbers=numbers, verdict=verdict)
-        for trail in trails:
-            for samples, time, u, model, silent in trail.inputs():
-                back, state = self.take_in(back, samples, time, u, None, model, silent=silent)
-                back, state = self._caught_up(back, samples, time, state)
-        if state is None:
-            return memory, found
-        numbers = back.numbers.copy()
-        numbers["believed"] = 0
-        for name in ("witness", "baseline", "model_walk"):
-            numbers[name] = memory.numbers[name]
-        health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
-        start = memory._replace(
-            numbers=numbers,
-            health=health,
-            waiting=back.waiting,
-            runs=back.runs,
-            pose=back.pose,
-            reset_counter=back.reset_counter,
-            frame=back.frame,
-            replays=memory.replays + 1,
-            trail=None,
-            trail_before=None,
-        )
-        return start._replace(trail=Trail(start, now)), state
 
     def _usual(
         self, memory: FusionMemory, samples: Sequence[Sample], now: float
@@ -552,7 +430,7 @@ class SensorFusion:
         health, fault = arrived(
             before, sample, now, self.tuning, lambda: bool(x["same"][0].min() >= STUCK_READINGS)
         )
-        time = self._measured_at(memory, sample)
+        time = self._update.measured_at(memory, sample)
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             # Measured before the filter began, it came as soon as it could.
@@ -576,13 +454,6 @@ class SensorFusion:
             waiting = tuple(sorted(waiting))
         known = (waiting, (*others, health), memory.arrivals + 1, delay)
         return FusionMemory._make((*memory[:6], *known, *memory[10:]))
-
-    def _measured_at(self, memory: FusionMemory, sample: Aiding) -> float:
-        """When a ``sample`` was measured [s]: its time stamp, less what that leaves out."""
-        if isinstance(sample, PoseSample):
-            delay = float(memory.numbers["pose_delay"][0])
-            return sample.time - (delay if memory.started else self.tuning.pose_delay)
-        return sample.time - (self.tuning.gnss_delay if isinstance(sample, GnssSample) else 0.0)
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""
@@ -663,13 +534,12 @@ class SensorFusion:
         shown = innovation if len(ratio) > 1 else innovation[:1]
         health = health.with_fused(fused, ratio, shown)
         counter, memory = memory.reset_counter, memory.after(one, health, runs)
-        if announced and run is not None and not run.is_confirmed:
+        believed = run is not None and run.is_believable(
+            self.tuning.reset_time, announced=announced
+        )
+        if announced and run is not None and not believed:
             memory = memory._replace(reset_counter=counter)
-        if (
-            run is not None
-            and max(ratio) > 1.0
-            and (run.is_confirmed if announced else run.is_believable(self.tuning.reset_time))
-        ):
+        if believed and max(ratio) > 1.0:
             memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
@@ -721,67 +591,6 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         trail=None,
         trail_before=None,
     )
-
-
-def _near_the_ground(memory: FusionMemory) -> FusionMemory:
-    """The memory without what has been compared so far: rotors do not explain what legs feel."""
-    evidence, verdict = memory.verdict.evidence, memory.verdict
-    if evidence is None or not (evidence[0]["count"] or verdict.is_on):
-        return memory
-    x = memory.numbers.copy()
-    x["suspect"] = 0
-    verdict = verdict.acquitted()._replace(evidence=np.zeros(1, EVIDENCE))
-    return memory._replace(numbers=x, verdict=verdict, trail=None, trail_before=None)
-
-
-def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
-    """The memory with a new trail where the newest one is long enough.
-
-    None is begun while it may have to be said soon who is wrong.
-    """
-    newest, verdict = memory.trail, memory.verdict
-    if newest is not None:
-        decides = verdict.is_on and now - verdict.since < redundancy.UNDECIDED
-        if decides or now - newest.began < _TRAIL:
-            return memory
-    start = memory._replace(trail=None, trail_before=None)
-    return memory._replace(trail_before=newest, trail=Trail(start, now))
-
-
-def _lost(memory: FusionMemory, verdict: Verdict, now: float) -> Source:
-    """What says nothing of how the vehicle moves, because it is silent or stuck."""
-    if now < verdict.lost_until:
-        return Source.GYRO | Source.ACCELEROMETER
-    found, same = NOBODY, memory.numbers[0]["same"]
-    for place, (source, _) in enumerate(_HALVES):
-        if same[place] >= STUCK_READINGS:
-            found |= source
-    return found
-
-
-def _widen(M: Array, suspects: Source) -> None:
-    """Know little of the biases of new ``suspects``, and of what they have led to; M (17, 17) [SI].
-
-    A bias that may walk alone takes too long to be found.
-    """
-    k = np.arange(3)
-    for source, bias, most, state, led in (
-        (Source.ACCELEROMETER, BA, _SUSPECTED_FORCE, V, _SUSPECTED_SPEED),
-        (Source.GYRO, BG, _SUSPECTED_RATE, TH, _SUSPECTED_TURN),
-    ):
-        if source & suspects:
-            M[bias + k, bias + k] += most**2
-            M[state + k, state + k] += led**2
-
-
-def _halves(sources: Source) -> int:
-    """Halves of the inertial unit, as ``FILTER`` counts them, among some ``sources``."""
-    return sum(half for source, half in _HALVES if source & sources)
-
-
-def _fused_as(health: Health, other: Health) -> Health:
-    """The ``health`` of a sensor of which other samples have been fused."""
-    return health.with_fused(other.fused, other.ratio, other.innovation)
 
 
 def _of_reading(asked: Asked, fault: int) -> int:

@@ -18,6 +18,7 @@ AILMENTS: Final[dict[Condition, Subject]] = {
     Condition.AIDING_LOST: Subject.ESTIMATOR,
     Condition.ESTIMATE_INVALID: Subject.ESTIMATOR,
     Condition.SENSOR_LOST: Subject.SENSORS,
+    Condition.INERTIAL_LOST: Subject.SENSORS,
     Condition.SENSORS_UNDECIDED: Subject.SENSORS,
     Condition.SENSORS_CONTRADICT: Subject.SENSORS,
     Condition.ROTOR_LOST: Subject.ACTUATORS,

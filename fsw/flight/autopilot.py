@@ -23,7 +23,6 @@ from fsw.control.cascade import (
 from fsw.control.safety_gate import gate
 from fsw.control.tube import beyond_covered
 from fsw.estimation.estimator import estimate_state
-from fsw.estimation.frame_trust import FrameTrust
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
@@ -34,6 +33,7 @@ from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.jump import moved_along
+from fsw.flight.land_detector import with_range
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
@@ -44,7 +44,7 @@ from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import CaughtUp, SensedState
 from fsw.flight.snapshot import snapshot_of
-from fsw.flight.state import Damage, FlightState, PlanMemory, SafetyMemory
+from fsw.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.flight.zone_room import ZoneRoom
 from fsw.frozen import replace
@@ -105,7 +105,6 @@ class Controlled(NamedTuple):
     memory: CascadeMemory  # of the loops, for the next tick
     estimate: StateEstimate | None = None  # None: there has been none yet
     fusion: FusionMemory | None = None
-    trust: FrameTrust = FrameTrust()
     flown: bool = False  # the loops are closed
     nominal: PredictionState | None = None  # where the running plan wants the vehicle now
     plan: PlanMemory = PlanMemory()
@@ -163,7 +162,6 @@ class Autopilot:
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
-        self._exact.warm_up(estimate, TickInputs(_STILL))
 
     def quiet_ticks(self) -> QuietTicks:
         """What flies ticks of this configuration in which nothing happens."""
@@ -197,11 +195,11 @@ class Autopilot:
         texts: list[StatusText] = []
         if state.vehicle.restarts:
             state = restarted(state)
-        fusion, trust, caught = state.fusion, state.trust, None
+        fusion, caught = state.fusion, None
         if inputs.samples or fusion is not None:
             state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
         else:
-            state, trust, estimate = self._exact.estimate(state, inputs, texts)
+            state, estimate = self._exact.estimate(state, inputs, texts)
         state = self._receive(state, inputs, texts)
         if estimate is None:
             return self._blind(state, inputs, texts)._replace(fusion=fusion, caught=caught)
@@ -233,7 +231,6 @@ class Autopilot:
             memory,
             estimate,
             fusion,
-            trust,
             flown,
             nominal,
             plan,
@@ -323,7 +320,7 @@ class Autopilot:
             fusion,
             state.estimator,
             state.aiding,
-            c.trust,
+            state.dropout,
             state.kept,
             state.accuracy,
             state.host,
@@ -390,7 +387,7 @@ class Autopilot:
             state = self._believe(state, inputs, texts)
         ranges = [one for one in inputs.samples if type(one) is RangeSample]
         if ranges:
-            state = replace(state, vehicle=replace(state.vehicle, range=ranges[-1]))
+            state = replace(state, vehicle=with_range(state.vehicle, ranges[-1]))
         if inputs.battery is not None:
             levels = self._battery_levels
             battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
@@ -546,11 +543,11 @@ class Autopilot:
         """Covariance (6, 6) of position [m, NED] and attitude [rad, NED], as clearances grow by it.
 
         ``covariance`` (17, 17) [SI] is that of the filter, if there is one; without, exact states
-        are uncertain while they are doubted. None: certain.
+        are uncertain while a part of them is missing. None: certain.
         """
         if covariance is not None and fusion is not None:
             return pose_covariance(covariance, estimate, self._sensed.lasting_error(fusion))
-        if fusion is None and state.trust.doubted:
+        if fusion is None and state.aiding is not AIDED:
             position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
             return np.diag((position**2,) * 3 + (attitude**2,) * 3)
         return None
@@ -627,8 +624,8 @@ class Autopilot:
         of the joints; nor does it after a jump of time: what was commanded has not been done
         meanwhile.
         """
-        trust, aiding = controlled.trust, state.aiding
-        blind = trust.inertial.unused or (aiding.lost and aiding.has_lost(Sensor.IMU))
+        lost = state.aiding.lost
+        blind = bool(lost) and state.aiding.has_lost(Sensor.IMU)
         if blind or not (controlled.flown and self._watches) or self._jumped(state, estimate.t_us):
             return state.damage, paused(state.watch)
         return self._damage.see(
@@ -639,7 +636,7 @@ class Autopilot:
             estimate,
             controlled.ticks,
             angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
-            angles_known=not (trust.joints.unused or aiding.lost),
+            angles_known=not lost,
         )
 
     def zones_now(self, state: FlightState) -> Array:

@@ -62,6 +62,7 @@ class Condition(Enum):
     JOINT_FAILED = "joint failed"
     POSITION_LOW = "position uncertain"
     SENSOR_LOST = "sensor lost"
+    INERTIAL_LOST = "no attitude is measured"
     SENSORS_UNDECIDED = "sensors contradict each other for long"
     SENSORS_CONTRADICT = "sensors contradict each other"
     ROOM_LACKING = "too little room for what the estimate is not sure of"

@@ -20,22 +20,27 @@ from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 
 _RATE: Final = 4.0  # 1/s, of the speed down
 _MOST: Final = 1.0  # m/s^2
-# Where no position is measured the vehicle sinks faster: how far it is carried grows with the
-# square of the time. Times the speed of landing near the ground and above, however wrong the height
-# is: the legs stand eight times as much.
-_BLIND: Final = 2.0
-_BLIND_HIGH: Final = 4.0
+# Where no position or no attitude is measured the vehicle sinks faster: how far it is carried grows
+# with the square of the time. Times the speed of landing near the ground and above, however wrong
+# the height is: the legs stand eight times as much.
+_HURRIED: Final = 2.0
+_HURRIED_HIGH: Final = 4.0
 _HIGH: Final = 1.0  # m above the legs; with _MOST the vehicle is slow again 0.6 m above them
 # And faster still where the height is known to be enough to be slow again.
 _FAST: Final = 1.5  # m/s, as PX4's MPC_Z_VEL_MAX_DN
 _SLOW: Final = 0.3  # m above the legs, less ``_SIGMAS`` of the height
 _SIGMAS: Final = 3.0
-_MOST_BLIND: Final = 2.0  # m/s^2
+_MOST_HURRIED: Final = 2.0  # m/s^2
 _BRAKING: Final = 1.2  # m/s^2 that are counted on; loops lag
 _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable velocity
 _SPEED_GOOD: Final = 0.5  # m/s; from here to there the vehicle draws back ever slower
 _BACK: Final = 1.0  # m/s, as fast as it draws back at most
 _BACK_RATE: Final = 1.5  # 1/s
+
+
+def is_hurried(aiding: Aiding, unaided_us: int) -> bool:
+    """Whether the estimate gets worse with time: without a position for long, or an attitude."""
+    return aiding.unaided_us >= unaided_us or not aiding.attitude_held
 
 
 class Descent:
@@ -58,12 +63,12 @@ class Descent:
     ) -> tuple[PredictionState, PlanInput]:
         """The plan's state ``ticks`` [1] later, and the input that leads on from it.
 
-        ``place`` [m, NED] is where the vehicle draws back to while no position is measured.
+        ``place`` [m, NED] is where the vehicle draws back to in a hurry.
         """
         blind = aiding.unaided_us >= self._unaided_us
         speed, most, across = self._speed, _MOST, (0.0, 0.0)
-        if blind:
-            speed, most = self._blind_speed(estimate, aiding)
+        if is_hurried(aiding, self._unaided_us):
+            speed, most = self._hurried_speed(estimate, aiding)
             if place is not None:
                 across = _back(estimate, aiding, place)
         for _ in range(ticks):
@@ -79,16 +84,16 @@ class Descent:
                 )
         return nominal, self._input(nominal, speed, most, across)
 
-    def _blind_speed(self, estimate: StateEstimate, aiding: Aiding) -> Vec2:
-        """How fast to sink where no position is measured, and to get there: [m/s], [m/s^2]."""
+    def _hurried_speed(self, estimate: StateEstimate, aiding: Aiding) -> Vec2:
+        """How fast to sink in a hurry, and to get there: [m/s], [m/s^2]."""
         height = self._legs_z - estimate.p_WB[2]
-        slow = _BLIND * self._speed
+        slow = _HURRIED * self._speed
         sure = height - _SLOW - _SIGMAS * aiding.height_sigma
-        usual = _BLIND_HIGH * self._speed if height > _HIGH else slow
+        usual = _HURRIED_HIGH * self._speed if height > _HIGH else slow
         if not sure > 0.0:
             return usual, _MOST
         braked = math.sqrt(slow * slow + 2.0 * _BRAKING * sure)
-        return max(usual, min(_FAST, braked)), _MOST_BLIND
+        return max(usual, min(_FAST, braked)), _MOST_HURRIED
 
     def _input(
         self, nominal: PredictionState, speed: float, most: float, across: Vec2

@@ -140,15 +140,15 @@ def sensors_contradict(context: FailsafeContext, seconds: float) -> bool:
     return disputed_us > 1e6 * seconds and context.state.vehicle.flies
 
 
-def imu_alone_is_lost(context: FailsafeContext) -> bool:
+def inertial_is_lost(context: FailsafeContext) -> bool:
     """In flight, the inertial unit was of no use for a while, and no pose holds the attitude.
 
     Satellites and rotors hold it for longer where only one half of the unit is lost.
     """
     aiding, now_us = context.state.aiding, context.estimate.t_us
-    if aiding.pose is Sensor.POSE and not is_unaided(context):
+    if aiding.attitude_held or not context.state.vehicle.flies:
         return False
-    return context.state.vehicle.flies and any(
+    return any(
         one.sensor is Sensor.IMU
         and now_us - one.since_us > (0 if one.fault is SensorFault.STALE else _HALF_LOST_US)
         for one in lost_sensors(context)

@@ -7,6 +7,10 @@ carry less than the weight, the loops open and rotors idle. In the air the vehic
 its velocity shows it within 0.1 s: even an accelerometer that is wrong by 3 m/s^2 shows 6.8 of
 free fall's 9.8, and on the ground no more than 3. Then the loops close again.
 
+Where rotors' thrusts stand in for the inertial unit and no pose holds the attitude, the ground must
+not carry any of the weight: what the legs feel would be taken for a tilt. Then rotors stop as soon
+as the legs are close above the ground, and the vehicle falls less far than its legs stand.
+
 Source: docs/concepts/failsafes.md.
 """
 
@@ -16,16 +20,18 @@ import math
 from typing import Final
 
 from fsw.flight.plan_exchange import without_plan
-from fsw.flight.state import FlightState
+from fsw.flight.state import FlightState, VehicleMemory
 from fsw.frozen import replace
+from fsw.measurements import RangeSample
 from fsw.model.airframe import GRAVITY
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import StateEstimate
+from fsw.signals import StateEstimate, Vec2
 
 _CONTACT: Final = 0.7  # of the weight as configured; what flies is at most so much lighter
 _SINKS: Final = 0.15  # m/s; slower than a landing, faster than the rebound of the legs
 _FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free fall, at worst
 _SIGMAS: Final = 3.0  # by which a height may be wrong
+_CLOSE: Final = 0.1  # m of the legs above the ground; from there it falls at 1.4 m/s
 _RANGE_US: Final = 300_000  # in which a distance is one of now
 _CONTACT_US: Final = 100_000  # of contact before loops open
 _DOUBTED_US: Final = 1_000_000  # the same where height or velocity say that there is no ground
@@ -35,6 +41,15 @@ _SURE_US: Final = 200_000  # with open loops, in which a fall is seen
 def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
     """Height of the vehicle above its standing height at the origin [m]."""
     return -estimate.p_WB[2] - config.airframe.leg_length
+
+
+def with_range(vehicle: VehicleMemory, sample: RangeSample) -> VehicleMemory:
+    """The vehicle after a ``sample`` of the rangefinder; one that is too short does not count."""
+    last, used = vehicle.range_newest, sample
+    recent = last is not None and 0.0 <= sample.time - last.time < 1e-6 * _RANGE_US
+    if last is not None and recent and last.distance > sample.distance:
+        used = replace(sample, distance=last.distance)
+    return replace(vehicle, range=used, range_newest=sample)
 
 
 def stands(config: FlightConfig, estimate: StateEstimate) -> bool:
@@ -55,15 +70,38 @@ def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate
 
     By the rangefinder where there is one, else by the estimate, as far as that knows its height.
     """
-    limits, seen, aiding = config.limits, state.vehicle.range, state.aiding
-    if seen is not None and 0 <= estimate.t_us - round(1e6 * seen.time) < _RANGE_US:
-        height = seen.distance * estimate.R_WB[8] - config.airframe.leg_length
-        sigma = math.sqrt(max(seen.variance, 0.0))
+    limits, aiding, measured = (
+        config.limits,
+        state.aiding,
+        _measured_height(config, state, estimate),
+    )
+    if measured is not None:
+        height, sigma = measured
     elif aiding.unaided_us >= limits.aiding_loss_us:
         return True
     else:
         height, sigma = height_above_ground(config, estimate), aiding.height_sigma
     return height - _SIGMAS * sigma < limits.landed_height
+
+
+def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether legs are less than 0.1 m above the ground: nothing that is known says otherwise."""
+    height, sigma = height_above_ground(config, estimate), state.aiding.height_sigma
+    measured = _measured_height(config, state, estimate)
+    if measured is None:
+        return height < _CLOSE and _SIGMAS * sigma < _CLOSE
+    return measured[0] < _CLOSE and height - _SIGMAS * sigma < _CLOSE
+
+
+def _measured_height(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate
+) -> Vec2 | None:
+    """Height of the legs above the ground by the rangefinder [m], and its deviation [m]."""
+    seen = state.vehicle.range
+    if seen is None or not 0 <= estimate.t_us - round(1e6 * seen.time) < _RANGE_US:
+        return None
+    height = seen.distance * estimate.R_WB[8] - config.airframe.leg_length
+    return height, math.sqrt(max(seen.variance, 0.0))
 
 
 def feel_ground(
@@ -74,6 +112,8 @@ def feel_ground(
     To be asked where a descent is commanded.
     """
     vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
+    if not state.aiding.attitude_held and is_close(config, state, estimate):
+        return state, True
     if vehicle.unloaded is None:
         if not sum(state.cascade.rotors) < _CONTACT * config.airframe.mass * GRAVITY:
             return in_the_air(state, estimate), False

@@ -24,9 +24,7 @@ from fsw.control.actuator_watch import Watch, at_start, blank, watch
 from fsw.control.cascade import Cascade, CascadeMemory, close_loops
 from fsw.control.joints import JointMemory
 from fsw.control.tracking import Observed
-from fsw.estimation.frame_checks import looked_at
-from fsw.estimation.frame_trust import FrameTrust
-from fsw.estimation.pose_imu_agreement import WINDOW_FRAMES, Window, is_calm
+from fsw.estimation.estimator import attitude
 from fsw.flight.active_failsafes import all_is_well
 from fsw.flight.failsafe import SLOW_US
 from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
@@ -44,7 +42,6 @@ from fsw.signals import (
     Mode,
     PlanInput,
     PredictionState,
-    SensorFrame,
     StateEstimate,
     Vec2,
     Vec3,
@@ -61,14 +58,6 @@ QUIET: Final = np.dtype(
         # The estimate, beside what the frame holds.
         ("R", _FLOAT, (9,)),
         ("yaw", _FLOAT),  # rad
-        # The running window of pose_imu_agreement.
-        ("frames", _FLOAT),
-        ("turn", _FLOAT, (3,)),  # rad
-        ("speed", _FLOAT, (3,)),  # m/s
-        ("same_rate", _FLOAT),
-        ("same_force", _FLOAT),
-        ("windows", _FLOAT),  # whole ones so far, and the sums of the last of them
-        ("last", _FLOAT, (9,)),
         # The plan's state, SI as in PredictionState, and its input since the last tick.
         ("nominal", _FLOAT, (19,)),
         ("u", _FLOAT, (6,)),
@@ -86,7 +75,7 @@ QUIET: Final = np.dtype(
     align=True,
 )
 Quiet = NDArray[Any]  # (1,) of QUIET
-_NO_WINDOWS: Final = (0.0,) * 10
+_NOT_READ: Final = (0.0,) * READINGS
 
 
 class Bounds(NamedTuple):
@@ -122,18 +111,9 @@ def _tick(
     """
     b, a = before[0], after[0]
     no_thrust, no_torque = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0)
-    new, old = _frame(reading), _frame(b.reading)
-    p, v, _, w, f, q_arm, qd_arm = new
-    p0, v0, _, w0, f0, q0, qd0 = old
-    R0 = (b.R[0], b.R[1], b.R[2], b.R[3], b.R[4], b.R[5], b.R[6], b.R[7], b.R[8])
-    same = int(b.same_rate), int(b.same_force)
-    window = Window(int(b.frames), _three(b.turn, 0), _three(b.speed, 0), same[0], same[1])
-    never, far, R, yaw, stuck, _, sums = looked_at(
-        new, old, bounds.tick, window, p0, v0, R0, w0, -f0[2], q0, qd0, bounds.tick, 0.0
-    )
-    if never or far or stuck or not R[8] > bounds.upright:
-        return False, no_thrust, no_torque
-    if sums[0] >= WINDOW_FRAMES and not is_calm(sums[0], sums[1], sums[2], sums[3], sums[4]):
+    p, v, q, w, f, q_arm, qd_arm = _frame(reading)
+    missing, R, yaw = attitude(p, v, q, w, f, q_arm, qd_arm)
+    if missing or not R[8] > bounds.upright:
         return False, no_thrust, no_torque
     u = PlanInput(_three(b.u, 0), b.u[3], (b.u[4], b.u[5]))
     plan = advance(model[0], state_of(b.nominal), u, 1)
@@ -175,7 +155,6 @@ def _tick(
     if failed:
         return False, no_thrust, no_torque
     _note_frame(a, reading, R, yaw)
-    _note_window(a, b, sums)
     _note_plan(a, plan, u)
     _note_memory(a, kept, command)
     return True, command.rotor_thrust, command.joint_torque
@@ -232,24 +211,6 @@ def _note_frame(a: Any, reading: Array, R: Any, yaw: float) -> None:
     for i in range(9):
         a.R[i] = R[i]
     a.yaw = yaw
-
-
-@compilable
-def _note_window(a: Any, b: Any, sums: Any) -> None:
-    """The running window, or where it is whole the next one, empty."""
-    whole = sums[0] >= WINDOW_FRAMES
-    a.windows = b.windows + 1.0 if whole else b.windows
-    a.frames = 0.0 if whole else float(sums[0])
-    a.same_rate = 0.0 if whole else float(sums[3])
-    a.same_force = 0.0 if whole else float(sums[4])
-    for i in range(3):
-        a.turn[i] = 0.0 if whole else sums[1][i]
-        a.speed[i] = 0.0 if whole else sums[2][i]
-        a.last[1 + i] = sums[1][i] if whole else b.last[1 + i]
-        a.last[4 + i] = sums[2][i] if whole else b.last[4 + i]
-    a.last[0] = float(sums[0]) if whole else b.last[0]
-    a.last[7] = float(sums[3]) if whole else b.last[7]
-    a.last[8] = float(sums[4]) if whole else b.last[8]
 
 
 @compilable
@@ -325,11 +286,9 @@ class QuietTicks:
         if ticks <= 0:
             return 0
         plan, x, nominal = state.plan.running, state.estimate, state.nominal
-        last = state.trust.last
         assert plan is not None
         assert x is not None
         assert nominal is not None
-        assert last is not None
         u = planned_input(plan, state.t_us)
         now = planned_input(plan, state.t_us + self._tick_us)
         if u is None or u is not now:
@@ -338,7 +297,7 @@ class QuietTicks:
         self._bounds = self._bounds._replace(
             off_plan=off_plan_bound(self._radius, state.accuracy.reach)
         )
-        _take(self._before, state, last, x, nominal, u)
+        _take(self._before, state, x, nominal, u)
         self._watched = at_start() if state.watch is None else state.watch
         self._watching = blank()
         return ticks
@@ -374,15 +333,9 @@ class QuietTicks:
             return state
         t_us = state.t_us + self._flown * self._tick_us
         numbers = _Numbers(self._before)
-        p, v, q, w, f, q_arm, qd_arm = _frame(numbers.take(READINGS))
+        p, v, _, w, f, q_arm, qd_arm = _frame(numbers.take(READINGS))
         R = cast(Mat3, tuple(numbers.take(9)))
         (yaw,) = numbers.take(1)
-        window = _window(numbers.take(9))
-        (windows,) = numbers.take(1)
-        last = _window(numbers.take(9))
-        trust, agreement = state.trust, state.trust.agreement
-        if windows:
-            agreement = agreement.after_calm(int(windows), last)
         nominal = state_of(numbers.take(19))
         numbers.take(6)  # the plan still has its input
         return replace(
@@ -392,17 +345,11 @@ class QuietTicks:
             estimate=StateEstimate(t_us, p, v, R, w, yaw, q_arm, qd_arm, -f[2]),
             nominal=nominal,
             cascade=_memory(numbers, state.cascade),
-            trust=FrameTrust(
-                SensorFrame(t_us, p, v, q, w, f, q_arm, qd_arm),
-                bad_us=trust.bad_us,
-                window=window,
-                agreement=agreement,
-            ),
             watch=self._watched,
         )
 
     def _most(self, state: FlightState) -> int:
-        """How many ticks after this state no clock, plan or window ends; 0: it is not quiet."""
+        """How many ticks after this state no clock or plan ends; 0: it is not quiet."""
         if not _is_quiet(state, self._config):
             return 0
         plan, mission, now_us = state.plan, state.mission, state.t_us
@@ -425,7 +372,7 @@ class QuietTicks:
 
 def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
     """Whether nothing goes on that a quiet tick does not know of."""
-    vehicle, trust, plan, estimate = state.vehicle, state.trust, state.plan, state.estimate
+    vehicle, plan, estimate = state.vehicle, state.plan, state.estimate
     return (
         vehicle.mode is Mode.TRAJECTORY
         and vehicle.flies
@@ -439,9 +386,6 @@ def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
         and state.invalid_ticks == 0
         and not state.tuning
         and state.aiding is AIDED
-        and trust.last is not None
-        and trust.last.t_us == state.t_us
-        and not (trust.doubted or trust.returned_us or trust.shadow or trust.agreement.doubted)
         and not (state.damage.rotor or state.damage.joint)
         and state.damage.health is state.cascade.health is HEALTHY
         and bool(config.limits.watches_actuators)
@@ -453,22 +397,13 @@ def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
 
 
 def _take(
-    into: Quiet,
-    state: FlightState,
-    last: SensorFrame,
-    x: StateEstimate,
-    n: PredictionState,
-    u: PlanInput,
+    into: Quiet, state: FlightState, x: StateEstimate, n: PredictionState, u: PlanInput
 ) -> None:
     """Write a state down as a quiet tick has it, in the order of ``QUIET``."""
-    m, window = state.cascade, state.trust.window
+    m = state.cascade
     thrust, torque = m.commanded
     into.view(np.float64)[:] = (
-        *(*last.p_WB, *last.v_WB, *last.q_WB, *last.gyro_B, *last.accel_B),
-        *(*last.q_arm, *last.qd_arm),
-        *(*x.R_WB, x.yaw),
-        *(window.frames, *window.turn, *window.speed, window.same_rate, window.same_force),
-        *_NO_WINDOWS,
+        *(*_NOT_READ, *x.R_WB, x.yaw),
         *(*n.p, *n.v, *n.a, *n.j, *n.s, n.yaw, n.yaw_rate, *n.q_arm, *n.qd_arm),
         *(*u.a, u.yaw_acc, *u.qdd_arm),
         *(*m.rotors, *thrust, *torque),
@@ -490,10 +425,6 @@ class _Numbers:
         """The next ones."""
         begin, self._at = self._at, self._at + count
         return self._numbers[begin : self._at]
-
-
-def _window(x: list[float]) -> Window:
-    return Window(int(x[0]), (x[1], x[2], x[3]), (x[4], x[5], x[6]), int(x[7]), int(x[8]))
 
 
 def _memory(numbers: _Numbers, before: CascadeMemory) -> CascadeMemory:

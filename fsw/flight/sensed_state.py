@@ -40,6 +40,7 @@ _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
 _LOW = 0.1  # m of the legs above the ground, below which they may touch it
 _LATELY = 0.02  # s, in which a fault is one of now
+_UNHELD_US = 300_000  # without a pose, after which poses do not hold the attitude any more
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
 
@@ -311,19 +312,23 @@ def _aiding(
     a receiver's error was there before, and is no reason to come down.
     """
     before, now, verdict = state.aiding, memory.now, memory.verdict
+    lost = _lost(memory, before.lost, report.t_us)
     aid = memory.of(Sensor.POSE)
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
     pose, V = report.pose_covariance, report.velocity_covariance
+    unaided_us = max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0
+    by_pose = aid.sensor is Sensor.POSE and unaided_us < _UNHELD_US
     return Aiding(
-        unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
+        unaided_us=unaided_us,
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
         position_sigma=drifted,
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11], 0.0)),
         attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
         height_sigma=math.sqrt(max(pose[11], 0.0)),
-        lost=_lost(memory, before.lost, report.t_us),
+        lost=lost,
+        attitude_held=by_pose or not any(one.sensor is _IMU for one in lost),
         disputed_us=max(round(1e6 * (now - verdict.since)), 1) if verdict.contradicts else 0,
         suspects=names(verdict.suspects),
     )

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from fsw.control.actuator_watch import Watch
 from fsw.control.cascade import CascadeMemory
 from fsw.control.tracking import Observed
-from fsw.estimation.frame_trust import FrameTrust
+from fsw.estimation.frame_dropout import Dropout
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.accuracy_watch import AccuracyMemory
@@ -63,7 +63,8 @@ class VehicleMemory:
     moved_us: int = 0  # when the vehicle last moved, for the land detector
     # On contact with the ground rotors idle: since when, and the velocity down [m/s] at that time.
     unloaded: tuple[int, float] | None = None
-    range: RangeSample | None = None  # the rangefinder's last one
+    range: RangeSample | None = None  # of the rangefinder's last two the longer: dust is too close
+    range_newest: RangeSample | None = None
     mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     mode_yaw: float = 0.0  # rad, there
     mode_begin_us: int = 0
@@ -233,6 +234,7 @@ class Aiding(NamedTuple):
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
+    attitude_held: bool = True  # by inertial unit or pose; False: rotors' thrusts stand in
     disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
     suspects: str = ""  # of which one is wrong then
 
@@ -242,6 +244,7 @@ class Aiding(NamedTuple):
 
 
 AIDED: Final = Aiding()
+COMPLETE: Final = Dropout()
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +278,7 @@ class FlightState:
     fusion: FusionMemory | None = None  # where sensors have times of their own
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
-    trust: FrameTrust = FrameTrust()  # where states are exact
+    dropout: Dropout = COMPLETE  # where states are exact
     kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)

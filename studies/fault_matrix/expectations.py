@@ -13,7 +13,7 @@ from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from sitl.faults.keys import Fault, Kind, Unit, instances
 from sitl.scenario_file import SUITE_NAMES, build_table
-from studies.fault_matrix.flights import SITUATIONS, FaultFlight
+from studies.fault_matrix.flights import SITUATIONS, FaultFlight, is_believed
 
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
 ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
@@ -149,6 +149,11 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
         modes = _modes(table, _names(fault, names))
         faults = () if fault is None else (fault, *more)
         for suite in suites:
+            if any(is_believed(one, suite) for one in faults):
+                raise ExpectationError(
+                    f"{name}: with {suite} what a sensor says is believed, unless it is silent "
+                    "(off, intermittent); fly it with another suite"
+                )
             full = name if suite == "perfect" else f"{name}-{suite}"
             flown = {one: it for one, it in modes.items() if suite not in without.get(one, {})}
             found.append(Expected(full, faults, suite, link, flown))

@@ -35,10 +35,10 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
 )
-from sitl.faults.keys import Fault
+from sitl.faults.keys import SENSORS, Fault
 from sitl.result import EndKind
 from sitl.scenario import Scenario
-from sitl.scenario_file import load_scenario, parse_scenario
+from sitl.scenario_file import PERFECT, load_scenario, parse_scenario
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.collector import collector_off
@@ -73,6 +73,8 @@ _LANDS: Final = (Mode.RETURN, Mode.LAND)  # a return that is complete
 _FOLLOWS_S: Final = 0.1  # after that, a vehicle that is not in Trajectory has left it
 
 _CONTACTS: Final = ("", "ground", "wall")
+
+_SILENCE: Final = ("off", "intermittent")  # of a sensor
 
 Spoken = tuple[float, CommandAction]  # at a time [s], and what is commanded
 
@@ -255,6 +257,14 @@ def _listed(line: Mapping[str, Any], name: str) -> list[Any]:
     if not isinstance(found, list):
         raise TypeError(f"{name} = {found!r} is no array")
     return found
+
+
+def is_believed(fault: Fault, suite: str) -> bool:
+    """Whether a vehicle with this suite takes for the truth what a sensor with the fault says.
+
+    Exact states are believed where they are numbers: of them only silence is a fault.
+    """
+    return suite == PERFECT and fault.unit in SENSORS and fault.kind not in _SILENCE
 
 
 def contact_of(kind: EndKind | None, sentence: str) -> str:

@@ -97,14 +97,15 @@ def judge(cell: Cell, flight: FaultFlight) -> Judged:
     return Judged(cell, flight, differences(cell.mode, expected, flight))
 
 
-def sound_seed(mode: str, suite: str, seed: int) -> int:
-    """This seed, or one of a row of its own with which satellites let the mode be flown at all.
+def sound_seed(mode: str, suite: str, seed: int, *, surely: bool = False) -> int:
+    """This seed, or one of a row of its own with which sensors let the mode be flown at all.
 
-    At the start they may be off by so much that the vehicle is not armed, or takes itself to be on
-    the ground; without corrections, by more than the wall is away.
+    At the start satellites may be off by so much that the vehicle is not armed, or takes itself to
+    be on the ground; without corrections, by more than the wall is away. Other suites let it be
+    flown nearly always, and are looked at where that is to be known ``surely``.
     """
     row = (seed + k * _NEXT_SEED for k in range(_TRIES))
-    if suite == "rtk":
+    if surely or suite == "rtk":
         return next((one for one in row if not _natural(mode, suite, one).problem), seed)
     if suite == "gnss":
         flown = ((one, _natural(mode, suite, one)) for one in row)

@@ -90,14 +90,9 @@ class FaultySensors:
         if fault.kind == "silent":
             nothing = {name: (math.nan,) * len(getattr(frame, name)) for name in names}
             return replace(frame, **nothing)  # type: ignore[arg-type]
-        if fault.kind == "frozen":
-            self._held = self._held or {name: getattr(frame, name) for name in names}
-            return replace(frame, **self._held)
-        if fault.kind == "over":
-            return replace(frame, q_WB=_rolled(frame.q_WB))
         if fault.kind == "fast":
             return replace(frame, v_WB=(_FAR, 0.0, 0.0))
-        raise ValueError("exact states come with the tick's own time, which nothing can change")
+        raise ValueError(f"{fault.kind}: exact states are believed where they are in range")
 
     def samples(self, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
         """What the samples of a suite become."""

@@ -214,9 +214,9 @@ _FAULTS: tuple[tuple[str, Sensor, FaultKind, float], ...] = (
     ("one time stamp 10 s ahead", Sensor.POSE, "ahead", 0.0),
 )
 _ALL_LATE: Final = (14.0, 20.0)  # ms
-# In process the time of a frame of exact states is the tick's; the link refuses one that is ahead
-# (tests/fsw/link/test_sim_link.py).
-_OF_SUITES_ONLY: Final = ("ahead",)
+# Exact states are believed where they are numbers and in range. In process the time of a frame is
+# the tick's; the link refuses one that is ahead (tests/fsw/link/test_sim_link.py).
+_OF_SUITES_ONLY: Final = ("frozen", "over", "ahead")
 
 
 def cells(duration_s: float | None = None) -> list[Cell]:

@@ -1,4 +1,4 @@
-"""Sensors that lie, freeze or fall silent in flight, with exact states and with a suite."""
+"""Sensors that lie, freeze or fall silent in flight; exact states that are no numbers."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ START_US = 1_000_000
 FIRST = 300  # step of the fault
 NAN = math.nan
 NOTHING = (NAN, NAN, NAN)
-POSE, INERTIAL = ("p_WB", "v_WB", "q_WB"), ("gyro_B", "accel_B")
-ENCODERS = ("q_arm", "qd_arm")
 
 
 def lies(steps: int, first: int = FIRST, **changes: Any) -> Callable[[SensorFrame], SensorFrame]:
@@ -31,21 +29,6 @@ def lies(steps: int, first: int = FIRST, **changes: Any) -> Callable[[SensorFram
     def spoil(frame: SensorFrame) -> SensorFrame:
         step = (frame.t_us - START_US) // STEP_US
         return replace(frame, **changes) if first <= step < first + steps else frame
-
-    return spoil
-
-
-def freezes(steps: int, first: int, *names: str) -> Callable[[SensorFrame], SensorFrame]:
-    """Readings as they were when it began, for a number of steps."""
-    held: dict[str, Any] = {}
-
-    def spoil(frame: SensorFrame) -> SensorFrame:
-        step = (frame.t_us - START_US) // STEP_US
-        if not first <= step < first + steps:
-            return frame
-        for name in names:
-            held.setdefault(name, getattr(frame, name))
-        return replace(frame, **held)
 
     return spoil
 
@@ -65,14 +48,11 @@ def off(flight: Flight) -> float:
     [
         (lies(5, p_WB=NOTHING), "pose says what cannot be"),
         (lies(30, p_WB=NOTHING), "pose says what cannot be"),
-        (lies(1, q_WB=(math.cos(0.79), math.sin(0.79), 0.0, 0.0)), "pose jumps"),  # beyond 90 deg
         (lies(1, v_WB=(1e6, 0.0, 0.0)), "pose says what cannot be"),
         (lies(1, v_WB=(0.0, 1e30, 0.0)), "pose says what cannot be"),
-        (lies(50, p_WB=(1.0, 1.0, -1.0)), "pose jumps"),
         (lies(25, p_WB=NOTHING, gyro_B=NOTHING, qd_arm=(NAN, NAN)), "IMU says what cannot be"),
-        (freezes(100, FIRST, *POSE), ""),  # reported when it lasts
     ],
-    ids=["10 ms", "no place", "over", "1e6 m/s", "1e30 m/s", "elsewhere", "nothing", "frozen"],
+    ids=["10 ms", "no place", "1e6 m/s", "1e30 m/s", "nothing"],
 )
 def test_what_lasts_a_moment_is_flown_through_and_reported(
     spoil: Callable[[SensorFrame], SensorFrame], text: str
@@ -85,7 +65,7 @@ def test_what_lasts_a_moment_is_flown_through_and_reported(
         assert 10.0 < sum(flight.outputs.actuators.rotor_thrust) < 60.0
         assert off(flight) < 0.02
     assert not told(flight, "safe set by")
-    assert told(flight, text) or not text, flight.texts
+    assert told(flight, text), flight.texts
 
 
 @pytest.mark.requirement("REQ-ARM-1")
@@ -207,12 +187,10 @@ def test_one_encoder_that_is_stuck_beside_walls_is_told_and_touches_nothing(join
     ("spoil", "words"),
     [
         (lies(LONG, BESIDE, p_WB=NOTHING), ("no position is measured", "pose", "for 0.25 s")),
-        (freezes(LONG, BESIDE, *POSE), ("no position is measured", "pose is stuck")),
-        (freezes(LONG, BESIDE, "p_WB", "v_WB"), ("no position is measured", "pose is stuck")),
-        (freezes(LONG, BESIDE, *INERTIAL), ("sensor lost: IMU is stuck", "for 0.05 s")),
-        (freezes(LONG, BESIDE, *ENCODERS), ("sensor lost: joint encoders are stuck",)),
+        (lies(LONG, BESIDE, gyro_B=NOTHING), ("sensor lost: IMU says what cannot be", "for 0.05")),
+        (lies(LONG, BESIDE, q_arm=(NAN, NAN)), ("sensor lost: joint encoders say",)),
     ],
-    ids=["no pose", "pose stuck", "place stuck", "IMU stuck", "encoders stuck"],
+    ids=["no pose", "no IMU", "no encoders"],
 )
 def test_exact_states_that_fail_for_two_seconds_touch_nothing(
     spoil: Callable[[SensorFrame], SensorFrame], words: tuple[str, ...]

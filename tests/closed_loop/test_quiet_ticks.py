@@ -13,7 +13,7 @@ import pytest
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.conditions import Condition
 from fsw.flight.quiet_ticks import READINGS
-from fsw.flight.state import FlightState
+from fsw.flight.state import AIDED, FlightState
 from fsw.frozen import replace
 from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
@@ -146,16 +146,13 @@ CHANGES: dict[str, Callable[[FlightState], FlightState]] = {
     "a breach": lambda s: replace(s, safety=replace(s.safety, breach_us=s.t_us)),
     "a rotor": lambda s: replace(s, damage=s.damage._replace(rotor="rotor 1 gives nothing")),
     "a joint": lambda s: replace(s, damage=s.damage._replace(joint="joint 1 does not move")),
-    "a doubted pose": lambda s: replace(
-        s, trust=s.trust._replace(pose=s.trust.pose._replace(unused=1))
-    ),
+    "a pose that is missing": lambda s: replace(s, aiding=AIDED._replace(unaided_us=2000)),
     "no plan": lambda s: replace(s, plan=replace(s.plan, running=None)),
     "a plan that was refused": lambda s: replace(s, plan=replace(s.plan, refused=True)),
     "a plan that is due": lambda s: replace(
         s, plan=replace(s.plan, awaited_id=9, awaited_us=s.t_us + 2000)
     ),
     "no more targets": lambda s: replace(s, mission=replace(s.mission, stream=())),
-    "no frame before": lambda s: replace(s, trust=s.trust._replace(last=None)),
 }
 
 
@@ -168,11 +165,11 @@ def test_no_tick_is_quiet_while_something_goes_on(before: Before, what: str) -> 
 
 READING: dict[str, Callable[[Any], None]] = {
     "a place that is none": lambda r: r.__setitem__(0, np.nan),
-    "a place elsewhere": lambda r: r.__setitem__(1, r[1] + 0.2),
+    "a place beyond all range": lambda r: r.__setitem__(1, 1e6),
     "a rate that is none": lambda r: r.__setitem__(10, np.inf),
     "off the plan": lambda r: r.__setitem__(2, r[2] + 0.09),
     "on its back": lambda r: r.__setitem__(slice(6, 10), (0.0, 1.0, 0.0, 0.0)),
-    "a joint elsewhere": lambda r: r.__setitem__(16, r[16] + 1.0),
+    "a joint rate out of range": lambda r: r.__setitem__(18, 200.0),
 }
 
 

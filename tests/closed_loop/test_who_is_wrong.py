@@ -18,19 +18,22 @@ in_long = pytest.mark.long
 
 
 @pytest.mark.requirement("REQ-EST-13")
-@pytest.mark.parametrize("suite", ["mocap", "vio", "rtk"])
+@pytest.mark.parametrize("suite", ["mocap", "vio", "rtk", "gnss"])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=in_long) for k in range(1, 20))])
 def test_whatever_is_wrong_with_it_is_told_and_nothing_is_touched(suite: str, seed: int) -> None:
     random = np.random.default_rng((seed, len(suite)))
     fault = Fault(
         unit=random.choice(["gyro", "accel"]),
-        kind=random.choice(["stuck", "garbage", "wrong"]),
+        kind=random.choice(["off", "stuck", "garbage", "wrong", "intermittent", "slow", "delayed"]),
         start_s=float(random.uniform(4.0, 6.0)),
         axis=float(random.integers(0, 4)),
+        share=float(random.uniform(0.1, 0.95)),
+        delay_ms=2.0 * float(random.integers(5, 250)),
+        rate_hz=float(random.uniform(1.0, 50.0)),
         size=float(random.choice([-1.0, 1.0]) * random.uniform(1.0, 5.0)),
     )
     scenario = parse_scenario(beside_the_wall_text("airborne", "none"), "wall", suite)
-    flight = Flight(replace(scenario, faults=(fault,)), seed=900 + seed)
+    flight = Flight(replace(scenario, faults=(fault,)), seed=1100 + seed)
     flight.step(command(ARM, 1.0, 21196.0))
     flight.run(fault.start_s)
     said = len(flight.texts)

@@ -65,7 +65,8 @@ def test_a_gyro_that_is_off_for_good_is_named_and_the_vehicle_holds(
         ("rtk", 1, 0.9),
         *(pytest.param("rtk", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.5, 0.2)),
         *(pytest.param("gnss", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.5, 0.2)),
-        *(pytest.param("vio", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.2)),
+        # 0.2 rad/s is where the safety manual says that it may stay undecided.
+        *(pytest.param("vio", k, s, marks=in_long) for k in range(3) for s in (-0.9, 0.25)),
     ],
 )
 def test_a_gyro_that_is_off_by_less_is_named_and_done_without(
@@ -78,10 +79,13 @@ def test_a_gyro_that_is_off_by_less_is_named_and_done_without(
     flight.step(command(ARM, 1.0))
     flight.run(at + 1.2)
     assert "IMU does not agree with the other sensors" in flight.texts
-    flight.run(4.0)
-    estimate, truth = flight.snapshot.estimate, flight.sim.truth()
-    R = matrix_from_quaternion(truth.q_WB)
-    assert max(abs(a - b) for a, b in zip(estimate.R_WB, R, strict=True)) < 0.15
+    for _ in range(40):  # or until it has landed, which without a pose it does in a hurry
+        flight.run(0.1)
+        if flight.mode is Mode.DISARMED:
+            break
+        estimate, truth = flight.snapshot.estimate, flight.sim.truth()
+        R = matrix_from_quaternion(truth.q_WB)
+        assert max(abs(a - b) for a, b in zip(estimate.R_WB, R, strict=True)) < 0.15
     assert flight.sim.ended is None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fsw.flight.descent import is_hurried
 from fsw.flight.modes.base import FlightMode, ModeResult, Px4Mode, touch_down
 from fsw.flight.retreat import retreat_place
 from fsw.flight.setpoint_generator import PositionGoal
@@ -31,12 +32,12 @@ class Descend(FlightMode):
         return touch_down(self.config, state, estimate)
 
     def aim(self, state: FlightState, estimate: StateEstimate) -> FlightState:
-        """Where no position is measured, the place to draw back to.
+        """Where no position or attitude is measured, the place to draw back to.
 
         Clearances have grown by what the place is uncertain by, as far as there is room for.
         """
         safe_set, limits = state.kept.whole.safe_set, self.config.limits
-        if state.aiding.unaided_us < limits.aiding_loss_us or not safe_set.zones:
+        if not (is_hurried(state.aiding, limits.aiding_loss_us) and safe_set.zones):
             known = state.setpoint.goal is None
             return state if known else replace(state, setpoint=SetpointMemory())
         place = retreat_place(safe_set, estimate, self._body, self._links, self._room)

@@ -119,9 +119,9 @@ def test_the_estimate_is_the_one_of_python() -> None:
         w, x, y, z = (float(value) for value in q / np.linalg.norm(q))
         p, v, gyro, accel = (vec3(random.uniform(-2.0, 2.0, 3)) for _ in range(4))
         sensors = SensorFrame(1, p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
-        usable, rotation, yaw = attitude(p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
+        missing, rotation, yaw = attitude(p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
         estimate = estimate_state(sensors)
-        assert usable
+        assert missing == 0
         assert estimate is not None
         np.testing.assert_allclose(estimate.R_WB, rotation, rtol=0, atol=1e-9)
         assert estimate.yaw == pytest.approx(yaw, abs=1e-9)

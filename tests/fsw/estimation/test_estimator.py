@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.estimation.estimator import estimate_state
+from fsw.estimation.estimator import INERTIAL, JOINTS, POSE, estimate_state, read_frame
 from fsw.signals import SensorFrame, Vec4
 from tests.fsw.random_states import mat3
 
@@ -34,6 +34,44 @@ def test_one_reading_that_is_no_number_invalidates_the_frame(name: str, value: f
     for index in range(len(readings)):
         broken: Any = (*readings[:index], value, *readings[index + 1 :])
         assert estimate_state(replace(GOOD, **{name: broken})) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "largest"),
+    [
+        ("p_WB", 1e5),
+        ("v_WB", 100.0),
+        ("gyro_B", 100.0),
+        ("q_arm", 100.0),
+        ("qd_arm", 100.0),
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_no_vehicle_of_this_kind_does_is_no_state(
+    name: str, largest: float, sign: float
+) -> None:
+    readings = getattr(GOOD, name)
+    for index in range(len(readings)):
+        for value, usable in ((0.999 * largest, True), (largest, False), (1e300, False)):
+            changed: Any = (*readings[:index], sign * value, *readings[index + 1 :])
+            assert (estimate_state(replace(GOOD, **{name: changed})) is not None) is usable
+
+
+@pytest.mark.parametrize(("force", "usable"), [(999.0, True), (-999.0, True), (-1000.0, False)])
+def test_a_specific_force_out_of_range_is_no_state(force: float, usable: bool) -> None:
+    assert (estimate_state(replace(GOOD, accel_B=(0.0, 0.0, force))) is not None) is usable
+
+
+PARTS = {"p_WB": POSE, "v_WB": POSE, "q_WB": POSE, "gyro_B": INERTIAL, "q_arm": JOINTS}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_a_part_that_is_no_number_is_named_and_the_others_stay(name: str) -> None:
+    nothing: Any = (math.nan,) * len(getattr(GOOD, name))
+    missing, state = read_frame(replace(GOOD, **{name: nothing}))
+    assert missing == PARTS[name]
+    if name != "gyro_B":
+        assert state.w_WB_B == GOOD.gyro_B
 
 
 def test_opposite_infinities_do_not_cancel() -> None:

@@ -229,6 +229,20 @@ def test_who_is_named_has_fired_and_nobody_is_while_nothing_does(ratios: list[fl
     assert bool(verdict.is_on or verdict.wrong) == (max(ratios) > 1.0)
 
 
+@given(st.sampled_from(list(Source)), st.floats(0.0, 1.9), st.floats(1.1, 20.0))
+def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
+    silent: Source, later: float, ratio: float
+) -> None:
+    """Encoders that send garbage leave the rotors' model without its arm, and no gyro is wrong."""
+    verdict = Verdict().hearing_nothing_of(silent, 5.0)
+    lost = verdict.lost(5.0 + later)
+    assert lost == silent
+    assert not verdict.lost(5.0 + redundancy.WINDOWS[-1])
+    fires = tuple([ratio if of & silent else 0.0 for of in redundancy.OF])
+    verdict = judged(verdict, fires, 5.0 + later, holds_attitude=True, lost=lost)
+    assert not (verdict.is_on or verdict.wrong)
+
+
 def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
     x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
     level: NDArray[np.float64] = np.eye(3).ravel()

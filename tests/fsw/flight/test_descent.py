@@ -21,6 +21,7 @@ HIGH: Vec3 = (1.0, 2.0, -5.0)
 HERE = vehicle_at(HIGH)
 AIDED = Aiding()
 BLIND = Aiding(unaided_us=10**6, velocity_sigma=0.5, height_sigma=9.0)
+ON_ROTORS = Aiding(attitude_held=False, height_sigma=9.0)
 LOST = BLIND._replace(velocity_sigma=1.1)
 LIMITS = CONFIG.limits
 
@@ -38,9 +39,15 @@ def descended(
 @pytest.mark.requirement("REQ-MODE-9")
 @pytest.mark.parametrize(
     ("aiding", "height", "times"),
-    [(AIDED, 5.0, 1.0), (AIDED, 0.9, 1.0), (BLIND, 5.0, 4.0), (BLIND, 0.9, 2.0)],
+    [
+        (AIDED, 5.0, 1.0),
+        (AIDED, 0.9, 1.0),
+        (BLIND, 5.0, 4.0),
+        (BLIND, 0.9, 2.0),
+        (ON_ROTORS, 5.0, 4.0),
+    ],
 )
-def test_it_brakes_across_and_sinks_at_the_speed_of_landing_and_faster_where_it_is_blind(
+def test_it_brakes_across_and_sinks_at_the_speed_of_landing_and_faster_in_a_hurry(
     aiding: Aiding, height: float, times: float
 ) -> None:
     here = vehicle_at((1.0, 2.0, GROUND_Z - height))

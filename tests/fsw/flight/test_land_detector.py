@@ -14,6 +14,7 @@ from fsw.flight.land_detector import (
     may_be_low,
     standing_unclear,
     stands,
+    with_range,
 )
 from fsw.flight.state import AIDED, Aiding, FlightState
 from fsw.measurements import RangeSample
@@ -95,6 +96,45 @@ def test_the_rangefinder_says_whether_the_ground_is_near_else_the_estimate(
     state = replace(flying(Mode.LAND, range=sample), aiding=Aiding(height_sigma=sigma))
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
     assert may_be_low(CONFIG, state, estimate) is low
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("height", "sigma", "sample", "landed"),
+    [
+        (0.05, 0.02, None, True),
+        (0.15, 0.02, None, False),
+        (0.05, 0.2, None, False),  # nobody knows how high it is
+        (0.15, 0.02, seen(0.15), False),
+        (0.3, 0.1, seen(0.05), True),
+        (0.5, 0.1, seen(0.05), False),  # one of them is wrong
+        (0.05, 0.02, seen(0.2), False),
+    ],
+)
+def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
+    height: float, sigma: float, sample: RangeSample | None, landed: bool
+) -> None:
+    """And with an attitude that is measured they carry it down to the ground."""
+    state = flying(Mode.DESCEND, range=sample)
+    carries = state.cascade._replace(rotors=(0.25 * WEIGHT,) * 4)
+    estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
+    for held in (False, True):
+        aiding = Aiding(height_sigma=sigma, attitude_held=held)
+        found = feel_ground(CONFIG, replace(state, cascade=carries, aiding=aiding), estimate)
+        assert found[1] is (landed and not held)
+
+
+def test_a_distance_that_is_too_short_counts_once_a_second_one_says_so() -> None:
+    vehicle, distances = flying(Mode.LAND).vehicle, (1.0, 0.1, 0.9, 0.2, 0.2, 0.8)
+    used = []
+    for k, distance in enumerate(distances):
+        vehicle = with_range(vehicle, RangeSample(0.1 * k, distance, 0.01**2))
+        assert vehicle.range is not None
+        used.append((vehicle.range.time, vehicle.range.distance))
+    times = [0.1 * k for k in range(6)]
+    assert used == list(zip(times, (1.0, 1.0, 0.9, 0.9, 0.2, 0.8), strict=True))
+    vehicle = with_range(vehicle, RangeSample(2.0, 0.1, 0.01**2))
+    assert vehicle.range == RangeSample(2.0, 0.1, 0.01**2), "the last one is of another time"
 
 
 def landed_after(

@@ -210,6 +210,10 @@ _MOTOR = '[[faults]]\nunits = ["motor"]\nkinds = ["weak"]\nthen = ["hold"]\n'
         (f"{_MOTOR}margin_mm = {'9' * 400}", "must be a length in mm, from -1e+06 to 1e+06"),
         (f"{_MOTOR}told_within_s = {'9' * 400}", "must be a time above 0, in seconds, up to 86400"),
         (
+            '[[faults]]\nunits = ["vio"]\nkinds = ["wrong"]\nthen = ["hold"]',
+            "vio-wrong: with perfect what a sensor says is believed, unless it is silent",
+        ),
+        (
             '[[faults]]\nunits = "gyro"\nthen = ["hold"]',
             "units = 'gyro': must be an array, of gyro",
         ),

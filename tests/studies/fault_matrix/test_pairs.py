@@ -11,8 +11,8 @@ import pytest
 
 from fsw.signals import Severity
 from pandion.faults import main
-from sitl.faults.keys import KINDS, Fault
-from sitl.scenario_file import SUITE_NAMES
+from sitl.faults.keys import KINDS, SENSORS, Fault
+from sitl.scenario_file import PERFECT, SUITE_NAMES
 from studies.fault_matrix import pairs
 from studies.fault_matrix.expectations import not_flown
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight, Said
@@ -52,6 +52,9 @@ def test_draws_have_every_kind_mode_and_suite_that_can_be_flown() -> None:
     drawn = [draw(1, number, without) for number in range(2500)]
     kinds = {(fault.unit, fault.kind) for one in drawn for fault in one.expected.faults}
     assert kinds == {(unit, kind) for unit in UNITS for kind in KINDS[unit]}
+    exact = [one.expected.faults for one in drawn if one.expected.suite == PERFECT]
+    of_exact = {fault.kind for faults in exact for fault in faults if fault.unit in SENSORS}
+    assert of_exact == {"off", "intermittent"}, "the rest is believed"
     flown = {(one.mode, one.expected.suite) for one in drawn}
     there = {(mode, suite) for mode in SITUATIONS for suite in SUITE_NAMES}
     assert flown == {(m, s) for m, s in there if s not in without.get(m, {})}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -84,16 +83,19 @@ def test_the_rows_of_the_milestone_are_there() -> None:
         found = {change for flown, _, change in rows if flown == suite}
         assert found >= {
             "no pose for 2 s",
-            "IMU frozen for 2 s",
-            "encoders frozen for 2 s",
-            "pose frozen for 0.3 s",
             "no pose for 10 ms",
-            "one attitude 75 deg over",
             "one frame of 1e6 m/s",
             "all sensors 14 ms late",
             "all sensors 20 ms late",
         }
-    assert ("mocap", "I", "one time stamp 10 s ahead") in rows
+        lies = {
+            "IMU frozen for 2 s",
+            "encoders frozen for 2 s",
+            "pose frozen for 0.3 s",
+            "one attitude 75 deg over",
+            "one time stamp 10 s ahead",
+        }
+        assert found & lies == (lies if suite == "mocap" else set())
     assert {change for suite, case, change in rows if (suite, case) == ("perfect", "II")} == set(
         CHANGES
     )
@@ -148,10 +150,8 @@ def test_real_air_has_every_effect() -> None:
     ("sensor", "kind", "changed"),
     [
         (Sensor.POSE, "silent", {"p_WB", "v_WB", "q_WB"}),
-        (Sensor.POSE, "frozen", {"p_WB", "v_WB"}),
-        (Sensor.IMU, "frozen", {"gyro_B", "accel_B"}),
-        (Sensor.ENCODERS, "frozen", {"q_arm", "qd_arm"}),
-        (Sensor.POSE, "over", {"q_WB"}),
+        (Sensor.IMU, "silent", {"gyro_B", "accel_B"}),
+        (Sensor.ENCODERS, "silent", {"q_arm", "qd_arm"}),
         (Sensor.POSE, "fast", {"v_WB"}),
     ],
 )
@@ -167,12 +167,13 @@ def test_a_fault_of_exact_states_changes_its_sensor_while_it_lasts(
             for name in ("p_WB", "v_WB", "q_WB", "gyro_B", "accel_B", "q_arm", "qd_arm")
             if getattr(given, name) != getattr(true, name)
         }
-        lasts = 500 + (kind == "frozen") <= step < 505  # the first frozen frame is the true one
-        assert differs == (changed if lasts else set()), step
-        if lasts and kind == "frozen" and sensor is Sensor.POSE:
-            assert given.p_WB == (500.0, 0.0, -1.0)
-        if lasts and kind == "over":
-            assert 2.0 * math.acos(given.q_WB[0]) > math.radians(70.0)
+        assert differs == (changed if 500 <= step < 505 else set()), step
+
+
+@pytest.mark.parametrize("kind", ["frozen", "over", "ahead"])
+def test_exact_states_have_no_fault_that_would_be_believed(kind: FaultKind) -> None:
+    with pytest.raises(ValueError, match="exact states are believed"):
+        FaultySensors(fault(Sensor.POSE, kind, 0.01), seed=3).frame(frame(1.0))
 
 
 @pytest.mark.parametrize(

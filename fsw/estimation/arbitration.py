@@ -1,0 +1,275 @@
+"""What follows for the filter when sensors contradict each other, or one is named.
+
+Every 20 ms it is asked who is wrong (``redundancy.py``). Of suspects the biases are not known any
+more; without who is named the filter runs again, from before it was wrong.
+
+Source: docs/decisions/0041-one-law-for-who-is-wrong.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from fsw.estimation import redundancy
+from fsw.estimation.error_state import (
+    BA,
+    BG,
+    NO_FORCE,
+    NO_RATE,
+    NOTHING,
+    ON_TRIAL,
+    TH,
+    Array,
+    V,
+)
+from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
+from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS
+from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
+from fsw.estimation.measurement_update import MeasurementUpdate
+from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
+from fsw.estimation.sensor_checks import Aiding, Health
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.estimation.stated_variance import StatedVariance
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.geometry.quaternion import normalised
+from fsw.measurements import GnssSample, MagneticSample, PoseSample
+from fsw.signals import StateEstimate
+
+_TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
+# Of a suspect, standard deviations of its bias, and of what it may have led to by then.
+_SUSPECTED_FORCE: Final = 3.0  # m/s^2
+_SUSPECTED_SPEED: Final = 0.3  # m/s
+_SUSPECTED_RATE: Final = 0.5  # rad/s
+_SUSPECTED_TURN: Final = 0.03  # rad
+_HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
+_UNIT: Final = Source.GYRO | Source.ACCELEROMETER
+_ROUNDING: Final = 1e-9  # s
+
+Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
+"""What a tick makes of a memory."""
+
+
+class Arbitration:
+    """Asks who is wrong, for one configuration; holds nothing that changes in flight."""
+
+    def __init__(
+        self,
+        tuning: EstimatorTuning,
+        stated: StatedVariance,
+        update: MeasurementUpdate,
+        again: Again,
+    ) -> None:
+        self._tuning = tuning
+        self._stated = stated
+        self._update = update
+        self._again = again
+
+    def step(
+        self, memory: FusionMemory, now: float, found: StateEstimate, *, aloft: bool
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory, and the state ``found`` at ``now`` [s], after what is due.
+
+        Nothing is, unless the vehicle is ``aloft``: else the ground may hold it.
+        """
+        evidence = memory.verdict.evidence
+        if evidence is None:
+            return begun(memory), found
+        if not aloft:
+            return _near_the_ground(memory), found
+        if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
+            return memory, found
+        return self._look(memory, now, found)
+
+    def _look(
+        self, memory: FusionMemory, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory after a look at whether all sensors agree, and the state with it."""
+        before = memory.verdict
+        evidence, aids, seen = np.empty(1, EVIDENCE), [], []
+        evidence[:] = before.evidence
+        newest = memory.newest_pose, memory.gnss, memory.newest_field
+        for sample, last in zip(newest, before.seen, strict=True):
+            aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
+            seen.append(sample)
+        verdict = before.hearing_nothing_of(_silent(memory, now), now)
+        lost = verdict.lost(now) | _stuck(memory)
+        learns = not (before.is_on or before.wrong or lost)
+        redundancy.look(evidence, memory.numbers, now, *aids, learns)
+        ratios = tuple(evidence[0]["ratio"].tolist())
+        verdict = verdict._replace(evidence=evidence, seen=tuple(seen))
+        if before.is_on or before.wrong or max(ratios) > 1.0:
+            held = Source.POSE in self._aided(memory, now)
+            verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held, lost=lost)
+        memory = memory._replace(verdict=verdict)
+        state: StateEstimate | None = found
+        if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
+            memory, state = self._convicted(memory, before, now, found)
+        return _with_trail(memory, now), state
+
+    def _aid(self, memory: FusionMemory, sample: Aiding) -> Aid:
+        """What a measurement says to the law for who is wrong."""
+        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)
+        time = self._update.measured_at(memory, sample)
+        if isinstance(sample, PoseSample):
+            place, about = self._update.noise(memory, sample)
+            sigma, angle = math.sqrt(max(place) * scale[0]), math.sqrt(max(about) * scale[1])
+            return True, time, sample.position, normalised(sample.attitude), sigma, angle
+        if isinstance(sample, GnssSample):
+            place, speed = self._stated.of_gnss(sample)
+            sigma, fast = math.sqrt(max(place) * scale[2]), math.sqrt(max(speed) * scale[3])
+            return True, time, sample.position, (*sample.velocity, 0.0), sigma, fast
+        assert isinstance(sample, MagneticSample)
+        return True, time, sample.field, NO_TURN, self._tuning.mag_noise, 0.0
+
+    def _aided(self, memory: FusionMemory, now: float) -> Source:
+        """Who measures places at ``now`` [s] and is not named."""
+        found = NOBODY
+        for sensor, source in ((Sensor.POSE, Source.POSE), (Sensor.GNSS, Source.GNSS)):
+            if now - memory.of(sensor).came <= self._tuning.stale_time:
+                found |= source
+        return found & ~memory.verdict.wrong
+
+    def _convicted(
+        self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory with a filter that knows the verdict, and the state with it."""
+        verdict = memory.verdict
+        x = memory.numbers.copy()
+        memory = memory._replace(numbers=x)
+        new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
+        # A half that has jumped is believed where the rotors are named for it, and where it agrees.
+        agrees = back or (before.is_on and not verdict.is_on and not verdict.wrong)
+        believes = bool(x["doubted"][0].any() and (agrees or verdict.named is Source.MODEL))
+        x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
+        if verdict.is_on:
+            x["suspect"] |= ON_TRIAL
+            if self._aided(memory, now):  # else nothing would find the bias, and all would be lost
+                _widen(x[0]["covariance"], verdict.accused & ~before.accused)
+        if not (new or believes):
+            return memory, found
+        x["believed"] = NOTHING if believes else 0
+        if new & _UNIT:
+            memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
+        return self._replayed(memory, now, found)
+
+    def _replayed(
+        self, memory: FusionMemory, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Go back to before sensors contradicted, and do without what is wrong since then."""
+        trails = [one for one in (memory.trail_before, memory.trail) if one is not None]
+        x = memory.numbers[0]
+        believed = int(x["believed"])
+        x["believed"] = 0
+        if not trails:
+            return memory, found
+        back, state = trails[0].start, None
+        numbers = back.numbers.copy()
+        for name in ("out", "suspect"):
+            numbers[name] = x[name]
+        numbers["believed"] = believed
+        verdict = memory.verdict._replace(evidence=None)
+        back = back._replace(numbers=numbers, verdict=verdict)
+        for trail in trails:
+            for tick in trail.inputs():
+                back, state = self._again(back, tick)
+        if state is None:
+            return memory, found
+        numbers = back.numbers.copy()
+        numbers["believed"] = 0
+        for name in ("witness", "baseline", "model_walk"):
+            numbers[name] = memory.numbers[name]
+        health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
+        start = memory._replace(
+            numbers=numbers,
+            health=health,
+            waiting=back.waiting,
+            runs=back.runs,
+            pose=back.pose,
+            reset_counter=back.reset_counter,
+            frame=back.frame,
+            replays=memory.replays + 1,
+            trail=None,
+            trail_before=None,
+        )
+        return start._replace(trail=Trail(start, now)), state
+
+
+def begun(memory: FusionMemory) -> FusionMemory:
+    """The memory of a filter that has just begun: what sensors say is compared from now on."""
+    verdict = memory.verdict._replace(evidence=np.zeros(1, EVIDENCE))
+    return memory._replace(verdict=verdict, trail=None, trail_before=None)
+
+
+def _near_the_ground(memory: FusionMemory) -> FusionMemory:
+    """The memory without what has been compared so far: rotors do not explain what legs feel."""
+    evidence, verdict = memory.verdict.evidence, memory.verdict
+    if evidence is None or not (evidence[0]["count"] or verdict.is_on):
+        return memory
+    x = memory.numbers.copy()
+    x["suspect"] = 0
+    verdict = verdict.acquitted()._replace(evidence=np.zeros(1, EVIDENCE))
+    return memory._replace(numbers=x, verdict=verdict, trail=None, trail_before=None)
+
+
+def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory with a new trail where the newest one is long enough.
+
+    None is begun while it may have to be said soon who is wrong.
+    """
+    newest, verdict = memory.trail, memory.verdict
+    if newest is not None:
+        decides = verdict.is_on and now - verdict.since < redundancy.UNDECIDED
+        if decides or now - newest.began < _TRAIL:
+            return memory
+    start = memory._replace(trail=None, trail_before=None)
+    return memory._replace(trail_before=newest, trail=Trail(start, now))
+
+
+def _silent(memory: FusionMemory, now: float) -> Source:
+    """What has said nothing of how the vehicle moves at ``now`` [s].
+
+    Rotors explain it only where it is known how the arm moves.
+    """
+    unit = now - memory.imu_came > IMU_TOO_OLD
+    encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
+    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault is not SensorFault.SELDOM
+    arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
+    return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
+
+
+def _stuck(memory: FusionMemory) -> Source:
+    """Halves of the inertial unit that repeat themselves."""
+    found, same = NOBODY, memory.numbers[0]["same"]
+    for place, (source, _) in enumerate(_HALVES):
+        if same[place] >= STUCK_READINGS:
+            found |= source
+    return found
+
+
+def _widen(M: Array, suspects: Source) -> None:
+    """Know little of the biases of new ``suspects``, and of what they have led to; M (17, 17) [SI].
+
+    A bias that may walk alone takes too long to be found.
+    """
+    k = np.arange(3)
+    for source, bias, most, state, led in (
+        (Source.ACCELEROMETER, BA, _SUSPECTED_FORCE, V, _SUSPECTED_SPEED),
+        (Source.GYRO, BG, _SUSPECTED_RATE, TH, _SUSPECTED_TURN),
+    ):
+        if source & suspects:
+            M[bias + k, bias + k] += most**2
+            M[state + k, state + k] += led**2
+
+
+def _halves(sources: Source) -> int:
+    """Halves of the inertial unit, as ``FILTER`` counts them, among some ``sources``."""
+    return sum(half for source, half in _HALVES if source & sources)
+
+
+def _fused_as(health: Health, other: Health) -> Health:
+    """The ``health`` of a sensor of which other samples have been fused."""
+    return health.with_fused(other.fused, other.ratio, other.innovation)
