@@ -167,7 +167,9 @@ def test_a_page_of_two_flights_says_their_difference() -> None:
     assert difference("58.76 of 60.00 deg", "59.00 of 60.00 deg") == "+0.24 deg"
     assert difference("5.94 %", "6.00 %") == "+0.06 %"
     assert difference("3", "5") == "+2"
-    for one, other in (("mocap", "rtk"), ("1 mm", "1 m"), ("1 / 2 / 3", "1 / 2 / 4"), ("", "1")):
+    assert difference("88.6 mm / 152.2 mm", "83.5 mm / 152.3 mm") == "-5.1 mm / +0.1 mm"
+    assert difference("0.77 / 7.8 / 15 ms", "0.70 / 6.8 / 14 ms") == "-0.07 / -1.0 / -1 ms"
+    for one, other in (("mocap", "rtk"), ("1 mm", "1 m"), ("1 / 2", "1 / 2 / 4"), ("", "1")):
         assert difference(one, other) == ""
 
 

@@ -116,13 +116,23 @@ def _summary(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
 
 
 def difference(one: str, other: str) -> str:
-    """The second number minus the first, in their unit; empty where they are not alike."""
-    found = [_NUMBER.fullmatch(cell.strip()) for cell in (one, other)]
-    if found[0] is None or found[1] is None or found[0]["unit"] != found[1]["unit"]:
+    """The second number minus the first, in their unit; of several behind slashes, of each.
+
+    Empty where they are not alike.
+    """
+    pairs = list(zip(one.split(" / "), other.split(" / "), strict=False))
+    changes = [_change(*pair) for pair in pairs]
+    alike = one.count(" / ") == other.count(" / ") and all(changes)
+    return " / ".join(changes) if alike else ""
+
+
+def _change(one: str, other: str) -> str:
+    before, after = (_NUMBER.fullmatch(cell.strip()) for cell in (one, other))
+    if before is None or after is None or before["unit"] != after["unit"]:
         return ""
-    digits = max(len(each["digits"] or "") for each in found if each is not None)
-    change = float(found[1]["number"]) - float(found[0]["number"])
-    return f"{change:+.{digits}f} {found[0]['unit'].strip()}".strip()
+    digits = max(len(each["digits"] or "") for each in (before, after))
+    change = float(after["number"]) - float(before["number"])
+    return f"{change:+.{digits}f} {before['unit'].strip()}".strip()
 
 
 def _figure(chart: Chart) -> str:
