@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import astuple
 from operator import attrgetter
-from struct import Struct
 from typing import Any, Final
 
 from fsw.estimation.sensor_fault import Sensor
@@ -26,9 +25,8 @@ from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import samples, topics
 from fsw.log.json_codec import JsonCodec
-from fsw.log.packed import Packed
+from fsw.log.packed import Packed, Records
 from fsw.log.px4_records import Px4Records, validity
-from fsw.log.samples import numbers_of
 from fsw.measurements import ImuSample
 from fsw.model.kinematics import point_in_flight
 from fsw.ports import GroupTiming
@@ -85,10 +83,12 @@ NAV_STATES: Final[dict[str, int]] = {
 
 
 # What a replay needs and what it is compared by: every tick in every profile.
-(_SENSORS,) = Packed(topics.SENSOR_FRAME).heads
-(_TICK,) = Packed(topics.TICK).heads
-_FRAME: Final = Struct("<" + "".join(field.code for field in topics.SENSOR_FRAME.fields))
-_COMMAND: Final = Packed(topics.ACTUATOR_COMMAND)
+(_SENSORS,), (_TICK,) = Packed(topics.SENSOR_FRAME).heads, Packed(topics.TICK).heads
+(_COMMAND,) = Packed(topics.ACTUATOR_COMMAND).heads
+_FRAME: Final = samples.FRAME
+_AS_SENT: Final = "5s" + topics.ACTUATOR_COMMAND.codes
+_SHORT_TICK: Final = Records(f"<5sQ{_AS_SENT}")
+_WHOLE_TICK: Final = Records(f"<5sQ{_FRAME.size}s{_AS_SENT}")
 # What follows from that, for reading.
 _DETAIL: Final = Packed(
     topics.VEHICLE_ATTITUDE,
@@ -160,7 +160,7 @@ class LogEncoder:
         for sample in inputs.samples:
             out += samples.record(inputs.sensors.t_us, sample)
         self._timed(snapshot, out)
-        self._px4.add(inputs, snapshot, out)
+        self._px4.add(snapshot, out)
         self._add_inputs(inputs, out)
         last = self._last
         if last is None or snapshot.constraints is not last.constraints:
@@ -207,19 +207,20 @@ class LogEncoder:
     def _every_tick(self, inputs: TickInputs, snapshot: FlightSnapshot) -> bytes:
         one, sent = inputs.sensors, snapshot.actuators
         t_us = one.t_us
-        numbers = _FRAME.pack(
-            *one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *one.q_arm, *one.qd_arm
-        )
-        command = _COMMAND.pack(
-            (*_COMMAND.heads, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
-        )
         for sample in inputs.samples:
             if type(sample) is ImuSample:
                 self._imu = sample
+                self._px4.feel(sample.acceleration, sample.rate)
+        if not inputs.samples:
+            self._px4.feel(one.accel_B, one.gyro_B)
+        numbers = _FRAME.pack(
+            *one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *one.q_arm, *one.qd_arm
+        )
+        command = (_COMMAND, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        known = self._imu is not None and numbers == _FRAME.pack(*numbers_of(self._imu))
-        head, rest = (_TICK, b"") if known else (_SENSORS, numbers)
-        return head + t_us.to_bytes(8, "little") + rest + command
+        if self._imu is not None and numbers == samples.frame_of(self._imu):
+            return _SHORT_TICK.pack((_TICK, t_us, *command))
+        return _WHOLE_TICK.pack((_SENSORS, t_us, numbers, *command))
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
         estimate, sent = snapshot.estimate, snapshot.actuators

@@ -13,12 +13,12 @@ from messages.ulog import Topic, data_head
 _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 
 
-class Packed:
-    """Records of some topics, packed in one call."""
+class Records:
+    """Records that are packed in one call."""
 
-    def __init__(self, *members: Topic) -> None:
-        self.heads = tuple(data_head(topics.TOPICS.index(topic), topic) for topic in members)
-        self.struct = Struct("<" + "".join("5s" + topic.codes for topic in members))
+    def __init__(self, layout: str) -> None:
+        """As :mod:`struct` names them."""
+        self.struct = Struct(layout)
 
     def pack(self, values: tuple[Any, ...]) -> bytes:
         """Pack heads and values; a number too large for a float becomes infinite."""
@@ -26,6 +26,14 @@ class Packed:
             return self.struct.pack(*values)
         except OverflowError:
             return self.struct.pack(*map(_within_float, values))
+
+
+class Packed(Records):
+    """Records of some topics."""
+
+    def __init__(self, *members: Topic) -> None:
+        super().__init__("<" + "".join("5s" + topic.codes for topic in members))
+        self.heads = tuple(data_head(topics.TOPICS.index(topic), topic) for topic in members)
 
 
 def _within_float(value: Any) -> Any:

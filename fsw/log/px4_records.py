@@ -15,9 +15,8 @@ from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_global
 from fsw.geometry.vectors import dot
 from fsw.log import px4_topics as topics
 from fsw.log.packed import Packed
-from fsw.measurements import ImuSample
 from fsw.model.airframe import GRAVITY
-from fsw.signals import FlightSnapshot, Origin, PlanInput, PredictionState, TickInputs, Vec3, Vec4
+from fsw.signals import FlightSnapshot, Origin, PlanInput, PredictionState, Vec3, Vec4
 
 _TORQUE_US: Final = 10_000
 _SETPOINTS_US: Final = 50_000
@@ -26,6 +25,7 @@ _SECOND_US: Final = 1_000_000
 _VIBRATION_SHARE: Final = 0.01  # of a change that is taken over, as in PX4
 _FIX_3D: Final = 3  # GPS_FIX_TYPE
 _NAN: Final = math.nan
+_UNKNOWN: Final[Vec3] = (_NAN, _NAN, _NAN)
 _POSITION_LOST: Final = frozenset(
     {Condition.ESTIMATE_INVALID.value, Condition.POSITION_LOST.value, Condition.ATTITUDE_LOST.value}
 )
@@ -51,13 +51,11 @@ class Px4Records:
         # Numbers of the intervals that were written last.
         self._torque = self._setpoints = self._place = self._second = -1
         self._failures: tuple[str, ...] = ()
-        self._accel: Vec3 | None = None
-        self._gyro: Vec3 | None = None
-        self._vibration = [0.0, 0.0]  # m/s^2, rad/s
+        self._accel = self._gyro = _UNKNOWN
+        self._shaken = self._turned = 0.0  # m/s^2, rad/s
 
-    def add(self, inputs: TickInputs, snapshot: FlightSnapshot, out: bytearray) -> None:
+    def add(self, snapshot: FlightSnapshot, out: bytearray) -> None:
         """Append what is due in this tick."""
-        self._feel(inputs)
         t_us = snapshot.t_us
         if t_us // _TORQUE_US != self._torque:
             self._torque = t_us // _TORQUE_US
@@ -80,18 +78,18 @@ class Px4Records:
             self._second = second
             out += _failsafe_flags(snapshot)
 
-    def _feel(self, inputs: TickInputs) -> None:
-        sensed = [one for one in inputs.samples if type(one) is ImuSample]
-        readings = [(one.acceleration, one.rate) for one in sensed]
-        if not inputs.samples:
-            readings = [(inputs.sensors.accel_B, inputs.sensors.gyro_B)]
-        for accel, gyro in readings:
-            if self._accel is not None and self._gyro is not None:
-                shaken = math.dist(accel, self._accel), math.dist(gyro, self._gyro)
-                for k, change in enumerate(shaken):
-                    if math.isfinite(change):
-                        self._vibration[k] += _VIBRATION_SHARE * (change - self._vibration[k])
-            self._accel, self._gyro = accel, gyro
+    def feel(self, accel: Vec3, gyro: Vec3) -> None:
+        """Take what the inertial unit measured next.
+
+        Specific force ``accel`` [m/s^2, FRD] and body rates ``gyro`` [rad/s, FRD].
+        """
+        (ax, ay, az), (gx, gy, gz) = self._accel, self._gyro
+        shaken = math.hypot(accel[0] - ax, accel[1] - ay, accel[2] - az)
+        turned = math.hypot(gyro[0] - gx, gyro[1] - gy, gyro[2] - gz)
+        if shaken + turned < math.inf:  # no number yet, or none any more
+            self._shaken += _VIBRATION_SHARE * (shaken - self._shaken)
+            self._turned += _VIBRATION_SHARE * (turned - self._turned)
+        self._accel, self._gyro = accel, gyro
 
     def _torques(self, snapshot: FlightSnapshot) -> bytes:
         k, (rear, left, front, right) = self._per_newton, snapshot.actuators.rotor_thrust
@@ -121,7 +119,7 @@ class Px4Records:
             (
                 *(status, snapshot.t_us, battery.voltage, battery.current),
                 *(1e3 * battery.consumed, battery.remaining, left, int(battery.charge)),
-                *(imu, snapshot.t_us, *self._vibration),
+                *(imu, snapshot.t_us, self._shaken, self._turned),
             )
         )
 

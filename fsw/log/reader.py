@@ -146,7 +146,7 @@ class _Inputs:
         """The frame of a tick that says nothing but what the inertial unit measured last."""
         if self._imu is None:
             raise ValueError("it repeats what an inertial unit says, and none was heard")
-        return _sensor_frame((t_us, *samples.numbers_of(self._imu)))
+        return _sensor_frame((t_us, *samples.FRAME.unpack(samples.frame_of(self._imu))))
 
     def _check_numbers(self) -> None:
         for number, topic in enumerate(topics.TOPICS):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator
-from struct import Struct
+from struct import Struct, pack
 from typing import Any, Final
 
 from fsw.log import topics
@@ -14,8 +14,10 @@ from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 
 Values = tuple[Any, ...]
-_UNKNOWN_POSE: Final = (math.nan,) * 10  # position, velocity and attitude
-_UNKNOWN_ARM: Final = (math.nan,) * 4  # angles and rates
+FRAME: Final = Struct("<" + "".join(field.code for field in topics.SENSOR_FRAME.fields))
+_SIX: Final = Struct("<6d")
+_UNKNOWN_POSE: Final = pack("<10d", *(math.nan,) * 10)  # position, velocity and attitude
+_UNKNOWN_ARM: Final = pack("<4d", *(math.nan,) * 4)  # angles and rates
 _LATEST: Final = 1e12  # s; what is later fits no field
 
 
@@ -80,9 +82,9 @@ class _Codec:
             at += max(size, 1)
 
 
-def numbers_of(imu: ImuSample) -> tuple[float, ...]:
-    """The numbers of a frame of sensors (20,) of which the inertial unit alone is known."""
-    return (*_UNKNOWN_POSE, *imu.rate, *imu.acceleration, *_UNKNOWN_ARM)
+def frame_of(imu: ImuSample) -> bytes:
+    """The numbers of a frame of sensors of which the inertial unit alone is known."""
+    return _UNKNOWN_POSE + _SIX.pack(*imu.rate, *imu.acceleration) + _UNKNOWN_ARM
 
 
 _CODECS: Final = {kind: _Codec(kind, topic) for kind, topic in topics.OF_SAMPLES.items()}

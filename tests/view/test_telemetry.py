@@ -326,6 +326,15 @@ def test_junk_in_a_log_is_skipped_and_told(junk: bytes, tmp_path: Path) -> None:
     assert "are no frames" in cut.unusable[0]
 
 
+def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(tmp_path: Path) -> None:
+    whole = a_flight(1000, 6, 1.0)
+    flight, _ = places(tmp_path / "gap.tlog", whole + bytes(5_000_000) + a_flight(2000, 6, 2.0))
+    assert "2 flights" in flight.unusable[0]
+    assert flight.unusable[1].startswith("5000000 bytes")
+    flooded, _ = places(tmp_path / "flood.tlog", whole + b"\xfd" * 2_000_000)
+    assert flooded.unusable == ("2000000 bytes are no frames, and are skipped",)
+
+
 def test_another_component_of_the_vehicle_s_system_is_not_the_vehicle(tmp_path: Path) -> None:
     flight, _ = places(tmp_path / "gimbal.tlog", a_flight(1000, 6, 1.0, beside=True))
     assert flight.unusable == ()
