@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation.error_state import WITNESS, vec3
+from fsw.estimation.error_state import BG, WITNESS, vec3
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.model.airframe import GRAVITY
@@ -87,6 +87,9 @@ _AT: Final = 8  # column of the integrals at its time
 _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
 _BASELINE_SHARE: Final = 0.3  # of the time since the vehicle flies, if that is less: biases settle
+# A bias that is known so well moves slowly: if it does not, something turns that must not.
+_SETTLED: Final = 1e-3  # rad/s, deviation of each axis
+_BASELINE_SETTLED: Final = 60.0  # s
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 _LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
@@ -174,6 +177,9 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
     made = rotate(R, (0.0, 0.0, -model[3]))
     W[AGE] += dt
     share = dt / min(max(_BASELINE_SHARE * W[AGE], dt), _BASELINE)
+    of_gyro, M = share, x.covariance
+    if max(M[BG, BG], M[BG + 1, BG + 1], M[BG + 2, BG + 2]) < _SETTLED * _SETTLED:
+        of_gyro = dt / _BASELINE_SETTLED
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
         W[FELT + i] += dt * (felt[i] + down)
@@ -187,7 +193,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):
             b[i] += share * (x.accel_bias[i] - b[i])
-            b[3 + i] += share * (x.gyro_bias[i] - b[3 + i])
+            b[3 + i] += of_gyro * (x.gyro_bias[i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
 
 
