@@ -44,7 +44,8 @@ _ON_GROUND: Final = 1
 _STEPS: Final = 6  # most of an MPC_HORIZON
 _REQUESTS: Final = (511, 512)  # of messages; their answers are of no interest
 _UNTIMED: Final = 0xFFFFFFFF
-_RESTARTED_S: Final = 5.0  # by which its clock goes back where a vehicle starts again
+_OUR_MESSAGES: Final = 60_200  # the first number of the dialect, which one component alone speaks
+RESTARTED_S: Final = 5.0  # by which its clock goes back where a vehicle starts again
 _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
@@ -123,7 +124,7 @@ class Telemetry:
             known = one.interval == one.interval
             one.interval = one.interval + _AVERAGE * (since - one.interval) if known else since
         one.count, one.at, one.values = one.count + 1, at, frame.payload_values
-        if frame.system_id != ids.SYSTEM_ID:
+        if not _is_of_vehicle(frame):
             return
         self.at = at
         read = _READERS.get(frame.message_id)
@@ -249,7 +250,7 @@ class Telemetry:
 
     def read_clock(self, t: float) -> None:
         """Take the vehicle's time ``t`` [s]; it goes back only if the vehicle starts again."""
-        if t < self.t - _RESTARTED_S:
+        if t < self.t - RESTARTED_S:
             self._forget()
         if not t <= self.t:
             self.t = t
@@ -439,6 +440,12 @@ def _shown(value: Any) -> str:
 def _clock(us: bool) -> Callable[[Telemetry, tuple[Any, ...]], None]:
     scale = 1e-6 if us else 1e-3
     return lambda telemetry, values: telemetry.read_clock(scale * values[0])
+
+
+def _is_of_vehicle(frame: Frame) -> bool:
+    """Whether the vehicle itself speaks: a gimbal or companion may have its system's number."""
+    ours = frame.component_id == ids.AUTOPILOT or frame.message_id >= _OUR_MESSAGES
+    return frame.system_id == ids.SYSTEM_ID and ours
 
 
 def _nothing(_: Telemetry, values: tuple[Any, ...]) -> None:

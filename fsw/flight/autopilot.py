@@ -406,7 +406,8 @@ class Autopilot:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None
         if not unheard or inputs.refused_setpoints:
-            state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
+            offboard = accept_setpoints(state, inputs, self.config, texts)
+            state = replace(state, offboard=offboard)
         return state
 
     def _believe(
