@@ -41,6 +41,10 @@ VERBS: Final[dict[str, tuple[str, str]]] = {
         "pandion.tune",
         "improve parameters against a cost and a chance constraint, judged on other flights",
     ),
+    "search": (
+        "pandion.search",
+        "search for a scenario that decides between controllers, judged on other seeds",
+    ),
     "faults": (
         "pandion.faults",
         "let something fail in flight, in one mode or in all, and compare with what must happen",
