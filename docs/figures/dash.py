@@ -19,6 +19,7 @@ BASE, REFERENCE, END_EFFECTOR, FORBIDDEN = "#0969da", "#1a7f37", "#bc4c00", "#cf
 NO_PLAN: Final = "#8250df"
 NAMES: Final = {"naive": "Naive MPC", "hc": "MPC-HC", "sc": "MPC-SC", "blf": "MPC-BLF"}
 _SHOWN_S: Final = (3.5, 17.0)
+_ON_WHITE: Final = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
 _PLAN_S: Final = 0.1
 _SLOWER: Final = 0.1  # m/s, less than without a safety term: it brakes
 
@@ -81,7 +82,7 @@ def draw_dash(target: Path) -> None:
     axes[1][0].set_ylabel("base towards the wall, m/s")
     axes[0][0].legend(frameon=False, fontsize=7.5, loc="upper right")
     axes[0][0].set_xlim(*_SHOWN_S)
-    axes[0][0].set_ylim(-0.1, 1.2)
+    axes[0][0].set_ylim(-0.1, 1.4)
     save(figure, target)
 
 
@@ -108,12 +109,13 @@ def _draw_distance(axes: Axes, flight: Dash, clearance: float) -> None:
         first = flight.failed_s[0]
         axes.annotate(
             f"infeasible from {first:.1f} s",
-            (first, 1.05),
+            (first, 1.28),
             (-4, 0),
             textcoords="offset points",
             fontsize=8,
             color=NO_PLAN,
             ha="right",
+            bbox=_ON_WHITE,
         )
 
 
@@ -131,6 +133,7 @@ def _draw_speed(axes: Axes, flight: Dash, free: Dash) -> None:
             textcoords="offset points",
             fontsize=8,
             color=FORBIDDEN,
+            bbox=_ON_WHITE,
         )
 
 

@@ -31,7 +31,8 @@ from studies.paper.settings import Figure, Report, Settings, Table
 from studies.paper.summary import Summary, fly_cells
 
 _TIGHTENINGS_MM = (0, 25, 50, 75, 100, 125, 150)
-_LAMBDAS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5)  # m/s
+_COARSE_MM = (0, 50, 100, 150)  # where a planning step takes long, or little changes
+_LAMBDAS = (0.1, 0.2, 0.25, 0.3, 0.35, 0.5)  # m/s
 _SOFT = (1e-2, 1.0, 1e1, 1e2, 1e4)  # times the printed weight, which stands in a denominator
 _CENTRING = (1.0, 10.0, 100.0, 1000.0)
 _HORIZONS = (10, 20)
@@ -100,12 +101,15 @@ def _points(case: Case, settings: Settings) -> Iterator[_Point]:
             centred = replace(naive, planner=planner)
             yield _Point(case, "naive", f"centring {weight:g}", centred)
     soft_hc = softened(hc)
-    families = [("hc", hc), ("hc softened", soft_hc)]
-    families += [(f"hc softened, n = {n}", with_horizon(soft_hc, n)) for n in _HORIZONS]
     ends_safe = replace(soft_hc, planner=replace(soft_hc.planner, hard_terminal=True))
-    families.append(("hc softened, terminal set", ends_safe))
-    for name, config in families:
-        for more in _TIGHTENINGS_MM:
+    families = [
+        ("hc", hc, _TIGHTENINGS_MM),
+        ("hc softened", soft_hc, _TIGHTENINGS_MM),
+        *((f"hc softened, n = {n}", with_horizon(soft_hc, n), _COARSE_MM) for n in _HORIZONS),
+        ("hc softened, terminal set", ends_safe, _COARSE_MM),
+    ]
+    for name, config, tightenings in families:
+        for more in tightenings:
             if case == "I" or more < _radius_mm(settings):
                 yield _Point(case, name, f"+{more} mm", tightened(config, 1e-3 * max(more, 1)))
     for times in _SOFT:
