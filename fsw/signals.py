@@ -562,6 +562,8 @@ class PlanRequest:
     tuning: Tuning = ()  # of the planner's configuration
     # (2,) rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
     joint_targets: tuple[Vec2, ...] = ()
+    # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
+    recent_disturbance: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)

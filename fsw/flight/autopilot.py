@@ -499,6 +499,7 @@ class Autopilot:
             safe_set=state.kept.safe_set,
             from_nominal=from_nominal,
             joint_targets=joints,
+            recent_disturbance=state.cascade.observed.recent,
         )
         return state, request, requested(plan, apply_us), said
 

@@ -435,6 +435,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Action when the vehicle is outside its safe set"),
         ("GF_ACTION", "limits.fence_action", "", 0.0, 6.0,
          "Action when the vehicle is outside an uploaded fence"),
+        ("SAFE_LAMBDA_MIN", "planner.lambda_min", "m/s", 0.0, 5.0,
+         "Least λ beside walls, after little disturbance for long; 0: λ is always whole"),
         ("SAFE_SIGMAS", "limits.clearance_sigmas", "", 0.0, 6.0,
          "Standard deviations of the estimate that clearances grow by"),
         ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
