@@ -25,19 +25,25 @@ def system(vehicle: Vehicle) -> Iterator[System]:
         yield system
 
 
+def allowed(system: System) -> Failure:
+    """Failures may be injected: the plugin is made after that, for it reads the parameter then."""
+    Param(system).set_param_int("SYS_FAILURE_EN", 1)
+    return Failure(system)
+
+
 @pytest.mark.requirement("REQ-ARM-9")
 def test_a_failure_needs_the_parameter(system: System) -> None:
-    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+    Param(system).set_param_int("SYS_FAILURE_EN", 0)
     with pytest.raises(FailureError) as refused:
         Failure(system).inject(FailureUnit.SENSOR_GYRO, FailureType.OFF, 0)
-    assert "DENIED" in str(refused.value)
+    # MAVSDK's own word, where it has read the parameter already, or the vehicle's.
+    assert "DISABLED" in str(refused.value) or "DENIED" in str(refused.value)
 
 
 def test_a_failure_is_injected_seen_and_ended(system: System) -> None:
     texts: list[str] = []
-    telemetry, failure = Telemetry(system), Failure(system)
+    telemetry, failure = Telemetry(system), allowed(system)
     telemetry.subscribe_status_text(lambda text, _: texts.append(text.text))
-    Param(system).set_param_float("SYS_FAILURE_EN", 1.0)
     failure.inject(FailureUnit.SENSOR_GYRO, FailureType.OFF, 0)
     assert eventually(lambda: "fault injected: gyro off" in texts), texts
     assert eventually(lambda: any("invalid" in text for text in texts)), texts
@@ -47,7 +53,7 @@ def test_a_failure_is_injected_seen_and_ended(system: System) -> None:
     with pytest.raises(FailureError):
         failure.inject(FailureUnit.SYSTEM_RC_SIGNAL, FailureType.OFF, 0)
     assert eventually(lambda: any("no unit 104" in text for text in texts)), texts
-    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+    Param(system).set_param_int("SYS_FAILURE_EN", 0)
 
 
 @pytest.mark.requirement("REQ-MODE-12")
@@ -70,10 +76,9 @@ def test_it_restarts_on_the_ground_and_takes_off_again(system: System) -> None:
 
 @pytest.mark.long
 def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> None:
-    telemetry, action, failure = Telemetry(system), Action(system), Failure(system)
+    telemetry, action, failure = Telemetry(system), Action(system), allowed(system)
     announced, events = [], Events(system)  # their texts, as MAVSDK reads them in our document
     told = events.subscribe_events(lambda event, _: announced.append(event.message))
-    Param(system).set_param_float("SYS_FAILURE_EN", 1.0)
     action.set_takeoff_altitude(3.0)
     action.arm()
     action.takeoff()
@@ -93,4 +98,4 @@ def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> N
     assert eventually(lambda: telemetry.landed_state().name == "ON_GROUND", 40.0)
     assert eventually(lambda: not telemetry.armed())
     events.unsubscribe_events(told)
-    Param(system).set_param_float("SYS_FAILURE_EN", 0.0)
+    Param(system).set_param_int("SYS_FAILURE_EN", 0)

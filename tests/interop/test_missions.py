@@ -26,9 +26,9 @@ METRE = 360.0 / (2.0 * math.pi * 6_371_000.0)  # degrees of latitude
 def system(vehicle: Vehicle) -> Iterator[System]:
     with connected(vehicle.api_port) as system:
         # MAVSDK sends a heartbeat a second, and the vehicle's seconds are faster than that.
-        Param(system).set_param_float("NAV_DLL_ACT", 0.0)
+        Param(system).set_param_int("NAV_DLL_ACT", 0)
         yield system
-        Param(system).set_param_float("NAV_DLL_ACT", 2.0)
+        Param(system).set_param_int("NAV_DLL_ACT", 2)
 
 
 def waypoint(system: System, north: float, height: float, **more: object) -> MissionItem:

@@ -24,7 +24,7 @@ from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.parameters.flight_config import flight_config
 from fsw.parameters.registry import ACCEL_RANGE
-from fsw.ports import LoopHealth
+from fsw.ports import LinkLosses, LoopHealth
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
@@ -113,6 +113,7 @@ class Ground:
     told: list[StatusText] = field(default_factory=list)
     acks: list[CommandAck] = field(default_factory=list)
     received: int = 0
+    losses: LinkLosses = field(default_factory=LinkLosses)
 
     def poll(self, t_us: int) -> None:
         self.done.append("ground")
