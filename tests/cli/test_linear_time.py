@@ -122,6 +122,7 @@ def test_a_record_that_no_log_can_have_is_refused_before_it_takes_memory(
 ) -> None:
     path = tmp_path / "flight.ulg"
     text = f"huge:uint64_t timestamp;{declared}".encode("ascii")
-    path.write_bytes(ulog.opening(0) + ulog.message(ulog.FORMAT, text))
+    begins = ulog.message(ulog.SUBSCRIPTION, b"\0\0\0huge")
+    path.write_bytes(ulog.opening(0) + ulog.message(ulog.FORMAT, text) + begins)
     with pytest.raises(UlogError, match="huge has records of more than 65533 bytes"):
         open_log(path)
