@@ -138,7 +138,12 @@ $(NODE): | $(READY)
 	@cd $(@D) && npm ci --silent --no-audit --no-fund --ignore-scripts
 	@$(done)
 
-interop: setup $(MAVPROXY) $(NODE) ## fly by MAVProxy and node-mavlink (needs npm)
+COMPANIONS := $(call ready,.interop/companions,$(EXTERNAL)/companions.lock)
+$(COMPANIONS): | $(READY)
+	@$(call tool,$(@D),$(EXTERNAL)/companions.lock)
+	@$(done)
+
+interop: setup $(MAVPROXY) $(COMPANIONS) $(NODE) ## other people's clients (needs npm)
 	PANDION_INTEROP=.interop $(PYTEST) $(EXTERNAL)
 
 wheel: setup ## build dist/pandion-*.whl, which pip installs anywhere
@@ -207,11 +212,12 @@ lock: .boot/uv ## renew requirements.lock (to fly) and requirements-dev.lock (to
 	@$(COMPILE) pyproject.toml --group dev --constraints requirements.lock \
 		--output-file requirements-dev.lock
 	@$(COMPILE) --group mavproxy --no-deps --output-file $(EXTERNAL)/mavproxy.lock
+	@$(COMPILE) --group companions --output-file $(EXTERNAL)/companions.lock
 	@$(COMPILE) --group docs --constraints requirements-dev.lock --output-file requirements-docs.lock
 	@$(COMPILE) --group mutation --no-deps --output-file $(MUTATION)/tool.lock
 	@$(COMPILE) --group fuzz --no-deps --output-file $(FUZZ)/tool.lock
 	@git diff --stat -- requirements.lock requirements-dev.lock requirements-docs.lock \
-		$(EXTERNAL)/mavproxy.lock $(MUTATION) $(FUZZ)
+		$(EXTERNAL)/*.lock $(MUTATION) $(FUZZ)
 
 clean: ## remove the environment, generated files and caches
 	rm -rf .venv .boot .docs .interop .mutation .fuzz build dist messages/dialect.py .mypy_cache .ruff_cache .pytest_cache \

@@ -7,6 +7,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
+# A rotor from above, blue and white.
+ICON: Final = (
+    "data:image/svg+xml,%3Csvg xmlns=%27http://www.w3.org/2000/svg%27 viewBox=%270 0 16 16%27%3E"
+    "%3Ccircle cx=%278%27 cy=%278%27 r=%277%27 fill=%27%230969da%27/%3E%3Cpath d=%27M3 8h10M8 3v10"
+    "%27 stroke=%27white%27 stroke-width=%272%27/%3E%3C/svg%3E"
+)
 _STYLE: Final = Path(__file__).with_suffix(".css")
 
 

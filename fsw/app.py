@@ -24,6 +24,7 @@ from fsw.link.events.event_service import EventService
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
+from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
@@ -164,7 +165,14 @@ class _Session:
         parameters = ParameterService(program.parameters)
         missions = MissionService(program.missions)
         events = EventService(program.events)
-        return parameters, missions, events, LogService(logs), FtpService(vehicle_files(logs))
+        return (
+            parameters,
+            missions,
+            events,
+            LogService(logs),
+            LogStreamService(logs),
+            FtpService(vehicle_files(logs)),
+        )
 
     def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> ParameterFile:
         """Take over the parameters of the vehicle's file, and say what of it is of no use.

@@ -68,6 +68,17 @@ class VehicleFacts:
     sqp_iterations: int
 
 
+@dataclass(frozen=True, slots=True)
+class LinkLosses:
+    """What came over the links to the ground and was of no use, since the start."""
+
+    damaged: int = 0  # start markers without a valid frame
+    echoes: int = 0  # the vehicle's own frames, sent back by a router
+    refused: int = 0  # frames, by their signature
+    unhandled: int = 0  # frames of kinds that are of no use here
+    overflowed: int = 0  # datagrams that the kernel dropped
+
+
 @dataclass(slots=True)
 class LoopHealth:
     """The latest timing of the rate groups; the loop replaces them once a second."""
@@ -78,3 +89,4 @@ class LoopHealth:
     housekeeping: GroupTiming = field(default_factory=lambda: GroupTiming(period_us=1_000_000))
     vibration: Vec2 = (0.0, 0.0)  # rad/s, m/s^2: gyro and accelerometer, high-pass filtered
     clipped: int = 0  # readings of one axis of the accelerometer at an end of its range, so far
+    losses: LinkLosses = field(default_factory=LinkLosses)  # of all links to the ground

@@ -104,9 +104,20 @@ class EndEffectorTarget:
     yaw: float = 0.0  # rad
 
 
+class PositionFrom(Enum):
+    """What the position of a setpoint counts from."""
+
+    ORIGIN = "origin"  # of the local frame
+    VEHICLE = "vehicle"  # body or end-effector, where it is when the setpoint arrives
+    HOME_HEIGHT = "home height"  # north and east from the origin, down from home
+
+
 @dataclass(frozen=True, slots=True)
 class MotionSetpoint:
-    """Where the body or the end-effector should be or move from now on; None leaves it open."""
+    """Where the body or the end-effector should be or move from now on; None leaves it open.
+
+    NaN leaves one axis of a vector open: each axis has a position, a velocity or an acceleration.
+    """
 
     of_end_effector: bool
     p: Vec3 | None = None  # m
@@ -115,6 +126,7 @@ class MotionSetpoint:
     yaw: float | None = None  # rad
     yaw_rate: float | None = None  # rad/s
     along_heading: bool = False  # v and a in the body's level frame: forward, right, down
+    p_from: PositionFrom = PositionFrom.ORIGIN  # with along_heading, p from the vehicle is as v
 
 
 @dataclass(frozen=True, slots=True)
@@ -439,6 +451,9 @@ class MissionAction(Enum):
     LAND = "land"
     RETURN = "return"
     LOOK_AT = "look at"  # from now on: a place, or nothing
+    CIRCLE = "circle"  # some turns about a position, then stay for hold_s
+    JUMP = "jump"  # to another step, some times
+    SKIP = "skip"  # it is for a payload that this vehicle does not have
 
 
 @dataclass(frozen=True, slots=True)
@@ -453,6 +468,11 @@ class MissionStep:
     acceptance: float = 0.1  # m, end-effector to position
     speed: float | None = None  # m/s; None: the usual
     stop_after: bool = False  # hold until commanded to continue
+    radius: float = 0.0  # m, of a circle; negative: anticlockwise as seen from above
+    turns: float = 0.0
+    target: int = 0  # of a jump: the step to go on with
+    repeats: int = 0  # of a jump: how often it is taken; negative: without end
+    here: bool = False  # position gives the height alone: north and east stay as they are
 
 
 @dataclass(frozen=True, slots=True)
@@ -542,6 +562,8 @@ class PlanRequest:
     tuning: Tuning = ()  # of the planner's configuration
     # (2,) rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
     joint_targets: tuple[Vec2, ...] = ()
+    # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
+    recent_disturbance: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -890,6 +912,7 @@ class TickInputs:
     # By how much the sensors' clock has jumped. The times in here are the vehicle's: none has.
     sensor_clock_jump_us: int = 0
     refused: tuple[str, ...] = ()  # what a link refused since the last tick, and why
+    setpoint_problem: str = ""  # why the newest of the refused setpoints is; empty: it is not ours
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from messages.ulog import Topic, doubles
+from messages.ulog import Field, Topic, doubles
 
 SIM_GROUND_TRUTH: Final = Topic(
     "sim_ground_truth",
@@ -30,5 +30,33 @@ SIM_TRACKING: Final = Topic(
     "10 Hz",
     (doubles("p_WE", 3, "m, NED"), doubles("target", 3, "m, NED")),
 )
-TRUTH_TOPICS: Final = (SIM_GROUND_TRUTH, SIM_TRACKING)
+# Under PX4's names, for tools that draw them beside the estimate.
+ATTITUDE_TRUTH: Final = Topic(
+    "vehicle_attitude_groundtruth",
+    "True attitude",
+    "10 Hz",
+    (Field("q", "float", 4, "[w, x, y, z], body to NED"),),
+)
+RATES_TRUTH: Final = Topic(
+    "vehicle_angular_velocity_groundtruth",
+    "True body rates",
+    "10 Hz",
+    (Field("xyz", "float", 3, "rad/s, body"),),
+)
+POSITION_TRUTH: Final = Topic(
+    "vehicle_local_position_groundtruth",
+    "True position and velocity of the body origin",
+    "10 Hz",
+    (
+        *(Field(name, "float", note="m, NED") for name in ("x", "y", "z")),
+        *(Field(name, "float", note="m/s, NED") for name in ("vx", "vy", "vz")),
+    ),
+)
+TRUTH_TOPICS: Final = (
+    SIM_GROUND_TRUTH,
+    SIM_TRACKING,
+    ATTITUDE_TRUTH,
+    RATES_TRUTH,
+    POSITION_TRUTH,
+)
 FIRST_NUMBER: Final = 1000  # of their subscriptions, out of the way of the flight software's

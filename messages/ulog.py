@@ -11,18 +11,22 @@ Source: ULog file format, https://docs.px4.io/main/en/dev_log/ulog_file_format.h
 from __future__ import annotations
 
 from dataclasses import dataclass
-from struct import Struct, pack
+from struct import Struct, calcsize, pack
 from typing import Final
 
 MAGIC: Final = b"ULog\x01\x12\x35\x01"  # the last byte is the version
 SYNC_BYTES: Final = bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12])
 
 FLAGS, FORMAT, INFO, PARAMETER = b"B", b"F", b"I", b"P"
+MULTI_INFO, DEFAULT_PARAMETER, REMOVAL = b"M", b"Q", b"R"
 SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT = b"A", b"D", b"L", b"C", b"S", b"O"
-# What may stand among the data; of M, Q and R nothing is written here.
+# What may stand before the data, and among them; of the last three nothing is written here.
+BEFORE_DATA: Final = frozenset((FLAGS, FORMAT, INFO, PARAMETER, MULTI_INFO, DEFAULT_PARAMETER))
 AMONG_DATA: Final = frozenset(
-    (SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT, INFO, PARAMETER, b"M", b"Q", b"R")
+    (SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT, INFO, PARAMETER)
+    + (MULTI_INFO, DEFAULT_PARAMETER, REMOVAL)
 )
+PADDING: Final = "_padding"  # how names of fields begin that hold nothing
 
 _CODES: Final = {
     "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I",
@@ -47,6 +51,16 @@ class Field:
         return f"{self.type}{array} {self.name}"
 
     @property
+    def is_own(self) -> bool:
+        """Whether the type is one of the format's own, not the name of another topic."""
+        return self.type in _CODES
+
+    @property
+    def is_padding(self) -> bool:
+        """Whether it only fills a record up, as PX4 does to align fields."""
+        return self.name.rpartition(".")[2].startswith(PADDING)
+
+    @property
     def code(self) -> str:
         """As :mod:`struct` packs it.
 
@@ -55,11 +69,15 @@ class Field:
         """
         if self.type not in _CODES:
             raise ValueError(f"{self.name} has the unknown type {self.type!r}")
+        if self.is_padding:
+            return f"{calcsize(f'<{self.count or 1}{_CODES[self.type]}')}x"
         return f"{self.count or ''}{_CODES[self.type]}"
 
     @property
     def values(self) -> int:
         """How many values :mod:`struct` takes for it."""
+        if self.is_padding:
+            return 0
         return 1 if self.type == "char" else self.count or 1
 
 

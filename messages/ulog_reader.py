@@ -1,4 +1,8 @@
-"""Reads ULog files, as far as this project writes them; what it does not know is passed over."""
+"""Reads ULog files, those of PX4 too; what it does not know is passed over.
+
+A type that is the name of another format is taken apart into its fields, padding is left out, and
+a topic that was subscribed to more than once has its instance behind its name, from 1 on.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import mmap
 import re
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from struct import Struct, unpack_from
 from typing import Final, NamedTuple
@@ -20,6 +24,8 @@ _KEY = re.compile(r"(?P<type>\w+)(?:\[(?P<count>\d{1,5})\])? (?P<name>\S+)")
 _NAME = re.compile(r"\w+", re.ASCII)  # of a topic; it also names a file of an export
 _MOST_BYTES: Final = 65533  # of a record behind its number
 _TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
+_DEEPEST: Final = 8  # types inside one another
+_APPENDED: Final = 1  # bit of the flags: data was appended behind the end
 _DAMAGE = (ValueError, IndexError, KeyError, struct.error)  # what a wrong byte leads to
 
 
@@ -48,7 +54,11 @@ class UlogFile:
     size: int = 0
     at: int = 0  # bytes read so far
     whole: bool = True  # False once the end turned out to be cut
-    _lengths: dict[int, int] = field(default_factory=dict)  # of the records, by number
+    _declared: dict[str, tuple[Field, ...]] = field(default_factory=dict)  # as they stand there
+    _padded: dict[str, int] = field(default_factory=dict)  # bytes of a record with its padding
+    # Bytes of the records by number, without and with padding at their end.
+    _lengths: dict[int, tuple[int, int]] = field(default_factory=dict)
+    _joints: list[int] = field(default_factory=list)  # where data were appended
 
     def records(self) -> Iterator[Record]:
         """Every message behind the definitions, in file order.
@@ -61,30 +71,43 @@ class UlogFile:
         try:
             for kind, body in self._messages():
                 if kind == ulog.SUBSCRIPTION:
-                    self._subscribe(unpack_from("<H", body, 1)[0], body[3:].decode("ascii"))
+                    number = unpack_from("<H", body, 1)[0]
+                    self._subscribe(body[0], number, body[3:].decode("ascii"))
+                elif kind == ulog.REMOVAL:
+                    self.topics.pop(unpack_from("<H", body)[0], None)
                 else:
                     record = _record(kind, body)
                     self._check(record, len(record.body))
-                    yield record
+                    yield self._unpadded(record)
                 begin = self.at
             self._check_rest(begin)
         except _DAMAGE as problem:
             raise UlogError(f"{self.path} is damaged at byte {begin}: {problem}") from None
 
-    def _subscribe(self, number: int, name: str) -> None:
-        if number in self.topics or name not in self.formats:
+    def _subscribe(self, instance: int, number: int, name: str) -> None:
+        if number in self.topics or name not in self._declared:
             raise ValueError(f"topic {name!r} was not declared, or its number is taken")
+        if name not in self.formats:
+            raise ValueError(f"the records of {name!r} do not begin with a time")
         topic = self.formats[name]
-        self._lengths[number] = unpacker(topic).size
+        if instance:
+            topic = replace(topic, name=f"{name}_{instance}")
+        self._lengths[number] = (unpacker(topic).size, self._padded[name])
         self.topics[number] = topic
 
     def _check(self, record: Record, length: int) -> None:
         if record.kind not in ulog.AMONG_DATA:
             raise ValueError(f"{record.kind!r} is no kind of message among data")
-        if record.kind == ulog.DATA and length != self._lengths.get(record.number):
+        if record.kind == ulog.DATA and length not in self._lengths.get(record.number, ()):
             raise ValueError(f"a record of topic {record.number} has {length} bytes")
         if length < _TEXT_HEADS.get(record.kind, 0):
             raise ValueError(f"a text has {length} bytes")
+
+    def _unpadded(self, record: Record) -> Record:
+        """The record without padding at its end, which may or may not be there."""
+        if record.kind != ulog.DATA or len(record.body) == self._lengths[record.number][0]:
+            return record
+        return record._replace(body=record.body[: self._lengths[record.number][0]])
 
     def _check_rest(self, begin: int) -> None:
         """Distinguish a last message that was cut from one whose length is wrong."""
@@ -104,27 +127,74 @@ class UlogFile:
         """
         for kind, body in self._messages():
             if kind == ulog.FORMAT:
-                topic = _topic(body.decode("ascii"))
-                self.formats[topic.name] = topic
+                self._declare(body.decode("ascii"))
+            elif kind == ulog.FLAGS:
+                self._read_flags(body)
             elif kind in (ulog.INFO, ulog.PARAMETER):
                 self._note(kind, body)
-            elif kind != ulog.FLAGS:
+            elif kind not in ulog.BEFORE_DATA:
                 self.at -= _HEADER.size + len(body)
+                self._complete()
                 return
         raise UlogError(f"{self.path} ends before its data begin")
+
+    def _declare(self, text: str) -> None:
+        name, _, fields = text.partition(":")
+        if _NAME.fullmatch(name) is None:
+            raise ValueError(f"{name!r} names no topic")
+        self._declared[name] = tuple(_field(part) for part in fields.split(";") if part)
+
+    def _complete(self) -> None:
+        """Make topics of the formats; those without a time are parts of others."""
+        for name, declared in self._declared.items():
+            fields = list(self._flat(declared, 0))
+            whole = struct.calcsize("<" + "".join(one.code for one in fields))
+            if not fields or (fields[0].name, fields[0].type) != ("timestamp", "uint64_t"):
+                continue
+            if whole > _MOST_BYTES:
+                raise ValueError(f"{name} has records of more than {_MOST_BYTES} bytes")
+            while fields[-1].is_padding:
+                fields.pop()
+            self.formats[name] = Topic(name, "", "", tuple(fields[1:]))
+            self._padded[name] = whole
+
+    def _flat(self, fields: tuple[Field, ...], depth: int) -> Iterator[Field]:
+        """Fields of the format's own types; those of another format by a dotted name."""
+        if depth > _DEEPEST:
+            raise ValueError(f"types are nested more than {_DEEPEST} deep")
+        for one in fields:
+            if one.is_own:
+                yield one
+            elif one.type not in self._declared:
+                raise ValueError(f"{one.name} has the unknown type {one.type!r}")
+            else:
+                inner = tuple(self._flat(self._declared[one.type], depth + 1))
+                if len(inner) * (one.count or 1) > _MOST_BYTES:
+                    raise ValueError(f"{one.name} has too many fields")
+                for k in range(one.count or 1):
+                    where = f"{one.name}[{k}]" if one.count else one.name
+                    for part in inner:
+                        yield replace(part, name=f"{where}.{part.name}")
+
+    def _read_flags(self, body: bytes) -> None:
+        """Note where data were appended, perhaps into the middle of a message that was cut."""
+        if any(body[8:16]) and (body[8] & ~_APPENDED or any(body[9:16])):
+            raise ValueError("it has features that this build does not know")
+        if body[8] & _APPENDED:
+            self._joints = [at for at in unpack_from("<3Q", body, 16) if at]
 
     def _note(self, kind: bytes, body: bytes) -> None:
         size = body[0]
         declared = _field(body[1 : 1 + size].decode("ascii"))
         rest = body[1 + size :]
         if declared.type == "char":
-            self.information[declared.name] = rest.decode()
-            return
-        value = unpack_from("<" + declared.code, rest)[0]
-        if kind == ulog.PARAMETER:
-            self.parameters[declared.name] = value
-        else:
-            self.information[declared.name] = value
+            self.information[declared.name] = rest.decode("utf-8", "replace")
+        elif declared.is_own:
+            value = unpack_from("<" + declared.code, rest)[0]
+            if kind == ulog.PARAMETER:
+                self.parameters[declared.name] = value
+            else:
+                self.information[declared.name] = value
 
     def _messages(self) -> Iterator[tuple[bytes, bytes]]:
         with (
@@ -135,6 +205,10 @@ class UlogFile:
             while self.at + _HEADER.size <= self.size:
                 length, kind = _HEADER.unpack_from(data, self.at)
                 begin = self.at + _HEADER.size
+                joint = next((at for at in self._joints if self.at < at), self.size)
+                if begin + length > joint < self.size:
+                    self.at = joint  # the message was cut when data were appended
+                    continue
                 if begin + length > self.size:
                     break
                 self.at = begin + length
@@ -182,6 +256,8 @@ def columns(topic: Topic) -> tuple[str, ...]:
     names: list[str] = []
     for part in topic.all_fields:
         single = part.values == 1
+        if part.is_padding:
+            continue
         names += [part.name] if single else [f"{part.name}[{k}]" for k in range(part.count)]
     return tuple(names)
 
@@ -190,17 +266,6 @@ def _record(kind: bytes, body: bytes) -> Record:
     if kind == ulog.DATA:
         return Record(kind, body[0] | body[1] << 8, body[2:])
     return Record(kind, -1, body)
-
-
-def _topic(text: str) -> Topic:
-    name, _, fields = text.partition(":")
-    if _NAME.fullmatch(name) is None:
-        raise ValueError(f"{name!r} names no topic")
-    _, *declared = (_field(part) for part in fields.split(";") if part)
-    topic = Topic(name, "", "", tuple(declared))
-    if struct.calcsize("<" + topic.codes) > _MOST_BYTES:
-        raise ValueError(f"{name} has records of more than {_MOST_BYTES} bytes")
-    return topic
 
 
 def _field(text: str) -> Field:

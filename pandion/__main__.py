@@ -53,6 +53,10 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         ),
         "splitting": ("pandion.splitting", "estimate how rare a small margin is"),
         "tune": ("pandion.tune", "improve parameters on some flights, judge them on others"),
+        "search": (
+            "pandion.search",
+            "search for a scenario that decides between controllers, judged on other seeds",
+        ),
         "faults": ("pandion.faults", "let something fail in flight, compare with what must happen"),
         "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),
     },

@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
             display = Display(sys.stdout, lines=0)
             stack.enter_context(display.progress())
             count = _export(log, sink, display)
-            if options.mcap is not None:
+            if options.mcap is not None and _is_ours(log):
                 _draw(path, sink)
         if count == 0:
             raise UlogError(f"{path} holds no record")
@@ -91,6 +91,12 @@ def _write_layouts(folder: Path) -> int:
         return COULD_NOT_START
     say(f"{', '.join(made)} in {folder}")
     return DONE
+
+
+def _is_ours(log: UlogFile) -> bool:
+    from view.flight_data import is_ours
+
+    return is_ours(log)
 
 
 def _draw(path: Path, sink: Any) -> None:

@@ -62,6 +62,9 @@ class FalsifyOptions:
         whole(1, 100_000),
         default=1,
     )
+    params: Path | None = option(
+        "--params FILE", "parameters that differ from the defaults, without --over", Path
+    )
     cluster: ClusterOptions = group(ClusterOptions)
     replay: Path | None = option(
         "--replay FILE", "fly a worst.json of an earlier search with planner and referee", Path
@@ -110,10 +113,23 @@ def _check(scenario: Scenario) -> None:
         )
 
 
-def _config(scenario: Scenario) -> FlightConfig:
+def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
     from fsw.parameters.flight_config import flight_config
 
-    return flight_config(body=scenario.body)  # as pandion fly
+    config = flight_config(body=scenario.body)  # as pandion fly
+    if options.params is None:
+        return config
+    from fsw.parameters.contradictions import contradictions
+    from fsw.parameters.registry import BY_NAME
+    from fsw.parameters.storage import load
+    from fsw.tuning import tuned
+
+    loaded = load(options.params)
+    changed = [(BY_NAME[name], value) for name, value in loaded.values.items()]
+    config = tuned(config, tuple((one.path, one.scale * value) for one, value in changed))
+    for sentence in (*loaded.complaints, *contradictions(config)):
+        raise UnusableError(f"{options.params}: {sentence}")
+    return config
 
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
@@ -131,7 +147,7 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
     with display.progress():
         outcome, whole_stack = search_and_fly(
             scenario,
-            _config(scenario),
+            _config(options, scenario),
             options.amplitude,
             options.evaluations,
             options.seed,
@@ -189,10 +205,19 @@ def _of_whole_stack(outcome: WholeOutcome) -> list[str]:
     closest, margin = outcome.closest.flown, outcome.closest.flown.margin_m
     near = "" if math.isinf(margin) else f", least margin {margin * _MM:+.1f} mm"
     verdict = "claim holds" if outcome.holds else f"claim BROKEN: {closest.contact}"
+    told = []
+    if outcome.step is not None:
+        step = outcome.step
+        least = step.flown.margin_m
+        told.append(
+            f"step       begun {step.start.step * 0.002:.1f} s, near the calm flight's least margin"
+            + ("" if math.isinf(least) else f": least margin {least * _MM:+.1f} mm")
+        )
     return [
+        *told,
         f"no contact {outcome.evaluations} stretches of the whole stack: {outcome.contacts} with "
         f"contact, {outcome.breaches} beyond the safe set, {outcome.departures} out of the "
-        f"tube{near}: {verdict}"
+        f"tube{near}: {verdict}",
     ]
 
 
@@ -228,6 +253,7 @@ def _as_json(
             "out_of_the_tube": whole_stack.departures,
             "furthest": _whole(whole_stack.furthest),
             "closest": _whole(whole_stack.closest),
+            "step": None if whole_stack.step is None else _whole(whole_stack.step),
         },
     }
 
@@ -283,7 +309,7 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
     from studies.search.falsify import bounds, replay
 
     first_step, pushes = _read(path, scenario)
-    config = _config(scenario)
+    config = _config(options, scenario)
     amplitude = max(abs(value) for push in pushes for value in push)
     console = console_beside(options.json)
     display = Display(console)

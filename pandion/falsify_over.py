@@ -31,6 +31,8 @@ def _search(options: FalsifyOptions, file: Path) -> int:
 
     if options.replay is not None:
         raise CampaignError("--replay flies a worst.json; what --over finds flies with pandion fly")
+    if options.params is not None:
+        raise CampaignError("with --over parameters are set by [parameters] of the file")
     plan = load_plan(file)
     run = begin("falsify", options, plan, f"{options.evaluations} flights")
     folder, display = run.folder, run.display

@@ -15,6 +15,7 @@ from command_line.parser import COULD_NOT_START, unknown_name
 from fsw.link.udp_endpoint import LinkError, parse_address
 
 if TYPE_CHECKING:
+    from fsw.parameters.storage import Loaded
     from pandion.param_vehicle import ParameterClient
 
 DONE, REFUSED = 0, 1  # exit codes
@@ -88,20 +89,20 @@ class FileValues:
         Raises:
             ParameterRefused: It is out of range or contradicts the others.
         """
+        from fsw.parameters.facts import ALIASES
         from fsw.parameters.flight_config import FlightConfig
-        from fsw.parameters.float32 import nearest_decimal
         from fsw.parameters.registry import BY_NAME
         from fsw.parameters.storage import save
         from fsw.tuning import tuned
         from pandion.param_vehicle import ParameterRefused
 
-        parameter = BY_NAME.get(name)
+        parameter = BY_NAME.get(ALIASES.get(name, name))
         if parameter is None:
             raise ParameterRefused(unknown_name("parameter", name, BY_NAME))
         refusal = parameter.refusal(value)
         if refusal is not None:
             raise ParameterRefused(refusal)
-        kept = self._kept() | {name: nearest_decimal(value)}
+        kept = self._kept() | {parameter.name: parameter.kept(value)}
         try:
             tuned(
                 FlightConfig(),
@@ -114,7 +115,7 @@ class FileValues:
     def _kept(self) -> dict[str, float]:
         if not self._path.exists():
             return {}
-        return _read_file(self._path)
+        return _read_file(self._path).values
 
 
 Values: TypeAlias = "FileValues | ParameterClient"
@@ -182,9 +183,9 @@ def _set(options: _Set, values: Values) -> int:
 def _import(options: _File, values: Values) -> int:
     from pandion.param_vehicle import ParameterRefused
 
-    wanted, held = _read_file(options.path), values.read_all()
-    changed = refused = 0
-    for name, value in wanted.items():
+    loaded, held = _read_file(options.path), values.read_all()
+    changed, refused = 0, loaded.unusable
+    for name, value in loaded.values.items():
         if held.get(name) == value:
             continue
         try:
@@ -193,7 +194,7 @@ def _import(options: _File, values: Values) -> int:
         except ParameterRefused as error:
             complain("pandion param", error)
             refused += 1
-    print(f"{len(wanted)} parameters read, {changed} changed, {refused} refused")
+    print(f"{len(loaded.values)} parameters read, {changed} changed, {refused} refused")
     return REFUSED if refused else DONE
 
 
@@ -212,14 +213,14 @@ def _export(options: _File, values: Values) -> int:
     return DONE
 
 
-def _read_file(path: Path) -> dict[str, float]:
+def _read_file(path: Path) -> Loaded:
     """The values of a file; unusable lines are reported on standard error."""
     from fsw.parameters.storage import load
 
     loaded = load(path)
     for complaint in loaded.complaints:
         complain("pandion param", f"{path}, {complaint}")
-    return loaded.values
+    return loaded
 
 
 def _show(values: Mapping[str, float], *, as_json: bool) -> None:
@@ -235,11 +236,13 @@ def _show(values: Mapping[str, float], *, as_json: bool) -> None:
 
 def _described(name: str, value: float) -> dict[str, Any]:
     from fsw.parameters.facts import FACT_BY_NAME, GROUP
+    from fsw.parameters.param_type import type_name
     from fsw.parameters.registry import BY_NAME
 
-    entry: dict[str, Any] = {"name": name, "value": value}
+    entry: dict[str, Any] = {"name": name, "value": value, "type": type_name(value)}
     if (fact := FACT_BY_NAME.get(name)) is not None:
-        meaning = f"{fact.label}: {fact.meaning} (read only)"
+        kind = f"the value of {fact.repeats}" if fact.repeats else f"{fact.meaning} (read only)"
+        meaning = f"{fact.label}: {kind}"
         entry |= {"unit": fact.unit, "group": GROUP, "meaning": meaning}
     elif (parameter := BY_NAME.get(name)) is not None:
         entry |= {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 import socket
 import time
@@ -12,13 +13,14 @@ from typing import Final, cast
 from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
 from fsw.link.wire import message_ids as ids
 from fsw.parameters.float32 import nearest_decimal
+from fsw.parameters.param_type import field_of, value_of
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
 
 _SYSTEM, _COMPONENT = 254, 190  # of no ground station in use
 _VEHICLE: Final = (1, 1)
 _NO_INDEX: Final = 0xFFFF
-_REAL32: Final = 9
+_BY_NAME: Final = -1  # in place of an index
 _GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
 _TRIES: Final = 3
 _NAME: Final = re.compile(r"[A-Za-z0-9_]{1,16}")
@@ -41,6 +43,7 @@ class ParameterClient:
     def __init__(self, vehicle: Address, patience_s: float = 1.0) -> None:
         """Open a socket; each answer is waited for ``patience_s``, three times."""
         self._vehicle = vehicle
+        self._known: dict[str, float] = {}  # values that have come, for their types
         self._patience_s = patience_s
         self._writer = FrameWriter(_SYSTEM, _COMPONENT)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -72,7 +75,7 @@ class ParameterClient:
                 frame = self._hear((ids.PARAM_VALUE,), left_s)
                 if frame is None:
                     break
-                value, count, index, name, _ = cast(
+                field, count, index, name, type_ = cast(
                     "tuple[float, int, int, bytes, int]", frame.payload_values
                 )
                 if index == _NO_INDEX:
@@ -80,9 +83,10 @@ class ParameterClient:
                 self._check(count, index, _text(name))
                 if index not in values:  # who repeats itself is not waited for again
                     until = min(time.monotonic() + _QUIET_S, at_most)
-                values[index] = (_text(name), nearest_decimal(value))
+                values[index] = (_text(name), _value(field, type_))
             if len(values) == count:
-                return dict(values.values())
+                self._known = dict(values.values())
+                return dict(self._known)
         missing = "nothing" if not values else f"{len(values)} of {count} parameters"
         raise NoAnswer(f"{missing} came from the vehicle at {self._where}")
 
@@ -93,15 +97,23 @@ class ParameterClient:
             ParameterRefused: The vehicle's reason.
             NoAnswer: The vehicle is silent.
         """
-        held, texts = self._ask(name, value)
-        if held != nearest_decimal(value):
+        if name not in self._known:
+            self._ask(name, ids.PARAM_REQUEST_READ, _BY_NAME, *_VEHICLE, name.encode())
+        # In the vehicle's type; a value that this cannot hold is the vehicle's to refuse.
+        whole = isinstance(self._known[name], int) and float(value).is_integer()
+        value = int(value) if whole else nearest_decimal(value)
+        field, type_ = field_of(value)
+        held, texts = self._ask(name, ids.PARAM_SET, field, *_VEHICLE, name.encode(), type_)
+        if held != value:
             raise ParameterRefused("; ".join(texts) or f"the vehicle leaves {name} at {held:g}")
 
-    def _ask(self, name: str, value: float) -> tuple[float, tuple[str, ...]]:
-        """Set a value until one comes back; that and the status texts meanwhile."""
+    def _ask(
+        self, name: str, message_id: int, *values: float | bytes
+    ) -> tuple[float, tuple[str, ...]]:
+        """Read or set until a value comes back; that and the status texts meanwhile."""
         said: list[Frame] = []  # status texts
         for _ in range(_TRIES):
-            self._send(ids.PARAM_SET, value, *_VEHICLE, name.encode(), _REAL32)
+            self._send(message_id, *values)
             until = time.monotonic() + self._patience_s
             while (left_s := until - time.monotonic()) > 0.0:
                 frame = self._hear((ids.PARAM_VALUE, ids.PARAM_ERROR, ids.STATUSTEXT), left_s)
@@ -110,11 +122,12 @@ class ParameterClient:
                 if frame.message_id == ids.STATUSTEXT:
                     said.append(frame)
                 elif frame.message_id == ids.PARAM_VALUE:
-                    held, _, _, named, _ = cast(
+                    field, _, _, named, type_ = cast(
                         "tuple[float, int, int, bytes, int]", frame.payload_values
                     )
                     if _text(named) == name:
-                        return nearest_decimal(held), status_text.joined(said)
+                        self._known[name] = _value(field, type_)
+                        return self._known[name], status_text.joined(said)
                 elif _text(cast(bytes, frame.payload_values[3])) == name and not said:
                     raise ParameterRefused(f"the vehicle has no parameter {name}")
         raise NoAnswer(f"no answer from the vehicle at {self._where}")
@@ -157,6 +170,12 @@ class ParameterClient:
                 self._waiting = split(self._socket.recv(MAX_DATAGRAM))
 
     _waiting: Iterator[Frame] = iter(())
+
+
+def _value(field: float, type_: int) -> float:
+    """What a PARAM_VALUE says; NaN in a type that nobody sends."""
+    value = value_of(field, type_)
+    return math.nan if value is None else value
 
 
 def _text(padded: bytes) -> str:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from studies.paper.settings import Report, Settings
 
 PLANTS = ("double-integrator", "full")
+FAMILIES = ("walls", "dash")
 TRACKING = KNOWN["tracking"]
 
 DONE, BROKEN = 0, 1  # exit codes
@@ -80,6 +81,12 @@ class ReproduceOptions:
         default="lqr",
         old="--inner",
     )
+    scenario: str = option(
+        "--scenario NAME",
+        "table4, rivals: walls, or dash, whose paths are too fast for the horizon",
+        one_of("scenario", *FAMILIES),
+        default="walls",
+    )
     suite: str | None = option(
         "--sensors SUITE",
         "robustness: only the rows flown with these sensors",
@@ -115,6 +122,8 @@ def main(argv: list[str]) -> int:
     try:
         if options.what != "robustness" and (options.suite or options.only):
             raise NoCellError(f"{options.what} has no rows to choose by --sensors or --only")
+        if options.scenario != "walls" and options.what not in ("table4", "rivals"):
+            raise NoCellError(f"{options.what} is of one pair of scenarios, without --scenario")
         return _run(options)
     except (NoMatplotlibError, NoCellError, CampaignError, SchedulerGoneError, OSError) as error:
         complain("pandion reproduce", error)
@@ -160,6 +169,7 @@ def _settings(options: ReproduceOptions) -> Settings:
         seeds=options.seeds,
         duration_s=options.duration_s,
         inner="pid" if options.tracking == "pid" else "tracking",
+        family="dash" if options.scenario == "dash" else "walls",
         suite=options.suite,
         only=options.only,
     )
@@ -172,6 +182,8 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
     command += f" --seeds {options.seeds.start}:{options.seeds.stop}"
     if options.duration_s is not None:
         command += f" --duration {options.duration_s:g}"
+    if options.scenario != "walls":
+        command += f" --scenario {options.scenario}"
     if options.suite is not None:
         command += f" --sensors {options.suite}"
     if options.only is not None:

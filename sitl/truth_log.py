@@ -7,11 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from struct import Struct
 from typing import Final
 
 from messages import ulog
 from messages.block_file import BlockFile
-from messages.ground_truth import FIRST_NUMBER, SIM_GROUND_TRUTH, SIM_TRACKING, TRUTH_TOPICS
+from messages.ground_truth import (
+    ATTITUDE_TRUTH,
+    FIRST_NUMBER,
+    POSITION_TRUTH,
+    RATES_TRUTH,
+    SIM_GROUND_TRUTH,
+    SIM_TRACKING,
+    TRUTH_TOPICS,
+)
 from messages.ulog_reader import unpacker
 from sitl.simulation import SAMPLE_STEPS, START_US, Simulation
 
@@ -19,6 +28,12 @@ _FLUSH_BYTES: Final = 1 << 16
 _STATE_HEAD: Final = ulog.data_head(FIRST_NUMBER, SIM_GROUND_TRUTH)
 _TRACKING_HEAD: Final = ulog.data_head(FIRST_NUMBER + 1, SIM_TRACKING)
 _TRACKING: Final = unpacker(SIM_TRACKING)
+_PX4_TOPICS: Final = (ATTITUDE_TRUTH, RATES_TRUTH, POSITION_TRUTH)
+_PX4: Final = Struct("<" + "".join("5s" + topic.codes for topic in _PX4_TOPICS))
+_PX4_HEADS: Final = tuple(
+    ulog.data_head(FIRST_NUMBER + TRUTH_TOPICS.index(topic), topic) for topic in _PX4_TOPICS
+)
+_MOTION: Final = Struct("<13d")  # position, velocity, attitude and rates, first in the state
 
 
 class TruthLog:
@@ -43,6 +58,12 @@ class TruthLog:
         if simulation.step % SAMPLE_STEPS == 0:
             truth = simulation.truth()
             self._records += _TRACKING_HEAD + _TRACKING.pack(t_us, *truth.p_WE, *truth.target.p)
+            motion = _MOTION.unpack_from(simulation.state_bytes())
+            attitude, rates, position = _PX4_HEADS
+            self._records += _PX4.pack(
+                *(attitude, t_us, *motion[6:10], rates, t_us, *motion[10:13]),
+                *(position, t_us, *motion[:6]),
+            )
         if len(self._records) > _FLUSH_BYTES:
             self._flush()
 

@@ -20,7 +20,7 @@ from messages.ulog import Field, Topic
 from messages.ulog_reader import UlogError, UlogFile, open_log
 from view.results_beside import results_beside
 
-__all__ = ["FlightData", "InputChange", "Table", "Text", "UlogError", "read_flight"]
+__all__ = ["FlightData", "InputChange", "Table", "Text", "UlogError", "is_ours", "read_flight"]
 
 Array = NDArray[Any]
 
@@ -29,6 +29,7 @@ _NUMPY: Final = {
     "int32_t": "<i4", "uint64_t": "<u8", "int64_t": "<i8", "float": "<f4", "double": "<f8",
     "bool": "?",
 }  # fmt: skip
+_SYSTEM: Final = "Pandion"
 _INPUTS: Final = "tick_input"
 _OURS: Final = {
     topic.name: {one.name: one for one in topic.fields} for topic in (*TOPICS, *TRUTH_TOPICS)
@@ -131,27 +132,39 @@ class FlightData:
             raise UlogError(f"{self.path}: {problem}") from None
 
 
+def is_ours(log: UlogFile) -> bool:
+    """Whether this project wrote a log; the topics of others may have our names."""
+    return str(log.information.get("sys_name", _SYSTEM)).startswith(_SYSTEM)
+
+
 def read_flight(path: Path) -> FlightData:
     """Read a flight log, by its file or its directory; topics of any build.
 
     Raises:
-        UlogError: It is no log, is damaged, or holds no record.
+        UlogError: It is no log, one of another system, is damaged, or holds no record.
     """
     log = open_log(path / "flight.ulg" if path.is_dir() else path)
-    bodies: dict[int, list[bytes]] = {}
+    if not is_ours(log):
+        raise UlogError(
+            f"{log.path} is a log of {str(log.information['sys_name'])[:32]!r}, whose vehicle has "
+            "no arm to show; `pandion export` writes it as CSV or MCAP"
+        )
+    bodies: dict[str, list[bytes]] = {}  # by topic: one may have had several numbers
+    topics: dict[str, Topic] = {}
     texts: list[Text] = []
     lost_ms = 0
     for kind, number, body in log.records():
         if kind == ulog.DATA:
-            if (of_topic := bodies.get(number)) is None:
-                bodies[number] = of_topic = []
+            topic = log.topics[number]
+            if (of_topic := bodies.get(topic.name)) is None:
+                topics[topic.name], bodies[topic.name] = topic, (of_topic := [])
             of_topic.append(body)
         elif (reported := ulog.text_of(kind, body)) is not None:
             severity, t_us, text = reported
             texts.append(Text(1e-6 * t_us, severity, text))
         elif kind == ulog.DROPOUT:
             lost_ms += int.from_bytes(body, "little")
-    tables = {log.topics[number].name: _table(log, number, b) for number, b in bodies.items()}
+    tables = {name: _table(log, topics[name], b) for name, b in bodies.items()}
     if not tables:
         raise UlogError(f"{log.path} holds no record")
     inputs = _inputs(tables.pop(_INPUTS)) if _INPUTS in tables else ()
@@ -180,11 +193,10 @@ def _missing(topic: str, name: str) -> UlogError:
     return UlogError(f"the log is of another build: its topic {topic} has no {name}")
 
 
-def _table(log: UlogFile, number: int, bodies: list[bytes]) -> Table:
-    topic = log.topics[number]
+def _table(log: UlogFile, topic: Topic, bodies: list[bytes]) -> Table:
     _check_fields(log, topic)
     records = np.frombuffer(b"".join(bodies), dtype=_dtype(topic))
-    columns = {one.name: records[one.name] for one in topic.fields}
+    columns = {one.name: records[one.name] for one in topic.fields if not one.is_padding}
     t = 1e-6 * records["timestamp"].astype(np.float64)
     if np.any(np.diff(t) < 0.0):  # the simulator's records were appended; others are in order
         order = np.argsort(t, kind="stable")
@@ -227,7 +239,9 @@ def _kind(one: Field) -> str:
 def _dtype(topic: Topic) -> np.dtype[Any]:
     fields: list[Any] = []
     for one in topic.all_fields:
-        if one.type == "char":
+        if one.is_padding:
+            fields.append((one.name, f"V{one.code.removesuffix('x')}"))
+        elif one.type == "char":
             fields.append((one.name, f"S{one.count or 1}"))
         else:
             fields.append((one.name, _NUMPY[one.type], (one.count,) if one.count else ()))

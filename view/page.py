@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
+import html
 import http
 import inspect
 import io
 import ipaddress
+import re
 import socket
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
@@ -15,7 +18,17 @@ from urllib.parse import urlsplit
 import viser
 import websockets.asyncio.server
 
+from command_line.html_page import ICON
+
 LOCAL: Final = ("127.0.0.1", "localhost")
+_TITLE: Final = re.compile(rb"<title>[^<]*</title>")
+_VISERS_ICON: Final = re.compile(rb'(<link\s+rel="icon"\s+)href="[^"]*"')
+_ROOT: Final = re.compile(rb'(<div id="root">)</div>')
+# The script that draws the scene replaces it.
+_LOADING: Final = (
+    '<p style="font: 16px system-ui, sans-serif; margin: 40vh auto 0; text-align: center">'
+    "loading the scene ...</p>"
+)
 
 
 class PageError(Exception):
@@ -52,7 +65,7 @@ def open_server(host: str, port: int, title: str) -> Server:
             ) from None
         port = int(probe.getsockname()[1])
     # It prints its address in a box.
-    with contextlib.redirect_stdout(io.StringIO()), _own_pages_only():
+    with contextlib.redirect_stdout(io.StringIO()), _own_pages_only(title):
         server = Server(host=host, port=port, label=title, verbose=False)
     server.gui.configure_theme(
         show_logo=False, show_share_button=False, control_width="large", brand_color=(9, 105, 218)
@@ -63,8 +76,10 @@ def open_server(host: str, port: int, title: str) -> Server:
 
 
 @contextlib.contextmanager
-def _own_pages_only() -> Iterator[None]:
+def _own_pages_only(title: str) -> Iterator[None]:
     """Let a server that starts meanwhile refuse browsers that show a page of another site.
+
+    What it serves has our ``title`` and icon, and says that the scene is loading until it is there.
 
     Any site's page may open a socket to this machine, and could command the vehicle. viser has no
     option for that; websockets lets a request be looked at first.
@@ -78,7 +93,8 @@ def _own_pages_only() -> Iterator[None]:
             if not is_own(origins, hosts):
                 return connection.respond(http.HTTPStatus.FORBIDDEN, "a page of another site\n")
             found = process_request(connection, request)
-            return await found if inspect.isawaitable(found) else found
+            found = await found if inspect.isawaitable(found) else found
+            return titled(found, title)
 
         return usual(*args, process_request=look, **more)
 
@@ -87,6 +103,24 @@ def _own_pages_only() -> Iterator[None]:
         yield
     finally:
         module.serve = usual
+
+
+def titled(response: Any, title: str) -> Any:
+    """The same response, a page with ``title``, our icon and a word while the scene loads."""
+    if response is None or "text/html" not in response.headers.get("Content-Type", ""):
+        return response
+    packed = response.headers.get("Content-Encoding") == "gzip"
+    body = gzip.decompress(response.body) if packed else response.body
+    for was, becomes in (
+        (_TITLE, f"<title>{html.escape(title)} - Pandion</title>"),
+        (_VISERS_ICON, rf'\g<1>href="{ICON}"'),
+        (_ROOT, rf"\g<1>{_LOADING}</div>"),
+    ):
+        body = was.sub(becomes.encode(), body, count=1)
+    response.body = gzip.compress(body, 1) if packed else body
+    del response.headers["Content-Length"]
+    response.headers["Content-Length"] = str(len(response.body))
+    return response
 
 
 def is_own(origins: Sequence[str], hosts: Sequence[str]) -> bool:

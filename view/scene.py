@@ -78,6 +78,7 @@ class Safety(NamedTuple):
     breaches: int = 0
     departures: int = 0
     interventions: int = 0
+    refusals: int = 0  # of what was announced, streamed or uploaded, each message counted
 
 
 _SAFE = Safety()
@@ -108,6 +109,7 @@ class Scene:
     failures: str = ""  # names of the active failsafes
     battery: Battery | None = None
     link_age: float = math.nan  # s since something came; NaN for a log
+    dropped: str = ""  # what the vehicle has dropped of all that it was sent
     solver: Solver | None = None
     timing: tuple[Timing, ...] = ()
     safety: Safety = _SAFE

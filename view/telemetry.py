@@ -14,7 +14,7 @@ from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.parameters.float32 import nearest_decimal
+from fsw.parameters.param_type import value_of
 from fsw.signals import CommandResult, PlanInput, PredictionState, SafeSet, Vec3, Vec4, Zone
 from messages import dialect
 from messages.frames import Frame, wire_fields
@@ -44,11 +44,14 @@ _ON_GROUND: Final = 1
 _STEPS: Final = 6  # most of an MPC_HORIZON
 _REQUESTS: Final = (511, 512)  # of messages; their answers are of no interest
 _UNTIMED: Final = 0xFFFFFFFF
-_RESTARTED_S: Final = 5.0  # by which its clock goes back where a vehicle starts again
+_OUR_MESSAGES: Final = 60_200  # the first number of the dialect, which one component alone speaks
+RESTARTED_S: Final = 5.0  # by which its clock goes back where a vehicle starts again
 _SHORT_S: Final = 1.0  # what was said longer ago is not so any more
 _AVERAGE: Final = 0.2  # weight of the newest interval in a rate
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
 _WARNING: Final = 4  # MAV_SEVERITY
+# Of SYS_STATUS, as fsw.link.wire.encode_health has them.
+_LOSSES: Final = ("damaged", "echoes", "unsigned", "overflowed")
 
 
 @dataclass(slots=True)
@@ -121,7 +124,7 @@ class Telemetry:
             known = one.interval == one.interval
             one.interval = one.interval + _AVERAGE * (since - one.interval) if known else since
         one.count, one.at, one.values = one.count + 1, at, frame.payload_values
-        if frame.system_id != ids.SYSTEM_ID:
+        if not _is_of_vehicle(frame):
             return
         self.at = at
         read = _READERS.get(frame.message_id)
@@ -157,6 +160,7 @@ class Telemetry:
             failures=self._failures(beat),
             battery=self._battery(),
             link_age=now - self.at,
+            dropped=self._dropped(),
             solver=None if solver is None else _solver(solver),
             timing=tuple(self._timings[group] for group in sorted(self._timings)),
             safety=safety,
@@ -210,13 +214,17 @@ class Telemetry:
 
     def _margins(self) -> tuple[tuple[Margin, ...], float, float, Safety]:
         values = self._newest(ids.BARRIER_MARGIN, lasts=2.0 * _SHORT_S)
+        setpoints = self._newest(ids.SETPOINT_STATUS)
+        refusals = 0 if setpoints is None else setpoints[5]
         if values is None:
-            return (), math.nan, math.nan, Safety()
+            return (), math.nan, math.nan, Safety(refusals=refusals)
         count = min(int(values[37]), 16)
         names = [_margin_name(k, count, self._safe_set) for k in range(count)]
         margins = tuple(Margin(n, values[1 + k], values[17 + k]) for k, n in enumerate(names))
         added = max(values[42:58], default=0.0)
-        return margins, values[34], added, Safety(*values[39:42])
+        breaches, departures, interventions = values[39:42]
+        safety = Safety(breaches, departures, interventions, refusals)
+        return margins, values[34], added, safety
 
     def _sigma(self) -> Vec3 | None:
         values = self._newest(ids.ESTIMATOR_STATUS, lasts=3.0)
@@ -231,13 +239,18 @@ class Telemetry:
             return None
         return Battery(1e-3 * values[4], 0.01 * values[12])
 
+    def _dropped(self) -> str:
+        values = self._newest(ids.SYS_STATUS)
+        counts = (0,) * len(_LOSSES) if values is None else (values[7], *values[8:10], values[11])
+        return ", ".join(f"{n} {what}" for n, what in zip(counts, _LOSSES, strict=True) if n)
+
     def note(self, kind: EventKind, text: str) -> None:
         """Add an event of now."""
         self.events.append(Event(self.t, kind.value, text))
 
     def read_clock(self, t: float) -> None:
         """Take the vehicle's time ``t`` [s]; it goes back only if the vehicle starts again."""
-        if t < self.t - _RESTARTED_S:
+        if t < self.t - RESTARTED_S:
             self._forget()
         if not t <= self.t:
             self.t = t
@@ -324,12 +337,14 @@ class Telemetry:
 
     def read_parameter(self, values: tuple[Any, ...]) -> None:
         """Take a PARAM_VALUE."""
-        value, count, index, name, _ = values
+        field, count, index, name, type_ = values
+        value = value_of(field, type_)
         if index < count:
             self.parameter_count = count
         known = _text(name)
-        if known in self.parameters or len(self.parameters) < _MOST_PARAMETERS:
-            self.parameters[known] = nearest_decimal(value)
+        room = known in self.parameters or len(self.parameters) < _MOST_PARAMETERS
+        if room and value is not None:
+            self.parameters[known] = value
 
     def read_timing(self, values: tuple[Any, ...]) -> None:
         """Take a LOOP_TIMING."""
@@ -427,6 +442,12 @@ def _clock(us: bool) -> Callable[[Telemetry, tuple[Any, ...]], None]:
     return lambda telemetry, values: telemetry.read_clock(scale * values[0])
 
 
+def _is_of_vehicle(frame: Frame) -> bool:
+    """Whether the vehicle itself speaks: a gimbal or companion may have its system's number."""
+    ours = frame.component_id == ids.AUTOPILOT or frame.message_id >= _OUR_MESSAGES
+    return frame.system_id == ids.SYSTEM_ID and ours
+
+
 def _nothing(_: Telemetry, values: tuple[Any, ...]) -> None:
     """Only the values are kept."""
 
@@ -447,6 +468,7 @@ _READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
     ids.ARM_JOINT_STATE: _clock(us=True),
     ids.END_EFFECTOR_TARGET: _nothing,
     ids.BARRIER_MARGIN: _clock(us=True),
+    ids.SETPOINT_STATUS: _nothing,
     ids.MPC_STATUS: _nothing,
     ids.LOOP_TIMING: Telemetry.read_timing,
     ids.OBSTACLE_SHAPE: Telemetry.read_zone,

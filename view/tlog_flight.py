@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
+from fsw.link.wire.message_ids import SYSTEM_ID
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import Vec3
-from messages.tlog_reader import tlog_frames
+from messages.frames import Frame
+from messages.tlog_reader import TlogFrames
 from view.flight import Curve, Trail
 from view.flight_data import UlogError
-from view.scene import Scene, Worst
-from view.telemetry import Telemetry
+from view.scene import Event, Scene, Worst
+from view.telemetry import RESTARTED_S, Telemetry
 from view.vehicle import places, tilt
 
 Array = NDArray[Any]
@@ -25,6 +29,67 @@ Array = NDArray[Any]
 _SCENE_S: Final = 0.04  # between two scenes that are kept
 _MOST_BYTES: Final = 128 * 1024 * 1024  # an hour of a vehicle's telemetry has 40 MB
 _MOST_SCENES: Final = 360_000
+_MOST_EVENTS: Final = 5_000
+_BETWEEN_S: Final = 1.0  # from one flight to the next, as it is shown
+
+
+class _Recording:
+    """The scenes of a log, and what happened; a flight that follows another one comes after it.
+
+    A vehicle's clock begins anew with each start. A second later than the last scene of one flight,
+    the next one begins.
+    """
+
+    def __init__(self, path: Path, frames: TlogFrames) -> None:
+        self.telemetry = Telemetry()
+        self.scenes: list[Scene] = []
+        self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)
+        self._path = path
+        self._frames = frames
+        self._shift = 0.0  # s, from the vehicle's clock to the one that is shown
+        self._begins: list[float] = []  # s, shown, of the flights after the first
+        for at, frame in frames:
+            self._take(frame, at)
+
+    def _take(self, frame: Frame, at: float) -> None:
+        telemetry, before = self.telemetry, self.telemetry.t
+        telemetry.take(frame, at)
+        if telemetry.t < before - RESTARTED_S and self.scenes:
+            begin = self.scenes[-1].t + _BETWEEN_S
+            self._shift = begin - telemetry.t
+            self._begins.append(begin)
+        while telemetry.events:
+            event = telemetry.events.popleft()
+            self.events.append(event._replace(t=event.t + self._shift))
+        last = self.scenes[-1].t if self.scenes else -math.inf
+        if telemetry.t + self._shift >= last + _SCENE_S:
+            scene = telemetry.scene(at)
+            if scene.estimate is not None:
+                self.scenes.append(replace(scene, t=scene.t + self._shift))
+            if len(self.scenes) > _MOST_SCENES:
+                longest = _MOST_SCENES * _SCENE_S / 3600.0
+                raise UlogError(f"{self._path} is too long: at most {longest:.0f} h can be shown")
+
+    def remarks(self) -> tuple[str, ...]:
+        """What of the log is shown otherwise than it stands there, a sentence each."""
+        told = []
+        if self._begins:
+            times = ", ".join(f"{begin:.0f} s" for begin in self._begins)
+            told.append(f"{len(self._begins) + 1} flights, one after another: new ones at {times}")
+        if self._frames.skipped:
+            told.append(f"{self._frames.skipped} bytes are no frames, and are skipped")
+        return tuple(told)
+
+    def missing(self) -> str:
+        """Why nothing of the log can be shown."""
+        systems = sorted({one.system for one in self.telemetry.heard.values()})
+        if not systems:
+            return "is no telemetry log with positions of a vehicle: it has no MAVLink frame"
+        heard = ", ".join(map(str, systems))
+        return (
+            "is no telemetry log with positions of a vehicle: LOCAL_POSITION_NED and ATTITUDE of "
+            f"system {SYSTEM_ID} are needed; it has messages of system {heard}"
+        )
 
 
 class TlogFlight:
@@ -37,34 +102,25 @@ class TlogFlight:
             UlogError: It is no telemetry log, or says nothing about where the vehicle was.
         """
         self.airframe = AIRFRAME
-        telemetry = Telemetry()
-        self._scenes: list[Scene] = []
         try:
             log = read_bounded(path, _MOST_BYTES)
         except OSError as error:
             raise UlogError(f"cannot read {path}: {error.strerror}") from None
-        for at, frame in tlog_frames(log):
-            telemetry.take(frame, at)
-            last = self._scenes[-1].t if self._scenes else -math.inf
-            if telemetry.t >= last + _SCENE_S:
-                scene = telemetry.scene(at)
-                if scene.estimate is not None:
-                    self._scenes.append(scene)
-                if len(self._scenes) > _MOST_SCENES:
-                    longest = _MOST_SCENES * _SCENE_S / 3600.0
-                    raise UlogError(f"{path} is too long: at most {longest:.0f} h can be shown")
+        recording = _Recording(path, TlogFrames(log))
+        self._scenes = recording.scenes
         if not self._scenes:
-            raise UlogError(f"{path} is no telemetry log with positions of a vehicle")
+            raise UlogError(f"{path} {recording.missing()}")
         self._times = [scene.t for scene in self._scenes]
         self.begin, self.end = self._times[0], self._times[-1]
         self.title = f"{path.parent.name}/{path.name}"
+        telemetry = recording.telemetry
+        self.unusable = recording.remarks()
         heard = sum(one.count for one in telemetry.heard.values())
-        self.unusable: tuple[str, ...] = ()
         self.facts: tuple[tuple[str, str], ...] = (("file", str(path)), ("messages", f"{heard}"))
         if telemetry.left_out:
             self.facts += (("zones not shown", f"{telemetry.left_out} messages"),)
         self.events = tuple(
-            one if math.isfinite(one.t) else one._replace(t=self.begin) for one in telemetry.events
+            one if math.isfinite(one.t) else one._replace(t=self.begin) for one in recording.events
         )
         self.worst = self._worst()
 

@@ -15,6 +15,7 @@ import matplotlib as mpl
 
 from docs.figures.animation import draw_animation
 from docs.figures.browser import NoBrowser
+from docs.figures.dash import draw_dash
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
@@ -59,6 +60,7 @@ def draw_all(flights: Path) -> None:
         draw_architecture(IMAGES / "architecture.svg")
         draw_timing(IMAGES / "timing.svg")
         draw_frames(IMAGES / "frames.svg")
+        draw_dash(IMAGES / "dash.svg")
         for flown, name in PICTURED.items():
             draw_flight(fly(*flown, flights), IMAGES / name)
     pictured = fly(*next(iter(PICTURED)), flights)

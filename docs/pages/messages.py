@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 from fsw.link.events.event_service import EventService
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
+from fsw.link.files.log_stream import LogStreamService
 from fsw.link.inbox import Inbox
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
@@ -50,7 +51,7 @@ ANSWERS: Final = (
     ids.MISSION_ITEM_INT, ids.MISSION_ITEM, ids.MISSION_REQUEST_INT, ids.MISSION_ITEM_REACHED,
     ids.MISSION_ACK, ids.COMMAND_ACK, ids.FILE_TRANSFER_PROTOCOL, ids.TIMESYNC, ids.LOG_ENTRY,
     ids.LOG_DATA, ids.MESSAGE_INTERVAL, ids.STATUSTEXT, ids.EVENT, ids.CURRENT_EVENT_SEQUENCE,
-    ids.RESPONSE_EVENT_ERROR, *ON_REQUEST,
+    ids.RESPONSE_EVENT_ERROR, ids.LOGGING_DATA, ids.LOGGING_DATA_ACKED, *ON_REQUEST,
 )  # fmt: skip
 _OF_THE_LINK: Final = (ids.HEARTBEAT, ids.RADIO_STATUS, ids.SETUP_SIGNING)
 # What the mission service hears; it exists with a mission only.
@@ -163,7 +164,8 @@ def _description(element: ET.Element) -> str:
 
 def heard() -> frozenset[int]:
     """Every message that the vehicle does something with."""
-    services = (ParameterService, LogService, FtpService, TimeService, EventService)
+    files = (LogService, LogStreamService, FtpService)
+    services = (ParameterService, *files, TimeService, EventService)
     return frozenset(_OF_THE_LINK).union(
         Inbox().message_ids,
         OF_MISSIONS,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -80,6 +81,7 @@ class TargetPoints:
     yaw: Array  # (n + 1,) rad
     q_arm: Array | None = None  # (n + 1, 2) rad; None: the planner is free to choose
     t_us: int = 0  # of node 0; what moves by itself is placed by it
+    recent_disturbance: float = math.inf  # m/s^2, which lambda may follow
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "yaw"):  # kernels rely on the layout

@@ -17,9 +17,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fsw.compiled import compilable
+
+LOUD: Final = 0.4  # m/s^2, observed disturbance from which on lambda is whole
 
 
 class BarrierNumbers(NamedTuple):
@@ -60,6 +62,15 @@ class BarrierTuning:
     def approach_speed(self, distance: float) -> float:
         """S of these constants [m/s] at a ``distance`` [m] to the boundary."""
         return safe_approach_speed(distance, self.alpha, self.slope)
+
+    def following(self, recent: float, least: float) -> float:
+        """Lambda [m/s] where no more than ``recent`` [m/s^2] of disturbance was observed of late.
+
+        It goes down to ``least`` [m/s], and is whole from ``LOUD`` on and where ``least`` is 0.
+        """
+        if not 0.0 < least < self.lambda_:
+            return self.lambda_
+        return least + (self.lambda_ - least) * min(1.0, recent / LOUD)
 
     def check_sampling(self, period: float) -> None:
         """Check ``k_S T <= 1`` and ``gamma T <= 1`` for the planner's ``period`` [s].

@@ -58,6 +58,7 @@ _LEAST_THRUST = 6.0  # m/s^2, specific, within the limits of the inputs
 
 # Entries of the settings, for kernels: one array costs what one number costs to hand over.
 _DISTANCES, _TIGHTENING, _FIRST, _MOST, _KEPT, _FOLLOWING = 0, 1, 2, 3, 7, 13
+_LAMBDA = 3  # among the entries of a tuning
 
 
 def settings(
@@ -92,14 +93,17 @@ class ZoneRows:
         tightening: float = 0.0,
         skipped_nodes: int | None = None,
         most: Vec4 = (math.inf, 0.0, 0.0, 0.0),
+        least_lambda: float = 0.0,
     ) -> None:
         """Lay out the rows of a safe set, to be refilled.
 
         The first of ``tunings`` is for all zones but those that follow the target. With
         ``distances`` the rows require a distance of ``tightening`` [m] in place of a barrier.
         ``most`` bounds the inputs: horizontal and vertical [m/s^2], yaw and joints [rad/s^2]; by
-        default no row is left out.
+        default no row is left out. Lambda follows the disturbance down to ``least_lambda`` [m/s]
+        if that is not 0, but for zones that follow the target: those have no room to spare.
         """
+        self._kept, self._least_lambda = tunings[0], least_lambda
         self._probes = body.probes
         self._period_us = round(1e6 * model.period)
         self.update(safe_set)
@@ -132,6 +136,8 @@ class ZoneRows:
             times_us = targets.t_us + self._period_us * np.arange(len(targets.position))
             self._moves = shifts(self._moving, times_us, targets.position, targets.velocity)
             self._targets = targets
+            lambda_ = self._kept.following(targets.recent_disturbance, self._least_lambda)
+            self._settings[_KEPT + _LAMBDA] = lambda_
         self._fill(
             self._zones,
             self._moves,

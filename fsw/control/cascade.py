@@ -373,7 +373,7 @@ def _close_loops(
 ) -> tuple[
     tuple[Vec4, Vec2],
     Vec4,
-    tuple[Vec3, Vec3, Vec2],
+    tuple[Vec3, Vec3, Vec2, float],
     float,
     tuple[Vec3, float],
     tuple[Vec2, Vec2, Vec2, Vec2, Vec2],
@@ -385,7 +385,12 @@ def _close_loops(
     return (
         (command.rotor_thrust, command.joint_torque),
         kept.rotors,
-        (kept.observed.v, kept.observed.d, kept.observed.disturbance_bias),
+        (
+            kept.observed.v,
+            kept.observed.d,
+            kept.observed.disturbance_bias,
+            kept.observed.recent,
+        ),
         kept.mass,
         (kept.attitude, kept.height),
         (

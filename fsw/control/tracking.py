@@ -33,6 +33,8 @@ from fsw.model.rotors import MotionState
 from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 
 _LEAST_SPECIFIC_THRUST = 2.0  # m/s^2; below it tilt hardly accelerates the vehicle
+_RECENT_S = 2.0  # in which a disturbance fades that is not seen again
+_NOT_KNOWN = 1.0  # m/s^2; nothing was observed yet, and what is to come may be large
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,7 @@ class Observed(NamedTuple):
     v: Vec3  # m/s
     d: Vec3  # m/s^2, disturbance acceleration
     disturbance_bias: Vec2 = (0.0, 0.0)  # m/s^2, horizontal part of d that stays: wind
+    recent: float = _NOT_KNOWN  # m/s^2, largest horizontal d of late: at once up, slowly down
 
 
 @compilable
@@ -71,7 +74,9 @@ def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
     wind_y = clamp_magnitude(
         memory.disturbance_bias[1] + share * (dy - memory.disturbance_bias[1]), most
     )
-    return Observed((vx, vy, vz), (dx, dy, dz), (wind_x, wind_y))
+    faded = memory.recent * (1.0 - min(dt / _RECENT_S, 1.0))
+    recent = max(math.sqrt(dx * dx + dy * dy), faded)
+    return Observed((vx, vy, vz), (dx, dy, dz), (wind_x, wind_y), recent)
 
 
 @compilable

@@ -123,6 +123,20 @@ def tube(
     )
 
 
+@lru_cache(maxsize=4)
+def base_after(
+    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
+) -> Array:
+    """How far [m] any disturbance within 1 m/s^2 of one axis can have pushed the base.
+
+    An entry (ticks,) for each tick of ``dt`` [s] after it began.
+    """
+    reach: Array = np.cumsum(
+        np.abs(impulse_responses(airframe, tuning, gains, dt, wind=False)[:, 0])
+    )
+    return reach
+
+
 @dataclass(frozen=True, slots=True)
 class EstimateTube:
     """Reach of an error of the estimate, at most, on one horizontal axis."""

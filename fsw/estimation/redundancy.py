@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation.error_state import WITNESS, vec3
+from fsw.estimation.error_state import BG, WITNESS, vec3
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.model.airframe import GRAVITY
@@ -87,11 +87,15 @@ _AT: Final = 8  # column of the integrals at its time
 _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
 _BASELINE_SHARE: Final = 0.3  # of the time since the vehicle flies, if that is less: biases settle
+# A bias that is known so well moves slowly: if it does not, something turns that must not.
+_SETTLED: Final = 1e-3  # rad/s, deviation of each axis
+_BASELINE_SETTLED: Final = 60.0  # s
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 _LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
 _MODEL_SIGMAS: Final = 5.0  # of them, that are nominal
 _NOISE_SIGMAS: Final = 4.0  # of the noise of measurements
+_BEND_SIGMAS: Final = 5.5  # the same of second differences of places: two in a row share noise
 # The least thresholds, by window [SI]. A gust is a force of 1 to 2 m/s^2 and no turn.
 _TURN_OFF: Final = 0.2  # rad/s
 _TURN_OFF_AIDED: Final = 0.15  # rad/s
@@ -100,6 +104,7 @@ _FORCE_OFF_AIDED: Final = 0.9  # m/s^2
 _GYRO_OFF: Final = 0.012  # rad/s: scale, axes and bias
 _GYRO_OFF_LONG: Final = 0.004  # rad/s
 _FIELD_OFF_LONG: Final = 0.012  # rad/s: hard and soft iron of a vehicle that tilts
+_IRON: Final = 0.1  # rad: by how much they turn a field, for each radian that the vehicle turns
 _ACCEL_OFF: Final = 0.4  # m/s^2: scale, axes, bias and tilt
 _SPEED_OFF: Final = 0.08  # m/s
 # How a vehicle moves between two measurements, of which one may be an outlier: beside the velocity
@@ -174,6 +179,9 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
     made = rotate(R, (0.0, 0.0, -model[3]))
     W[AGE] += dt
     share = dt / min(max(_BASELINE_SHARE * W[AGE], dt), _BASELINE)
+    of_gyro, M = share, x.covariance
+    if max(M[BG, BG], M[BG + 1, BG + 1], M[BG + 2, BG + 2]) < _SETTLED * _SETTLED:
+        of_gyro = dt / _BASELINE_SETTLED
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
         W[FELT + i] += dt * (felt[i] + down)
@@ -187,7 +195,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):
             b[i] += share * (x.accel_bias[i] - b[i])
-            b[3 + i] += share * (x.gyro_bias[i] - b[3 + i])
+            b[3 + i] += of_gyro * (x.gyro_bias[i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
 
 
@@ -461,7 +469,7 @@ def _unit_and_pose(
     _note_model(s, now, MP_TURN, k, r, _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning, learns)
     bent = _bend(c, b, a, _MEASURED)
     felt, made = _bend(c, b, a, _AT + FELT2), _bend(c, b, a, _AT + MADE2)
-    noise = _NOISE_SIGMAS * math.sqrt(18.0) * sigma / (over * over)
+    noise = _BEND_SIGMAS * math.sqrt(18.0) * sigma / (over * over)
     r = (bent[0] - felt[0], bent[1] - felt[1], bent[2] - felt[2])
     _note(s, now, AP, k, r, _ACCEL_OFF + noise)
     r = (bent[0] - made[0], bent[1] - made[1], bent[2] - made[2])
@@ -525,14 +533,18 @@ def _gyro_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3) -> Non
         return
     b, a = s.aids[2, last % _AIDS], s.aids[2, first % _AIDS]
     over, off, v = b[0] - a[0], _field_off(a, b), vec3(b, _MEASURED)
+    r = _across(bias, v, (off[0] / over, off[1] / over, off[2] / over))
+    iron = _IRON * _size(rotation_vector(_apart(a, b, _AT + SAID)))
+    noise = _NOISE_SIGMAS * noise / max(_size(v), 1e-3)
+    _note(s, now, GB, k, r, _GYRO_OFF + (iron + noise) / over)
+
+
+@compilable
+def _across(a: Vec3, v: Vec3, r: Vec3) -> Vec3:
+    """What of ``a`` is at right angles to the field ``v`` [Gauss], added to ``r``, both [rad/s]."""
     size = max(_size(v), 1e-3)
-    along = (bias[0] * v[0] + bias[1] * v[1] + bias[2] * v[2]) / (size * size)
-    r = (
-        off[0] / over + bias[0] - along * v[0],
-        off[1] / over + bias[1] - along * v[1],
-        off[2] / over + bias[2] - along * v[2],
-    )
-    _note(s, now, GB, k, r, _GYRO_OFF + _NOISE_SIGMAS * noise / size / over)
+    along = (a[0] * v[0] + a[1] * v[1] + a[2] * v[2]) / (size * size)
+    return r[0] + a[0] - along * v[0], r[1] + a[1] - along * v[1], r[2] + a[2] - along * v[2]
 
 
 @compilable
@@ -577,7 +589,9 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
         noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about / over
         _note(s, now, GP, 4, r, _GYRO_OFF_LONG + noise)
     else:
-        _note(s, now, GB, 4, r, _FIELD_OFF_LONG)
+        b = s.aids[kind, last % _AIDS]
+        iron = _IRON * _size(rotation_vector(_apart(a, b, _AT + SAID)))
+        _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron / over)
 
 
 look = of_fixed_types(_look)

@@ -34,6 +34,7 @@ from fsw.flight.descent import Descent
 from fsw.flight.exact_state import ExactState
 from fsw.flight.jump import moved_along
 from fsw.flight.land_detector import with_range
+from fsw.flight.missed_ticks import loops_resumed, plan_resumed
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints
 from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
@@ -195,12 +196,14 @@ class Autopilot:
         texts: list[StatusText] = []
         if state.vehicle.restarts:
             state = restarted(state)
-        fusion, caught = state.fusion, None
+        fusion, caught, came = state.fusion, None, inputs
         if inputs.samples or fusion is not None:
+            if state.index >= 0:
+                state, inputs = self._sensed.take_missed(state, inputs)
             state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
         else:
             state, estimate = self._exact.estimate(state, inputs, texts)
-        state = self._receive(state, inputs, texts)
+        state = self._receive(state, came, texts)
         if estimate is None:
             return self._blind(state, inputs, texts)._replace(fusion=fusion, caught=caught)
 
@@ -211,16 +214,18 @@ class Autopilot:
         state = self._commander.check_failsafes(state, estimate, texts)
         state = self._commander.check_mode_completion(state, estimate, texts)
 
-        ticks = self._elapsed_ticks(state, now_us)
-        nominal, plan, u = state.nominal, state.plan, REST_INPUT
+        ticks = looped = self._elapsed_ticks(state, now_us)
         vehicle = state.vehicle
         armed = vehicle.armed
-        flown = vehicle.flies and vehicle.unloaded is None and nominal is not None
+        flown = vehicle.flies and vehicle.unloaded is None and state.nominal is not None
+        if flown and now_us - state.t_us > self._most_us:
+            state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
+        nominal, plan, u = state.nominal, state.plan, REST_INPUT
         if flown and nominal is not None:
-            nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, ticks)
+            nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, looped)
         followed = nominal if flown else None
         sent, memory, replaced, guarded = self._actuate(
-            state, estimate, followed, u, ticks, armed=armed
+            state, estimate, followed, u, looped, armed=armed
         )
         answer = Answer(sent, armed, vehicle.mode, tuple(acks), tuple(texts))
         # By position, as what follows: each is made in every tick, and names cost a microsecond.
@@ -401,7 +406,8 @@ class Autopilot:
             state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
         unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None
         if not unheard or inputs.refused_setpoints:
-            state = replace(state, offboard=accept_setpoints(state.offboard, inputs, self.config))
+            offboard = accept_setpoints(state, inputs, self.config, texts)
+            state = replace(state, offboard=offboard)
         return state
 
     def _believe(
@@ -446,6 +452,16 @@ class Autopilot:
         """Whether time did: on by more than is made up for, or not on at all."""
         return state.index >= 0 and not 0 < now_us - state.t_us <= self._most_us
 
+    def _resumed(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """The state after a time without ticks: loops and plan go on from the measurement."""
+        motion = self._cascade.motion(state.cascade, estimate)
+        state = plan_resumed(self.config, state, estimate, motion)
+        return replace(state, cascade=loops_resumed(self.config, state.cascade, estimate))
+
+    def _until_plan(self, state: FlightState) -> int:
+        """Ticks from the last one to the next that asks for a plan."""
+        return self._ticks_per_plan - state.index % self._ticks_per_plan
+
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
         elapsed = (now_us - state.t_us) // self._tick_us
@@ -483,6 +499,7 @@ class Autopilot:
             safe_set=state.kept.safe_set,
             from_nominal=from_nominal,
             joint_targets=joints,
+            recent_disturbance=state.cascade.observed.recent,
         )
         return state, request, requested(plan, apply_us), said
 

@@ -31,7 +31,17 @@ MAX_ACCELERATION: Final = 20.0  # m/s^2, the same
 MAX_RATE: Final = 10.0  # rad/s
 MAX_YAW: Final = 4.0 * math.pi  # rad
 MAX_STAY: Final = 3600.0  # s, at a place of a mission, and ahead of now of a target
+CIRCLE_RADII: Final = (0.5, 100.0)  # m
+MAX_TURNS: Final = 100.0
+MAX_REPEATS: Final = 1000  # of a jump
+MOVES_NOTHING: Final = frozenset(
+    {MissionAction.SPEED, MissionAction.LOOK_AT, MissionAction.JUMP, MissionAction.SKIP}
+)
 _AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
+_AXES: Final = ("north", "east", "down")
+_WHAT: Final = ("position", "velocity", "acceleration")
+_UNITS: Final = ("m", "m/s", "m/s^2")
+_MOST: Final = (MAX_DISTANCE, MAX_SPEED, MAX_ACCELERATION)
 
 
 def safe_set_problem(safe_set: SafeSet, max_speed: float = math.inf) -> str | None:
@@ -72,25 +82,39 @@ def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
 
 def target_problem(target: EndEffectorTarget, now_us: int) -> str | None:
     """Why a target of a stream cannot be believed at a time."""
-    motion = MotionSetpoint(True, target.p_WE, target.v_WE, target.a_WE, target.yaw)
     if abs(target.t_us - now_us) > 1e6 * MAX_STAY:
         return f"its time is more than {MAX_STAY:g} s from now"
-    return motion_refusal(motion)
+    return point_problem(target.p_WE, target.v_WE, target.a_WE, target.yaw)
+
+
+def point_problem(p: Vec3, v: Vec3, a: Vec3, yaw: float) -> str | None:
+    """Why a point of a trajectory is out of range; none of its axes may be open.
+
+    It has a place ``p`` [m, NED], a velocity ``v`` [m/s, NED], an acceleration ``a`` [m/s^2, NED]
+    and a heading ``yaw`` [rad].
+    """
+    if not all(map(math.isfinite, (*p, *v, *a, yaw))):
+        return "a number is not finite"
+    return motion_refusal(MotionSetpoint(True, p, v, a, yaw))
 
 
 def motion_refusal(setpoint: MotionSetpoint) -> str | None:
-    """Why a motion setpoint is out of range."""
-    for vector, most, what in (
-        (setpoint.p, MAX_DISTANCE, "position"),
-        (setpoint.v, MAX_SPEED, "velocity"),
-        (setpoint.a, MAX_ACCELERATION, "acceleration"),
-    ):
-        if vector is not None and not math.hypot(*vector) <= most:
-            return f"{what} out of range"
+    """Why a motion setpoint is out of range, or has vectors that all leave one axis open."""
+    vectors = setpoint.p, setpoint.v, setpoint.a
+    for vector, most, what, unit in zip(vectors, _MOST, _WHAT, _UNITS, strict=True):
+        if vector is None:
+            continue
+        size = math.hypot(*[0.0 if math.isnan(x) else x for x in vector])
+        if not size <= most:
+            return f"{what} out of range: {size:g} {unit}, at most {most:g} {unit}"
+    given = [vector for vector in vectors if vector is not None]
+    for axis, name in enumerate(_AXES):
+        if given and all(math.isnan(vector[axis]) for vector in given):
+            return f"{name} has no position, velocity or acceleration"
     if setpoint.yaw is not None and not abs(setpoint.yaw) <= MAX_YAW:
-        return "yaw out of range"
+        return f"yaw out of range: {setpoint.yaw:g} rad, at most {MAX_YAW:.2f} rad"
     if setpoint.yaw_rate is not None and not abs(setpoint.yaw_rate) <= MAX_RATE:
-        return "yaw rate out of range"
+        return f"yaw rate out of range: {setpoint.yaw_rate:g} rad/s, at most {MAX_RATE:g} rad/s"
     return None
 
 
@@ -106,16 +130,39 @@ def bounded_update(update: MissionUpdate | None) -> tuple[MissionUpdate | None, 
     if update is None:
         return None, []
     kept, against = update, []
-    for number, step in enumerate(update.steps or ()):
-        problem = step_problem(step)
-        if problem is not None:
-            kept = replace(kept, steps=None, current=None)
-            against.append(f"mission refused: step {number}: {problem}")
-            break
+    wrong = mission_problem(update.steps or ())
+    if wrong is not None:
+        kept = replace(kept, steps=None, current=None)
+        against.append(f"mission refused: step {wrong[0]}: {wrong[1]}")
     if not all(math.hypot(*place) <= MAX_DISTANCE for place in update.rally or ()):
         kept = replace(kept, rally=None)
         against.append(f"rally points refused: one is more than {MAX_DISTANCE:g} m away")
     return kept, against
+
+
+def mission_problem(steps: tuple[MissionStep, ...]) -> tuple[int, str] | None:
+    """The first step of a mission that cannot be flown, and why."""
+    for number, step in enumerate(steps):
+        problem = step_problem(step)
+        if problem is None and step.action is MissionAction.JUMP:
+            problem = _jump_problem(steps, number)
+        if problem is not None:
+            return number, problem
+    return None
+
+
+def _jump_problem(steps: tuple[MissionStep, ...], number: int) -> str | None:
+    """Why a jump cannot be taken: it leads nowhere, or back to itself before anything is flown."""
+    if not 0 <= steps[number].target < len(steps):
+        return f"a jump to item {steps[number].target} of 0 to {len(steps) - 1}"
+    seen, at = set[int](), number
+    while at < len(steps) and steps[at].action in MOVES_NOTHING:
+        if at in seen:
+            return "a jump without end past nothing that is flown"
+        seen.add(at)
+        endless = steps[at].action is MissionAction.JUMP and steps[at].repeats < 0
+        at = steps[at].target if endless else at + 1
+    return None
 
 
 def step_problem(step: MissionStep) -> str | None:
@@ -129,4 +176,18 @@ def step_problem(step: MissionStep) -> str | None:
     stays = step.hold_s == math.inf and step.action is MissionAction.GO
     if not (stays or 0.0 <= step.hold_s <= MAX_STAY):
         return f"a stay of {step.hold_s:g} s is outside 0 to {MAX_STAY:g} s"
+    if step.action is MissionAction.CIRCLE:
+        return circle_problem(step.radius, step.turns)
+    if step.action is MissionAction.JUMP and not -1 <= step.repeats <= MAX_REPEATS:
+        return f"{step.repeats} jumps are outside 0 to {MAX_REPEATS}, or -1 without end"
     return None if step.acceptance >= 0.0 else "the acceptance is less than 0"
+
+
+def circle_problem(radius: float, turns: float) -> str | None:
+    """Why ``turns`` [1] of a ``radius`` [m], negative anticlockwise, cannot be flown."""
+    least, most = CIRCLE_RADII
+    if not least <= abs(radius) <= most:
+        return f"a radius of {abs(radius):g} m is outside {least:g} to {most:g} m"
+    if not 0.0 < turns <= MAX_TURNS:
+        return f"{turns:g} turns are outside 0 to {MAX_TURNS:g}"
+    return None

@@ -23,7 +23,7 @@ from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, Handover
 from fsw.flight.modes.hold import stop
 from fsw.flight.modes.mission import left as mission_left
 from fsw.flight.modes.mission import with_update
-from fsw.flight.modes.offboard import is_fresh
+from fsw.flight.modes.offboard import current_problem, is_fresh
 from fsw.flight.plan_exchange import without_plan
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.restart import rests
@@ -123,6 +123,7 @@ class Commander:
             mission=state.mission.flight.progress,
             mission_refusal=mission_refusal(state.mission.flight, vehicle.landed),
             setpoint_fresh=is_fresh(self._config, state, estimate.t_us),
+            setpoint_problem=current_problem(self._config, state, estimate.t_us),
             position=estimate.p_WB,
             yaw=estimate.yaw,
             joints=asked or estimate.q_arm,

@@ -433,6 +433,7 @@ FAILSAFES: Final = (
         Condition.SETPOINTS_LOST,
         evidence.setpoints_are_lost,
         actions.on_setpoints_lost,
+        detail=wording.refused_setpoints,
         detected="in Offboard, no setpoint for `COM_OF_LOSS_T`",
         parameters=("COM_OF_LOSS_T", "COM_OBL_RC_ACT"),
         ends="setpoints come again, or the pilot commands a mode",

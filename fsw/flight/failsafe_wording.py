@@ -7,6 +7,7 @@ from typing import Final
 
 from fsw.estimation.sensor_fault import sentence
 from fsw.flight.failsafe_evidence import FailsafeContext, lost_sensors, plan_age_us, way_home_s
+from fsw.flight.state import is_young
 from fsw.signals import SolverStatus
 
 
@@ -70,6 +71,14 @@ def no_plan(context: FailsafeContext) -> str:
     why = "silent" if plan.awaited_missed or not plan.refused else ""
     why = why or _PLANNER_FAILS.get(plan.status, "failing")
     return f": planner {why}, last plan {1e-6 * plan_age_us(context):.2f} s ago"
+
+
+def refused_setpoints(context: FailsafeContext) -> str:
+    """Why the setpoints that still come are refused; nothing where none comes."""
+    memory, timeout_us = context.state.offboard, context.limits.setpoint_timeout_us
+    if not is_young(memory.problem_us, context.estimate.t_us, timeout_us):
+        return ""
+    return f": refused: {memory.problem}"
 
 
 def refused_plan(context: FailsafeContext) -> str:

@@ -1,7 +1,8 @@
 """A mission in flight: which step, which segment, and what follows; pure.
 
 Each step that names a place is one segment from rest to rest (``trajectory_segment.py``), a stay
-there, and the next step. A step is reached where the end-effector really is within its acceptance.
+there, and the next step. A circle begins with the straight one to its nearest point. A step is
+reached where the end-effector really is within its acceptance.
 A place that the vehicle cannot get to, beyond a wall say, is given up after a while, with a text
 and without being called reached.
 """
@@ -12,11 +13,15 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from fsw.flight.bounds import MOVES_NOTHING
 from fsw.flight.reference_governor import project_to_safe_set
 from fsw.flight.trajectory_segment import (
+    TOO_NEAR_TO_LOOK,
+    CircleSegment,
     MotionLimits,
-    TrajectorySegment,
+    Segment,
     braking_segment,
+    circle_from,
     segment_to,
 )
 from fsw.signals import (
@@ -34,8 +39,6 @@ from fsw.signals import (
 )
 
 ARRIVAL_TIMEOUT_US = 5_000_000  # at the end of a segment, for the end-effector to arrive
-_TOO_NEAR_TO_LOOK = 0.3  # m
-_NO_MOVES = (MissionAction.SPEED, MissionAction.LOOK_AT)
 
 
 class Stage(Enum):
@@ -56,12 +59,13 @@ class MissionFlight:
 
     steps: tuple[MissionStep, ...] = ()
     stage: Stage = Stage.IDLE
-    segment: TrajectorySegment | None = None
+    segment: Segment | None = None
     place: Vec3 | None = (
         None  # m, where the step is to be reached; the segment may stop before a wall
     )
     since_us: int = 0  # when the stage began
     speed: float | None = None  # m/s, as the mission says
+    jumps: tuple[int, ...] = ()  # the steps whose jump was taken, once for each time
     progress: MissionProgress = field(default_factory=MissionProgress)
 
 
@@ -105,7 +109,7 @@ def refusal(flight: MissionFlight, landed: bool) -> str | None:
         return "no mission: none was uploaded"
     first = flight.progress
     at = 0 if first.state is MissionState.COMPLETE else first.current
-    moves = [step for step in flight.steps[at:] if step.action not in _NO_MOVES]
+    moves = [step for step in flight.steps[at:] if step.action not in MOVES_NOTHING]
     if landed and (not moves or moves[0].action is not MissionAction.TAKE_OFF):
         return f"no mission: on the ground, and step {at} is not a takeoff; take off first"
     return None
@@ -126,6 +130,7 @@ def begun(
     progress = flight.progress
     if progress.state is MissionState.COMPLETE:
         progress = replace(progress, current=0, reached=-1)
+        flight = replace(flight, jumps=())
     return replace(
         flight,
         stage=Stage.BRAKE,
@@ -150,6 +155,7 @@ def jumped(flight: MissionFlight, step: int, now_us: int, limits: MotionLimits) 
     if state is MissionState.COMPLETE:
         state = MissionState.NOT_STARTED
     progress = replace(flight.progress, current=step, state=state)
+    flight = replace(flight, jumps=())
     if flight.segment is None:
         return replace(flight, progress=progress)
     return replace(
@@ -182,7 +188,7 @@ def advance(
         return replace(flight, stage=Stage.ARRIVE, since_us=now_us), NOTHING
     step = flight.steps[flight.progress.current]
     if flight.stage is Stage.ARRIVE:
-        return _arrive(flight, step, context)
+        return _arrive(flight, step, context, limits)
     if flight.stage is Stage.STAY and now_us - flight.since_us >= 1e6 * step.hold_s:
         return _hand_over(flight, step)
     return flight, NOTHING
@@ -211,8 +217,11 @@ def _begin(
     if step.action is MissionAction.LOOK_AT:
         following, event = _next(_reached(flight))
         return following, replace(event, looks=True, look_at=step.position)
-    if flight.speed is not None:
-        limits = replace(limits, speed=min(flight.speed, MAX_MISSION_SPEED))
+    if step.action is MissionAction.SKIP:
+        return _next(_reached(flight))
+    if step.action is MissionAction.JUMP:
+        return _jump(flight, step)
+    limits = _paced(flight, limits)
     place = _destination(step, at, context)
     end = project_to_safe_set(place, context.safe_set, context.now_us)
     segment = segment_to(at, end, _heading(step, end, context.look_at), limits)
@@ -223,9 +232,30 @@ def _begin(
     return moving, MissionEvent(text=text)
 
 
+def _paced(flight: MissionFlight, limits: MotionLimits) -> MotionLimits:
+    """The limits with the speed that the mission asked for."""
+    if flight.speed is None:
+        return limits
+    return replace(limits, speed=min(flight.speed, MAX_MISSION_SPEED))
+
+
+def _jump(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
+    """Go on with another step, until that was done as often as the mission says."""
+    number = flight.progress.current
+    taken = flight.jumps.count(number)
+    if 0 <= step.repeats <= taken:
+        return _next(_reached(flight))
+    if step.repeats > 0:
+        flight = replace(flight, jumps=(*flight.jumps, number))
+    following, event = _next(_reached(flight, over=False), step.target)
+    count = f"{taken + 1} of {step.repeats}" if step.repeats > 0 else "without end"
+    text = f"mission step {number}: jump to step {step.target}, {count}"
+    return following, replace(event, text="; ".join(filter(None, (text, event.text))))
+
+
 def _heading(step: MissionStep, end: Vec3, look_at: Vec3 | None) -> float | None:
     """The heading at the end of a segment [rad]: towards the place that is looked at, if any."""
-    if look_at is None or math.dist(look_at[:2], end[:2]) < _TOO_NEAR_TO_LOOK:
+    if look_at is None or math.dist(look_at[:2], end[:2]) < TOO_NEAR_TO_LOOK:
         return step.yaw
     return math.atan2(look_at[1] - end[1], look_at[0] - end[0])
 
@@ -236,8 +266,14 @@ def _destination(step: MissionStep, at: EndEffectorTarget, context: MissionConte
     x, y, z = step.position
     if step.above_home:
         z = min(z + context.home_z, 0.0)  # home may have been set below the ground
+    if step.here:
+        x, y = at.p_WE[:2]
     if step.action is MissionAction.LAND:
         return x, y, at.p_WE[2]  # the descent is the landing's
+    if step.action is MissionAction.CIRCLE:
+        dx, dy = at.p_WE[0] - x, at.p_WE[1] - y
+        bearing = math.atan2(dy, dx)  # above the centre: north
+        return x + abs(step.radius) * math.cos(bearing), y + abs(step.radius) * math.sin(bearing), z
     if step.action is MissionAction.TAKE_OFF:
         # The height is the base's, and a vehicle that is higher already does not come down.
         return at.p_WE[0], at.p_WE[1], at.p_WE[2] - max(-z - context.height, 0.0)
@@ -245,17 +281,37 @@ def _destination(step: MissionStep, at: EndEffectorTarget, context: MissionConte
 
 
 def _arrive(
-    flight: MissionFlight, step: MissionStep, context: MissionContext
+    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
 ) -> tuple[MissionFlight, MissionEvent]:
     place = flight.place
     off = 0.0 if step.position is None or place is None else math.dist(context.p_WE, place)
     if off <= step.acceptance:
+        if step.action is MissionAction.CIRCLE and not isinstance(flight.segment, CircleSegment):
+            return _circle(flight, step, context, limits), NOTHING
         return replace(flight, stage=Stage.STAY, since_us=context.now_us), NOTHING
     if context.now_us - flight.since_us < ARRIVAL_TIMEOUT_US:
         return flight, NOTHING
     following, event = _next(flight)
     text = f"mission step {flight.progress.current} not reached: {off:.2f} m away"
     return following, replace(event, text=text, unmet=True)
+
+
+def _circle(
+    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
+) -> MissionFlight:
+    """The circle itself, from the end of the way to it."""
+    assert flight.segment is not None
+    assert step.position is not None
+    at = flight.segment.at(context.now_us)
+    x, y, _ = step.position
+    if step.here:  # the way led straight from the centre to the north
+        x, y = at.p_WE[0] - abs(step.radius), at.p_WE[1]
+    centre = (x, y, at.p_WE[2])
+    circle = circle_from(
+        at, centre, step.radius, step.turns, context.look_at, _paced(flight, limits)
+    )
+    end = circle.at(circle.end_us).p_WE
+    return replace(flight, stage=Stage.MOVE, segment=circle, place=end, since_us=context.now_us)
 
 
 def _hand_over(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
@@ -267,17 +323,21 @@ def _hand_over(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight,
     return _next(_reached(flight))
 
 
-def _reached(flight: MissionFlight) -> MissionFlight:
+def _reached(flight: MissionFlight, *, over: bool = True) -> MissionFlight:
+    """The current step is done; with the last one the mission is, unless it is not ``over``."""
     now = flight.progress
-    last = now.current == now.total - 1
+    last = over and now.current == now.total - 1
     state = MissionState.COMPLETE if last else now.state
     progress = replace(now, state=state, reached=now.current, reached_count=now.reached_count + 1)
     return replace(flight, progress=progress)
 
 
-def _next(flight: MissionFlight) -> tuple[MissionFlight, MissionEvent]:
+def _next(
+    flight: MissionFlight, following: int | None = None
+) -> tuple[MissionFlight, MissionEvent]:
+    """Go on with the step that follows, by default the next one."""
     now = flight.progress
-    following = now.current + 1
+    following = now.current + 1 if following is None else following
     if following == now.total:
         done = replace(flight, progress=replace(now, state=MissionState.COMPLETE))
         return done, MissionEvent(Mode.HOLD, "mission done", "mission complete")

@@ -74,3 +74,21 @@ def as_motion(tilt: Tilt, specific_thrust: float) -> MotionSetpoint:
         GRAVITY - specific_thrust * cr * cp,
     )
     return MotionSetpoint(of_end_effector=False, a=a, yaw=tilt.yaw)
+
+
+def finite_or_zero(vector: Vec3) -> Vec3:
+    """A vector [any unit, any frame] with 0 in the axes that a setpoint leaves open."""
+    x, y, z = vector
+    if math.isfinite(x + y + z):
+        return vector
+    return (
+        0.0 if math.isnan(x) else x,
+        0.0 if math.isnan(y) else y,
+        0.0 if math.isnan(z) else z,
+    )
+
+
+def turn_level(ahead: Vec3, yaw: float) -> Vec3:
+    """A vector ``ahead`` [any unit, ahead, right, down] in NED, of a vehicle at ``yaw`` [rad]."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1], ahead[2]

@@ -65,7 +65,7 @@ QUIET: Final = np.dtype(
         ("rotors", _FLOAT, (4,)),  # N
         ("thrust", _FLOAT, (4,)),  # N, sent
         ("torque", _FLOAT, (2,)),  # N m, sent
-        ("observed", _FLOAT, (8,)),  # m/s, m/s^2
+        ("observed", _FLOAT, (9,)),  # m/s, m/s^2
         ("mass", _FLOAT),  # kg
         ("attitude", _FLOAT, (3,)),  # rad s
         ("height", _FLOAT),  # m s
@@ -185,7 +185,7 @@ def _four(x: Array) -> Vec4:
 
 @compilable
 def _observed(x: Any) -> Observed:
-    return Observed((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7]))
+    return Observed((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7]), x[8])
 
 
 @compilable
@@ -233,6 +233,7 @@ def _note_memory(a: Any, m: CascadeMemory, command: ActuatorCommand) -> None:
         a.attitude[i] = m.attitude[i]
     a.mass, a.height, a.off_plan = m.mass, m.height, m.off_plan
     k = m.joints
+    a.observed[8] = m.observed.recent
     for i in range(2):
         a.torque[i] = command.joint_torque[i]
         a.observed[6 + i] = m.observed.disturbance_bias[i]
@@ -407,7 +408,7 @@ def _take(
         *(*n.p, *n.v, *n.a, *n.j, *n.s, n.yaw, n.yaw_rate, *n.q_arm, *n.qd_arm),
         *(*u.a, u.yaw_acc, *u.qdd_arm),
         *(*m.rotors, *thrust, *torque),
-        *(*m.observed.v, *m.observed.d, *m.observed.disturbance_bias),
+        *(*m.observed.v, *m.observed.d, *m.observed.disturbance_bias, m.observed.recent),
         *(m.mass, *m.attitude, m.height),
         *[value for pair in m.joints for value in pair],
         m.off_plan,
@@ -431,7 +432,7 @@ def _memory(numbers: _Numbers, before: CascadeMemory) -> CascadeMemory:
     f1, f2, f3, f4 = numbers.take(4)
     sent1, sent2, sent3, sent4 = numbers.take(4)
     t1, t2 = numbers.take(2)
-    observed = _observed(numbers.take(8))
+    observed = _observed(numbers.take(9))
     (mass,), (x, y, z), (height,) = numbers.take(1), numbers.take(3), numbers.take(1)
     joints = _joints(numbers.take(10))
     (off_plan,) = numbers.take(1)

@@ -25,6 +25,7 @@ from functools import cache, lru_cache
 
 from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.compiled import compilable, kernel, machine_code
+from fsw.flight.offboard_setpoints import finite_or_zero
 from fsw.frozen import replace
 from fsw.geometry.vectors import add_scaled, dot, limit_norm, norm, subtract
 from fsw.model.body import Body, body_of, hull_reach
@@ -349,7 +350,8 @@ class ReferenceGovernor:
             left |= _LOW
         if motion.p is not None and motion.p[2] + hanging < highest - _TOLD:
             left |= _HIGH
-        if motion.v is not None and norm(motion.v) > fastest + _TOLD:
+        speed = 0.0 if motion.v is None else norm(finite_or_zero(motion.v))
+        if speed > fastest + _TOLD:
             left |= _FAST
         return self.reason(left, self._limits)
 

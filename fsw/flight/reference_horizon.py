@@ -10,11 +10,14 @@ from fsw.flight.reference_governor import ReferenceGovernor
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState, arrived
 from fsw.flight.state import FlightState, SetpointMemory
 from fsw.frozen import replace
+from fsw.geometry.vectors import norm, subtract
 from fsw.model.kinematics import point_in_flight
 from fsw.mpc.reference import sample, still_at
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import EndEffectorTarget, MotionSetpoint, SafeSet, StateEstimate, Vec2
+from fsw.signals import EndEffectorTarget, MotionSetpoint, SafeSet, StateEstimate, Vec2, Vec3
 
+_LEAD = 0.4  # m that a reference may be ahead of a vehicle at rest, as of one from outside
+_NEAR = 0.1  # m, of a vehicle at the largest speed
 _OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
 
 Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]
@@ -47,10 +50,10 @@ class ReferenceHorizon:
             nodes, period_us = self._config.planner.horizon + 1, self._config.mpc_period_us
             targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
             joints = ()
-            if not mode.external_reference:
-                same = not state.limited
-                return state if same else replace(state, limited=""), (targets, joints)
         p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        if not mode.external_reference and (reference is None or goal is None):
+            targets = _led_aside(targets, p_WE, v_WE, self._config.steering.speed)
+            return replace(state, limited="") if state.limited else state, (targets, joints)
         safe_set, why = state.kept.safe_set, ""
         if mode.external_reference:
             state, lowest = self._came_up(state, targets[0])
@@ -116,3 +119,25 @@ class ReferenceHorizon:
         # On the ground the plan may well be lower.
         low = height_above_ground(self._config, estimate) < self._config.limits.airborne_height
         return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN
+
+
+def _led_aside(
+    targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, fastest: float
+) -> tuple[EndEffectorTarget, ...]:
+    """The targets of a mode that generates no setpoint, as near as the ``fastest`` [m/s] leads.
+
+    The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED]. The height is left to
+    the mode: a landing asks for what is below the ground, at a speed of its own.
+    """
+    near = max(_LEAD * (1.0 - norm(v_WE) / fastest), _NEAR)
+    limited = []
+    for one in targets:
+        reach = near + 1e-6 * fastest * (one.t_us - targets[0].t_us)
+        north, east, _ = subtract(one.p_WE, p_WE)
+        away = math.hypot(north, east)
+        if away > reach:
+            share = reach / away
+            p = (p_WE[0] + share * north, p_WE[1] + share * east, one.p_WE[2])
+            one = replace(one, p_WE=p)
+        limited.append(one)
+    return tuple(limited)

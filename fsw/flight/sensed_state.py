@@ -22,6 +22,7 @@ from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
 from fsw.flight.jump import on_return, told
+from fsw.flight.missed_ticks import missed_inputs
 from fsw.flight.state import Aiding, FlightState, LostSensor
 from fsw.frozen import made, replace
 from fsw.measurements import ImuSample, JointSample, Sample
@@ -114,6 +115,21 @@ class SensedState:
         if state.invalid_ticks:
             state = replace(state, invalid_ticks=0)
         return state, memory, estimate, caught
+
+    def take_missed(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickInputs]:
+        """The state after ticks that were missed, and the ``inputs`` that are left for this one.
+
+        What came meanwhile is taken in its order; what the actuators did meanwhile is not known.
+        """
+        *missed, inputs = missed_inputs(state.t_us, inputs)
+        for one in missed:
+            now = 1e-6 * one.sensors.t_us
+            memory = _memory(state, now)
+            memory, estimate = self._fusion.take_in(memory, one.samples, now)
+            aloft = self._is_aloft(state, now)
+            memory, found = self._fusion.catch_up(memory, one.samples, now, estimate, aloft=aloft)
+            state = replace(state, fusion=memory, estimate=found or estimate or state.estimate)
+        return state, inputs
 
     def catch_up(
         self,

@@ -16,6 +16,7 @@ import math
 from dataclasses import dataclass
 
 from fsw.barriers.safe_approach import safe_approach_speed
+from fsw.flight.offboard_setpoints import finite_or_zero, turn_level
 from fsw.flight.orbit_path import looking_at, on_orbit
 from fsw.flight.reference_governor import SETTLE_RATE, ReferenceGovernor
 from fsw.frozen import replace
@@ -37,6 +38,7 @@ from fsw.signals import (
 _BRAKING_SHARE = 0.7  # of the acceleration; the rest is what stepping costs
 _ARRIVED = 0.02  # m
 _AT_REST = 0.05  # m/s
+_OPEN: Vec3 = (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,11 +203,9 @@ def _move_point(
     dt: float,
 ) -> tuple[Vec3, Vec3]:
     braking, most = _BRAKING_SHARE * limits.acceleration, limits.speed
-    wanted = (0.0, 0.0, 0.0) if motion.v is None else motion.v
-    if motion.along_heading:
-        wanted = _level(wanted, reference.yaw)
+    wanted = _velocity_asked(reference, motion, dt)
     if motion.p is not None:
-        error = subtract(motion.p, reference.p)
+        error = finite_or_zero(subtract(motion.p, reference.p))
         distance = norm(error)
         if distance > 0.0:
             cruise = min(goal.speed or limits.cruise_speed, limits.speed)
@@ -213,14 +213,23 @@ def _move_point(
                 most = max(cruise, goal.orbit.speed)
             closing = min(safe_approach_speed(distance, braking, SETTLE_RATE), cruise)
             wanted = add_scaled(wanted, error, closing / distance)
-    elif motion.v is None and motion.a is not None:
-        a = _level(motion.a, reference.yaw) if motion.along_heading else motion.a
-        wanted = add_scaled(reference.v, a, dt)
     wanted = limit_norm(wanted, most)
     change = limit_norm(subtract(wanted, reference.v), limits.acceleration * dt)
     v = add_scaled(reference.v, change, 1.0)
     mean = add_scaled(reference.v, change, 0.5)
     return add_scaled(reference.p, mean, dt), v
+
+
+def _velocity_asked(reference: ReferenceState, motion: MotionSetpoint, dt: float) -> Vec3:
+    """The velocity of each axis [m/s]: given; else 0 towards a place, or as accelerated."""
+    p, v, a = (vector or _OPEN for vector in (motion.p, motion.v, motion.a))
+    if motion.along_heading:
+        v, a = turn_level(v, reference.yaw), turn_level(a, reference.yaw)
+    grown = finite_or_zero(add_scaled(reference.v, a, dt))
+    x, y, z = (
+        (grown[k] if math.isnan(p[k]) else 0.0) if math.isnan(v[k]) else v[k] for k in range(3)
+    )
+    return x, y, z
 
 
 def _turn(
@@ -237,8 +246,3 @@ def _turn(
     change = clamp_magnitude(wanted - reference.yaw_rate, limits.yaw_acceleration * dt)
     yaw = wrap_angle(reference.yaw + dt * (reference.yaw_rate + 0.5 * change))
     return yaw, reference.yaw_rate + change
-
-
-def _level(ahead: Vec3, yaw: float) -> Vec3:
-    c, s = math.cos(yaw), math.sin(yaw)
-    return c * ahead[0] - s * ahead[1], s * ahead[0] + c * ahead[1], ahead[2]

@@ -118,6 +118,9 @@ class OffboardMemory:
     accepted: int = 0
     refused: int = 0
     tilt: Tilt = field(default_factory=Tilt)
+    problem: str = ""  # why the newest refused one was
+    problem_us: int = -1  # when it came
+    told_us: int = -1  # when a problem was reported last
 
     @property
     def heard_us(self) -> int:

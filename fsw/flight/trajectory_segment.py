@@ -1,4 +1,4 @@
-r"""A straight segment of a mission: from rest to rest, or from a speed to rest.
+r"""A segment of a mission, straight or along a circle, from rest or a speed to rest.
 
 The share s of the way rises with a rate that follows a cubic smooth step up, stays, and
 follows one down again:
@@ -12,13 +12,15 @@ follows another at rest. The fastest segment within a speed and an acceleration 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fsw.geometry.rotation import wrap_angle
 from fsw.geometry.vectors import subtract
 from fsw.signals import EndEffectorTarget, Vec3
 
 _PEAK = 1.5  # largest slope of S
+_ZERO: Vec3 = (0.0, 0.0, 0.0)
+TOO_NEAR_TO_LOOK = 0.3  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,79 @@ class TrajectorySegment:
             s, rate, bend = _rise(left, self.down)
             return 1.0 - u * s, u * rate, -u * bend
         return u * (t - 0.5 * self.up), u, 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CircleSegment:
+    """Some turns about a centre; share and timing are those of a segment of the same length."""
+
+    along: TrajectorySegment  # its way is the arc's length, its yaw the heading
+    centre: Vec3  # m, NED, at the height that is flown
+    radius: float  # m
+    bearing: float  # rad, of the start as seen from the centre
+    angle: float  # rad, flown in all; positive clockwise as seen from above
+    look_at: Vec3 | None = None  # m, NED, where the nose points; None: the heading stays
+
+    @property
+    def end_us(self) -> int:
+        """When the segment is flown."""
+        return self.along.end_us
+
+    def at(self, t_us: int) -> EndEffectorTarget:
+        """The reference at an instant, at rest before and after."""
+        line = self.along.at(t_us)
+        per_metre = self.angle / self.along.way[0]
+        angle = self.bearing + line.p_WE[0] * per_metre
+        rate, bend = line.v_WE[0] * per_metre, line.a_WE[0] * per_metre
+        c, s, r = math.cos(angle), math.sin(angle), self.radius
+        x, y, z = self.centre
+        p = (x + r * c, y + r * s, z)
+        yaw = line.yaw
+        if self.look_at is not None and math.dist(self.look_at[:2], p[:2]) > TOO_NEAR_TO_LOOK:
+            yaw = math.atan2(self.look_at[1] - p[1], self.look_at[0] - p[0])
+        return EndEffectorTarget(
+            t_us,
+            p,
+            (-r * s * rate, r * c * rate, 0.0),
+            (-r * (s * bend + c * rate * rate), r * (c * bend - s * rate * rate), 0.0),
+            yaw,
+        )
+
+
+Segment = TrajectorySegment | CircleSegment
+
+
+def circle_from(
+    start: EndEffectorTarget,
+    centre: Vec3,
+    radius: float,
+    turns: float,
+    look_at: Vec3 | None,
+    limits: MotionLimits,
+) -> CircleSegment:
+    """The fastest circle within limits from ``start`` on it, taken at rest, to rest.
+
+    It goes ``turns`` [1] about ``centre`` [m, NED] with ``radius`` [m], negative anticlockwise, and
+    points at ``look_at`` [m, NED].
+    """
+    x, y, z = start.p_WE[0] - centre[0], start.p_WE[1] - centre[1], start.p_WE[2]
+    r = abs(radius)
+    # Half of the acceleration turns the velocity, and leaves more than half for its size.
+    speed = min(limits.speed, math.sqrt(0.5 * limits.acceleration * r))
+    if look_at is not None:
+        speed = min(speed, limits.turn_rate * r)
+    share = math.sqrt(0.75)
+    arc = 2.0 * math.pi * r * turns
+    paced = replace(limits, speed=speed, acceleration=share * limits.acceleration)
+    from_zero = EndEffectorTarget(start.t_us, _ZERO, _ZERO, _ZERO, start.yaw)
+    return CircleSegment(
+        along=segment_to(from_zero, (arc, 0.0, 0.0), None, paced),
+        centre=(centre[0], centre[1], z),
+        radius=r,
+        bearing=math.atan2(y, x),
+        angle=math.copysign(2.0 * math.pi * turns, radius),
+        look_at=look_at,
+    )
 
 
 def segment_to(

@@ -10,6 +10,7 @@ from fsw.link.gcs_link import GcsLink, LinkSetup, RecordFrame
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice, addresses
+from fsw.link.sent_frames import SentFrames
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile, NoKeyFile
@@ -63,7 +64,7 @@ def build_links(
                 remote=choice.allow_remote,
             )
         )
-    times = SignedTimes()
+    times, sent = SignedTimes(), SentFrames()
     links = [
         GcsLink(
             setup,
@@ -73,6 +74,7 @@ def build_links(
             now_us,
             record if number == 0 else None,
             (TimeService(), *services()),
+            sent,
         )
         for number, setup in enumerate(setups)
     ]

@@ -13,6 +13,7 @@ from fsw.link.bounded_memory import renew
 from fsw.link.inbox import Inbox
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
+from fsw.link.sent_frames import SentFrames
 from fsw.link.services.service import Dispatch, LinkService
 from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
@@ -20,22 +21,32 @@ from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
 from fsw.link.udp_endpoint import Address, OpenEndpoint
 from fsw.link.wire import encode_replies, message_ids
-from fsw.link.wire.message_ids import AUTOPILOT
+from fsw.link.wire.decode import for_this_vehicle
+from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.ports import Clock
+from fsw.ports import Clock, LinkLosses
 from fsw.signals import CommandAck, FlightSnapshot, MessageSource, TickOutputs
+from messages import dialect
 from messages.frames import Frame, Losses, as_version_1, cut, is_version_1
 
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
 
 _LEAST_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
+_MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
 _HOUSEKEEPING_US: Final = 1_000_000
 _MESSAGE_ID: Final = slice(7, 10)  # in a frame
 # Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
+# Neither remembered, for they would fill the memory and do nothing when they come back.
 _FILE_DATA: Final = frozenset(
-    id_.to_bytes(3, "little") for id_ in (message_ids.LOG_DATA, message_ids.FILE_TRANSFER_PROTOCOL)
+    id_.to_bytes(3, "little")
+    for id_ in (
+        message_ids.LOG_DATA,
+        message_ids.LOGGING_DATA,
+        message_ids.LOGGING_DATA_ACKED,
+        message_ids.FILE_TRANSFER_PROTOCOL,
+    )
 )
 
 
@@ -63,14 +74,24 @@ class GcsLink:
         clock: Clock,
         record: RecordFrame | None = None,
         services: Sequence[LinkService] = (),
+        sent: SentFrames | None = None,
     ) -> None:
-        """Open the link; ``record`` takes all frames of both directions; the clock is wall time."""
+        """Open the link; ``record`` takes all frames of both directions; the clock is wall time.
+
+        What all links have ``sent`` is known again on each.
+        """
         self.name = setup.name
         self.losses = Losses()
         self.signing = signing
         self.outbox = Outbox(signing)
         self.dispatch = Dispatch(services, self.outbox.add_output)
         self.accepted = 0  # frames
+        self.echoes = 0  # frames of ours that came back: dropped
+        self.elsewhere = 0  # accepted frames for another system or component
+        self.unhandled: dict[int, int] = {}  # accepted frames of no use here, by message
+        self._sent = SentFrames() if sent is None else sent
+        handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
+        self._handled = frozenset[int]().union(*handled)
         self._read = 0  # datagrams
         self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
         self.talks = setup.unheard  # whether more than a heartbeat is sent
@@ -81,7 +102,7 @@ class GcsLink:
         self._context = context
         self._clock = clock
         self._record = record
-        self._commands = LinkCommands(self.rates, context)
+        self._commands = LinkCommands(self.rates, context, services)
         self._snapshot: FlightSnapshot | None = None
         self._speakers: dict[tuple[int, int], None] = {}  # the one heard last is the last
         self._housekeeping_us = 0
@@ -133,7 +154,9 @@ class GcsLink:
             self._read += 1
             budget -= max(len(datagram), _LEAST_COST)
             for frame, raw in cut(datagram, self.losses):
-                if not self.outbox.is_own(frame.system_id, frame.component_id):
+                if frame.system_id == SYSTEM_ID and raw in self._sent:
+                    self.echoes += 1
+                else:
                     self._take(t_us, frame, raw, sender)
         if self.outbox.waiting:
             self._send(t_us)
@@ -195,12 +218,22 @@ class GcsLink:
             "false_starts": self.losses.frames,
             "bytes_lost": self.losses.bytes,
             "datagrams_dropped": self.dropped,
+            "echoes_dropped": self.echoes,
+            "for_others": self.elsewhere,
+            "unhandled": {_message_name(id_): count for id_, count in self.unhandled.items()},
             "refused": asdict(self.signing.counters),
             "signed": self.signing.active,
             "peers": len(self.peers),
             "encode_failures": self.outbox.encode_failures,
             "service_failures": self.dispatch.failures,
         }
+
+    @property
+    def losses_so_far(self) -> LinkLosses:
+        """What came and was of no use."""
+        refused = sum(asdict(self.signing.counters).values())
+        unhandled = sum(self.unhandled.values())
+        return LinkLosses(self.losses.frames, self.echoes, refused, unhandled, self.dropped or 0)
 
     def close(self) -> None:
         """Close the socket."""
@@ -223,6 +256,7 @@ class GcsLink:
         if frame.message_id == message_ids.SETUP_SIGNING:
             self._set_up_signing(t_us, frame, sender)
             return
+        self._count_use(frame)
         host, port = sender
         source = MessageSource(
             frame.system_id, frame.component_id, self.name, f"{host}:{port}", self.signing.active
@@ -239,6 +273,15 @@ class GcsLink:
             if refusal is not None:
                 self.outbox.add_text(refusal, t_us)
         self.dispatch.handle(frame, t_us, source)
+
+    def _count_use(self, frame: Frame) -> None:
+        """Count what will not be answered, because nobody here is asked or nothing here can."""
+        if not for_this_vehicle(frame):
+            self.elsewhere += 1
+        elif frame.message_id not in self._handled:
+            count = self.unhandled.get(frame.message_id, 0)
+            if count or len(self.unhandled) < _MAX_UNHANDLED:
+                self.unhandled[frame.message_id] = count + 1
 
     def _set_up_signing(self, t_us: int, frame: Frame, sender: Address) -> None:
         armed = self._snapshot is not None and self._snapshot.armed
@@ -274,6 +317,11 @@ class GcsLink:
     def _send_to(self, peers: Collection[Address], frames: list[bytes]) -> None:
         if not peers or not frames:
             return
+        self._sent.add(frame for frame in frames if frame[_MESSAGE_ID] not in _FILE_DATA)
         for datagram in packed(frames):
             for peer in peers:
                 self._endpoint.send(datagram, peer)
+
+
+def _message_name(message_id: int) -> str:
+    return str(dialect.mavlink_map[message_id].msgname)

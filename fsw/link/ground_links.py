@@ -5,13 +5,14 @@ from __future__ import annotations
 import select
 import time
 from collections.abc import Sequence
+from dataclasses import astuple
 from operator import attrgetter
 from typing import Final
 
 from fsw.link.gcs_link import GcsLink
 from fsw.link.telemetry.stream_rates import SLOT_US
 from fsw.link.wire.px4_mode import shown_mode
-from fsw.ports import Clock
+from fsw.ports import Clock, LinkLosses
 from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
@@ -46,6 +47,12 @@ class GroundLinks:
     def received(self) -> int:
         """Datagrams that came over all links since the start, dropped ones too."""
         return sum(link.received for link in self.links)
+
+    @property
+    def losses(self) -> LinkLosses:
+        """What came over all links and was of no use."""
+        each = [astuple(link.losses_so_far) for link in self.links]
+        return LinkLosses(*map(sum, zip(*each, strict=True)))
 
     def poll(self, t_us: int) -> None:
         """Read what arrived, in lockstep; call it once a tick, after :meth:`publish`."""

@@ -15,6 +15,7 @@ from fsw.link.wire.decode_setpoints import (
     attitude_setpoint,
     body_setpoint,
     end_effector_setpoint,
+    global_setpoint,
     joint_setpoint,
 )
 from fsw.measurements import Sample
@@ -68,6 +69,7 @@ class Received:
     attitude: AttitudeSetpoint | None = None
     joints: JointSetpoint | None = None
     refused_setpoints: int = 0  # that were of no use
+    setpoint_problem: str = ""  # why the newest of them was; empty: it was for another vehicle
     station_heard: bool = False  # a ground station's heartbeat
     samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
     battery: BatteryReading | None = None  # the newest
@@ -106,6 +108,9 @@ class Inbox:
             message_ids.SET_MODE: partial(self._command, decode.set_mode),
             message_ids.END_EFFECTOR_TARGET: self._target,
             message_ids.SET_POSITION_TARGET_LOCAL_NED: partial(self._setpoint, body_setpoint),
+            message_ids.SET_POSITION_TARGET_GLOBAL_INT: partial(
+                self._setpoint, partial(global_setpoint, self.locate)
+            ),
             message_ids.SET_ATTITUDE_TARGET: partial(self._setpoint, attitude_setpoint),
             message_ids.ARM_JOINT_SETPOINT: partial(self._setpoint, joint_setpoint),
             message_ids.HEARTBEAT: self._heartbeat,
@@ -173,7 +178,7 @@ class Inbox:
             samples, self._received.samples = self._received.samples, []
             return TickInputs(
                 *(sensors, plan, (), (), (), None, None, None, 0, False),
-                *(mission, tuning, stale_us, tuple(samples), None, host, 0, ()),
+                *(mission, tuning, stale_us, tuple(samples), None, host, 0, (), ""),
             )
         came = self.take()
         return TickInputs(
@@ -195,6 +200,7 @@ class Inbox:
             host,
             came.sensor_clock_jump_us,
             tuple(came.refused),
+            came.setpoint_problem,
         )
 
     def _command(
@@ -235,14 +241,19 @@ class Inbox:
             return
         self._received.targets.append(target)
 
-    def _setpoint(self, read: Callable[[Numbers], Setpoint | None], frame: Frame) -> None:
-        """Keep the newest of each kind; one for another vehicle is refused like a wrong one."""
-        values = cast(Numbers, frame.payload_values)
-        setpoint = read(values) if decode.for_this_vehicle(frame) else None
-        received = self._received
+    def _setpoint(self, read: Callable[[Numbers], Setpoint], frame: Frame) -> None:
+        """Keep the newest of each kind; one for another vehicle is counted with the wrong ones."""
+        values, received = cast(Numbers, frame.payload_values), self._received
+        setpoint, problem = None, ""
+        if decode.for_this_vehicle(frame):
+            try:
+                setpoint = read(values)
+            except decode.RefusedError as error:
+                problem = f"{error}; from {self._source}"
         if setpoint is None:
             self.refused += 1
             received.refused_setpoints += 1
+            received.setpoint_problem = problem or received.setpoint_problem
         elif isinstance(setpoint, JointSetpoint):
             received.joints = setpoint
         elif isinstance(setpoint, AttitudeSetpoint):

@@ -86,10 +86,6 @@ class Outbox:
         for values in status_text.pieces(text.text, text.severity, self._text_id):
             self.add(AUTOPILOT, message_ids.STATUSTEXT, values)
 
-    def is_own(self, system: int, component: int) -> bool:
-        """Whether a frame from there is one of ours, sent back by a router."""
-        return system == SYSTEM_ID and component in self._writers
-
     def take(self) -> tuple[list[bytes], set[bytes]]:
         """Hand over the frames, in order, and those among them that were asked for."""
         frames, self._frames = self._frames, []

@@ -19,6 +19,7 @@ from messages.frames import FrameWriter
 _AGAIN_US: Final = 100_000
 _OVER_US: Final = 600_000  # a ground station waits for a second at least
 _MOST: Final = 16  # as many as a tick takes
+_NAMELESS: Final = 255  # in place of 0, which is for addressing only
 
 _Key = tuple[int, int, int]  # command, and system and component of the sender
 
@@ -41,8 +42,7 @@ class RoutedCommands:
 
     def add(self, request: CommandRequest) -> None:
         """Take a command; its sender has given up an earlier one that was the same."""
-        key = (request.command, request.source_system, request.source_component)
-        renew(self._waiting, key, _Waiting(request), _MOST)
+        renew(self._waiting, (request.command, *_name(request)), _Waiting(request), _MOST)
 
     def due(self, t_us: int) -> bytes:
         """Frames to send now, in the name of who sent the commands, as a router does."""
@@ -59,25 +59,36 @@ class RoutedCommands:
 
     def answered(self, acks: Iterable[CommandAck]) -> list[CommandAck]:
         """Those of the simulator's ``acks`` that somebody still waits for."""
-        return [ack for ack in acks if self._waiting.pop(_key(ack), None) is not None]
+        found = []
+        for ack in acks:
+            sender = (ack.target_system, ack.target_component)
+            one = self._waiting.pop((ack.command, *sender), None)
+            if one is not None:
+                found.append(_answer(one.request, ack.result))
+        return found
 
     def given_up(self, t_us: int) -> list[CommandAck]:
         """The answers to what the simulator has not answered; it may have been done or not."""
         over = [
-            key
+            (key, one.request)
             for key, one in self._waiting.items()
             if one.since_us >= 0 and t_us - one.since_us >= _OVER_US
         ]
-        for key in over:
+        for key, _ in over:
             del self._waiting[key]
-        return [CommandAck(key[0], CommandResult.FAILED, *key[1:]) for key in over]
+        return [_answer(request, CommandResult.FAILED) for _, request in over]
 
 
-def _key(ack: CommandAck) -> _Key:
-    return ack.command, ack.target_system, ack.target_component
+def _name(request: CommandRequest) -> tuple[int, int]:
+    """The sender, as a frame can say it; pymavlink's component is 0 unless it is told another."""
+    return request.source_system or _NAMELESS, request.source_component or _NAMELESS
+
+
+def _answer(request: CommandRequest, result: int) -> CommandAck:
+    return CommandAck(request.command, result, request.source_system, request.source_component)
 
 
 def _frame(request: CommandRequest, confirmation: int) -> bytes:
-    writer = FrameWriter(request.source_system, request.source_component)
+    writer = FrameWriter(*_name(request))
     values = (*request.params, request.command, SYSTEM_ID, SIMULATOR, confirmation)
     return writer.frame(message_ids.COMMAND_LONG, *values)

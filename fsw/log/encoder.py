@@ -8,16 +8,26 @@ each would cost more than the numbers in them.
 from __future__ import annotations
 
 import math
-import struct
 from dataclasses import astuple
 from operator import attrgetter
-from struct import Struct
 from typing import Any, Final
 
 from fsw.estimation.sensor_fault import Sensor
+from fsw.flight.estimator_report import (
+    ABOVE_GROUND,
+    ABSOLUTE,
+    HEIGHT,
+    LEVEL_VELOCITY,
+    RELATIVE,
+    VERTICAL_VELOCITY,
+)
+from fsw.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.log import samples, topics
 from fsw.log.json_codec import JsonCodec
+from fsw.log.packed import Packed, Records
+from fsw.log.px4_records import Px4Records, validity
+from fsw.measurements import ImuSample
 from fsw.model.kinematics import point_in_flight
 from fsw.ports import GroupTiming
 from fsw.signals import (
@@ -25,13 +35,15 @@ from fsw.signals import (
     EstimatorReport,
     FlightSnapshot,
     Mode,
+    Origin,
     PlanRequest,
     PlanTimings,
+    TestRatios,
     TickInputs,
     TickOutputs,
     Vec2,
 )
-from messages.ulog import Topic, data_head, logged_text
+from messages.ulog import logged_text
 
 TYPED: Final = "sensors"  # the inputs that have topics of their own
 SAMPLES: Final = "samples"
@@ -41,13 +53,18 @@ DETAIL_US: Final = {
     THIN: 20_000,
     FULL: 1,
 }  # from one record of what follows from others to the next
+FAST_US: Final = {THIN: 10_000, FULL: 1}
+PLAN_US: Final = {THIN: 50_000, FULL: 1}
 
 _UNMEASURED: Final = PlanTimings(math.nan, math.nan, math.nan)
 _NO_TIMES: Final = PlanTimings(-1.0, -1.0, -1.0)  # in inputs: JSON has no NaN
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
-_LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 _U16, _U32 = 0xFFFF, 0xFFFFFFFF
 
+_UNAIDED_US: Final = 1_000_000
+# In the order of TestRatios.
+_INNOVATION_BITS: Final = (0, 1, 2, 6, 9)
+_ROTARY_WING: Final = 1  # VEHICLE_TYPE of PX4
 _LOITER: Final = 4
 # PX4's NAVIGATION_STATE of what a mode does; the modes' own names are in the log as well.
 NAV_STATES: Final[dict[str, int]] = {
@@ -65,49 +82,39 @@ NAV_STATES: Final[dict[str, int]] = {
 }
 
 
-class _Packed:
-    """Records of some topics, packed in one call."""
-
-    def __init__(self, *members: Topic) -> None:
-        self.heads = tuple(data_head(topics.TOPICS.index(topic), topic) for topic in members)
-        self.struct = Struct("<" + "".join("5s" + topic.codes for topic in members))
-
-    def pack(self, values: tuple[Any, ...]) -> bytes:
-        """Pack heads and values; a number too large for a float becomes infinite."""
-        try:
-            return self.struct.pack(*values)
-        except OverflowError:
-            return self.struct.pack(*map(_within_float, values))
-
-
 # What a replay needs and what it is compared by: every tick in every profile.
-_TICK: Final = _Packed(topics.SENSOR_FRAME, topics.ACTUATOR_COMMAND)
-_SENSORS, _COMMAND = _TICK.heads
+(_SENSORS,), (_TICK,) = Packed(topics.SENSOR_FRAME).heads, Packed(topics.TICK).heads
+(_COMMAND,) = Packed(topics.ACTUATOR_COMMAND).heads
+_FRAME: Final = samples.FRAME
+_AS_SENT: Final = "5s" + topics.ACTUATOR_COMMAND.codes
+_SHORT_TICK: Final = Records(f"<5sQ{_AS_SENT}")
+_WHOLE_TICK: Final = Records(f"<5sQ{_FRAME.size}s{_AS_SENT}")
 # What follows from that, for reading.
-_DETAIL: Final = _Packed(
+_DETAIL: Final = Packed(
     topics.VEHICLE_ATTITUDE,
-    topics.VEHICLE_ANGULAR_VELOCITY,
     topics.VEHICLE_LOCAL_POSITION,
     topics.ACTUATOR_MOTORS,
     topics.ARM_JOINT_STATE,
 )
-_ATTITUDE, _RATES, _POSITION, _MOTORS, _ARM = _DETAIL.heads
-_IN_FLIGHT: Final = _Packed(
+_ATTITUDE, _POSITION, _MOTORS, _ARM = _DETAIL.heads
+# What tools look at the spectrum of.
+_RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
+_IN_FLIGHT: Final = Packed(
     topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
 )
 _POSITION_SETPOINT, _ARM_SETPOINT, _PLAN_INPUT = _IN_FLIGHT.heads
-_PLANNING: Final = _Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
+_PLANNING: Final = Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
 _BARRIER, _END_EFFECTOR = _PLANNING.heads
-_MPC: Final = _Packed(topics.MPC_STATUS)
-_REQUEST: Final = _Packed(topics.MPC_REQUEST)
-_STATUS: Final = _Packed(
+_MPC: Final = Packed(topics.MPC_STATUS)
+_REQUEST: Final = Packed(topics.MPC_REQUEST)
+_STATUS: Final = Packed(
     topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED, topics.FAILURE_DETECTOR_STATUS
 )
-_ASKED: Final = _Packed(topics.VEHICLE_COMMAND)
-_ANSWERED: Final = _Packed(topics.VEHICLE_COMMAND_ACK)
-_INPUT: Final = _Packed(topics.TICK_INPUT)
-_TIMING: Final = _Packed(topics.LOOP_TIMING)
-_ESTIMATOR: Final = _Packed(
+_ASKED: Final = Packed(topics.VEHICLE_COMMAND)
+_ANSWERED: Final = Packed(topics.VEHICLE_COMMAND_ACK)
+_INPUT: Final = Packed(topics.TICK_INPUT)
+_TIMING: Final = Packed(topics.LOOP_TIMING)
+_ESTIMATOR: Final = Packed(
     topics.ESTIMATOR_STATUS, topics.ESTIMATOR_INNOVATIONS, topics.ESTIMATOR_SENSOR_BIAS
 )
 
@@ -116,14 +123,26 @@ class LogEncoder:
     """Turns ticks into bytes; remembers what it has written, to write changes only."""
 
     def __init__(
-        self, *, measured: bool, thrust_max: float, link_length: Vec2, profile: int = FULL
+        self,
+        *,
+        measured: bool,
+        thrust_max: float,
+        link_length: Vec2,
+        profile: int = FULL,
+        origin: Origin = DEFAULT_ORIGIN,
     ) -> None:
         """Start a log; without times ``measured`` by the wall clock it repeats to the byte.
 
         A rotor gives ``thrust_max`` [N]; the arm's links have ``link_length`` [m]; THIN or FULL.
+        The local frame begins at ``origin``.
         """
-        self._detail_us = DETAIL_US[profile]
-        self._detailed = -1  # number of the interval of which details were written last
+        self._detail_us, self._fast_us = DETAIL_US[profile], FAST_US[profile]
+        self._plan_us = PLAN_US[profile]
+        # Numbers of the intervals that were written last.
+        self._detailed = self._fast = self._planned = -1
+        self._px4 = Px4Records(1.0 / thrust_max, origin)
+        self._imu: ImuSample | None = None  # the last one
+        self._took_over = False  # the pilot, from a failsafe whose condition still holds
         self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
         self._measured = measured
         self._per_newton = 1.0 / thrust_max
@@ -140,12 +159,8 @@ class LogEncoder:
         out += self._every_tick(inputs, snapshot)
         for sample in inputs.samples:
             out += samples.record(inputs.sensors.t_us, sample)
-        interval = snapshot.t_us // self._detail_us
-        if interval != self._detailed:
-            self._detailed = interval
-            out += self._detail(snapshot)
-            if snapshot.plan_state is not None:
-                out += self._in_flight(snapshot)
+        self._timed(snapshot, out)
+        self._px4.add(snapshot, out)
         self._add_inputs(inputs, out)
         last = self._last
         if last is None or snapshot.constraints is not last.constraints:
@@ -154,10 +169,7 @@ class LogEncoder:
             out += self._mpc(snapshot)
         if outputs.plan_request is not None:
             out += _request(snapshot.t_us, outputs.plan_request)
-        self._ticks_to_status -= 1
-        if self._ticks_to_status < 0 or last is None or _status_changed(snapshot, last):
-            self._ticks_to_status = STATUS_TICKS - 1
-            out += _status(snapshot)
+        self._add_status(snapshot, last, out)
         for ack in outputs.acks:
             addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
             values = (ack.command & _U32, ack.result & 0xFF, *addressee)
@@ -166,16 +178,49 @@ class LogEncoder:
             out += logged_text(text.severity & 7, snapshot.t_us, text.text)
         self._last = snapshot
 
+    def _timed(self, snapshot: FlightSnapshot, out: bytearray) -> None:
+        """What has a rate of its own, as far as it is due."""
+        interval = snapshot.t_us // self._detail_us
+        if interval != self._detailed:
+            self._detailed = interval
+            out += self._detail(snapshot)
+        if snapshot.plan_state is not None and snapshot.t_us // self._plan_us != self._planned:
+            self._planned = snapshot.t_us // self._plan_us
+            out += self._in_flight(snapshot)
+        if snapshot.t_us // self._fast_us != self._fast:
+            self._fast = snapshot.t_us // self._fast_us
+            out += _RATES.pack((*_RATES.heads, snapshot.t_us, *snapshot.estimate.w_WB_B))
+
+    def _add_status(
+        self, snapshot: FlightSnapshot, last: FlightSnapshot | None, out: bytearray
+    ) -> None:
+        """Mode, landing and faults, on change and every second."""
+        self._ticks_to_status -= 1
+        if self._ticks_to_status < 0 or last is None or _status_changed(snapshot, last):
+            self._ticks_to_status = STATUS_TICKS - 1
+            if not snapshot.failures or snapshot.failsafe_from is not None:
+                self._took_over = False
+            elif last is not None and last.failsafe_from is not None:
+                self._took_over = True
+            out += _status(snapshot, self._took_over)
+
     def _every_tick(self, inputs: TickInputs, snapshot: FlightSnapshot) -> bytes:
-        sensors, sent = inputs.sensors, snapshot.actuators
-        t_us = sensors.t_us
-        return _TICK.pack(
-            (
-                _SENSORS, t_us, *sensors.p_WB, *sensors.v_WB, *sensors.q_WB,
-                *sensors.gyro_B, *sensors.accel_B, *sensors.q_arm, *sensors.qd_arm,
-                _COMMAND, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed,
-            )
-        )  # fmt: skip
+        one, sent = inputs.sensors, snapshot.actuators
+        t_us = one.t_us
+        for sample in inputs.samples:
+            if type(sample) is ImuSample:
+                self._imu = sample
+                self._px4.feel(sample.acceleration, sample.rate)
+        if not inputs.samples:
+            self._px4.feel(one.accel_B, one.gyro_B)
+        numbers = _FRAME.pack(
+            *one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *one.q_arm, *one.qd_arm
+        )
+        command = (_COMMAND, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
+        # Where sensors have times of their own, the frame has nothing that a sample does not say.
+        if self._imu is not None and numbers == samples.frame_of(self._imu):
+            return _SHORT_TICK.pack((_TICK, t_us, *command))
+        return _WHOLE_TICK.pack((_SENSORS, t_us, numbers, *command))
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
         estimate, sent = snapshot.estimate, snapshot.actuators
@@ -184,8 +229,8 @@ class LogEncoder:
         return _DETAIL.pack(
             (
                 _ATTITUDE, t_us, *quaternion_from_matrix(estimate.R_WB),
-                _RATES, t_us, *estimate.w_WB_B,
                 _POSITION, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
+                *validity(snapshot), -estimate.p_WB[2], _sees_ground(snapshot),
                 _MOTORS, t_us, k * f1, k * f2, k * f3, k * f4,
                 _ARM, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
             )
@@ -279,16 +324,22 @@ def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
     )
 
 
+def _sees_ground(snapshot: FlightSnapshot) -> bool:
+    """Whether a distance to the ground is measured and used."""
+    return snapshot.estimator is not None and bool(snapshot.estimator.flags & ABOVE_GROUND)
+
+
 def _status_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
     return (
         now.mode is not last.mode
         or now.armed is not last.armed
         or now.landed is not last.landed
+        or now.failsafe_from is not last.failsafe_from
         or (now.failures is not last.failures and now.failures != last.failures)
     )
 
 
-def _status(snapshot: FlightSnapshot) -> bytes:
+def _status(snapshot: FlightSnapshot, took_over: bool) -> bytes:
     mode: Mode = snapshot.mode
     head, landing, found = _STATUS.heads
     known = snapshot.actuators_found
@@ -297,6 +348,7 @@ def _status(snapshot: FlightSnapshot) -> bytes:
         (
             *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES.get(mode.value, _LOITER)),
             *(bool(snapshot.failures), mode.value.encode(), ",".join(snapshot.failures).encode()),
+            *(took_over, _ROTARY_WING, False),
             *(landing, snapshot.t_us, snapshot.landed),
             *(found, snapshot.t_us, rotors != 0, rotors, known.effect, known.lost),
             *(known.disobeys, *(round(kind) for kind in known.joints)),
@@ -320,6 +372,7 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
             *(ratios.heading, ratios.velocity, ratios.place, ratios.height, ratios.above_ground),
             *(*accuracy, math.nan if known.unaided_us < 0 else 1e-6 * known.unaided_us),
             *(known.pose_delay, known.resets & _U32, known.flags, faults.encode()),
+            *(_unusable(known), _unaided(known), _refused(ratios), 0.0),
             *(innovations, t_us, *fix[3:], *fix[:3], *pose),
             *known.innovation(Sensor.BAROMETER.value, 1),
             *known.innovation(Sensor.RANGEFINDER.value, 1),
@@ -328,6 +381,28 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
             *(*known.accel_bias, *known.accel_bias_variance),
         )
     )
+
+
+def _unusable(known: EstimatorReport) -> int:
+    """Bits of velocity, position and height that are of no use."""
+    flags = known.flags
+    usable = (
+        flags & LEVEL_VELOCITY and flags & VERTICAL_VELOCITY,
+        flags & (RELATIVE | ABSOLUTE),
+        flags & HEIGHT,
+    )
+    return sum(1 << bit for bit, well in enumerate(usable) if not well)
+
+
+def _unaided(known: EstimatorReport) -> int:
+    """The same bits of what nothing has corrected for a second; one sensor corrects all three."""
+    return 0 if 0 <= known.unaided_us <= _UNAIDED_US else 7
+
+
+def _refused(ratios: TestRatios) -> int:
+    """PX4's bits of innovations that were refused: velocity, place, height, heading, ground."""
+    tested = zip(_INNOVATION_BITS, ratios, strict=True)
+    return sum(1 << bit for bit, ratio in tested if ratio > 1.0)
 
 
 def _request(t_us: int, request: PlanRequest) -> bytes:
@@ -358,10 +433,3 @@ def _add_text(t_us: int, name: str, text: bytes, out: bytearray) -> None:
 
 def _filled(values: tuple[float, ...]) -> tuple[float, ...]:
     return values + (math.nan,) * (topics.MARGINS - len(values))
-
-
-def _within_float(value: Any) -> Any:
-    """The value, or infinity where a 32-bit float has no room for it."""
-    if isinstance(value, float) and _LARGEST < abs(value) < math.inf:
-        return math.copysign(math.inf, value)
-    return value

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import resource
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
+from fsw.log.px4_records import cpu_load, origin_of
 from fsw.log.topics import TOPICS
 from fsw.ports import GroupTiming
 from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
@@ -28,6 +31,7 @@ Number = int | float | bool
 _FLUSH_INTERVAL_US: Final = 250_000
 _FLUSH_BYTES: Final = 1 << 16
 _OF_THE_LOOP: Final = 1  # tag of its sentences
+_TICK_GROUP: Final = 0  # PANDION_RATE_GROUP
 _UNMEASURED: Final = (math.nan,) * 6
 
 
@@ -74,6 +78,7 @@ class FlightLog:
             thrust_max=subject.thrust_max,
             link_length=subject.link_length,
             profile=subject.profile,
+            origin=origin_of(subject.numbers),
         )
         pacing = "lockstep" if lockstep else "realtime"
         self._records += definitions(t_us, subject, pacing, self._encoder.inputs.schema)
@@ -100,6 +105,8 @@ class FlightLog:
         if not self._measured:  # being late or skipped is measured too
             timing = GroupTiming(timing.period_us, timing.ticks, 0, 0, *_UNMEASURED)
         self._records += loop_timing(t_us, group, timing)
+        if self._measured and group == _TICK_GROUP and timing.period_us > 0:
+            self._records += cpu_load(t_us, timing.execution_p50_us / timing.period_us, _memory())
 
     def add_notice(self, t_us: int, notice: StatusText) -> None:
         """Append a text of the loop; a replay of the tick does not repeat it."""
@@ -123,12 +130,19 @@ class FlightLog:
             self._unmarked_us += t_us - begin_us
 
 
+def _memory() -> float:
+    """The largest share of the machine's memory that the process had so far."""
+    pages, size = os.sysconf("SC_PHYS_PAGES"), os.sysconf("SC_PAGE_SIZE")
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (pages * size)
+
+
 def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
     """Everything before the first record, with the shape of the inputs, to read them back."""
     exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
     named = {**subject.numbers, **subject.parameters}
     facts: dict[str, str | int] = {
         "sys_name": "Pandion",
+        "ver_data_format": 2,  # of PX4's topics: degrees and metres of vehicle_gps_position
         **subject.facts,
         "pacing": pacing,
         "profile": subject.profile,

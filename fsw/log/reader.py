@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from fsw.log import samples, topics
+from fsw.log import px4_topics, samples, topics
 from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
+from fsw.measurements import ImuSample, Sample
 from fsw.signals import SensorFrame, TickInputs
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
@@ -18,7 +19,10 @@ __all__ = ["Gap", "LoggedTick", "UlogError", "UlogFile", "open_flight", "ticks"]
 
 _SENSORS: Final = topics.TOPICS.index(topics.SENSOR_FRAME)
 _INPUT: Final = topics.TOPICS.index(topics.TICK_INPUT)
-_TIMING: Final = topics.TOPICS.index(topics.LOOP_TIMING)
+_TICK: Final = topics.TOPICS.index(topics.TICK)
+_OF_THE_LOOP: Final = frozenset(
+    {topics.TOPICS.index(topics.LOOP_TIMING), topics.TOPICS.index(px4_topics.CPULOAD)}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +80,7 @@ def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
         elif record.kind == ulog.SYNC:
             ended = True
         elif _of_a_tick(record):
-            if record.number == _SENSORS and records:
+            if record.number in (_SENSORS, _TICK) and records:
                 yield inputs.tick(index, records)
                 index, records = index + 1, []
                 if lost_ms:
@@ -95,7 +99,7 @@ def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
 def _of_a_tick(record: Record) -> bool:
     """Whether the encoder writes it: timing is the loop's, truth the simulator's."""
     if record.kind == ulog.DATA:
-        return record.number < len(topics.TOPICS) and record.number != _TIMING
+        return record.number < len(topics.TOPICS) and record.number not in _OF_THE_LOOP
     return record.kind == ulog.TEXT
 
 
@@ -107,13 +111,15 @@ class _Inputs:
         self._codec = JsonCodec(TickInputs)
         self._values: dict[str, Any] = {}
         self._pieces = b""
+        self._imu: ImuSample | None = None  # the last one
         self._sensors = unpacker(topics.SENSOR_FRAME)
         self._input = unpacker(topics.TICK_INPUT)
 
     def tick(self, index: int, records: list[Record]) -> LoggedTick:
         if index == 0:
             self._check_numbers()
-        measured = []
+        measured: list[Sample] = []
+        short_us: int | None = None
         try:
             for record in records:
                 if record.kind != ulog.DATA:
@@ -122,12 +128,25 @@ class _Inputs:
                     measured.append(samples.sample_of(record.number, record.body))
                 elif record.number == _SENSORS:
                     self._values[TYPED] = _sensor_frame(self._sensors.unpack(record.body))
+                elif record.number == _TICK:
+                    short_us = int.from_bytes(record.body, "little")
                 elif record.number == _INPUT:
                     self._take(record.body)
             self._values[SAMPLES] = tuple(measured)
+            self._imu = next(
+                (one for one in reversed(measured) if isinstance(one, ImuSample)), self._imu
+            )
+            if short_us is not None:
+                self._values[TYPED] = self._of_samples(short_us)
             return LoggedTick(index, TickInputs(**self._values), records)
         except (ValueError, TypeError) as error:
             raise UlogError(f"{self._log.path} is damaged in tick {index}: {error}") from None
+
+    def _of_samples(self, t_us: int) -> SensorFrame:
+        """The frame of a tick that says nothing but what the inertial unit measured last."""
+        if self._imu is None:
+            raise ValueError("it repeats what an inertial unit says, and none was heard")
+        return _sensor_frame((t_us, *samples.FRAME.unpack(samples.frame_of(self._imu))))
 
     def _check_numbers(self) -> None:
         for number, topic in enumerate(topics.TOPICS):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
-from struct import Struct
+from struct import Struct, pack
 from typing import Any, Final
 
 from fsw.log import topics
@@ -13,6 +14,11 @@ from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 
 Values = tuple[Any, ...]
+FRAME: Final = Struct("<" + "".join(field.code for field in topics.SENSOR_FRAME.fields))
+_SIX: Final = Struct("<6d")
+_UNKNOWN_POSE: Final = pack("<10d", *(math.nan,) * 10)  # position, velocity and attitude
+_UNKNOWN_ARM: Final = pack("<4d", *(math.nan,) * 4)  # angles and rates
+_LATEST: Final = 1e12  # s; what is later fits no field
 
 
 def _of_imu(one: ImuSample) -> Values:
@@ -25,7 +31,7 @@ def _of_joints(one: JointSample) -> Values:
 
 def _of_pose(one: PoseSample) -> Values:
     place = (one.time, *one.position, *one.attitude, *one.position_variance)
-    return (*place, *one.attitude_variance, one.reset_counter, one.drifts)
+    return (*place, *one.attitude_variance, one.reset_counter, one.drifts, _sampled_us(one))
 
 
 # The frequent ones; :class:`_Codec` finds the values of any other by the names of its fields.
@@ -36,6 +42,11 @@ _VALUES: Final[dict[type, Callable[[Any], Values]]] = {
 }
 
 
+def _sampled_us(one: Sample) -> int:
+    """When it was measured [us]; 0 before the clock began or where that is not known."""
+    return round(1e6 * one.time) if 0.0 <= one.time < _LATEST else 0
+
+
 class _Codec:
     """Records of one kind of sample."""
 
@@ -43,7 +54,8 @@ class _Codec:
         self.number = topics.TOPICS.index(topic)
         self._kind = kind
         self._names = tuple(field.name for field in dataclasses.fields(kind))
-        self._sizes = tuple(field.count for field in topic.fields)  # 0: a number by itself
+        own = [field for field in topic.fields if field.name != topics.SAMPLED]
+        self._sizes = tuple(field.count for field in own)  # 0: a number by itself
         self.head = data_head(self.number, topic)
         self.pack = Struct("<5s" + topic.codes).pack
         self.values = _VALUES.get(kind, self._any_values)
@@ -68,6 +80,11 @@ class _Codec:
         for size in self._sizes:
             yield values[at : at + size] if size else values[at]
             at += max(size, 1)
+
+
+def frame_of(imu: ImuSample) -> bytes:
+    """The numbers of a frame of sensors of which the inertial unit alone is known."""
+    return _UNKNOWN_POSE + _SIX.pack(*imu.rate, *imu.acceleration) + _UNKNOWN_ARM
 
 
 _CODECS: Final = {kind: _Codec(kind, topic) for kind, topic in topics.OF_SAMPLES.items()}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.log import px4_topics
 from fsw.measurements import (
     GnssSample,
     ImuSample,
@@ -21,12 +22,13 @@ from fsw.measurements import (
 )
 from messages.ulog import Field, Topic, doubles
 
-TEXT_SIZE: Final = 200  # characters of an input's text in one record
+TEXT_SIZE: Final = 140  # characters of an input's text in one record
 MARGINS: Final = 16
+SAMPLED: Final = "timestamp_sample"
 
 EVERY_TICK: Final = "every tick"
 DETAIL: Final = "50 Hz; every tick with `LOG_PROFILE` 1"
-DETAIL_IN_FLIGHT: Final = "in flight, 50 Hz; every tick with `LOG_PROFILE` 1"
+DETAIL_IN_FLIGHT: Final = "in flight, 20 Hz; every tick with `LOG_PROFILE` 1"
 PLANNING: Final = "every planning cycle"
 CHANGE: Final = "on change"
 
@@ -53,11 +55,17 @@ SENSOR_FRAME: Final = Topic(
         doubles("qd_arm", 2, "rad/s"),
     ),
 )
+TICK: Final = Topic(
+    "tick",
+    "In place of a `sensor_frame` that has nothing but the last `sensor_combined`",
+    "every tick, where sensors have times of their own",
+    (),
+)
 VEHICLE_ATTITUDE: Final = Topic(
     "vehicle_attitude", "Estimate", DETAIL, (_vector("q", 4, "[w, x, y, z], body to NED"),)
 )
 VEHICLE_ANGULAR_VELOCITY: Final = Topic(
-    "vehicle_angular_velocity", "Estimate", DETAIL, (_vector("xyz", 3, "rad/s, body"),)
+    "vehicle_angular_velocity", "Estimate", px4_topics.FAST, (_vector("xyz", 3, "rad/s, body"),)
 )
 VEHICLE_LOCAL_POSITION: Final = Topic(
     "vehicle_local_position",
@@ -67,6 +75,9 @@ VEHICLE_LOCAL_POSITION: Final = Topic(
         *_floats("x", "y", "z", note="m, NED"),
         *_floats("vx", "vy", "vz", note="m/s, NED"),
         *_floats("heading", note="rad"),
+        *(Field(name, "bool") for name in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid")),
+        *_floats("dist_bottom", note="m, above the origin: the ground is taken for flat"),
+        Field("dist_bottom_valid", "bool", note="a rangefinder is used"),
     ),
 )
 ACTUATOR_COMMAND: Final = Topic(
@@ -207,6 +218,9 @@ VEHICLE_STATUS: Final = Topic(
         Field("failsafe", "bool", note="a fault is active"),
         Field("mode", "char", 16, "Pandion's name of the mode"),
         Field("failures", "char", 96, "names of the active faults"),
+        Field("failsafe_and_user_took_over", "bool", note="after a failsafe, and it lasts"),
+        Field("vehicle_type", "uint8_t", note="1 rotary wing"),
+        Field("is_vtol", "bool"),
     ),
 )
 FAILURE_DETECTOR_STATUS: Final = Topic(
@@ -301,6 +315,7 @@ VEHICLE_VISUAL_ODOMETRY: Final = Topic(
         doubles("orientation_variance", 3, "rad^2"),
         Field("reset_counter", "uint32_t"),
         Field("drifts", "bool", note="its frame does, as the variances say"),
+        Field(SAMPLED, "uint64_t", note="us; `time` again, as PX4 writes it"),
     ),
 )
 GNSS_LOCAL: Final = Topic(
@@ -345,7 +360,7 @@ JOINT_ENCODERS: Final = Topic(
     _MEASURED,
     (_MEASURED_AT, doubles("angle", 2, "rad")),
 )
-# Each kind of sample and its topic, whose fields are the sample's, in their order.
+# Each kind of sample and its topic, whose fields are the sample's, in their order, and SAMPLED.
 OF_SAMPLES: Final[dict[type[Sample], Topic]] = {
     ImuSample: SENSOR_COMBINED,
     PoseSample: VEHICLE_VISUAL_ODOMETRY,
@@ -372,6 +387,15 @@ ESTIMATOR_STATUS: Final = Topic(
         Field("reset_count", "uint32_t", note="jumps of the estimate"),
         Field("solution_status_flags", "uint16_t", note="ESTIMATOR_STATUS_FLAGS"),
         Field("faults", "char", 96, "sensors with something wrong, and what"),
+        Field("health_flags", "uint8_t", note="bits of no use: velocity, position, height"),
+        Field("timeout_flags", "uint8_t", note="the same bits, not corrected for a second"),
+        Field(
+            "innovation_check_flags",
+            "uint16_t",
+            note="PX4's bits of what was refused: 0 velocity, 1 position, 2 height, 6 heading, "
+            "9 height above ground",
+        ),
+        *_floats("time_slip", note="s; the filter goes by the sensors' clock alone: 0"),
     ),
 )
 ESTIMATOR_INNOVATIONS: Final = Topic(
@@ -428,5 +452,7 @@ TOPICS: Final = (
     ESTIMATOR_STATUS,
     ESTIMATOR_INNOVATIONS,
     ESTIMATOR_SENSOR_BIAS,
+    TICK,
+    *px4_topics.PX4_TOPICS,
 )
 """Everything the flight software writes; a topic's place is its number in the file."""

@@ -96,6 +96,7 @@ class Planner:
             np.array([target.yaw for target in request.targets]),
             np.array(request.joint_targets) if request.joint_targets else None,
             request.t_apply_us,
+            request.recent_disturbance,
         )
         asked = Question(ocp, start, targets, self._guess(request.t_apply_us))
         search = SOLVERS[self._config.solver](asked, self._config, self._stopwatch_us)

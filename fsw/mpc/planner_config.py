@@ -29,11 +29,14 @@ class PlannerConfig:
     # Beside walls the end-effector counts too, which swings more than the base wanders.
     walls: BarrierTuning = field(default_factory=lambda: BarrierTuning(lambda_=0.35))
     workspace: BarrierTuning = field(default_factory=BarrierTuning)
+    # m/s, that lambda follows the disturbance down to beside walls; 0: it does not
+    lambda_min: float = 0.0
     barrier_slack: float = 20.0  # penalty of a m/s less than the barrier requires
     # hc
     tightening: float = 0.0  # m, kept in addition to the safe set
     hard_slack: float | None = None  # penalty of a m outside; None: hard, as in the paper
     hard_skipped_nodes: int = 0
+    hard_terminal: bool = False  # the last node is to be where braking suffices, as of the barrier
     # sc, and naive with centring
     soft: SoftWeights = field(default_factory=SoftWeights)
     centred: bool = False

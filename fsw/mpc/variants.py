@@ -64,7 +64,25 @@ def _hard(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Oc
         skipped_nodes=config.hard_skipped_nodes,
         most=config.limits.most,
     )
-    return OcpTerms(costs, (rows,), config.hard_slack)
+    if not config.hard_terminal:
+        return OcpTerms(costs, (rows,), config.hard_slack)
+    return OcpTerms(costs, (rows, _terminal(config, model, safe_set)), config.hard_slack)
+
+
+def _terminal(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> ZoneRows:
+    """``h >= 0`` at the last node alone, with the tightening: from there braking suffices."""
+    # At gamma T = 1 nothing is left of the h at the start, and lambda is what is required.
+    wall, workspace = (
+        replace(
+            tuning,
+            gamma=1.0 / config.period,
+            lambda_=max(tuning.slope * config.tightening, 1e-6),
+            skipped_nodes=config.horizon - 1,
+        )
+        for tuning in config.tunings
+    )
+    body = body_of(config.body, model.airframe)
+    return ZoneRows(safe_set, body, model, (wall, workspace), most=config.limits.most)
 
 
 def _soft(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
@@ -92,7 +110,14 @@ def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Ocp
     costs, body = (TrackingCost(config.weights),), body_of(config.body, model.airframe)
     if not safe_set.zones:
         return OcpTerms(costs)
-    barrier = ZoneRows(safe_set, body, model, config.tunings, most=config.limits.most)
+    barrier = ZoneRows(
+        safe_set,
+        body,
+        model,
+        config.tunings,
+        most=config.limits.most,
+        least_lambda=config.lambda_min,
+    )
     return OcpTerms(costs, (barrier,), config.barrier_slack)
 
 

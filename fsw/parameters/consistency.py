@@ -11,9 +11,11 @@ Source: docs/equations.md T5.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from fsw.barriers.safe_approach import BarrierTuning
+import numpy as np
+
+from fsw.barriers.safe_approach import LOUD, BarrierTuning
 from fsw.control.gains import tracking_gains
 from fsw.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
 from fsw.control.tube import (
@@ -21,6 +23,7 @@ from fsw.control.tube import (
     Tube,
     all_axes,
     all_axes_up_to,
+    base_after,
     estimate_tube,
     limits_used,
     tube,
@@ -32,6 +35,7 @@ from fsw.shapes import kind_of
 from fsw.signals import SafeSet, Zone
 
 _SIGMAS = 3.0  # that count where clearances do not grow
+_SEEN_S = 0.02  # in which the observer sees what begins: two of its time constants
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
     if config.inner == "tracking":
         if others:
             findings += _tubes_of_parts(config, loop, others)
+            findings += _returns(config, loop)
         findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
 
@@ -295,6 +300,61 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) ->
         f"the boundary: margin {(room - reach) * 1e3:+.0f} mm",
         f"lambda >= {reach * tuning.slope:.3f} m/s is enough",
     )
+
+
+def _returns(config: FlightConfig, loop: Tube) -> list[Finding]:
+    """Whether lambda is back before a sudden disturbance has used up what is kept meanwhile."""
+    least, tuning = config.planner.lambda_min, config.planner.walls
+    if not tuning.following(0.0, least) < tuning.lambda_:
+        return []
+    room, low, high = return_room(config, loop, least), least, tuning.lambda_
+    while not room >= 0.0 and high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        enough = return_room(config, loop, middle) >= 0.0
+        low, high = (low, middle) if enough else (middle, high)
+    kept = stand_off(replace(tuning, lambda_=least))
+    return [
+        _finding(
+            "return of lambda",
+            room >= 0.0,
+            f"after little disturbance the plan keeps {kept * 1e3:.0f} mm, and when "
+            f"{config.surroundings.disturbance:g} m/s^2 begin on one axis lambda is back with "
+            f"{room * 1e3:+.0f} mm left",
+            f"SAFE_LAMBDA_MIN >= {math.ceil(1e3 * high) / 1e3:.3f} m/s is enough, and 0 keeps "
+            "lambda whole",
+        )
+    ]
+
+
+def return_room(config: FlightConfig, loop: Tube, least: float) -> float:
+    """Least distance [m] of the base to a wall after a disturbance that begins in still air.
+
+    Lambda follows the disturbance down to ``least`` [m/s]. The worst of all instants, and of all
+    that may have been observed before, which has the base as far off its plan as the tube says.
+    What begins is seen, asked about and planned for, and rows of the first nodes hold nothing; then
+    h rises as eq 25 has it, and the distance follows h.
+    """
+    dt, planner, tuning = config.tick_period_us * 1e-6, config.planner, config.planner.walls
+    tracking, airframe = config.tuning.tracking, config.airframe
+    gains = tracking_gains(tracking, airframe.rotor_lag, dt)
+    after = base_after(airframe, tracking, gains, dt)
+    wind = loop.base_wind - loop.wind_beyond
+    begins = _SEEN_S + planner.period + config.plan_delay_ticks * dt
+    times = dt * np.arange(1, len(after) + 1)
+    periods = np.floor((times - begins) / planner.period)
+    periods[periods <= tuning.skipped_nodes] = 0.0
+    missing = (1.0 - tuning.gamma * planner.period) ** periods
+    faded = np.exp(-tuning.slope * times)
+    rest = []
+    for seen in np.linspace(0.0, LOUD, 5):
+        kept = tuning.following(float(seen), least)
+        h = tuning.lambda_ - (tuning.lambda_ - kept) * missing
+        # d' = h - k_S d from rest; k_S is the most that S rises by with d.
+        distance = stand_off(replace(tuning, lambda_=kept))
+        gained = faded * np.cumsum((h - kept) * dt / faded)
+        pushed = config.surroundings.disturbance * after + seen * (after[-1] - after) + wind
+        rest.append(float((distance + gained - pushed).min()))
+    return min(rest)
 
 
 def _tube_of_all_axes(

@@ -52,6 +52,8 @@ class FlightLimits:
     station_loss_exceptions: int = (
         0  # where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory
     )
+    radio_input: int = 1  # 1 or 4: no radio; kept for programs that set it as PX4 wants it
+    radio_loss_exceptions: int = 0  # the same: modes as above in which no radio is missed
     failsafe_delay_us: int = 5_000_000  # in hold, before the vehicle returns or lands
     battery_low: float = 0.2  # share of the capacity
     battery_critical: float = 0.1

@@ -17,4 +17,6 @@ def nearest_decimal(value: float) -> float:
 
 def as_text(value: float) -> str:
     """``value`` [any unit] as text, without an exponent where that is short."""
+    if isinstance(value, int):
+        return str(value)
     return f"{nearest_decimal(value):.9g}"

@@ -13,7 +13,7 @@ import zlib
 from typing import Any, Final
 
 from fsw.parameters.facts import FACTS, GROUP, Fact
-from fsw.parameters.registry import PARAMETERS, Choices, Parameter
+from fsw.parameters.registry import BY_NAME, PARAMETERS, Choices, Parameter
 
 _VERSION: Final = 1
 _PARAMETER_TYPE: Final = 1  # COMP_METADATA_TYPE_PARAMETER
@@ -57,40 +57,50 @@ def metadata_crc(document: bytes) -> int:
 
 
 def _described(parameter: Parameter) -> dict[str, Any]:
+    default = parameter.default
     return {
         "name": parameter.name,
-        "type": "Float",
+        "type": _type(default),
         "shortDesc": parameter.meaning,
         "group": parameter.group,
         "category": "Standard",
         "units": parameter.unit,
-        "default": parameter.default,
-        "min": parameter.least,
-        "max": parameter.most,
-        **_form(parameter.choices, _decimals(parameter.default, at_least=2)),
+        "default": default,
+        "min": parameter.kept(parameter.least),
+        "max": parameter.kept(parameter.most),
+        **_form(parameter.choices, _decimals(default, at_least=2)),
     }
 
 
 def _told(fact: Fact) -> dict[str, Any]:
     if fact.repeats:
-        limits: dict[str, Any] = {}
-    else:
-        limits = {"default": fact.value, "min": fact.value, "max": fact.value}
+        return _described(BY_NAME[fact.repeats]) | {
+            "name": fact.name,
+            "longDesc": f"Another name: {fact.meaning}",
+        }
     return {
         "name": fact.name,
-        "type": "Float",
+        "type": _type(fact.value),
         "shortDesc": fact.label,
         "longDesc": f"Read only: {fact.meaning}",
         "group": GROUP,
         "category": "Standard",
         "units": fact.unit,
-        **limits,
+        "default": fact.value,
+        "min": fact.value,
+        "max": fact.value,
         **_form(fact.choices, _decimals(fact.value, at_least=0)),
     }
 
 
+def _type(value: float) -> str:
+    return "Int32" if isinstance(value, int) else "Float"
+
+
 def _decimals(value: float, at_least: int) -> int:
     """As many as the value has, six at most."""
+    if isinstance(value, int):
+        return 0
     return max(at_least, len(f"{value:f}".rstrip("0").partition(".")[2]))
 
 

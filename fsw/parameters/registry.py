@@ -1,9 +1,9 @@
 """Every parameter a ground station may change, and why the other numbers are not parameters.
 
-A parameter is a REAL32 on the wire (clients disagree on how integers are encoded) and one number
-of ``FlightConfig``. Units are chosen so that every default has at most six decimals: MAVProxy
-writes no more into its files. Names that PX4 has too mean what they mean there; all others
-avoid PX4's, because QGroundControl would show PX4's text beside them.
+A parameter is one number of ``FlightConfig``: an INT32 where it counts or chooses, else a REAL32.
+Units are chosen so that every default has at most six decimals: MAVProxy writes no more into its
+files. Names that PX4 has too mean what they mean there and have PX4's type; all others avoid
+PX4's, because QGroundControl would show PX4's text beside them.
 
 Defaults are not in the table: they are those of the dataclasses.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
@@ -43,6 +44,7 @@ class Parameter:
     meaning: str
     group: str
     scale: float  # the configuration's number is this times the parameter
+    integer: bool = False  # an INT32, whose values are ints; else a REAL32
     choices: Choices = ()  # where only some values mean something
 
     @property
@@ -52,10 +54,22 @@ class Parameter:
 
     def read(self, config: FlightConfig) -> float:
         """Its value in a configuration."""
-        return nearest_decimal(number_at(config, self.path) / self.scale)
+        return self.kept(number_at(config, self.path) / self.scale)
+
+    def kept(self, value: float) -> float:
+        """A ``value`` [its unit] of its range as the vehicle keeps it, in the parameter's type."""
+        return round(value) if self.integer else nearest_decimal(value)
+
+    def has_type_of(self, value: float) -> bool:
+        """Whether its type can hold a ``value`` [its unit] exactly, whatever its range."""
+        return float(value).is_integer() if self.integer else nearest_decimal(value) == value
 
     def refusal(self, value: float) -> str | None:
         """Why it cannot have a ``value`` [its unit]; None if the range allows it."""
+        if not self.integer:
+            value = nearest_decimal(value)
+        elif not self.has_type_of(value):
+            return f"{self.name} is an INT32 and must be a whole number, {value:g} is refused"
         if self.choices and value not in [number for number, _ in self.choices]:
             known = ", ".join(f"{number} {what}" for number, what in self.choices)
             return f"{self.name} is to be one of {known}; {value:g} is refused"
@@ -347,6 +361,11 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Ground station loss action, in every flight mode but those of COM_DLL_EXCEPT"),
         ("COM_DLL_EXCEPT", "limits.station_loss_exceptions", "", 0.0, 15.0,
          "Modes in which the loss of the ground station is ignored"),
+        # Any of their values is true of a vehicle without a radio, and scripts for PX4 set them.
+        ("COM_RC_IN_MODE", "limits.radio_input", "", 1.0, 4.0,
+         "Manual control input: there is no radio control, and no check of it"),
+        ("COM_RCL_EXCEPT", "limits.radio_loss_exceptions", "", 0.0, 31.0,
+         "Modes in which the loss of radio control is ignored: all, for there is none"),
         ("COM_FAIL_ACT_T", "limits.failsafe_delay_us", "s", 0.0, 25.0,
          "Time in Hold before a lost ground station or a battery lets the vehicle return or land",
          _IN_MICROSECONDS),
@@ -416,6 +435,8 @@ _ROWS: Final[dict[str, list[_Row]]] = {
          "Action when the vehicle is outside its safe set"),
         ("GF_ACTION", "limits.fence_action", "", 0.0, 6.0,
          "Action when the vehicle is outside an uploaded fence"),
+        ("SAFE_LAMBDA_MIN", "planner.lambda_min", "m/s", 0.0, 5.0,
+         "Least λ beside walls, after little disturbance for long; 0: λ is always whole"),
         ("SAFE_SIGMAS", "limits.clearance_sigmas", "", 0.0, 6.0,
          "Standard deviations of the estimate that clearances grow by"),
         ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
@@ -470,6 +491,7 @@ _CHOICES: Final[dict[str, Choices]] = {
     ),
     "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold"), (6, "Terminate")),
     "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, "Terminate")),
+    "COM_RC_IN_MODE": ((1, "Joystick only"), (4, "Disabled")),
     "COM_DLL_EXCEPT": tuple((bits, _exceptions(bits)) for bits in range(16)),
     "COM_FLTT_LOW_ACT": ((0, "None"), (1, "Warning"), (3, "Return")),
     "COM_ACT_FAIL_ACT": (
@@ -547,10 +569,16 @@ NO_PARAMETERS: Final[dict[str, str]] = {
 }
 
 
+# PX4 has these as INT32 although they are no counts: whole seconds and degrees.
+_WHOLE: Final = frozenset(("COM_DL_LOSS_T", "FD_FAIL_P", "FD_FAIL_R", "RTL_TIME_MARGIN"))
+_UNTUNED: Final = FlightConfig()
+
+
 def _parameter(group: str, row: _Row) -> Parameter:
     name, path, unit, least, most, meaning = row[:6]
     scale = row[6] if len(row) == 7 else 1.0
     choices = _CHOICES.get(name, ())
+    counts = scale == 1.0 and isinstance(attrgetter(path)(_UNTUNED), int | str)
     return Parameter(
         name=name,
         path=path,
@@ -560,6 +588,7 @@ def _parameter(group: str, row: _Row) -> Parameter:
         meaning=meaning,
         group=group,
         scale=scale,
+        integer=counts or name in _WHOLE,
         choices=choices,
     )
 

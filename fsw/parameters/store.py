@@ -9,14 +9,13 @@ the others wait, and every link hears of each.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.float32 import nearest_decimal
-from fsw.parameters.registry import BY_NAME, PARAMETERS, Parameter
+from fsw.parameters.registry import BY_NAME, PARAMETERS
 from fsw.tuning import Tuning
 
 Prepare = Callable[[Tuning], None]
@@ -40,11 +39,15 @@ class Listener:
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """One requested change."""
+    """One requested change, of one parameter or of several at once."""
 
-    parameter: Parameter
-    value: float
+    values: Mapping[str, float]
     asker: Listener
+
+    @property
+    def name(self) -> str:
+        """What it changes, at the beginning of a sentence."""
+        return next(iter(self.values)) if len(self.values) == 1 else "every parameter"
 
 
 class ParameterStore:
@@ -70,13 +73,18 @@ class ParameterStore:
         """Every parameter in use, by name."""
         return self._values
 
+    def is_changing(self, name: str) -> bool:
+        """Whether a change of a parameter is under way, its value not decided yet."""
+        under_way = (*self._waiting, *((self._change,) if self._change is not None else ()))
+        return any(name in change.values for change in under_way)
+
     def restore(self, values: Mapping[str, float]) -> int:
         """Take values within their ranges over before the first tick; how many are not the default.
 
         Raises:
             ValueError: They contradict each other.
         """
-        wanted = self._values | {name: nearest_decimal(value) for name, value in values.items()}
+        wanted = self._values | {name: BY_NAME[name].kept(value) for name, value in values.items()}
         tuning = self._tuning(wanted)
         if tuning:
             self._prepare(tuning)
@@ -106,7 +114,14 @@ class ParameterStore:
         if refusal is not None:
             asker.changed[name] = None
             return refusal
-        self._waiting.append(_Change(parameter, nearest_decimal(value), asker))
+        self._waiting.append(_Change({name: parameter.kept(value)}, asker))
+        return None
+
+    def reset(self, asker: Listener) -> str | None:
+        """Request the values of the start, all at once; why it cannot be, where that is clear."""
+        if len(self._waiting) >= WAITING:
+            return "too many changes at once, parameters are left as they are"
+        self._waiting.append(_Change(self.defaults, asker))
         return None
 
     def take_tuning(self) -> Tuning | None:
@@ -128,7 +143,7 @@ class ParameterStore:
         if change is None:
             return  # the values of the start
         if taken and self._executor is not None and self._save is not None:
-            self._values[change.parameter.name] = change.value
+            self._values.update(change.values)
             self._saving = True
             self._job = self._executor.submit(self._save, dict(self._values))
         else:
@@ -136,10 +151,12 @@ class ParameterStore:
 
     def _begin(self, executor: Executor) -> None:
         change = self._waiting.popleft()
-        name = change.parameter.name
-        if self._values[name] == change.value:
-            self._tell(name)
+        changed = {n: v for n, v in change.values.items() if self._values[n] != v}
+        if not changed:
+            if len(change.values) == 1:
+                self._tell(change.values)
             return
+        change = _Change(changed, change.asker)
         self._change, self._saving, self._rest = change, False, REST_TICKS
         self._job = executor.submit(self._prepare, self._tuning(self._wanted(change)))
 
@@ -154,25 +171,25 @@ class ParameterStore:
             if error is None:
                 self._offered = self._tuning(self._wanted(change))
             else:
-                change.asker.texts.append(f"{change.parameter.name} is left as it is: {error}")
+                change.asker.texts.append(f"{change.name} is left as it is: {error}")
                 self._drop(change)
             return
         if error is not None:
-            change.asker.texts.append(f"{change.parameter.name} holds until the end only: {error}")
+            change.asker.texts.append(f"{change.name} holds until the end only: {error}")
         self._change = None
-        self._tell(change.parameter.name)
+        self._tell(change.values)
 
     def _drop(self, change: _Change) -> None:
         """Show the asker the value in use; other listeners are not affected."""
-        change.asker.changed[change.parameter.name] = None
+        change.asker.changed.update(dict.fromkeys(change.values))
         self._change = None
 
-    def _tell(self, name: str) -> None:
+    def _tell(self, names: Iterable[str]) -> None:
         for listener in self._listeners:
-            listener.changed[name] = None
+            listener.changed.update(dict.fromkeys(names))
 
     def _wanted(self, change: _Change) -> dict[str, float]:
-        return self._values | {change.parameter.name: change.value}
+        return {**self._values, **change.values}
 
     def _tuning(self, values: Mapping[str, float]) -> Tuning:
         """What differs from the configuration of the start."""

@@ -3,7 +3,7 @@
 In real time the vehicle wakes on an absolute schedule of its own, a little behind the arrival of
 the sensor frames, and takes the newest frame. A late or lost frame does not stop the inner loop:
 the tick gets the last readings with their age. After ``MAX_STALE_TICKS`` such ticks no tick runs
-until a frame arrives; without commands the actuators stop the rotors after 0.1 s.
+until a frame arrives; without commands the motor controllers level the vehicle by themselves.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from typing import Any
 from command_line.bounded_json import JsonError, json_numbers
 from fsw.log.compare import Difference, first_difference
 from fsw.log.encoder import FULL, THIN, LogEncoder
+from fsw.log.px4_records import origin_of
 from fsw.log.reader import Gap, LoggedTick, UlogError, UlogFile, ticks
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.tick_runner import TickRunner
@@ -46,6 +47,7 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
         thrust_max=facts.rotor_thrust_max,
         link_length=facts.link_length,
         profile=int(profile),
+        origin=origin_of(logged_numbers(log)),
     )
     tick = TickRunner(program.control, program.conclude, program.first_state, on_error=lambda: None)
     compared = 0

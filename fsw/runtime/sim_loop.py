@@ -345,6 +345,7 @@ class SimLoop(Generic[State]):
         self._count_missed()
         record.health.vibration = self._vibration.metrics
         record.health.clipped = self._vibration.clipped
+        record.health.losses = self._ground.losses
         self._vibration.accel_range = self._parameters.values[ACCEL_RANGE]
         for group in RATE_GROUPS:
             # The planner's cycles are of interest, not the time that a request takes to send.

@@ -17,7 +17,9 @@ from sitl.simulation import Controls
 
 STALL_S: Final = 1.2  # so that 2 s after a stall both processes have ended; a pause of 1 s passes
 SILENT_S: Final = 0.1  # from then on a vehicle that ends so counts as silent
-HOLD_S: Final = 0.5  # real time: older controls are not held, the rotors stop, as PX4's IO does
+# Real time: older controls are not held, the rotors stop. PX4 waits as long for the setpoints of a
+# computer (COM_OF_LOSS_T). Until then see ``sitl.stand_in``.
+HOLD_S: Final = 1.0
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
 
 _OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
@@ -57,6 +59,8 @@ class Lockstep:
         self._start_s = time.perf_counter()
         self._number = 0
         self._listened_s = 0.0  # in vain, for the answer to this step
+
+    held_s: float | None = None  # controls are waited for, and never held
 
     @property
     def silent_since(self) -> int | None:
@@ -114,9 +118,9 @@ class Lockstep:
 class RealTime:
     """Never waits for the vehicle: what has arrived when the step is over is what was applied.
 
-    With the answer in time this is what lockstep applies; without it the last controls are held
-    and the step is counted as missed. Only the first step is waited for: the clock starts when
-    the vehicle has answered it and had a moment to make its first plan.
+    With the answer in time this is what lockstep applies; without it the last controls are held,
+    and the step is counted as missed. Only the first step is waited for: the clock starts when the
+    vehicle has answered it and had a moment to make its first plan.
     """
 
     def __init__(
@@ -140,6 +144,11 @@ class RealTime:
         self._heard_s = clock()
         self._heard_step = 0
         self._silent_s = 0.0  # at the end of the last step
+
+    @property
+    def held_s(self) -> float:
+        """For how long [s] the last controls have been held."""
+        return self._silent_s
 
     @property
     def silent_since(self) -> int | None:

@@ -22,7 +22,8 @@ from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.sensors.exact import SensorReadings
-from sitl.simulation import STEP_US, Simulation
+from sitl.simulation import STEP_US, Controls, Simulation
+from sitl.stand_in import StandIn
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
 _PROGRESS_S: Final = 0.1  # wall time between two reports
@@ -83,7 +84,7 @@ def serve(
         simulation.catch_up()
         spoken = pilot.speak(plan, state, simulation.t_us + STEP_US)
 
-    injector = Injector(simulation)
+    injector, stand_in = Injector(simulation), StandIn(simulation.vehicle)
     while simulation.ended is None:
         stamp_us = simulation.sensor_time_us
         # The pilot has a clock of its own, which does not fail with the sensors'.
@@ -97,7 +98,7 @@ def serve(
             if simulation.step == 0:  # the vehicle may take its time for the first answer
                 begin_s = time.perf_counter()
             answered = _injected(injector, encoder, answer) if answer.injections else b""
-            _advance(simulation, answer)
+            _advance(simulation, answer.controls, exchange.held_s, stand_in)
         except SimulatorError as error:
             _end_if_over(simulation, state, stop, t_us)
             simulation.end(EndKind.STOPPED, str(error))
@@ -183,9 +184,14 @@ def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
     return False
 
 
-def _advance(simulation: Simulation, answer: VehicleReply) -> None:
+def _advance(
+    simulation: Simulation, controls: Controls, held_s: float | None, stand_in: StandIn
+) -> None:
+    """Apply what came, ``held_s`` [s] ago; None: it is of this step."""
+    if held_s is not None:
+        controls = stand_in.applied(controls, held_s, simulation.healthy())
     try:
-        simulation.advance(answer.controls)
+        simulation.advance(controls)
     except ValueError as error:
         raise SimulatorError(f"the flight software sent unusable controls: {error}") from None
 

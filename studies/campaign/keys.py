@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME
 from fsw.tuning import tuned
 from sitl.ranges import Range
@@ -87,8 +86,9 @@ def applied(flown: Flown, values: Iterable[tuple[str, float]]) -> Flown:
 
 def rounded(key: str, value: float, allowed: Range) -> float:
     """The nearest ``value`` [of the key] that a key can have: in steps, or in single precision."""
-    if key.startswith(f"{PARAMETERS}."):
-        return nearest_decimal(value)  # as a vehicle keeps it
+    first, _, rest = key.partition(".")
+    if first == PARAMETERS:
+        return BY_NAME[rest].kept(value)  # as a vehicle keeps it
     if allowed.step is None:
         return value
     return min(max(round(value / allowed.step) * allowed.step, allowed.low), allowed.high)

@@ -159,11 +159,13 @@ def _maps(rows: Sequence[CampaignRow], result: CampaignResult) -> list[str]:
     drawn = sheet(lines, 2, 11.0, 2.6 * lines)
     axes = [ax for line in drawn.axes for ax in line]
     for ax, key in zip(axes, keys, strict=False):
-        for of, colour, size in ((some, BASE, 4.0), (bad, WALL, 14.0)):
+        # In points squared: seen where there are few, apart where there are many.
+        seen = min(max(4000.0 / max(len(some), 1), 5.0), 30.0)
+        for of, colour, size in ((some, BASE, seen), (bad, WALL, max(seen, 14.0))):
             there = [row for row in of if row.margin_m is not None and key in row.values]
             x = np.array([row.values[key] for row in there])
             y = np.array([1e3 * row.margin_m for row in there if row.margin_m is not None])
-            ax.scatter(x, y, s=size, color=colour, linewidths=0.0, alpha=0.6, rasterized=False)
+            ax.scatter(x, y, s=size, color=colour, linewidths=0.0, alpha=0.75, rasterized=False)
         ax.axhline(0.0, color=WALL, linewidth=0.8)
         ax.set_xlabel(key, fontsize=8)
         ax.set_ylabel("margin mm", fontsize=8)

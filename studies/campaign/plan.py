@@ -15,7 +15,6 @@ from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME
 from fsw.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
@@ -358,7 +357,7 @@ def _parameters(table: Any) -> tuple[tuple[str, float], ...]:
         refusal = parameter.refusal(_number(value, f"{PARAMETERS}.{name}"))
         if refusal is not None:
             raise CampaignError(f"{PARAMETERS}: {refusal}")
-        found.append((parameter.path, parameter.scale * nearest_decimal(float(value))))
+        found.append((parameter.path, parameter.scale * parameter.kept(float(value))))
     return tuple(found)
 
 

@@ -42,6 +42,7 @@ class FlightRecorder:
     step_us: list[float] = field(default_factory=list)  # processor time of each planning step
     plans: int = 0
     failures: int = 0  # planning steps without a plan
+    failed_ids: list[int] = field(default_factory=list)  # of the requests without a plan
     trace: list[TracePoint] = field(default_factory=list)  # empty unless asked for
     texts: list[tuple[float, str]] = field(default_factory=list)  # s, what an operator reads
     modes: list[str] = field(default_factory=list)  # that the vehicle changed to by itself
@@ -53,6 +54,7 @@ class FlightRecorder:
             self.plans += 1
         else:
             self.failures += 1
+            self.failed_ids.append(answer.plan_id)
 
 
 @dataclass(frozen=True, slots=True)

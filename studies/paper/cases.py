@@ -21,16 +21,25 @@ from sitl.scenario_file import load_scenario
 from studies.flight.job import PlantName
 
 Case = Literal["I", "II"]
+Family = Literal["walls", "dash"]
 Comparison = Literal["paper", "like-for-like"]
 
 CASES: tuple[Case, ...] = ("I", "II")
+FAMILIES: tuple[Family, ...] = ("walls", "dash")  # of scenarios, one a case: slow, and fast
 PLANTS: tuple[PlantName, ...] = ("double-integrator", "full")
 TUNING_SEEDS = range(30)
 REPORTING_FROM = 100
 
-_SCENARIOS: dict[Case, str] = {"I": "walls", "II": "workspace"}
-# What keeps the vehicle inside by other means than a barrier, found with tuning seeds.
-_TIGHTENING: dict[Case, float] = {"I": 0.08, "II": 0.05}  # m
+_SCENARIOS: dict[Family, dict[Case, str]] = {
+    "walls": {"I": "walls", "II": "workspace"},
+    "dash": {"I": "dash", "II": "chase"},
+}
+# What keeps the vehicle inside by other means than a barrier: found with tuning seeds where
+# something does, and otherwise all that there is room for.
+_TIGHTENINGS: dict[Family, dict[Case, tuple[float, ...]]] = {  # m
+    "walls": {"I": (0.08,), "II": (0.05,)},
+    "dash": {"I": (0.1,), "II": (0.04, 0.06)},
+}
 # Kept by every other HC: without it, calm flights fail by the micrometres of the solver's
 # tolerance and of the path's curvature between nodes, which is not what is compared.
 _ROUNDING_M = 0.001
@@ -46,9 +55,12 @@ class Entrant:
     config: FlightConfig
 
 
-def scenario(case: Case, *, disturbed: bool, duration_s: float | None = None) -> Scenario:
+def scenario(
+    case: Case, *, disturbed: bool, duration_s: float | None = None, family: Family = "walls"
+) -> Scenario:
     """A case of the paper, for its 120 s or less."""
-    name = _SCENARIOS[case] if disturbed else f"{_SCENARIOS[case]}-calm"
+    name = _SCENARIOS[family][case]
+    name = name if disturbed else f"{name}-calm"
     found = load_scenario(name)
     return found if duration_s is None else replace(found, duration_s=duration_s)
 
@@ -105,7 +117,9 @@ def with_horizon(config: FlightConfig, horizon: int) -> FlightConfig:
     return replace(config, planner=planner)
 
 
-def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
+def entrants(
+    case: Case, plant: PlantName, inner: Inner, family: Family = "walls"
+) -> tuple[Entrant, ...]:
     """Everyone who flies a case, in both comparisons.
 
     ``paper`` has each controller as the paper describes it, ``blf`` also with the paper's
@@ -118,33 +132,46 @@ def entrants(case: Case, plant: PlantName, inner: Inner) -> tuple[Entrant, ...]:
     naive, hc, sc, blf = (
         configuration(plant, name, inner) for name in ("naive", "hc", "sc", "blf")
     )
-    softened = replace(
-        hc.planner,
-        hard_slack=blf.planner.barrier_slack,
-        hard_skipped_nodes=blf.planner.workspace.skipped_nodes,
-    )
-    exact, tightened = (
-        replace(softened, tightening=_ROUNDING_M),
-        replace(softened, tightening=_TIGHTENING[case]),
-    )
-    hard = replace(hc, planner=replace(hc.planner, tightening=_ROUNDING_M))
+    hard = tightened(hc, _ROUNDING_M)
     fair: list[tuple[str, FlightConfig]] = [("naive", naive)]
     if case == "II":
         fair.append(("naive-centred", replace(naive, planner=replace(naive.planner, centred=True))))
     fair += [
-        ("hc", replace(hc, planner=exact)),
-        ("hc-tightened", replace(hc, planner=tightened)),
+        ("hc", tightened(softened(hc), _ROUNDING_M)),
+        *(
+            (
+                "hc-tightened" if family == "walls" else f"hc-tightened-{1e3 * more:.0f}-mm",
+                tightened(softened(hc), more),
+            )
+            for more in _TIGHTENINGS[family][case]
+        ),
         ("sc", sc),
         ("blf", blf),
     ]
     paper = [("naive", naive), ("hc", hard), ("sc", sc), ("blf", blf)]
-    paper.append(("blf-lambda-5", with_lambda(blf, 5.0)))
-    if plant == "full":
+    if family == "walls":
+        paper.append(("blf-lambda-5", with_lambda(blf, 5.0)))
+    if family == "walls" and plant == "full":
         paper.append(("blf-no-lag", replace(blf, inner="pid", airframe=_WITHOUT_LAG)))
     return tuple(
         [Entrant("paper", name, config) for name, config in paper]
         + [Entrant("like-for-like", name, config) for name, config in fair]
     )
+
+
+def softened(hc: FlightConfig) -> FlightConfig:
+    """HC with the slack of BLF, and with the same first node left out."""
+    planner = hc.planner
+    skipped = planner.workspace.skipped_nodes
+    return replace(
+        hc,
+        planner=replace(planner, hard_slack=planner.barrier_slack, hard_skipped_nodes=skipped),
+    )
+
+
+def tightened(hc: FlightConfig, more_m: float) -> FlightConfig:
+    """HC that keeps ``more_m`` [m] in addition to the safe set."""
+    return replace(hc, planner=replace(hc.planner, tightening=more_m))
 
 
 def reference_floor_m(flown: Scenario) -> float:

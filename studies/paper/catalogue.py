@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 STUDIES = {
     "table3": "table3",
     "table4": "table4",
+    "rivals": "rivals",
     "fig2": "figure2",
     "fig6": "flight_figures",
     "fig7": "flight_figures",

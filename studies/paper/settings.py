@@ -7,7 +7,7 @@ from typing import Any
 
 from fsw.control.cascade import Inner
 from studies.flight.job import PlantName
-from studies.paper.cases import REPORTING_FROM, TUNING_SEEDS
+from studies.paper.cases import REPORTING_FROM, TUNING_SEEDS, Family
 
 
 class NoCellError(ValueError):
@@ -22,6 +22,7 @@ class Settings:
     seeds: range = range(REPORTING_FROM, REPORTING_FROM + 20)
     duration_s: float | None = None  # None: as long as the scenario
     inner: Inner = "tracking"
+    family: Family = "walls"  # of scenarios; of Table IV and of the rivals
     # Cells of the study of robustness; None: all.
     suite: str | None = None  # flown with this one
     only: str | None = None  # with this in their name

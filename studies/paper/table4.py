@@ -9,7 +9,7 @@ from sitl.scenario import Scenario
 from studies.campaign.campaign import Campaign
 from studies.flight.job import Outcome
 from studies.paper import published, summary
-from studies.paper.cases import CASES, Case, Entrant, entrants, reference_floor_m, scenario
+from studies.paper.cases import CASES, Case, Entrant, Family, entrants, reference_floor_m, scenario
 from studies.paper.deviations import deviations
 from studies.paper.settings import Report, Settings, Table
 from studies.paper.summary import Summary, fly_cells
@@ -38,17 +38,17 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
             case,
             disturbed,
             entrant,
-            scenario(case, disturbed=disturbed, duration_s=settings.duration_s),
+            _flown(case, settings, disturbed=disturbed),
         )
         for disturbed in (False, True)
         for case in CASES
-        for entrant in entrants(case, settings.plant, settings.inner)
+        for entrant in entrants(case, settings.plant, settings.inner, settings.family)
     ]
     cells = [(entry.flown, entry.entrant.config) for entry in entries]
     summaries, errors = fly_cells(campaign, settings, cells)
     pairs = list(zip(entries, summaries, strict=True))
     return Report(
-        title=f"Table IV, {settings.plant} plant",
+        title=f"Table IV, scenarios of {settings.family}, {settings.plant} plant",
         rows=[_row(settings, entry, row) for entry, row in pairs],
         tables=tuple(
             _table(pairs, comparison, disturbed)
@@ -56,14 +56,24 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
             for disturbed in (False, True)
         )
         + (_floors(settings),),
-        deviations=deviations("both-tables", "table4", settings.plant),
+        deviations=deviations("both-tables", "table4", *_of(settings.family), settings.plant),
         errors=errors,
     )
+
+
+def _of(family: Family) -> tuple[str, ...]:
+    return () if family == "walls" else (family,)
+
+
+def _flown(case: Case, settings: Settings, *, disturbed: bool) -> Scenario:
+    duration_s, family = settings.duration_s, settings.family
+    return scenario(case, disturbed=disturbed, duration_s=duration_s, family=family)
 
 
 def _row(settings: Settings, entry: _Entry, row: Summary) -> dict[str, Any]:
     return {
         "plant": settings.plant,
+        "scenario": entry.flown.name,
         "case": entry.case,
         "disturbance": entry.disturbed,
         "controller": entry.entrant.name,
@@ -89,10 +99,7 @@ def _table(pairs: list[tuple[_Entry, Summary]], comparison: str, disturbed: bool
 
 
 def _floors(settings: Settings) -> Table:
-    floors = [
-        (case, reference_floor_m(scenario(case, disturbed=False, duration_s=settings.duration_s)))
-        for case in CASES
-    ]
+    floors = [(case, reference_floor_m(_flown(case, settings, disturbed=False))) for case in CASES]
     return Table(
         "Minimum TE of any safe controller: RMS distance of the reference from the safe set",
         ("case", "TE m"),

@@ -3,9 +3,10 @@
 Three kinds of disturbance, all of full amplitude on the axes they push: adversaries that chase the
 vehicle, from a list; adversaries whose weights CMA-ES improves; and sequences of signs, held for
 0.1 s, that CMA-ES improves. Each is tried from instants all over the flight, on the fast loops
-along the recorded plan. What counts is the deviation as a share of the bound that the start-up
-analysis prints: of the bound for one axis where one axis is pushed, of the bound for all of them
-otherwise.
+along the recorded plan. Near the instant at which the calm flight is nearest to a boundary, steps
+are tried as well: pushes that begin in still air and last. What counts is the deviation as a share
+of the bound that the start-up analysis prints: of the bound for one axis where one axis is pushed,
+of the bound for all of them otherwise.
 
 The worst of every kind and instant then flies again with everything that flies, and CMA-ES goes on
 from the worst of these. That decides about contact.
@@ -31,7 +32,7 @@ from sitl.disturbances.sequence import Played
 from sitl.result import EndKind
 from sitl.scenario import V3, Scenario, Sequence
 from sitl.simulation import STEP_US, Simulation
-from studies.search.plan_record import PlanRecord, Start, fly, record
+from studies.search.plan_record import EVERY, PlanRecord, Start, fly, record
 from studies.search.tracked_flight import FEATURES, FILTERED, OFF, PUSH, Disturbance, TrackedFlight
 from studies.search.whole_flight import Flown, WholeFlight
 
@@ -42,6 +43,12 @@ _SWITCHED = (1, 25, HELD_TICKS)  # ticks between two decisions of an adversary
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 1, 1))
 _LEADS = ((0.0, 1.0, 0.0), (3.0, 1.0, 0.05), (-3.0, 1.0, 0.0), (1.0, 1.0, 0.25), (0.0, 1.0, -0.1))
 _STARTS = 24  # instants of the flight
+# s before the calm flight's least margin; a step needs 0.6 s to push as far as it does.
+_BEFORE_WORST = (0.6, 0.3, 0.0)
+_STEPS = [
+    np.array([(x, y, 0.0)]) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y
+]  # the last row of a table goes on
+STEP = "step"
 WHOLE_SHARE = 0.1  # of the evaluations, that are stretches of the whole stack
 # Weights that matter alike: a position counts three times a velocity, an acceleration a tenth.
 _SCALE = np.tile((3.0, 1.0, 0.1), (3, 1))
@@ -131,6 +138,7 @@ class WholeOutcome:
     breaches: int  # stretches in which the safe set was left and the stack noticed
     furthest: WholeFound  # off the plan in force
     closest: WholeFound  # least margin; of those with contact, if there are any
+    step: WholeFound | None = None  # least margin of the steps; None: too few evaluations
 
     @property
     def holds(self) -> bool:
@@ -169,6 +177,9 @@ class Search:
         usable = [start for start in usable if start.row >= SETTLED_TICKS] or usable[-1:]
         chosen = np.linspace(0, len(usable) - 1, min(_STARTS, len(usable))).astype(int)
         self.starts = [usable[k] for k in chosen]
+        nearest = min(range(len(usable)), key=lambda k: usable[k].margin_m)
+        before = (round(lead * 500 / EVERY) for lead in _BEFORE_WORST)
+        self.worst_starts = [usable[k] for k in sorted({max(nearest - n, 0) for n in before})]
         self._kept: dict[str, Found] = {}
         self._telling: dict[tuple[str, int, str, int], Found] = {}
 
@@ -179,6 +190,15 @@ class Search:
     def sequence(self, start: Start, table: Array) -> float:
         """Fly under ``table`` (n, 3) [1, NED], -1 to 1, each held for 0.1 s; as ``adversary``."""
         return self._judge(start, Disturbance(self._amplitude, HELD_TICKS, table, _NO_WEIGHTS))
+
+    def steps(self, most: int) -> list[Found]:
+        """Up to ``most`` steps with the least margins, of instants and numbers of axes."""
+        found = [
+            one
+            for (name, _, kind, _), one in self._telling.items()
+            if name == "margin" and kind.startswith(STEP)
+        ]
+        return sorted(found, key=lambda one: one.margin_m)[:most]
 
     def outcome(self) -> Outcome:
         """The worst so far."""
@@ -244,7 +264,9 @@ def _rank(name: str, found: Found) -> float:
 
 
 def _kind(disturbance: Disturbance) -> str:
-    kind = "sequence" if len(disturbance.table) else "adversary"
+    kind = {0: "adversary", 1: STEP}.get(len(disturbance.table), "sequence")
+    if kind == STEP:
+        return STEP
     return f"{kind}, held {disturbance.every * 2} ms"
 
 
@@ -299,6 +321,9 @@ def _searched(
     def told() -> None:
         report("searched", hunt.evaluations, evaluations)
 
+    for start, table in itertools.product(hunt.worst_starts, _STEPS):
+        hunt.sequence(start, table)
+        told()
     listed = list(_listed(hunt.starts))
     if len(listed) > 0.4 * evaluations:
         chosen = random.permutation(len(listed))[: max(round(0.4 * evaluations), 1)]
@@ -327,13 +352,14 @@ def _fly_whole(
     report: Report,
 ) -> WholeOutcome:
     """Fly the worst finds again with the whole stack; improve the worst of each kind there."""
-    telling = hunt.telling(math.ceil(0.5 * evaluations))
+    steps = hunt.steps(math.ceil(0.25 * evaluations))
+    telling = [one for one in hunt.telling(math.ceil(0.5 * evaluations)) if one.kind != STEP]
     improved: dict[str, Found] = {}
     for found in telling:
         kind = found.kind.partition(",")[0]
         if kind not in improved or found.margin_m < improved[kind].margin_m:
             improved[kind] = found
-    each = (evaluations - len(telling)) // max(len(improved), 1)
+    each = (evaluations - len(telling) - len(steps)) // max(len(improved), 1)
     flight, flown = WholeFlight(scenario, config), list[WholeFound]()
 
     def value(start: Start, disturbance: Disturbance) -> float:
@@ -344,13 +370,15 @@ def _fly_whole(
         return max(one.flown.off_m) - margin + (0.0 if one.flown.contact is None else 1.0)
 
     for step, here in itertools.groupby(
-        sorted(telling, key=lambda found: found.start.step), key=lambda found: found.start.step
+        sorted([*telling, *steps], key=lambda found: found.start.step),
+        key=lambda found: found.start.step,
     ):
         flight.go_to(step, lambda done, total: report("calm flight of the stack", done, total))
         for found in here:
             value(found.start, found.disturbance)
             if any(found is one for one in improved.values()):
                 _improve_whole(found, each, seed, value)
+    stepped = [one for one in flown if one.kind == STEP]
     touching = [one for one in flown if one.flown.contact is not None]
     return WholeOutcome(
         evaluations=len(flown),
@@ -359,6 +387,7 @@ def _fly_whole(
         breaches=sum(one.flown.breaches > 0 for one in flown),
         furthest=max(flown, key=lambda one: max(one.flown.off_m)),
         closest=min(touching or flown, key=lambda one: one.flown.margin_m),
+        step=min(stepped, key=lambda one: one.flown.margin_m, default=None),
     )
 
 

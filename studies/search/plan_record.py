@@ -7,6 +7,7 @@ and a disturbed stretch can be flown again from any instant without the planner.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -28,7 +29,7 @@ from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
 from studies.flight.result import processor_time_us
 
 STATE, INPUT = 19, 6  # numbers of a plan's state and input in a row
-_EVERY = 50  # ticks between two starts
+EVERY = 50  # ticks between two starts
 _WARN = 1  # of SAFE_BREACH_ACT
 _Seen = Callable[[Simulation, FlightState, TickOutputs], None]
 
@@ -41,6 +42,7 @@ class Start:
     step: int  # of the simulation
     state: Array  # (17 + 2j,) [SI] of the plant
     memory: CascadeMemory
+    margin_m: float = math.inf  # of the calm flight here
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ def record(
     before: list[tuple[Array, CascadeMemory]] = []
 
     def sense(simulation: Simulation, state: FlightState) -> None:
-        if len(rows) % _EVERY == 0:
+        if len(rows) % EVERY == 0:
             now = np.frombuffer(simulation.state_bytes()).copy()
             before[:] = [(now, state.cascade)]
 
@@ -71,8 +73,9 @@ def record(
         plan, u = outputs.snapshot.plan_state, outputs.snapshot.plan_input
         if plan is None or u is None:
             return
-        if len(rows) % _EVERY == 0:
-            starts.append(Start(len(rows), simulation.step - 1, *before[0]))
+        if len(rows) % EVERY == 0:
+            margin = min(simulation.truth().margins_m, default=math.inf)
+            starts.append(Start(len(rows), simulation.step - 1, *before[0], margin))
         rows.append(row(plan, u))
         zones.add(state)
         if len(rows) % 500 == 0:

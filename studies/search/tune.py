@@ -19,7 +19,6 @@ import numpy as np
 from cmaes import CMA
 from scipy.special import bdtrc, stdtrit
 
-from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.registry import BY_NAME, Parameter
 from fsw.tuning import tuned
 from sitl.ranges import Range
@@ -63,7 +62,7 @@ class Tuned:
     def at(self, place: float) -> float:
         """The value at a ``place`` of the range [1], from -1 to 1, as a vehicle keeps it."""
         share = 0.5 + 0.5 * min(max(place, -1.0), 1.0)
-        value = nearest_decimal(self.low + share * (self.high - self.low))
+        value = self.parameter.kept(self.low + share * (self.high - self.low))
         return min(max(value, self.parameter.least), self.parameter.most)
 
     def place(self, value: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import socket
 import threading
 import time
@@ -14,11 +15,12 @@ from pathlib import Path
 import pytest
 
 from fsw.link.wire import message_ids as ids
+from fsw.parameters.param_type import field_of
 from fsw.parameters.registry import PARAMETERS
 from fsw.parameters.storage import load
-from messages.frames import FrameWriter
+from messages.frames import FrameWriter, split
 from pandion import param, param_vehicle
-from pandion.param_vehicle import NoAnswer, ParameterClient
+from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
 
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 
@@ -83,6 +85,69 @@ def test_what_cannot_be_done_is_one_sentence(
     assert reported in error
     assert error.count("\n") == 1
     assert not (tmp_path / "v.params").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "reported"),
+    [
+        ("MIS_TAKEOFF_ALT 2\nNAV_DLL_ACT 3\n", 0, "2 parameters read, 2 changed, 0 refused"),
+        ("COM_OBL_RC_ACT 0\nMIS_TAKEOFF_ALT 2\n", 1, "1 parameters read, 1 changed, 1 refused"),
+        ("NOT_OURS 1\n" * 30, 1, "0 parameters read, 0 changed, 30 refused"),
+        ("MAV_TYPE 13\n", 1, "0 parameters read, 0 changed, 1 refused"),
+    ],
+)
+def test_an_import_that_refuses_a_line_fails(
+    text: str, code: int, reported: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "wanted.params").write_text(text)
+    arguments = ["import", str(tmp_path / "wanted.params"), "--file", str(tmp_path / "v.params")]
+    assert param.main(arguments) == code
+    assert reported in capsys.readouterr().out
+
+
+def test_an_integer_is_said_and_kept_as_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "v.params"
+    where = ["--file", str(file)]
+    assert param.main(["set", "NAV_DLL_ACT", "3.0", *where]) == 0
+    assert "\tNAV_DLL_ACT\t3\t6\n" in file.read_text()
+    assert param.main(["set", "MPC_XY_VEL_MAX", "1.25", *where]) == 0
+    assert load(file).values == {"NAV_DLL_ACT": 3, "STR_V_MAX": 1.25}
+    assert param.main(["set", "NAV_DLL_ACT", "2.5", *where]) == 1
+    assert "NAV_DLL_ACT is an INT32 and must be a whole number" in capsys.readouterr().err
+    assert param.main(["get", "NAV_DLL_ACT", "--json", *where]) == 0
+    (entry,) = json.loads(capsys.readouterr().out)
+    assert (entry["value"], entry["type"]) == (3, "INT32")
+
+
+@pytest.mark.parametrize(
+    ("asked", "sent"), [(2.0, (field_of(2)[0], 6)), (2.5, (2.5, 9)), (float("inf"), (math.inf, 9))]
+)
+def test_a_vehicle_s_own_type_is_written(asked: float, sent: tuple[float, int]) -> None:
+    """An INT32 of another vehicle, which the command cannot know from its table."""
+    held, type_ = field_of(1)
+    answer = FrameWriter(1, 1).frame(ids.PARAM_VALUE, held, 1, 0, b"OF_ANOTHER", type_)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        written: list[tuple[object, object]] = []
+
+        def answers() -> None:
+            while not written:
+                datagram, client = vehicle.recvfrom(2048)
+                written.extend(
+                    (frame.payload_values[0], frame.payload_values[4])
+                    for frame in split(datagram)
+                    if frame.message_id == ids.PARAM_SET
+                )
+                vehicle.sendto(answer, client)
+
+        thread = threading.Thread(target=answers)
+        thread.start()
+        with ParameterClient(vehicle.getsockname()) as client, pytest.raises(ParameterRefused):
+            client.write("OF_ANOTHER", asked)
+        thread.join()
+    assert written == [sent]
 
 
 @pytest.mark.parametrize("suffix", ["params", "parm"])

@@ -18,6 +18,7 @@ from fsw.signals import (
     JointSetpoint,
     Mode,
     MotionSetpoint,
+    PositionFrom,
     SetpointKind,
     Vec3,
 )
@@ -169,6 +170,52 @@ def test_a_velocity_is_flown_in_both_frames() -> None:
     flight = offboard(hover(yaw_deg=90.0), **body(v=(0.5, 0.0, 0.0), along_heading=True))
     flight.run(3.0)
     assert flight.sim.truth().v_WB == pytest.approx((0.0, 0.5, 0.0), abs=0.05)
+
+
+def test_a_height_is_held_while_the_rest_is_a_velocity() -> None:
+    """Mask 0xBC3, as a pilot's stick or a visual servo sends it."""
+    flight = offboard(hover(), **body(p=(NAN, NAN, -1.6), v=(0.4, -0.2, NAN)))
+    flight.run(4.0)
+    truth = flight.sim.truth()
+    assert truth.p_WB[2] == pytest.approx(-1.6, abs=0.03)
+    assert truth.v_WB[:2] == pytest.approx((0.4, -0.2), abs=0.05)
+
+
+def test_an_offset_is_flown_from_where_the_vehicle_was_when_it_came() -> None:
+    flight = offboard(hover(yaw_deg=90.0), **body(v=(0.0, 0.0, 0.0)))
+    north, east, down = flight.sim.truth().p_WB
+    ahead = body(p=(0.5, 0.0, -0.2), along_heading=True, p_from=PositionFrom.VEHICLE)
+    flight.streamed = ahead
+    while flight.snapshot.offboard.motion == MotionSetpoint(False, v=(0.0, 0.0, 0.0)):
+        flight.step()
+    flight.streamed = {"joints": JointSetpoint(flight.sim.truth().q_arm)}
+    flight.run(0.4)
+    asked = flight.snapshot.offboard.motion
+    assert asked is not None
+    assert asked.p == pytest.approx((north, east + 0.5, down - 0.2), abs=0.02)
+    flight.streamed = {"motion": asked}
+    flight.run(4.0)
+    assert math.dist(flight.sim.truth().p_WB, asked.p or (NAN,) * 3) < 0.03
+
+
+def test_setpoints_that_are_refused_are_told_with_their_reason_and_not_as_silence() -> None:
+    flight = Flight(hover())
+    flight.step(command(ARM, 1.0))
+    wrong = {"refused_setpoints": 1, "setpoint_problem": "forces are not supported"}
+    flight.streamed = wrong
+    flight.run(0.1)
+    assert flight.texts[-1] == "setpoint refused: forces are not supported"
+    flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
+    assert flight.texts[-1] == "not offboard: setpoints are refused: forces are not supported"
+    flight.streamed = body(v=(0.0, 0.0, 0.0))
+    flight.run(0.1)
+    flight.step(command(SET_MODE, 1.0, 6.0, 0.0))
+    assert flight.mode is Mode.OFFBOARD
+    flight.streamed = wrong
+    flight.run(0.6)
+    stopped = [text for text in flight.texts if "setpoints stopped" in text]
+    assert len(stopped) == 1
+    assert "setpoints stopped: refused: forces are not supported" in stopped[0]
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from fsw.geometry.geodesy import to_local
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
+from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
@@ -72,10 +73,15 @@ class Connected:
     markers: set[int] = field(default_factory=set)  # of the frames that came
 
     def __post_init__(self) -> None:
-        self.mav = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+        self.become(255, 190, 6)
         self._reader = dialect.MAVLink(None)
         self._reader.robust_parsing = True
         self._beat_s = 0.0
+
+    def become(self, system: int, component: int, kind: int) -> None:
+        """Be a program of some identity and MAV_TYPE."""
+        self.mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        self.kind = kind
 
     @property
     def t_s(self) -> float:
@@ -97,7 +103,7 @@ class Connected:
         while self.t_s < end:
             if self.t_s >= self._beat_s:
                 self._beat_s = self.t_s + 1.0
-                self.send(dialect.MAVLink_heartbeat_message(6, 8, 192, 0, 4, 3))
+                self.send(dialect.MAVLink_heartbeat_message(self.kind, 8, 192, 0, 4, 3))
             self._step()
             arrived = self._arrived()
             self.heard += arrived
@@ -155,6 +161,7 @@ def connected(folder: Path, config: FlightConfig) -> Iterator[Connected]:
         ParameterService(parameters),
         MissionService(missions),
         LogService(logs),
+        LogStreamService(logs),
         FtpService(vehicle_files(logs)),
     )
     now_us = lambda: 2_000 * flight.sim.step  # noqa: E731

@@ -16,6 +16,7 @@ import pytest
 from fsw.link.files.flight_logs import MARK
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from fsw.parameters.flight_config import flight_config
+from fsw.parameters.param_type import value_of
 from fsw.signals import MissionState, Mode
 from messages import dialect as d
 from tests.conversations.connected import PARAMETER_FILE, Connected, connected
@@ -105,7 +106,8 @@ def test_no_parameter_that_it_insists_on_is_missing_and_none_asks_for_set_up(
     count = next(iter(values.values())).param_count
     assert {m.param_index for m in values.values() if m.param_index != 65535} == set(range(count))
     assert set(REQUIRED) - set(values) == set()
-    wrong = [n for n, holds in REQUIRED.items() if holds and not holds(values[n].param_value)]
+    read = {n: value_of(m.param_value, m.param_type) for n, m in values.items()}
+    wrong = [n for n, holds in REQUIRED.items() if holds and not holds(read[n])]
     assert wrong == []
 
 
@@ -197,7 +199,7 @@ def test_a_refused_parameter_comes_back_at_once_with_the_reason(
     vehicle: Connected, version: int
 ) -> None:
     speaks(vehicle, version)
-    for name, sent, held in ((b"COM_RC_IN_MODE", 4.0, 1.0), (b"STR_CRUISE", 9.0, 1.0)):
+    for name, sent, held in ((b"COM_RC_LOSS_T", 4.0, 0.0), (b"STR_CRUISE", 9.0, 1.0)):
         vehicle.send(d.MAVLink_param_set_message(1, 1, name, sent, 9))
         value = vehicle.run(1.0, lambda m: m.get_type() == "PARAM_VALUE")
         assert (value.param_id, value.param_value) == (name.decode(), held)

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from docs.figures.__main__ import FLOWN, PICTURED
+from docs.figures.dash import NAMES
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
@@ -68,6 +69,18 @@ def test_the_first_picture_is_of_the_flight_of_make_run() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     scenario, suite = next(iter(PICTURED))
     assert f"$(BIN)/pandion fly {scenario} --sensors {suite}\n" in makefile
+
+
+def test_the_picture_of_four_controllers_says_who_hits_the_wall_and_who_brakes() -> None:
+    said = words(IMAGES / "dash.svg")
+    verdicts = {
+        name: next(text for text in said if text.startswith(f"{name}:")) for name in NAMES.values()
+    }
+    assert "hits the wall" in verdicts[NAMES["naive"]]
+    assert "hits the wall" in verdicts[NAMES["hc"]]
+    assert any(text.startswith("infeasible from") for text in said)
+    assert "of 100" not in verdicts[NAMES["blf"]]
+    assert any(text.startswith("brakes from") for text in said)
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,13 @@ import pytest
 from pandion.__main__ import main
 from studies.campaign.flight_space import spaces
 from studies.campaign.plan import load_plan
+from studies.search.scenario_search import load_task as load_search
 from studies.search.tune import load_task
 from tests.docs.fences import DOCS, commands, fences
 
-FALSIFY, TUNE = DOCS / "how-to" / "falsify.md", DOCS / "how-to" / "tune.md"
+FALSIFY, TUNE, SEARCH = (
+    DOCS / "how-to" / f"{name}.md" for name in ("falsify", "tune", "search-a-scenario")
+)
 
 
 def file_of(page: Path, folder: Path, small: dict[str, str] | None = None) -> Path:
@@ -41,6 +44,30 @@ def test_the_file_of_the_tuning_is_one(tmp_path: Path) -> None:
     task = load_task(file_of(TUNE, tmp_path))
     assert [one.parameter.name for one in task.parameters] == ["WALL_LAMBDA", "TRK_EFFORT"]
     assert (task.plan.count, task.judge_flights) == (30, 100)
+
+
+def test_the_file_of_the_scenario_search_is_one(tmp_path: Path) -> None:
+    task = load_search(file_of(SEARCH, tmp_path))
+    assert [str(mark) for mark in task.marks] == ["softened hc + 60 mm", "blf"]
+    assert (task.train, task.judge) == (range(1), range(1000, 1020))
+
+
+@pytest.mark.long
+def test_the_scenario_search_can_be_typed_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    small = {
+        r"candidates = \d+": "candidates = 2",
+        r"judge_seeds = \d+": "judge_seeds = 1",
+        r"search_s = [\d.]+": "search_s = 1.0",
+        r"scenarios": "duration_s = 2.0\nscenarios",
+    }
+    file_of(SEARCH, tmp_path, small)
+    code = typed(SEARCH)
+    said = capsys.readouterr().out
+    assert ("NOT as wanted" in said) == (code == 1)
+    assert (tmp_path / "runs" / "sphere" / "found.toml").exists()
 
 
 def typed(page: Path, *more: str) -> int:

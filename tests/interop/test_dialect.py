@@ -25,7 +25,7 @@ PORT = 14550
 def capture(path: Path) -> list[str]:
     """What the vehicle sends within a second, as a capture of UDP; returns the messages' names."""
     snapshot = outputs_at(1_000_000).snapshot
-    writers = {component: FrameWriter(1, component) for component in (1, 191)}
+    writers = {component: FrameWriter(1, component) for component in (1, 25)}
     written = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 262144, 1)
     names = []
     for stream in STREAMS:

@@ -69,7 +69,8 @@ def test_every_stream_of_telemetry_arrives(telemetry: Telemetry) -> None:
 def test_all_parameters_arrive_within_a_second(system: System) -> None:
     parameters = Param(system)
     tried = [seconds(parameters.get_all_params) for _ in range(3)]
-    listed = {each.name: each.value for each in parameters.get_all_params().float_params}
+    found = parameters.get_all_params()
+    listed = {each.name: each.value for each in (*found.float_params, *found.int_params)}
     assert listed == pytest.approx(LISTED | PATIENT, rel=1e-6, abs=1e-9)
     assert min(tried) < 1.0, tried
 
@@ -171,7 +172,7 @@ def test_private_messages_are_read_with_our_xml(system: System, name: str) -> No
 
     direct.subscribe_message(name, note)
     assert done.wait(5.0)
-    assert heard[0].component_id == 191
+    assert heard[0].component_id == 25
     fields = json.loads(heard[0].fields_json)
     if name == "ARM_JOINT_STATE":
         assert all(abs(angle) < math.pi for angle in fields["position"])

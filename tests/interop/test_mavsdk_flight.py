@@ -9,7 +9,13 @@ from collections.abc import Iterator
 import pytest
 from mavsdk import System
 from mavsdk.plugins.action import Action
-from mavsdk.plugins.offboard import Offboard, OffboardError, PositionNedYaw, VelocityNedYaw
+from mavsdk.plugins.offboard import (
+    Offboard,
+    OffboardError,
+    PositionGlobalYaw,
+    PositionNedYaw,
+    VelocityNedYaw,
+)
 from mavsdk.plugins.telemetry import Telemetry
 
 from tests.interop.mavsdk_client import connected, eventually
@@ -101,6 +107,24 @@ def test_offboard_flies_positions_and_velocities(system: System, telemetry: Tele
     assert eventually(lambda: telemetry.velocity_ned().east_m_s < -0.4)
     offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -1.5, 0.0))
     assert near(telemetry, 0.0, 0.0, -1.5)
+    offboard.stop()
+    assert mode_is(telemetry, "HOLD")
+
+
+@pytest.mark.parametrize("above", ["REL_HOME", "AMSL"])
+def test_offboard_flies_to_a_place_on_earth(
+    system: System, telemetry: Telemetry, above: str
+) -> None:
+    """SET_POSITION_TARGET_GLOBAL_INT in frames 6 and 5."""
+    offboard, home = Offboard(system), telemetry.home()
+    height = {"REL_HOME": 1.5, "AMSL": home.absolute_altitude_m + 1.5}[above]
+    north = home.latitude_deg + 0.5 / METRES_PER_DEGREE
+    kind = PositionGlobalYaw.AltitudeType[above]
+    offboard.set_position_global(PositionGlobalYaw(north, home.longitude_deg, height, 0.0, kind))
+    offboard.start()
+    assert mode_is(telemetry, "OFFBOARD")
+    assert eventually(lambda: abs(telemetry.position().relative_altitude_m - 1.5) < 0.1)
+    assert eventually(lambda: abs(telemetry.position().latitude_deg - north) < 1e-6)
     offboard.stop()
     assert mode_is(telemetry, "HOLD")
 

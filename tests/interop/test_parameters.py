@@ -18,6 +18,7 @@ from mavsdk.plugins.param.param import Param, ParamError, ParamResult
 from pymavlink import mavutil
 from pymavlink.mavparm import MAVParmDict
 
+from fsw.parameters.param_type import value_of
 from fsw.parameters.registry import BY_NAME
 from fsw.parameters.storage import load
 from pandion import param
@@ -74,7 +75,7 @@ def downloaded(link: Any) -> dict[str, float]:
         assert value is not None
         assert value.param_count == len(LISTED)
         if value.param_index != 65535:  # the checksum of all
-            values[value.param_id] = value.param_value
+            values[value.param_id] = value_of(value.param_value, value.param_type) or 0
     return values
 
 
@@ -112,9 +113,18 @@ def test_mavsdk_lists_everything_within_a_second_and_is_told_the_truth(ground: G
         assert system is not None
         param = Param(system)
         begin = time.monotonic()
-        values = param.get_all_params().float_params
+        values = param.get_all_params()
         assert time.monotonic() - begin < 1.0
-        assert {value.name for value in values} == set(DEFAULTS)
+        integers = {value.name: value.value for value in values.int_params}
+        assert integers == {name: n for name, n in DEFAULTS.items() if isinstance(n, int)}
+        floats = {value.name for value in values.float_params}
+        assert floats == set(DEFAULTS) - set(integers)
+        for name, whole in (("COM_OBL_RC_ACT", 4), ("COM_RCL_EXCEPT", 7), ("NAV_DLL_ACT", 0)):
+            param.set_param_int(name, whole)
+            assert param.get_param_int(name) == whole
+            param.set_param_int(name, DEFAULTS[name])
+        with pytest.raises(ParamError):
+            param.set_param_int("COM_OBL_RC_ACT", 0)
         param.set_param_float("MIS_TAKEOFF_ALT", 1.3)
         assert param.get_param_float("MIS_TAKEOFF_ALT") == pytest.approx(1.3)
         for name, value, result in (
@@ -150,8 +160,8 @@ def test_the_command_line_lists_sets_exports_and_imports(
     output_of("export", str(file))
     assert load(file).values["TRK_EFFORT"] == 0.3
     file.write_text("TRK_EFFORT 0.2\nPLN_W_YAW 0.06\nGONE 1\n")
-    received, error = output_of("import", str(file))
-    assert received == "2 parameters read, 2 changed, 0 refused\n"
+    received, error = output_of("import", str(file), code=1)
+    assert received == "2 parameters read, 2 changed, 1 refused\n"
     assert "GONE is unknown" in error
     assert "TRK_EFFORT" not in load(ground.params).values, "the default again needs no keeping"
     assert "PLN_W_YAW" in load(ground.params).values

@@ -20,6 +20,7 @@ import pytest
 
 from fsw.link.events.event_table import event_document
 from fsw.parameters.metadata import metadata_crc, parameter_document
+from fsw.parameters.param_type import value_of
 from fsw.parameters.registry import PARAMETERS
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station
@@ -39,9 +40,11 @@ def station(vehicle: Vehicle) -> Iterator[Station]:
     station.close()
 
 
-def ftp(station: Station, opcode: int, data: bytes = b"", session: int = 0) -> tuple[Any, ...]:
+def ftp(
+    station: Station, opcode: int, data: bytes = b"", session: int = 0, offset: int = 0
+) -> tuple[Any, ...]:
     """(opcode, session, data) of the first answer."""
-    payload = HEADER.pack(1, session, opcode, len(data) or 239, 0, 0, 0) + data
+    payload = HEADER.pack(1, session, opcode, len(data) or 239, 0, 0, offset) + data
 
     def send() -> None:
         station.mav.file_transfer_protocol_send(0, 1, 1, payload.ljust(251, b"\0"))
@@ -55,16 +58,20 @@ def ftp(station: Station, opcode: int, data: bytes = b"", session: int = 0) -> t
 
 
 def download(station: Station, path: str) -> bytes:
-    """A file of less than one burst."""
+    """A file, burst after burst."""
     _, session, size = ftp(station, OPEN, path.encode())
-    _, _, first = ftp(station, BURST, session=session)
-    content, total = first, int.from_bytes(size, "little")
-    for message in station.messages(PATIENCE_S):
-        if message.get_type() == "FILE_TRANSFER_PROTOCOL":
-            packed = bytes(message.payload)
-            content += packed[HEADER.size : HEADER.size + packed[4]]
-        if len(content) >= total:
-            break
+    content, total = b"", int.from_bytes(size, "little")
+    while len(content) < total:
+        _, _, first = ftp(station, BURST, session=session, offset=len(content))
+        content += first
+        for message in station.messages(PATIENCE_S):
+            if len(content) >= total:
+                break
+            if message.get_type() == "FILE_TRANSFER_PROTOCOL":
+                packed = bytes(message.payload)
+                content += packed[HEADER.size : HEADER.size + packed[4]]
+                if packed[6]:  # the burst is over
+                    break
     ftp(station, TERMINATE, session=session)
     return content
 
@@ -119,7 +126,9 @@ def test_its_parameters(station: Station) -> None:
     for message in station.messages(5.0):
         if message.get_type() == "PARAM_VALUE":
             if message.param_index != 65535:  # the checksum of all
-                found[message.param_id] = message.param_value
+                value = value_of(message.param_value, message.param_type)
+                assert value is not None
+                found[message.param_id] = value
             if len(found) == message.param_count:
                 break
     station.took["parameters"] = time.monotonic() - begin

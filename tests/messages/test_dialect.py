@@ -18,7 +18,7 @@ PINNED = {
     "LOOP_TIMING": (60206, 49, 31),
     "OBSTACLE_WALL": (60207, 24, 28),
     "WORKSPACE_SPHERE": (60208, 18, 197),
-    "SETPOINT_STATUS": (60209, 21, 131),
+    "SETPOINT_STATUS": (60209, 25, 131),
     "OBSTACLE_POINT": (60210, 20, 254),
     "OBSTACLE_SHAPE": (60211, 94, 185),
     "JOINT_ENCODERS": (60212, 25, 156),
@@ -123,7 +123,7 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
         *("target_system", "target_component", "accepted", "refused", "numbers"),
-        *("breaches", "departures", "interventions", "steps"),
+        *("breaches", "departures", "interventions", "steps", "refusals"),
         *("start", "inputs"),  # of several dimensions, each with its unit in the description
     }
     for message in ET.parse(DEFINITION).iter("message"):

@@ -76,7 +76,9 @@ def test_a_station_reads_ratios_accuracy_and_covariance() -> None:
     variances = [place[f"pose_covariance[{k}]"] for k in (0, 6, 11, 15, 18, 20)]
     assert all(0.0 < one < 1e-3 for one in variances)
     assert place["estimator_type"] == 8
-    assert gps_raw(now, CONTEXT) is None, "there is no receiver"
+    fix = dict(zip(wire_fields(24), gps_raw(now, CONTEXT), strict=True))
+    assert (fix["fix_type"], fix["satellites_visible"]) == (3, 255), "there is no receiver"
+    assert 0 < fix["h_acc"] < 10, "mm, as the estimate knows its place"
     exact = replace(now, estimator=None)
     assert math.isnan(odometry(exact, CONTEXT)[14])
 

@@ -131,8 +131,9 @@ def test_what_the_simulator_stood_still_is_not_the_vehicles_silence() -> None:
     assert run.exchange.silent_since is None
     run.steps(20)
     assert run.exchange.silent_since == 99
-    run.steps(180)  # 480 ms: the controls are still held
+    run.steps(430)  # 980 ms: the controls are still held, and told from new ones
     assert all(run.armed)
+    assert run.exchange.held_s == pytest.approx(0.98, abs=0.004)
     run.steps(20)
     assert not run.armed[-1]
 

@@ -41,8 +41,10 @@ def north(t: float) -> float:
 
 
 def record(topic: Topic, t_s: float, *values: Any) -> bytes:
+    """One record; fields at its end that nothing here looks at are 0."""
     head = ulog.data_head(NUMBERS[topic.name], topic)
-    return head + struct.pack("<" + topic.codes, BEGIN_US + round(1e6 * t_s), *values)
+    rest = (0,) * (sum(field.values for field in topic.fields) - len(values))
+    return head + struct.pack("<" + topic.codes, BEGIN_US + round(1e6 * t_s), *values, *rest)
 
 
 def write_flight(directory: Path, seconds: int = SECONDS, **result: Any) -> Path:

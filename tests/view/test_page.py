@@ -1,10 +1,14 @@
 """Who may open a socket to a page."""
 
+import gzip
+import html
 import socket
+import urllib.request
 
 import pytest
 
-from view.page import is_own
+from command_line.html_page import ICON
+from view.page import is_own, open_server
 
 
 @pytest.mark.parametrize(
@@ -42,3 +46,22 @@ def test_what_is_no_browser_may_and_a_request_with_two_origins_may_not() -> None
     assert is_own([], ["127.0.0.1:8042"])
     assert not is_own(["http://127.0.0.1:8042"] * 2, ["127.0.0.1:8042"])
     assert not is_own(["http://127.0.0.1:8042"], [])
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_page_has_our_title_and_icon_and_says_that_it_loads(packed: bool) -> None:
+    server = open_server("127.0.0.1", 0, "walls <mocap>, seed 0")
+    try:
+        headers = {"Accept-Encoding": "gzip"} if packed else {}
+        address = f"http://127.0.0.1:{server.get_port()}/"
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answer:
+            body = answer.read()
+            assert int(answer.headers["Content-Length"]) == len(body)
+            assert (answer.headers["Content-Encoding"] == "gzip") is packed
+    finally:
+        server.stop()
+    page = (gzip.decompress(body) if packed else body).decode()
+    assert f"<title>{html.escape('walls <mocap>, seed 0')} - Pandion</title>" in page
+    assert f'href="{ICON}"' in page
+    assert '<div id="root"><p' in page
+    assert "loading the scene" in page

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import re
+from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,7 @@ from view.flight_events import EventKind, FlightEvent
 from view.log_flight import LogFlight
 from view.report.chart import thinned
 from view.report.charts import event_marks
+from view.report.page import difference
 from view.report.reported import Reported
 
 TIME_AXES = ("margins", "tracking", "inputs", "plan_inputs", "motion", "loop_timing", "estimator",
@@ -129,6 +131,46 @@ def test_a_spike_of_one_tick_is_in_the_thinned_line(drawn: dict[str, Any]) -> No
     assert [shape["y0"] for shape in drawn["inputs"]["layout"]["shapes"] if "x0" in shape][:2] == [
         0.0, 17.1675,
     ]  # fmt: skip
+
+
+def test_thrusts_are_a_band_of_all_and_a_mean_of_each(drawn: dict[str, Any]) -> None:
+    top = trace(drawn["inputs"], "rotors, least to most")
+    assert top["fill"] == "tonexty"
+    assert max(top["y"]) == SPIKE_N, "no extreme is lost in the band"
+    mean = trace(drawn["inputs"], "rotor rear, mean")
+    assert "visible" not in mean
+    assert max(mean["y"]) < SPIKE_N
+    assert trace(drawn["inputs"], "rotor rear")["visible"] == "legendonly"
+
+
+def test_each_row_has_its_legend_and_the_events_stand_between_it_and_the_axis(
+    drawn: dict[str, Any],
+) -> None:
+    figure = drawn["motion"]
+    layout = figure["layout"]
+    axes = [key for key in layout if key.startswith("yaxis")]
+    assert len(axes) > 2
+    for axis in axes:
+        legend = layout[axis.replace("yaxis", "legend")]
+        assert legend["y"] >= layout[axis]["domain"][1]
+        named = {
+            one["legend"] for one in figure["data"] if one["yaxis"] == axis.replace("axis", "")
+        }
+        assert named == {axis.replace("yaxis", "legend")}
+    inner_px = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+    assert all(one["y"] == 1 for one in layout["annotations"])
+    assert (layout["legend"]["y"] - 1.0) * inner_px >= 12.0, "room for the events' numbers"
+
+
+def test_a_page_of_two_flights_says_their_difference() -> None:
+    assert difference("215.9 mm", "200.4 mm") == "-15.5 mm"
+    assert difference("58.76 of 60.00 deg", "59.00 of 60.00 deg") == "+0.24 deg"
+    assert difference("5.94 %", "6.00 %") == "+0.06 %"
+    assert difference("3", "5") == "+2"
+    assert difference("88.6 mm / 152.2 mm", "83.5 mm / 152.3 mm") == "-5.1 mm / +0.1 mm"
+    assert difference("0.77 / 7.8 / 15 ms", "0.70 / 6.8 / 14 ms") == "-0.07 / -1.0 / -1 ms"
+    for one, other in (("mocap", "rtk"), ("1 mm", "1 m"), ("1 / 2", "1 / 2 / 4"), ("", "1")):
+        assert difference(one, other) == ""
 
 
 def test_thinning_keeps_the_extremes_and_the_number() -> None:
@@ -225,6 +267,7 @@ def test_verdict_and_provenance_are_said(page: str) -> None:
         "At 3.013 s the end-effector kept 12.3 mm more than the clearance from front (112.3 mm",
         "pandion fly walls --seed=3 --sensors=mocap --duration=4 --realtime --body=points",
         "PLN_TILT_MAX 17",
+        "log written", f"Pandion {version('pandion')}",
     ):  # fmt: skip
         assert words in page, words
 
@@ -238,6 +281,7 @@ def test_two_flights_stand_side_by_side(flight: Path, tmp_path: Path) -> None:
     assert "inputs" not in drawn  # those are compared by their limits
     assert [one["name"] for one in drawn["limits"]["data"]] == ["flown", "other"]
     assert "<th>flown</th><th>other</th>" in page
+    assert "<th>difference</th>" in page
     assert page.count("badge pass") == page.count("badge fail") == 1
     assert "kept 10.0 mm less than the clearance" in page
 

@@ -7,6 +7,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fsw.flight.conditions import Action, Condition
@@ -29,7 +30,7 @@ STEP = PlanInput((0.5, 0.0, 0.0), 0.0, (0.0, 0.0))
 FLYING = replace(
     SNAPSHOT, safe_set=WALLS, mode=Mode.HOLD, plan=replace(SNAPSHOT.plan, inputs=(STEP,) * 5)
 )
-WRITERS = {component: FrameWriter(1, component) for component in (1, 191)}
+WRITERS = {component: FrameWriter(1, component) for component in (1, 25)}
 
 
 def take(telemetry: Telemetry, *sent: Outgoing, at: float = 0.0) -> None:
@@ -270,6 +271,82 @@ def test_a_telemetry_log_is_a_flight(tmp_path: Path) -> None:
     assert flight.worst.margin == pytest.approx(0.2)
     assert flight.scene(3.5).mode == "hold"
     assert len(flight.trail().points) > 20
+
+
+def a_flight(wall_s: int, seconds: int, north: float, beside: bool = False) -> bytes:
+    """A vehicle that is armed at ``north``, perhaps with a gimbal of its system's number."""
+    log = bytearray()
+    gimbal = FrameWriter(1, 154)
+    at = FLYING.estimate._replace(p_WB=(north, 0.0, -1.0))
+    for k in range(10 * seconds):
+        t_us = 100_000 * k
+        now = replace(FLYING, t_us=t_us, estimate=at._replace(t_us=t_us))
+        for one in everything(now):
+            frame = WRITERS[one.component].frame(one.message_id, *one.values)
+            log += (1_000_000 * wall_s + t_us).to_bytes(8, "big") + frame
+        if beside:
+            frame = gimbal.frame(ids.HEARTBEAT, 0, 26, 8, 0, 4, 3)
+            log += (1_000_000 * wall_s + t_us).to_bytes(8, "big") + frame
+    return bytes(log)
+
+
+def places(path: Path, log: bytes) -> tuple[TlogFlight, list[float]]:
+    path.write_bytes(log)
+    flight = TlogFlight(path)
+    scenes = [flight.scene(float(t)) for t in np.arange(flight.begin, flight.end, 0.1)]
+    return flight, [scene.estimate.p[0] for scene in scenes if scene.estimate]
+
+
+@pytest.mark.parametrize("lengths", [(6, 12), (12, 6)])
+def test_flights_of_one_log_are_shown_one_after_another_and_told(
+    lengths: tuple[int, int], tmp_path: Path
+) -> None:
+    log = a_flight(1000, lengths[0], 1.0) + a_flight(2000, lengths[1], 2.0)
+    flight, north = places(tmp_path / "two.tlog", log)
+    assert north == sorted(north)
+    assert north.count(1.0) == pytest.approx(10 * lengths[0], abs=12)
+    assert north.count(2.0) == pytest.approx(10 * lengths[1], abs=12)
+    (told,) = flight.unusable
+    assert told.startswith("2 flights, one after another: new ones at ")
+    times = [event.t for event in flight.events]
+    assert times == sorted(times)
+
+
+@pytest.mark.parametrize(
+    "junk", [b"\0" * 5, b"\xfd" * 40, b"\xfe\xff\xfd\x05junk", bytes(range(256))]
+)
+def test_junk_in_a_log_is_skipped_and_told(junk: bytes, tmp_path: Path) -> None:
+    whole = a_flight(1000, 6, 1.0)
+    at = whole.index((1_003_000_000).to_bytes(8, "big"))
+    flight, north = places(tmp_path / "junk.tlog", whole[:at] + junk + whole[at:])
+    assert len(north) >= 55
+    assert flight.end == pytest.approx(5.9, abs=0.05)
+    assert flight.unusable == (f"{len(junk)} bytes are no frames, and are skipped",)
+    cut, _ = places(tmp_path / "cut.tlog", whole[:-5])
+    assert "are no frames" in cut.unusable[0]
+
+
+def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(tmp_path: Path) -> None:
+    whole = a_flight(1000, 6, 1.0)
+    flight, _ = places(tmp_path / "gap.tlog", whole + bytes(5_000_000) + a_flight(2000, 6, 2.0))
+    assert "2 flights" in flight.unusable[0]
+    assert flight.unusable[1].startswith("5000000 bytes")
+    flooded, _ = places(tmp_path / "flood.tlog", whole + b"\xfd" * 2_000_000)
+    assert flooded.unusable == ("2000000 bytes are no frames, and are skipped",)
+
+
+def test_another_component_of_the_vehicle_s_system_is_not_the_vehicle(tmp_path: Path) -> None:
+    flight, _ = places(tmp_path / "gimbal.tlog", a_flight(1000, 6, 1.0, beside=True))
+    assert flight.unusable == ()
+    assert all(flight.scene(0.1 * k).armed for k in range(60))
+
+
+def test_a_log_of_another_vehicle_says_whose_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "other.tlog"
+    frame = FrameWriter(7, 1).frame(ids.HEARTBEAT, 0, 2, 12, 0, 4, 3)
+    path.write_bytes((1_000_000).to_bytes(8, "big") + frame)
+    with pytest.raises(UlogError, match="it has messages of system 7"):
+        TlogFlight(path)
 
 
 def test_what_is_no_telemetry_log_is_refused_in_a_sentence(tmp_path: Path) -> None:

@@ -19,9 +19,9 @@ from view.telemetry import Telemetry
 from view.top.app import TopApp, headline, shown_value
 from view.top.peer import TelemetryPeer, fields, meaning, unit
 
-HEARTBEAT, ATTITUDE, LOCAL_POSITION_NED, STATUSTEXT = 0, 30, 32, 253
-BARRIER_MARGIN, MPC_STATUS = 60203, 60204
-VEHICLE, ARM = FrameWriter(1, 1), FrameWriter(1, 191)
+HEARTBEAT, SYS_STATUS, ATTITUDE, LOCAL_POSITION_NED, STATUSTEXT = 0, 1, 30, 32, 253
+BARRIER_MARGIN, MPC_STATUS, SETPOINT_STATUS = 60203, 60204, 60209
+VEHICLE, ARM = FrameWriter(1, 1), FrameWriter(1, 25)
 AUTO_TRAJECTORY = 4 << 16 | 11 << 24
 
 
@@ -75,6 +75,21 @@ def test_the_headline_says_mode_arming_place_and_margin() -> None:
     assert "disarmed" in seen(beat(armed=False))
     assert seen(beat(), now=5.0) == "vehicle lost: silent for 5 s"
     assert seen() == "no vehicle has answered yet"
+
+
+def test_the_headline_counts_what_was_refused() -> None:
+    assert "refused" not in seen(beat(), frame(ARM, SETPOINT_STATUS, refused=7), now=0.5)
+    assert "3 refused" in seen(beat(), frame(ARM, SETPOINT_STATUS, refusals=3), now=0.5)
+    assert "3 refused" in seen(
+        beat(), margins(0.3), frame(ARM, SETPOINT_STATUS, refusals=3), now=0.5
+    )
+
+
+def test_the_headline_says_what_the_vehicle_dropped() -> None:
+    status = frame(VEHICLE, SYS_STATUS, battery_remaining=80, errors_comm=3, errors_count1=12)
+    assert "dropped 3 damaged, 12 echoes" in seen(beat(), status)
+    unhandled = frame(VEHICLE, SYS_STATUS, errors_count3=7)
+    assert "dropped" not in seen(beat(), unhandled), "a ground station sends much that is of no use"
 
 
 def test_fields_have_units_and_names_of_values() -> None:

@@ -16,9 +16,11 @@ COLOURS: Final = ("#0969da", "#bc4c00", "#1a7f37", "#8250df", "#bf3989", "#9a670
 LIMIT: Final = "#cf222e"
 TRUTH, ESTIMATE, REFERENCE = "#0969da", "#8c959f", "#1a7f37"
 _DIGITS: Final = 5  # of a number in the page
-_GAP: Final = 0.06  # between two rows, share of the height
-_ROW_PX: Final = 200
-_FRAME_PX: Final = 110
+_ROW_PX: Final = 200  # of one pair of axes
+_LEGEND_PX: Final = 34  # above each row
+_EVENTS_PX: Final = 18  # above the first row, below its legend
+_MARGIN: Final = {"l": 70, "r": 34, "t": _LEGEND_PX + _EVENTS_PX + 6, "b": 44}
+_BAND = "rgba(87,96,106,0.25)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +89,36 @@ def mark(name: str, x: float, y: float, colour: str, text: str) -> Trace:
     }  # fmt: skip
 
 
+def spread(
+    name: str, t: Array, y: Array, parts: Sequence[tuple[str, str]], pieces: int = 600
+) -> list[Trace]:
+    """Several quantities ``y`` (n, k) [the axis' unit] as one band and a mean line each.
+
+    The band holds every sample at ``t`` (n,) [s]: from the least to the most of all of them in each
+    of ``pieces`` of equal length. Each line is hidden at first, with its extremes, as it is.
+    """
+    t, y = np.asarray(t, "f8"), np.asarray(y, "f8")
+    cuts = np.unique(np.linspace(0, len(t), min(pieces, len(t)) + 1).astype(int))
+    if len(cuts) < 2:
+        return []
+    begins = cuts[:-1]
+    middle = 0.5 * (t[begins] + t[cuts[1:] - 1])
+    low = np.minimum.reduceat(y.min(axis=1), begins)
+    high = np.maximum.reduceat(y.max(axis=1), begins)
+    means = np.add.reduceat(y, begins, axis=0) / np.diff(cuts)[:, None]
+    edge = {"width": 0}
+    traces = [
+        line(f"{name}, least", middle, low, _BAND, most=pieces, line=edge, showlegend=False),
+        line(f"{name}, least to most", middle, high, _BAND, most=pieces, line=edge,
+             fill="tonexty", fillcolor=_BAND),
+    ]  # fmt: skip
+    for k, (part, colour) in enumerate(parts):
+        traces.append(line(f"{part}, mean", middle, means[:, k], colour, most=pieces, width=1.4))
+    for k, (part, colour) in enumerate(parts):
+        traces.append(line(part, t, y[:, k], colour, width=0.8, visible="legendonly"))
+    return traces
+
+
 def over_time(
     name: str,
     title: str,
@@ -95,10 +127,15 @@ def over_time(
     marks: Iterable[tuple[float, str]] = (),
     span: tuple[float, float] | None = None,
 ) -> Chart:
-    """Rows over one axis of time, with a line at each of ``marks`` (time [s], its number)."""
-    height = 1.0 / len(rows)
+    """Rows over one axis of time, with a line at each of ``marks`` (time [s], its number).
+
+    Each row has a legend of its own above it; the numbers stand above the first row, where no line
+    and no legend is.
+    """
+    drawn_px = _ROW_PX * len(rows) + _LEGEND_PX * (len(rows) - 1)
     layout: dict[str, Any] = {
-        "height": _ROW_PX * len(rows) + _FRAME_PX,
+        "height": drawn_px + _MARGIN["t"] + _MARGIN["b"],
+        "margin": dict(_MARGIN),
         "xaxis": {"title": {"text": "time since the start [s]"}, "anchor": f"y{_n(len(rows))}"},
         "shapes": [],
         "annotations": [],
@@ -108,13 +145,15 @@ def over_time(
         layout["xaxis"]["range"] = list(span)
     data = []
     for k, row in enumerate(rows, start=1):
-        top = 1.0 - (k - 1) * height
-        bottom = top - height + (_GAP if k < len(rows) else 0.0)
+        top = 1.0 - (k - 1) * (_ROW_PX + _LEGEND_PX) / drawn_px
+        bottom = top - _ROW_PX / drawn_px
         axis: dict[str, Any] = {"title": {"text": row.unit}, "domain": [max(bottom, 0.0), top]}
         if row.span is not None:
             axis["range"] = list(row.span)
         layout[f"yaxis{_n(k)}"] = axis
-        data += [{**trace, "yaxis": f"y{_n(k)}"} for trace in row.traces]
+        above = top + (_EVENTS_PX / drawn_px if k == 1 else 0.0)
+        layout[f"legend{_n(k)}"] = {"y": above, **_LEGEND}
+        data += [{**one, "yaxis": f"y{_n(k)}", "legend": f"legend{_n(k)}"} for one in row.traces]
         layout["shapes"] += [_across(limit, f"y{_n(k)}") for limit in row.limits]
     for t, number in marks:
         layout["shapes"].append(_upright(t))
@@ -138,6 +177,11 @@ def _upright(t: float) -> dict[str, Any]:
         "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": t, "x1": t, "layer": "below",
         "line": {"color": "#afb8c1", "width": 1},
     }  # fmt: skip
+
+
+_LEGEND: Final = {
+    "orientation": "h", "yanchor": "bottom", "x": 0, "xanchor": "left", "font": {"size": 11},
+}  # fmt: skip
 
 
 def _number(t: float, text: str) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from view.report.chart import (
     mark,
     over_time,
     rounded,
+    spread,
 )
 from view.report.reported import Reported
 
@@ -202,10 +203,8 @@ def inputs(flights: Sequence[Reported]) -> Chart | None:
         flight.number(f"airframe.{name}_max") for name in ("rotor_thrust", "joint_torque")
     )
     names = ("rear", "left", "front", "right")
-    thrusts = [
-        line(f"rotor {name}", t, sent["rotor_thrust"][:, k], COLOURS[k], width=0.8)
-        for k, name in enumerate(names)
-    ]
+    rotors = [(f"rotor {name}", COLOURS[k]) for k, name in enumerate(names)]
+    thrusts = spread("rotors", t, sent["rotor_thrust"], rotors)
     torques = [
         line(f"joint {k + 1}", t, sent["joint_torque"][:, k], COLOURS[k + 4], width=0.8)
         for k in range(2)
@@ -213,7 +212,8 @@ def inputs(flights: Sequence[Reported]) -> Chart | None:
     return over_time(
         "inputs",
         "Inputs against their limits",
-        "Commanded 500 times a second; the thinned lines keep every extreme. Dashed: limits.",
+        "Commanded 500 times a second. The band holds every rotor's thrust, the lines are means; "
+        "a click on a name shows that rotor as commanded. Dashed: limits.",
         [
             Row("thrust [N]", thrusts, (0.0, most), (-0.5, 1.08 * most)),
             Row("torque [N m]", torques, (-torque, torque)),
@@ -478,15 +478,23 @@ def estimator(flights: Sequence[Reported]) -> Chart | None:
             for k, (field, name) in enumerate(_RATIOS)
             if np.isfinite(status[f"{field}_test_ratio"]).any()
         ]
-        rows.append(Row("innovation / limit", shown, (1.0,)))
+        rows.append(Row("innovation / limit", shown, (1.0,), _robust(shown)))
     exact = "" if status is not None else " The sensors of this flight are exact."
     return over_time(
         "estimator",
         "Estimator",
-        f"Estimated minus true position of the body, with three standard deviations.{exact}",
+        f"Estimated minus true position of the body, with three standard deviations.{exact} Rare "
+        "innovations far beyond their limit are outside the axis at first: a double click shows "
+        "all.",
         rows,
         _marks(flights),
     )
+
+
+def _robust(shown: Sequence[Trace]) -> tuple[float, float]:
+    """The span that holds nearly all of what is shown, and the limit 1; the rest can be zoomed."""
+    values = [y for one in shown for y in one["y"] if y is not None]
+    return 0.0, max(1.2, 1.3 * float(np.quantile(values, 0.99)) if values else 0.0)
 
 
 _RATIOS: Final = (("pos", "position"), ("hgt", "height"), ("vel", "velocity"), ("hdg", "heading"),

@@ -5,12 +5,13 @@ from __future__ import annotations
 import base64
 import gzip
 import html
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from command_line.html_page import document, table
+from command_line.html_page import ICON, document, table
 from command_line.output import json_text
 from view.report.chart import Chart
 from view.report.charts import charts, worst_sentence
@@ -23,6 +24,11 @@ _POLICY: Final = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:"
 )
+_PAIR: Final = 2  # flights of which the second is compared with the first
+# A number with its unit, and perhaps the limit that both flights share.
+_NUMBER: Final = re.compile(
+    r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d]*)?|%)"
+)
 Rows = Sequence[tuple[str, str]]
 
 
@@ -33,6 +39,8 @@ def page(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<link rel='icon' href='{ICON}'>\n"
     )
     parts = [
         f"<header><h1>{html.escape(title)}</h1>",
@@ -101,14 +109,39 @@ def _summary(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
     found = {label: dict(rows) for label, rows in summaries.items()}
     rows = [[name, *(found[f.label].get(name, "") for f in flights)] for name in names]
     heads = ["", *(flight.label if len(flights) > 1 else "" for flight in flights)]
+    if len(flights) == _PAIR:
+        heads.append("difference")
+        rows = [[*row, difference(row[1], row[2])] for row in rows]
     return table(heads, rows, "Result") if rows else ""
+
+
+def difference(one: str, other: str) -> str:
+    """The second number minus the first, in their unit; of several behind slashes, of each.
+
+    Empty where they are not alike.
+    """
+    pairs = list(zip(one.split(" / "), other.split(" / "), strict=False))
+    changes = [_change(*pair) for pair in pairs]
+    alike = one.count(" / ") == other.count(" / ") and all(changes)
+    return " / ".join(changes) if alike else ""
+
+
+def _change(one: str, other: str) -> str:
+    before, after = (_NUMBER.fullmatch(cell.strip()) for cell in (one, other))
+    if before is None or after is None or before["unit"] != after["unit"]:
+        return ""
+    digits = max(len(each["digits"] or "") for each in (before, after))
+    change = float(after["number"]) - float(before["number"])
+    return f"{change:+.{digits}f} {before['unit'].strip()}".strip()
 
 
 def _figure(chart: Chart) -> str:
     title, note = html.escape(chart.title), html.escape(chart.note)
     return (
         f'<section><h2 id="{chart.name}-title">{title}</h2><figure><figcaption>{note} '
-        f'<button class="numbers" data-figure="{chart.name}">numbers as JSON</button></figcaption>'
+        f'<button class="numbers" data-figure="{chart.name}">numbers as JSON</button> '
+        f'<button class="numbers" data-svg="{chart.name}">SVG</button> '
+        f'<button class="numbers" data-pdf="{chart.name}">PDF</button></figcaption>'
         f'<div class="chart" id="{chart.name}" style="height:{chart.layout["height"]}px"></div>'
         "</figure></section>"
     )

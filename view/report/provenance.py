@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
+import platform
 import shlex
 from collections.abc import Sequence
+from datetime import datetime
+from importlib.metadata import version
 from typing import Final
 
 from command_line.html_page import table
@@ -40,10 +44,32 @@ def provenance(flights: Sequence[Reported]) -> str:
     rows.append(
         ["parameters changed", *("; ".join(changed(flight)) or "none" for flight in flights)]
     )
+    rows.append(["log written", *(_written(flight) for flight in flights)])
     rows.append(["log", *("/".join(flight.data.path.parts[-2:]) for flight in flights)])
     rows.append(["to repeat it", *(command(flight) for flight in flights)])
+    made = f"Pandion {version('pandion')}, {machine()}, {_now()}"
+    rows.append(["this page", made, *("" for _ in flights[1:])])
     heads = ["", *(flight.label if len(flights) > 1 else "" for flight in flights)]
     return table(heads, rows, "Provenance")
+
+
+def machine() -> str:
+    """The machine on which this runs, in a few words."""
+    words = (platform.system(), platform.machine(), f"{os.cpu_count()} processors")
+    return f"{' '.join(words)}, Python {platform.python_version()}"
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(" ", "minutes")
+
+
+def _written(flight: Reported) -> str:
+    """When the log's file changed last; a log in lockstep holds no wall time."""
+    try:
+        seconds = flight.data.path.stat().st_mtime
+    except OSError:
+        return ""
+    return datetime.fromtimestamp(seconds).astimezone().isoformat(" ", "minutes")
 
 
 def changed(flight: Reported) -> list[str]:

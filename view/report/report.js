@@ -7,23 +7,36 @@ async function library() {
   (0, eval)(await new Response(stream).text());
 }
 
+// On paper and on a light screen, and on a dark one.
+const LIGHT = { text: "#1b1f24", paper: "#fff", grid: "#eaeef2", line: "#d0d7de" };
+const DARK = { text: "#e6edf3", paper: "#0d1117", grid: "#21262d", line: "#484f58" };
+const darkScreen = window.matchMedia("(prefers-color-scheme: dark)");
+const narrow = () => window.innerWidth < 700;
+const PRINTED_PX = 680; // fits between the margins of A4 and of letter
+
 const COMMON = {
-  font: { family: "system-ui, sans-serif", size: 12, color: "#1b1f24" },
   margin: { l: 70, r: 34, t: 40, b: 44 },
-  paper_bgcolor: "#fff",
-  plot_bgcolor: "#fff",
   legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, xanchor: "left", font: { size: 11 } },
   modebar: { orientation: "v" },
 };
-const AXIS = { gridcolor: "#eaeef2", zerolinecolor: "#d0d7de", linecolor: "#d0d7de", ticks: "outside",
-               tickcolor: "#d0d7de" };
 const OPTIONS = { responsive: true, displaylogo: false,
                   modeBarButtonsToRemove: ["sendChartToCloud", "select2d", "lasso2d", "autoScale2d"] };
 
+function coloured(whole, theme) {
+  const look = { paper_bgcolor: theme.paper, plot_bgcolor: theme.paper,
+                 font: { family: "system-ui, sans-serif", size: 12, color: theme.text } };
+  for (const key of Object.keys(whole).filter((one) => /^[xy]axis/.test(one)))
+    for (const [name, colour] of [["gridcolor", theme.grid], ["zerolinecolor", theme.line],
+                                  ["linecolor", theme.line], ["tickcolor", theme.line]])
+      look[`${key}.${name}`] = colour;
+  return look;
+}
+
 function laidOut(layout) {
   const whole = { ...COMMON, ...layout };
+  if (narrow()) whole.margin = { ...whole.margin, l: 46, r: 8 };
   for (const key of Object.keys(whole))
-    if (/^[xy]axis/.test(key)) whole[key] = { ...AXIS, ...whole[key] };
+    if (/^[xy]axis/.test(key)) whole[key] = { ticks: "outside", ...whole[key] };
   return whole;
 }
 
@@ -56,11 +69,36 @@ async function draw() {
       anchor.download = `${figure.name}.json`;
       anchor.click();
     });
+    document.querySelector(`[data-svg="${figure.name}"]`).addEventListener("click", async () => {
+      const element = document.getElementById(figure.name);
+      const light = { ...laidOut(figure.layout), ...element.layout };
+      await Plotly.relayout(figure.name, coloured(light, LIGHT));
+      await Plotly.downloadImage(figure.name, { format: "svg", filename: figure.name,
+                                                width: PRINTED_PX, height: figure.layout.height });
+      if (darkScreen.matches) Plotly.relayout(figure.name, coloured(light, DARK));
+    });
+    document.querySelector(`[data-pdf="${figure.name}"]`).addEventListener("click", () => {
+      document.getElementById(figure.name).closest("section").classList.add("only");
+      document.body.dataset.only = figure.name;
+      window.print(); // the browser's "save as PDF" writes this figure alone
+    });
   }
   link(figures);
-  const fit = () => figures.forEach((f) => Plotly.Plots.resize(f.name));
-  window.addEventListener("beforeprint", fit);
-  window.addEventListener("afterprint", fit);
+  const theme = (print) => {
+    const colours = !print && darkScreen.matches ? DARK : LIGHT;
+    const size = print ? { width: PRINTED_PX, autosize: false } : { width: null, autosize: true };
+    for (const figure of figures)
+      Plotly.relayout(figure.name, { ...coloured(figure.layout, colours), ...size });
+  };
+  theme(false);
+  darkScreen.addEventListener("change", () => theme(false));
+  // The page is laid out for paper only after this event: the width is set here, not measured.
+  window.addEventListener("beforeprint", () => theme(true));
+  window.addEventListener("afterprint", () => {
+    delete document.body.dataset.only;
+    document.querySelectorAll("section.only").forEach((one) => one.classList.remove("only"));
+    theme(false);
+  });
   document.body.dataset.drawn = figures.length;
 }
 draw().catch((problem) => {

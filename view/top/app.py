@@ -233,9 +233,12 @@ def headline(scene: Scene) -> str:
         parts.append(f"N {north:+.2f} E {east:+.2f} up {-down:.2f} m")
     if scene.margins:
         parts.append(f"margin {1e3 * scene.minimum:.0f} mm")
+    if scene.safety.refusals:
+        parts.append(f"{scene.safety.refusals} refused")
     if scene.solver is not None:
         timed = "" if math.isnan(scene.solver.total) else f" in {1e3 * scene.solver.total:.1f} ms"
         parts.append(f"plan {scene.solver.status}{timed}")
+    parts += [f"dropped {scene.dropped}"] if scene.dropped else []
     return "  ".join(parts)
 
 

@@ -57,6 +57,7 @@ class CommandContext:
     mission: MissionProgress
     mission_refusal: str | None  # None: it can be flown
     setpoint_fresh: bool  # an offboard setpoint came within the last 0.5 s
+    setpoint_problem: str  # why those of the last 0.5 s are refused; empty: none was
     position: Vec3  # m, of the body
     yaw: float  # rad
     joints: Vec2  # rad, asked for last or as they are

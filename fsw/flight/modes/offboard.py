@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
 from fsw.flight.land_detector import feel_ground, in_the_air
 from fsw.flight.modes.base import CONTINUE, CommandContext, FlightMode, ModeResult, Px4Mode
 from fsw.flight.offboard_setpoints import (
     Tilt,
     as_motion,
     attitude_refusal,
+    finite_or_zero,
     joints_refusal,
     motion_refusal,
     tilted,
+    turn_level,
 )
 from fsw.flight.setpoint_generator import PositionGoal
 from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory, is_young
 from fsw.frozen import replace
 from fsw.geometry.vectors import add_scaled
+from fsw.model.kinematics import point_in_flight
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import (
     Mode,
     MotionSetpoint,
     OffboardReport,
+    PositionFrom,
     SetpointKind,
+    Severity,
     StateEstimate,
+    StatusText,
     TickInputs,
 )
 
 _RISING = 0.1  # m, m/s or m/s^2 upwards: the setpoint asks a standing vehicle to fly
 _SINKING = 0.1  # m that the setpoint is below the vehicle: it presses on the ground
+_TOLD_AGAIN_US: Final = 5_000_000
 _NO_SETPOINTS = OffboardReport()
 
 
@@ -43,13 +53,17 @@ class Offboard(FlightMode):
         """Setpoints."""
         if context.setpoint_fresh:
             return None
+        if context.setpoint_problem:
+            return f"not offboard: setpoints are refused: {context.setpoint_problem}"
         return "not offboard: no setpoint was received in the last 0.5 s"
 
     def waits(self, state: FlightState, now_us: int) -> str | None:
         """Dropped when setpoints stop."""
         if is_fresh(self.config, state, now_us):
             return None
-        return "offboard cancelled: setpoints stopped before arming"
+        problem = current_problem(self.config, state, now_us)
+        why = f"were refused: {problem}" if problem else "stopped before arming"
+        return f"offboard cancelled: setpoints {why}"
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
         """On the ground, wait for a setpoint to fly; in the air, notice that one has landed it."""
@@ -67,9 +81,9 @@ class Offboard(FlightMode):
 
     def _asks_to_rise(self, state: FlightState, estimate: StateEstimate) -> bool:
         motion = self._motion(state, estimate)[0]
-        if motion.p is not None:
+        if motion.p is not None and math.isfinite(motion.p[2]):
             return estimate.p_WB[2] - motion.p[2] > (0.0 if motion.of_end_effector else _RISING)
-        if motion.v is not None:
+        if motion.v is not None and math.isfinite(motion.v[2]):
             return -motion.v[2] > _RISING
         return motion.a is not None and -motion.a[2] > _RISING
 
@@ -110,22 +124,73 @@ class Offboard(FlightMode):
 
 
 def accept_setpoints(
-    memory: OffboardMemory, inputs: TickInputs, config: FlightConfig
+    state: FlightState, inputs: TickInputs, config: FlightConfig, texts: list[StatusText]
 ) -> OffboardMemory:
-    """Store setpoints; those out of range are counted and dropped."""
-    refused, accepted, now_us = inputs.refused_setpoints, 0, inputs.sensors.t_us
+    """Store setpoints; refused ones are counted, with the reason of the newest.
+
+    A text says it, and again every few seconds while setpoints are refused.
+    """
+    memory, now_us = state.offboard, inputs.sensors.t_us
     motion, attitude, joints = inputs.motion, inputs.attitude, inputs.joints
-    if motion is not None and motion_refusal(motion) is None:
-        memory = replace(memory, motion=motion, attitude=None, motion_us=now_us)
-        accepted += 1
-    if attitude is not None and attitude_refusal(attitude) is None:
-        memory = replace(memory, attitude=attitude, motion=None, motion_us=now_us)
-        accepted += 1
-    if joints is not None and joints_refusal(joints.q_arm, config.airframe) is None:
-        memory = replace(memory, joints=joints, joints_us=now_us)
-        accepted += 1
+    refused, accepted, problem = inputs.refused_setpoints, 0, inputs.setpoint_problem
+    if motion is not None:
+        placed = _place_motion(motion, state, config)
+        if isinstance(placed, MotionSetpoint):
+            memory = replace(memory, motion=placed, attitude=None, motion_us=now_us)
+            accepted += 1
+        else:
+            problem = placed
+    if attitude is not None:
+        against = attitude_refusal(attitude)
+        if against is None:
+            memory = replace(memory, attitude=attitude, motion=None, motion_us=now_us)
+            accepted += 1
+        problem = against or problem
+    if joints is not None:
+        against = joints_refusal(joints.q_arm, config.airframe)
+        if against is None:
+            memory = replace(memory, joints=joints, joints_us=now_us)
+            accepted += 1
+        problem = against or problem
     refused += sum(one is not None for one in (motion, attitude, joints)) - accepted
+    if problem:
+        memory = replace(memory, problem=problem, problem_us=now_us)
+        if not is_young(memory.told_us, now_us, _TOLD_AGAIN_US):
+            texts.append(StatusText(Severity.WARNING, f"setpoint refused: {problem}"))
+            memory = replace(memory, told_us=now_us)
     return replace(memory, accepted=memory.accepted + accepted, refused=memory.refused + refused)
+
+
+def current_problem(config: FlightConfig, state: FlightState, now_us: int) -> str:
+    """Why setpoints are refused now; empty: none was within the timeout."""
+    memory = state.offboard
+    if is_young(memory.problem_us, now_us, config.limits.setpoint_timeout_us):
+        return memory.problem
+    return ""
+
+
+def _place_motion(
+    motion: MotionSetpoint, state: FlightState, config: FlightConfig
+) -> MotionSetpoint | str:
+    """A setpoint whose position counts from the origin of the local frame; or why it is refused."""
+    if motion.p is not None and motion.p_from is not PositionFrom.ORIGIN:
+        x, y, z = motion.p
+        home, estimate = state.vehicle.home, state.estimate
+        if motion.p_from is PositionFrom.HOME_HEIGHT:
+            if home is None:
+                return "its height counts from home, and no home is set"
+            place = (x, y, z + home.p[2])
+        elif estimate is None:
+            return "its position counts from the vehicle's, which is not known"
+        else:
+            if motion.along_heading:
+                x, y, z = turn_level(motion.p, estimate.yaw)
+            p = estimate.p_WB
+            if motion.of_end_effector:
+                p = point_in_flight(estimate, config.airframe.link_length)[0]
+            place = (x + p[0], y + p[1], z + p[2])
+        motion = replace(motion, p=place, p_from=PositionFrom.ORIGIN)
+    return motion_refusal(motion) or motion
 
 
 def is_fresh(config: FlightConfig, state: FlightState, now_us: int) -> bool:
@@ -161,7 +226,8 @@ def _moved_on(motion: MotionSetpoint, age_us: int) -> MotionSetpoint:
     """A moving setpoint, extrapolated to now."""
     if motion.p is None or motion.v is None or motion.along_heading:
         return motion
-    return replace(motion, p=add_scaled(motion.p, motion.v, 1e-6 * age_us))
+    v = finite_or_zero(motion.v)
+    return replace(motion, p=add_scaled(motion.p, v, 1e-6 * age_us))
 
 
 def _kind(memory: OffboardMemory) -> SetpointKind:

@@ -15,6 +15,7 @@ import contextlib
 import fcntl
 import os
 import threading
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ from fsw.link.files.served_file import DiskFile
 NAMES: Final = ("flight.ulg", "flight.tlog")  # the first that a flight has is *the* log of it
 MARK: Final = "vehicle.txt"  # of the directory of a flight: whose it is
 _MAX_MARK: Final = 4096  # bytes, of a path
+_LAST_S: Final = 0xFFFFFFFF  # seconds that LOG_ENTRY has room for, to 2106
 _MAX_FLIGHTS: Final = 1000  # the newest; more would take a ground station minutes to list
 
 
@@ -34,6 +36,7 @@ class LoggedFlight:
     """The files of one flight."""
 
     flight: str  # name of its directory
+    begun_s: int  # when it began [s since 1970]
     files: tuple[DiskFile, ...]  # in the order of NAMES; at least one
 
     @property
@@ -103,6 +106,12 @@ class FlightLogs:
             (directory / MARK).write_bytes(own)
         self.all = flight_logs(directory, own)
 
+    @property
+    def present_ulog(self) -> DiskFile | None:
+        """The ULog of this flight; None if it writes none."""
+        files = (file for log in self.all if log.flight == self._present for file in log.files)
+        return next((file for file in files if file.path.suffix == ".ulg"), None)
+
     def erase(self) -> Erasure:
         """Begin to delete the logs of finished flights; from now on only this one is listed.
 
@@ -143,4 +152,12 @@ def _flight(directory: Path, *, present: bool = False) -> LoggedFlight | None:
     files = tuple(DiskFile(path) for path in paths if path.is_file() and not path.is_symlink())
     if all(file.size() == 0 for file in files) and not present:
         return None  # a download of nothing never ends
-    return LoggedFlight(directory.name, files) if files else None
+    return LoggedFlight(directory.name, _begun_s(directory), files) if files else None
+
+
+def _begun_s(directory: Path) -> int:
+    """When a flight began [s since 1970]: then its mark was written; one without it begins now."""
+    try:
+        return min(max(int((directory / MARK).stat().st_mtime), 0), _LAST_S)
+    except OSError:
+        return int(time.time())

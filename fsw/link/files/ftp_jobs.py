@@ -32,27 +32,30 @@ def served_size(file: OpenFile) -> int:
 
 def read(request: Request, file: OpenFile) -> Job:
     """One piece of a file."""
-    yield from _piece(request, file, request.offset, burst_complete=False)
+    yield from _piece(request.size or MAX_DATA, file, request.offset, burst_complete=False)
 
 
 def burst(request: Request, file: OpenFile) -> Job:
-    """Piece after piece, to the end of the file or of the burst."""
-    size = request.size or MAX_DATA
+    """Piece after piece, to the end of the file or of the burst.
+
+    Each as large as fits, whatever size was asked for, as PX4 has it: some clients ask for 4 bytes.
+    """
+    size = MAX_DATA
     for number in range(_BURST):
         offset = request.offset + number * size
         last = number == _BURST - 1 or offset + size >= served_size(file)
-        yield from _piece(request, file, offset, burst_complete=last)
+        yield from _piece(size, file, offset, burst_complete=last)
         if last:
             return
 
 
-def _piece(request: Request, file: OpenFile, offset: int, *, burst_complete: bool) -> Job:
+def _piece(size: int, file: OpenFile, offset: int, *, burst_complete: bool) -> Job:
     left = served_size(file) - offset
     if left <= 0:
         yield refused(Refusal.END_OF_FILE)
         return
     try:
-        for data in _delivered(file, offset, min(request.size or MAX_DATA, left)):
+        for data in _delivered(file, offset, min(size, left)):
             if data is None:
                 yield None
             else:

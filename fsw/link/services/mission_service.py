@@ -207,7 +207,7 @@ class MissionService:
         kind, peer = upload.kind, upload.peer
         try:
             items, meanings = tuple(upload.items), tuple(upload.meanings)
-            self._store.keep(kind, items, meanings, self.source)
+            remarks = self._store.keep(kind, items, meanings, self.source)
         except BadItem as refused:
             return self._refuse(refused, kind, peer)
         self._upload = None
@@ -216,6 +216,7 @@ class MissionService:
         return (
             encode_ack(ACCEPTED, kind, peer, self._store.ids[kind]),
             StatusText(Severity.INFO, text),
+            *(StatusText(Severity.WARNING, remark) for remark in remarks),
         )
 
     # ------------------------------------------------------------ download

@@ -13,12 +13,14 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
-from fsw.flight.bounds import safe_set_problem
+from fsw.flight.bounds import mission_problem, safe_set_problem
 from fsw.flight.safe_set import may_grow_fence
 from fsw.flight.safe_set_change import growth
+from fsw.link.services.mission_remarks import fence_remarks, mission_remarks
 from fsw.link.wire.fence_items import check_fence_item, read_fence
 from fsw.link.wire.mission_items import (
     DENIED,
+    INVALID,
     BadItem,
     Locate,
     MissionItem,
@@ -96,6 +98,7 @@ class MissionStore:
         self.items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._update: MissionUpdate | None = None
         self._snapshot: FlightSnapshot | None = None
+        self._steps: tuple[MissionStep, ...] = ()  # of the mission
         self._kept_fence: tuple[SafeSet, MessageSource | None] = (SafeSet(), None)
 
     def observe(self, snapshot: FlightSnapshot) -> None:
@@ -119,10 +122,19 @@ class MissionStore:
         items: tuple[MissionItem, ...],
         meanings: tuple[Meaning, ...],
         source: MessageSource | None = None,
-    ) -> None:
-        """Put a whole upload in the place of the old one; ``BadItem`` leaves that."""
+    ) -> tuple[str, ...]:
+        """Put a whole upload in the place of the old one; ``BadItem`` leaves that.
+
+        Returns what the operator should know of it all the same.
+        """
+        remarks: tuple[str, ...] = ()
         if kind is Kind.MISSION:
             steps = tuple(step for step in meanings if isinstance(step, MissionStep))
+            wrong = mission_problem(steps)
+            if wrong is not None:
+                raise BadItem(INVALID, f"item {wrong[0]}: {wrong[1]}")
+            remarks = mission_remarks(items, steps, self._snapshot)
+            self._steps = steps
             self._change(MissionUpdate(steps=steps, current=0 if steps else None))
         elif kind is Kind.RALLY:
             places = tuple(place for place in meanings if isinstance(place, tuple))
@@ -134,6 +146,9 @@ class MissionStore:
             self._change(MissionUpdate(fence=fence, fence_source=source))
         self.items[kind] = items
         self.ids[kind] = _identity(items)
+        if kind is Kind.RALLY:
+            return ()
+        return remarks + fence_remarks(self._steps, self._kept_fence[0], self._snapshot)
 
     def clear(self, kinds: tuple[Kind, ...], source: MessageSource | None = None) -> None:
         """Clear all of these lists; ``BadItem`` leaves every one of them as it is."""

@@ -1,8 +1,9 @@
-"""The parameter protocol: list, read and set, every value a REAL32.
+"""The parameter protocol: list, read and set; values are INT32 or REAL32, as PX4 types them.
 
 A list is paced, so that no tick sends more than a datagram of it. A set is answered with the value
 that holds when it has been decided: the new one, or the old one after a text that says why. A
-change is reported on every link.
+read that comes before that waits for it. A change is reported on every link. A value of another
+type is taken where the parameter's type has it exactly.
 
 Source: https://mavlink.io/en/services/parameter.html
 """
@@ -14,14 +15,16 @@ import zlib
 from collections.abc import Sequence
 from typing import Final, cast
 
+from fsw.link.services.service import Outcome
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
-from fsw.parameters.facts import FACT_BY_NAME, REPEATED
+from fsw.parameters.facts import ALIASES, FACT_BY_NAME, REPEATED
+from fsw.parameters.float32 import as_text, nearest_decimal
+from fsw.parameters.param_type import as_bytes, field_of, value_of
 from fsw.parameters.registry import BY_NAME
-from fsw.parameters.storage import REAL32
 from fsw.parameters.store import ParameterStore
-from fsw.signals import Severity, StatusText
+from fsw.signals import CommandRequest, CommandResult, Severity, StatusText
 from messages.frames import Frame
 
 BURST: Final = 10  # values at once: one datagram
@@ -29,7 +32,10 @@ _BURST_EVERY_US: Final = 20_000  # 500 values a second
 _UINT32: Final = 5  # MAV_PARAM_TYPE
 _NO_INDEX: Final = 0xFFFF
 _BY_NAME: Final = -1  # in place of an index
-_DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY = 1, 2, 5  # MAV_PARAM_ERROR
+# MAV_PARAM_ERROR
+_DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY, _TYPE_UNSUPPORTED, _TYPE_MISMATCH = 1, 2, 5, 6, 7
+_PREFLIGHT_STORAGE: Final = 245  # MAV_CMD
+_LOAD, _SAVE, _RESET = 0.0, 1.0, 2.0  # its first parameter
 _HASH: Final = "_HASH_CHECK"  # what QGroundControl asks for, to see whether it knows all values
 _Peer = tuple[int, int]  # system and component
 # In the order of their index on the wire, which is that of their names: clients sort so too.
@@ -42,12 +48,14 @@ class ParameterService:
     """Parameters on one link."""
 
     message_ids = frozenset({ids.PARAM_REQUEST_READ, ids.PARAM_REQUEST_LIST, ids.PARAM_SET})
+    commands = frozenset({_PREFLIGHT_STORAGE})
 
     def __init__(self, store: ParameterStore) -> None:
         """Listen to a store that all links share."""
         self._store = store
         self._news = store.listen()
         self._next = _COUNT  # index of the next one to list
+        self._awaited: dict[str, None] = {}  # read while a change of them is under way
         self._burst_us = 0
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
@@ -66,10 +74,25 @@ class ParameterService:
         value, _, _, text, type_ = wanted
         return self._set(_name(text), value, type_, asker)
 
+    def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
+        """PREFLIGHT_STORAGE: a change is stored when it is made, so only a reset is to be done."""
+        if armed:
+            return CommandResult.TEMPORARILY_REJECTED, "parameters not stored: the vehicle is armed"
+        wish = request.params[0]
+        if wish == _RESET:
+            refusal = self._store.reset(self._news)
+            if refusal is not None:
+                return CommandResult.TEMPORARILY_REJECTED, refusal
+            return CommandResult.ACCEPTED, "parameters reset to the values of the start"
+        if wish in (_LOAD, _SAVE):
+            return CommandResult.ACCEPTED, ""
+        known = "0 load, 1 save or 2 reset"
+        return CommandResult.DENIED, f"parameters not stored: param1 = {wish:g} must be {known}"
+
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
         """Report what has changed, and continue a list."""
         news = self._news
-        if self._next == _COUNT and not news.changed and not news.texts:
+        if self._next == _COUNT and not news.changed and not news.texts and not self._awaited:
             return ()
         answers: list[ServiceOutput] = []
         if news.texts:
@@ -80,6 +103,9 @@ class ParameterService:
             answers.append(self._value(_INDEX[name]))
             if name in REPEATED:
                 answers.append(self._value(_INDEX[REPEATED[name]]))
+        for name in [name for name in self._awaited if not self._is_changing(name)]:
+            del self._awaited[name]
+            answers.append(self._value(_INDEX[name]))
         if self._next < _COUNT and t_us >= self._burst_us:
             self._burst_us = t_us + _BURST_EVERY_US
             end = min(self._next + BURST, _COUNT)
@@ -91,39 +117,55 @@ class ParameterService:
         if index < 0 and name == _HASH:
             return (self._hash(),)
         wanted = _INDEX.get(name, _COUNT) if index < 0 else index
-        if wanted < _COUNT:
-            return (self._value(wanted),)
-        return (_error(index, name, _DOES_NOT_EXIST, asker),)
+        if not wanted < _COUNT:
+            return (_error(index, name, _DOES_NOT_EXIST, asker),)
+        if self._is_changing(_NAMES[wanted]):
+            self._awaited[_NAMES[wanted]] = None
+            return ()
+        return (self._value(wanted),)
 
-    def _set(self, name: str, value: float, type_: int, asker: _Peer) -> Sequence[ServiceOutput]:
+    def _is_changing(self, name: str) -> bool:
+        return self._store.is_changing(ALIASES.get(name, name))
+
+    def _set(self, name: str, field: float, type_: int, asker: _Peer) -> Sequence[ServiceOutput]:
         if name == _HASH:
             self._next = _COUNT  # QGroundControl's word that it needs no list
             return ()
-        if name in FACT_BY_NAME:
-            kept, index = self._value(_INDEX[name]), _INDEX[name]
-            if value == kept.values[0]:
-                return (kept,)
-            why = f"{name} is read only: {FACT_BY_NAME[name].meaning}"
-            return (StatusText(Severity.WARNING, why), kept, _error(index, name, _READ_ONLY, asker))
-        if name not in BY_NAME:
+        if name not in _INDEX:
             return (_error(_BY_NAME, name, _DOES_NOT_EXIST, asker),)
-        if type_ == REAL32:
-            refusal = self._store.change(name, value, self._news)
+        value = value_of(field, type_)
+        ours = ALIASES.get(name, name)
+        parameter = BY_NAME.get(ours)
+        if parameter is None:
+            return self._set_fact(name, value, asker)
+        error, why = _OUT_OF_RANGE, None
+        if value is None:
+            error, why = _TYPE_UNSUPPORTED, f"type {type_} is not supported, use 6 or 9"
+        elif isinstance(value, int) != parameter.integer and not parameter.has_type_of(value):
+            kind = "an INT32" if parameter.integer else "a REAL32"
+            error, why = _TYPE_MISMATCH, f"{name} is {kind}, {as_text(value)} is refused"
         else:
-            refusal = f"{name} is a REAL32, type {type_} is refused"
-            self._news.changed[name] = None
-        if refusal is None:
+            why = self._store.change(ours, value, self._news)
+        if why is None:
             return ()
-        return (
-            StatusText(Severity.WARNING, refusal),
-            _error(_INDEX[name], name, _OUT_OF_RANGE, asker),
-        )
+        self._news.changed[ours] = None
+        if name != ours:
+            why = f"{name} is {ours} here: {why}"
+        return (StatusText(Severity.WARNING, why), _error(_INDEX[name], name, error, asker))
+
+    def _set_fact(self, name: str, value: float | None, asker: _Peer) -> Sequence[ServiceOutput]:
+        """Agree with who sets what is so, and tell anybody else why it is."""
+        fact, kept = FACT_BY_NAME[name], self._value(_INDEX[name])
+        if value == nearest_decimal(fact.value):
+            return (kept,)
+        why = f"{name} is read only: {fact.meaning}"
+        error = _error(_INDEX[name], name, _READ_ONLY, asker)
+        return (StatusText(Severity.WARNING, why), kept, error)
 
     def _value(self, index: int) -> Outgoing:
         name = _NAMES[index]
-        return Outgoing(
-            ids.PARAM_VALUE, (self._read_value(name), _COUNT, index, name.encode(), REAL32)
-        )
+        field, type_ = field_of(self._read_value(name))
+        return Outgoing(ids.PARAM_VALUE, (field, _COUNT, index, name.encode(), type_))
 
     def _read_value(self, name: str) -> float:
         fact, values = FACT_BY_NAME.get(name), self._store.values
@@ -133,8 +175,7 @@ class ParameterService:
         """CRC-32 over names and values in order, nothing inverted; its bits in place of a float."""
         state = 0xFFFFFFFF
         for name in _NAMES:
-            named = name.encode() + struct.pack("<f", self._read_value(name))
-            state = zlib.crc32(named, state)
+            state = zlib.crc32(name.encode() + as_bytes(self._read_value(name)), state)
         (bits,) = struct.unpack("<f", struct.pack("<I", state ^ 0xFFFFFFFF))
         return Outgoing(ids.PARAM_VALUE, (bits, _COUNT, _NO_INDEX, _HASH.encode(), _UINT32))
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, Protocol, runtime_checkable
 
 from fsw.link.wire.outgoing import ServiceOutput
-from fsw.signals import MessageSource
+from fsw.signals import CommandRequest, MessageSource
 from messages.frames import Frame
 
 
@@ -49,6 +49,21 @@ class SourcedService(LinkService, Protocol):
     source: MessageSource | None  # of the frame that is handled now
 
 
+Outcome = tuple[int, str]
+"""MAV_RESULT of a command, and in a sentence why it is refused."""
+
+
+@runtime_checkable
+class CommandedService(LinkService, Protocol):
+    """A service that carries out commands, which do not reach the tick then."""
+
+    commands: frozenset[int]  # MAV_CMD
+
+    def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
+        """Do it at once, or begin to."""
+        ...
+
+
 _BUSY_US: Final = 100_000  # after a question or an answer; the slowest pace is 20 ms
 
 
@@ -64,10 +79,15 @@ class Dispatch:
         self._polls = tuple(service.poll for service in services)
         self._bulky = tuple(service for service in services if isinstance(service, BulkService))
         self._sourced = tuple(one for one in services if isinstance(one, SourcedService))
-        self._wanting: dict[int, tuple[LinkService, ...]] = {}
+        self._wanting: dict[int, tuple[LinkService, ...]] = {}  # by message
         for service in services:
             for id_ in service.message_ids:
                 self._wanting[id_] = (*self._wanting.get(id_, ()), service)
+
+    @property
+    def message_ids(self) -> frozenset[int]:
+        """What any service wants to hear."""
+        return frozenset(self._wanting)
 
     def handle(self, frame: Frame, t_us: int, source: MessageSource | None = None) -> None:
         """Let every service that wants the frame answer it."""

@@ -1,4 +1,4 @@
-"""Commands to the link itself: how often messages are sent, and "send me this one now".
+"""Commands to the link itself: how often messages are sent, "send me this one now", its services.
 
 They are answered here and do not reach the tick, because each link keeps its own rates.
 """
@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from fsw.link.services.service import CommandedService, LinkService
 from fsw.link.telemetry.stream_rates import UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode, encode_replies, message_ids
@@ -38,9 +39,18 @@ _Outcome = tuple[int, str, Sequence[Outgoing]]  # MAV_RESULT, reason, what follo
 class LinkCommands:
     """Serves one link."""
 
-    def __init__(self, rates: StreamRates, context: TelemetryContext) -> None:
+    def __init__(
+        self, rates: StreamRates, context: TelemetryContext, services: Sequence[LinkService] = ()
+    ) -> None:
+        """Carry out what changes the rates, and let ``services`` carry out what is theirs."""
         self._rates = rates
         self._context = context
+        self._commanded = {
+            command: service
+            for service in services
+            if isinstance(service, CommandedService)
+            for command in service.commands
+        }
 
     def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
@@ -71,6 +81,10 @@ class LinkCommands:
             if message_id is None:
                 return _DENIED, "request message: param1 is not a message id", ()
             return self._now(message_id, second, snapshot)
+        service = self._commanded.get(request.command)
+        if service is not None:
+            armed = snapshot is not None and snapshot.armed
+            return *service.carry_out(request, t_us, armed), ()
         if request.command in _REQUESTS:  # the older commands, each of which asks for one message
             wanted, param1_is_1 = _REQUESTS[request.command]
             if param1_is_1 and request.params[0] != 1.0:

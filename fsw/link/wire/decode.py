@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final, cast
 
-from fsw.flight.bounds import motion_refusal, zone_problem
+from fsw.flight.bounds import point_problem, zone_problem
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from fsw.shapes import BY_NUMBER, kind_of
 from fsw.shapes.ball import point
@@ -22,7 +22,6 @@ from fsw.shapes.target_sphere import target_sphere
 from fsw.signals import (
     CommandRequest,
     EndEffectorTarget,
-    MotionSetpoint,
     SensorFrame,
     Shape,
     Vec3,
@@ -157,8 +156,7 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
     velocity = _ZERO if mask & _VELOCITY_IGNORED else cast(Vec3, values[4:7])
     acceleration = _ZERO if mask & _ACCELERATION_IGNORED else cast(Vec3, values[7:10])
     yaw = 0.0 if mask & _YAW_IGNORED else values[10]
-    motion = MotionSetpoint(True, position, velocity, acceleration, yaw)
-    problem = motion_refusal(motion)
+    problem = point_problem(position, velocity, acceleration, yaw)
     if problem is not None:
         raise RefusedError(f"target refused: {problem}")
     return EndEffectorTarget(int(values[0]), position, velocity, acceleration, yaw)

@@ -10,9 +10,15 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.flight.bounds import MAX_SPEED, MAX_YAW
+from fsw.flight.bounds import CIRCLE_RADII, MAX_SPEED, MAX_YAW
 from fsw.flight.command_handlers import MIN_SPEED
-from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, LOCAL_NED, Locate
+from fsw.link.wire.mission_items import (
+    GLOBAL_FRAMES,
+    HOME_FRAMES,
+    LOCAL_NED,
+    USUAL_RADIUS,
+    Locate,
+)
 from fsw.link.wire.px4_mode import MODE_BY_PX4, MODE_BY_STANDARD
 from fsw.signals import (
     Arm,
@@ -43,8 +49,6 @@ _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
 _MAY_SWITCH_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
 _FLAGS: Final = float(1 << 24)  # what a float holds whole
-_RADIUS_RANGE: Final = (0.5, 100.0)  # m
-_USUAL_RADIUS: Final = 2.0  # m
 _UNCHANGED: Final = 5.0  # ORBIT_YAW_BEHAVIOUR: what an earlier orbit said, here the usual
 _FACINGS: Final = {float(facing): facing for facing in Facing} | {_UNCHANGED: Facing.CENTRE}
 _SPEED_TYPES: Final = (0.0, 1.0)  # SPEED_TYPE of air and ground, which are one here
@@ -127,8 +131,8 @@ def _orbit(request: CommandRequest, locate: Locate) -> CommandAction:
     """Parameter 1 is the radius, negative anticlockwise, then speed, heading and turns."""
     radius, speed, behaviour, turns = request.params[:4]
     clockwise = not radius < 0.0
-    radius = _USUAL_RADIUS if math.isnan(radius) else abs(radius)
-    least, most = _RADIUS_RANGE
+    radius = USUAL_RADIUS if math.isnan(radius) else abs(radius)
+    least, most = CIRCLE_RADII
     if not least <= radius <= most:
         raise _InvalidError(
             f"no orbit: a radius of {radius:g} m is outside {least:g} to {most:g} m"

@@ -1,7 +1,7 @@
-"""Offboard setpoints from wire values; pure. None: invalid, to be refused and counted.
+"""Offboard setpoints from wire values; pure. What is of no use is refused with its reason.
 
-Groups of three are used whole or not at all; a number that is not used may be NaN, one that is
-used may not. What is out of range is for the vehicle to judge.
+An axis is used or not by the message's mask, as PX4 takes it; a number that is not used may be NaN,
+one that is used may not. Each axis needs a position, a velocity or an acceleration.
 """
 
 from __future__ import annotations
@@ -9,14 +9,29 @@ from __future__ import annotations
 import math
 from typing import Final, cast
 
-from fsw.link.wire.decode import Numbers
-from fsw.signals import AttitudeSetpoint, JointSetpoint, MotionSetpoint, Vec2, Vec3, Vec4
+from fsw.flight.bounds import motion_refusal
+from fsw.flight.offboard_setpoints import attitude_refusal
+from fsw.link.wire.decode import Numbers, RefusedError
+from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, Locate
+from fsw.signals import (
+    AttitudeSetpoint,
+    JointSetpoint,
+    MotionSetpoint,
+    PositionFrom,
+    Vec2,
+    Vec3,
+    Vec4,
+)
 
-_LOCAL_NED: Final = 1  # MAV_FRAME
-_BODY_NED, _BODY_FRD = 8, 12
-# POSITION_TARGET_TYPEMASK: what to ignore
-_POSITION: Final = 0x007
-_VELOCITY: Final = 0x038
+# MAV_FRAME, with what a position counts from there; the others have no meaning for a setpoint.
+_LOCAL_NED: Final = 1
+_LOCAL_OFFSET_NED: Final = 7
+_BODY_NED: Final = 8
+_ALONG_HEADING: Final = frozenset({_BODY_NED, 9, 12})  # and BODY_OFFSET_NED, BODY_FRD
+_TERRAIN: Final = frozenset({10, 11})
+# POSITION_TARGET_TYPEMASK: what to ignore, each group from bit 0, 3 and 6 on
+_GROUP: Final = 0x007
+_HORIZONTAL: Final = 0x003
 _ACCELERATION: Final = 0x1C0
 _FORCE: Final = 0x200  # the accelerations are forces
 _YAW: Final = 0x400
@@ -28,71 +43,146 @@ _ATTITUDE: Final = 0x80
 _JOINTS: Final = 2
 
 
-def body_setpoint(values: Numbers) -> MotionSetpoint | None:
-    """Read a SET_POSITION_TARGET_LOCAL_NED; positions only in the local frame."""
-    along_heading = values[15] in (_BODY_NED, _BODY_FRD)
-    if values[15] != _LOCAL_NED and not along_heading:
-        return None
-    setpoint = _motion(values[1:12], int(values[12]), of_end_effector=False)
-    if setpoint is None or not along_heading:
-        return setpoint
-    if setpoint.p is not None:
-        return None
-    return MotionSetpoint(
-        of_end_effector=False,
-        p=None,
-        v=setpoint.v,
-        a=setpoint.a,
-        yaw=setpoint.yaw,
-        yaw_rate=setpoint.yaw_rate,
-        along_heading=True,
-    )
+def body_setpoint(values: Numbers) -> MotionSetpoint:
+    """Read a SET_POSITION_TARGET_LOCAL_NED.
+
+    Raises:
+        RefusedError: It is of no use.
+    """
+    return _local(values, of_end_effector=False)
 
 
-def end_effector_setpoint(values: Numbers) -> MotionSetpoint | None:
-    """Read an END_EFFECTOR_TARGET without a time."""
-    if values[15] != _LOCAL_NED:
-        return None
-    return _motion(values[1:12], int(values[12]), of_end_effector=True)
+def end_effector_setpoint(values: Numbers) -> MotionSetpoint:
+    """Read an END_EFFECTOR_TARGET without a time.
+
+    Raises:
+        RefusedError: It is of no use.
+    """
+    return _local(values, of_end_effector=True)
 
 
-def attitude_setpoint(values: Numbers) -> AttitudeSetpoint | None:
-    """Read a SET_ATTITUDE_TARGET: an attitude, or body rates, and a thrust."""
+def global_setpoint(locate: Locate, values: Numbers) -> MotionSetpoint:
+    """Read a SET_POSITION_TARGET_GLOBAL_INT; ``locate`` takes places on Earth to local NED.
+
+    Velocities and accelerations are north, east and down, as in PX4.
+
+    Raises:
+        RefusedError: It is of no use.
+    """
+    mask, frame = int(values[12]), values[15]
+    if frame in _TERRAIN:
+        raise RefusedError(f"frame {frame:g} counts heights from terrain, which is not known")
+    if frame not in GLOBAL_FRAMES | HOME_FRAMES:
+        raise RefusedError(f"frame {frame:g} is not global: 0, 5, or 3, 6 above home")
+    latitude, longitude, altitude = 1e-7 * values[1], 1e-7 * values[2], values[3]
+    if mask & _HORIZONTAL not in (0, _HORIZONTAL):
+        raise RefusedError("latitude and longitude are used together or not at all")
+    north, east = 0.0, 0.0
+    if not mask & _HORIZONTAL:
+        if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):
+            raise RefusedError(f"{latitude:g}, {longitude:g} is no place on Earth")
+        north, east, _ = locate(latitude, longitude, 0.0)
+    above_home = frame in HOME_FRAMES
+    z = -altitude if above_home else locate(0.0, 0.0, altitude)[2]
+    p_from = PositionFrom.HOME_HEIGHT if above_home else PositionFrom.ORIGIN
+    return _motion((north, east, z, *values[4:12]), mask, p_from=p_from)
+
+
+def attitude_setpoint(values: Numbers) -> AttitudeSetpoint:
+    """Read a SET_ATTITUDE_TARGET: an attitude, or body rates, and a thrust.
+
+    Raises:
+        RefusedError: It is of no use.
+    """
     mask, thrust = int(values[11]), values[8]
     q_WB, rates = cast(Vec4, values[1:5]), cast(Vec3, values[5:8])
-    if mask & _THRUST or not math.isfinite(thrust):
-        return None
+    if mask & _THRUST:
+        raise RefusedError("an attitude needs a thrust, which type_mask ignores")
+    if mask & _ATTITUDE and mask & _RATES:
+        raise RefusedError("type_mask ignores the attitude and a body rate")
+    setpoint = AttitudeSetpoint(thrust, None, rates)
     if not mask & _ATTITUDE:
-        return AttitudeSetpoint(thrust, q_WB) if _finite(q_WB) else None
-    if mask & _RATES or not _finite(rates):
-        return None
-    return AttitudeSetpoint(thrust, None, rates)
+        setpoint = AttitudeSetpoint(thrust, q_WB)
+    problem = attitude_refusal(setpoint)
+    if problem is not None:
+        raise RefusedError(problem)
+    return setpoint
 
 
-def joint_setpoint(values: Numbers) -> JointSetpoint | None:
-    """Read an ARM_JOINT_SETPOINT; the planner finds velocities and accelerations itself."""
+def joint_setpoint(values: Numbers) -> JointSetpoint:
+    """Read an ARM_JOINT_SETPOINT.
+
+    Raises:
+        RefusedError: It is not for two joints, or an angle is not finite.
+    """
+    if values[15] != _JOINTS:
+        raise RefusedError(f"it is for {values[15]:g} joints; this arm has {_JOINTS}")
     q_arm = cast(Vec2, values[1:3])
-    return JointSetpoint(q_arm) if values[15] == _JOINTS and _finite(q_arm) else None
+    if not all(map(math.isfinite, q_arm)):
+        raise RefusedError("a joint angle is not finite")
+    return JointSetpoint(q_arm)
 
 
-def _motion(numbers: Numbers, mask: int, *, of_end_effector: bool) -> MotionSetpoint | None:
-    """Position, velocity, acceleration, yaw and yaw rate by what a mask leaves."""
-    partly = any(mask & group not in (0, group) for group in (_POSITION, _VELOCITY, _ACCELERATION))
-    nothing = _POSITION | _VELOCITY | _ACCELERATION
-    if partly or mask & _FORCE or mask & nothing == nothing:
-        return None
-    p = None if mask & _POSITION else cast(Vec3, numbers[0:3])
-    v = None if mask & _VELOCITY else cast(Vec3, numbers[3:6])
-    a = None if mask & _ACCELERATION else cast(Vec3, numbers[6:9])
-    yaw = None if mask & _YAW else numbers[9]
-    yaw_rate = None if mask & _YAW_RATE else numbers[10]
-    used = (*(p or ()), *(v or ()), *(a or ()), yaw or 0.0, yaw_rate or 0.0)
-    return (
-        MotionSetpoint(of_end_effector=of_end_effector, p=p, v=v, a=a, yaw=yaw, yaw_rate=yaw_rate)
-        if _finite(used)
-        else None
+def _local(values: Numbers, *, of_end_effector: bool) -> MotionSetpoint:
+    mask, frame = int(values[12]), values[15]
+    along_heading = frame in _ALONG_HEADING
+    if frame not in (_LOCAL_NED, _LOCAL_OFFSET_NED) and not along_heading:
+        raise RefusedError(f"frame {frame:g} is not one of 1, 7, 8, 9, 12")
+    if frame == _BODY_NED and mask & _GROUP != _GROUP:
+        # MAVLink has it count from the origin, PX4 passes it over, ArduPilot adds the vehicle's.
+        raise RefusedError("a position in frame 8 is ambiguous; use 1, 7 or 9")
+    if along_heading and any(
+        mask >> shift & _HORIZONTAL not in (0, _HORIZONTAL) for shift in (0, 3, 6)
+    ):
+        raise RefusedError(f"in frame {frame:g}, x and y are used together or not at all")
+    return _motion(
+        values[1:12],
+        mask,
+        of_end_effector=of_end_effector,
+        along_heading=along_heading,
+        p_from=PositionFrom.ORIGIN if frame == _LOCAL_NED else PositionFrom.VEHICLE,
     )
 
 
-def _finite(numbers: tuple[float, ...]) -> bool:
-    return all(map(math.isfinite, numbers))
+def _motion(
+    numbers: Numbers,
+    mask: int,
+    *,
+    of_end_effector: bool = False,
+    along_heading: bool = False,
+    p_from: PositionFrom = PositionFrom.ORIGIN,
+) -> MotionSetpoint:
+    """Position, velocity, acceleration, yaw and yaw rate by what a mask leaves."""
+    if mask & _FORCE and mask & _ACCELERATION != _ACCELERATION:
+        raise RefusedError("forces are not supported")
+    p, v, a = (_vector(numbers[k : k + 3], mask >> k) for k in (0, 3, 6))
+    if p is None and v is None and a is None:
+        raise RefusedError("type_mask ignores position, velocity and acceleration")
+    setpoint = MotionSetpoint(
+        of_end_effector=of_end_effector,
+        p=p,
+        v=v,
+        a=a,
+        yaw=None if mask & _YAW else _used(numbers[9]),
+        yaw_rate=None if mask & _YAW_RATE else _used(numbers[10]),
+        along_heading=along_heading,
+        p_from=p_from if p is not None else PositionFrom.ORIGIN,
+    )
+    problem = motion_refusal(setpoint)
+    if problem is not None:
+        raise RefusedError(problem)
+    return setpoint
+
+
+def _vector(numbers: Numbers, ignored: int) -> Vec3 | None:
+    """Three axes, NaN where bits 0 to 2 ignore one; None where they ignore all."""
+    if ignored & _GROUP == _GROUP:
+        return None
+    x, y, z = (math.nan if ignored >> k & 1 else _used(one) for k, one in enumerate(numbers))
+    return x, y, z
+
+
+def _used(number: float) -> float:
+    if math.isfinite(number):
+        return number
+    raise RefusedError("a number that type_mask uses is not finite")

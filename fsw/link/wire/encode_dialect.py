@@ -78,7 +78,7 @@ def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
     """SETPOINT_STATUS: how many setpoints were accepted and refused, and which kind is flown."""
     report = snapshot.offboard
     counts = (report.accepted & _U32, report.refused & _U32, min(report.age_us, _U32))
-    return (snapshot.t_us, *counts, int(report.kind))
+    return (snapshot.t_us, *counts, int(report.kind), snapshot.safety.refusals & _U32)
 
 
 def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:

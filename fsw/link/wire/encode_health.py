@@ -59,7 +59,7 @@ _JUMP: Final = fault_name(SensorFault.JUMP)
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
 _CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
 _LIPO, _FOR_EVERYTHING = 1, 1  # MAV_BATTERY_TYPE, MAV_BATTERY_FUNCTION
-_U32: Final = 0xFFFFFFFF
+_U16, _U32 = 0xFFFF, 0xFFFFFFFF
 _UNKNOWN_CELL: Final = 0xFFFF
 _UNKNOWN_TEMPERATURE: Final = 0x7FFF
 _UNKNOWN_ENERGY: Final = -1
@@ -68,7 +68,12 @@ _ESTIMATED: Final = 1 | 2 | 4 | 8 | 16 | 32
 
 
 def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """SYS_STATUS: load of the loop, health by subsystem, battery."""
+    """SYS_STATUS: load of the loop, health by subsystem, battery, what was dropped.
+
+    Of the autopilot's own errors 1 are echoes of the vehicle's frames, 2 frames that the signature
+    refused, 3 frames of kinds that are of no use here, 4 datagrams that the kernel dropped.
+    """
+    lost = context.health.losses
     battery = snapshot.battery
     sensing, ill = _sensors(snapshot.estimator)
     present = _PRESENT | sensing
@@ -99,8 +104,8 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         _millivolts(battery),
         _centiamperes(battery),
         0,
-        0,
-        *(0, 0, 0, 0),
+        min(lost.damaged, _U16),
+        *(min(n, _U16) for n in (lost.echoes, lost.refused, lost.unhandled, lost.overflowed)),
         _percent(battery),
         *(0, 0, 0),
     )

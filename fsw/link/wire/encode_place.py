@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.flight.conditions import Condition
 from fsw.geometry.geodesy import to_global
 from fsw.geometry.rotation import quaternion_from_matrix
 from fsw.link.wire.encode_standard import boot_ms
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot, Vec3
+from fsw.signals import FlightSnapshot, SatelliteFix, Vec3
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME
@@ -22,6 +23,18 @@ _COVARIANCE_UNKNOWN: Final[tuple[float, ...]] = (math.nan, *(0.0,) * 20)
 _I16: Final = 32767
 _AUTOPILOT: Final = 8  # MAV_ESTIMATOR_TYPE
 _UNKNOWN_U16, _U32 = 0xFFFF, 0xFFFFFFFF
+_NO_FIX: Final = 1  # GPS_FIX_TYPE
+_RESOLUTION: Final = 1e-3  # m and m/s, of an accuracy in GPS_RAW_INT
+_NAN: Final[Vec3] = (math.nan,) * 3
+# With any of these nothing measures the place.
+_NOWHERE: Final = frozenset(
+    condition.value
+    for condition in (
+        Condition.ESTIMATE_INVALID,
+        Condition.POSITION_LOST,
+        Condition.AIDING_LOST,
+    )
+)
 
 
 def global_position(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -98,12 +111,17 @@ def odometry(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     )
 
 
-def gps_raw(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
-    """GPS_RAW_INT: what the receiver said last; nothing where there is none."""
+def gps_raw(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """GPS_RAW_INT: what the receiver said last, or else the estimate as a fix.
+
+    Programs wait for a fix before they arm. A vehicle that knows its place by other sensors knows
+    it on Earth too, by the origin of the local frame: where this holds it is a fix in three
+    dimensions of unknown satellites, with the accuracy of the estimate.
+    """
     known = snapshot.estimator
     fix = None if known is None else known.fix
     if fix is None:
-        return None
+        fix = _estimate_as_fix(snapshot)
     known_place = math.isfinite(sum(fix.p))
     place = _scaled(to_global(context.origin, fix.p)) if known_place else (0, 0, 0)
     north, east, _ = fix.v if known_place else (0.0, 0.0, 0.0)
@@ -125,6 +143,19 @@ def gps_raw(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues |
         0,  # heading
         0,
     )
+
+
+def _estimate_as_fix(snapshot: FlightSnapshot) -> SatelliteFix:
+    """The place without a receiver; exact states are accurate to what the message resolves."""
+    known, estimate = snapshot.estimator, snapshot.estimate
+    if not _NOWHERE.isdisjoint(snapshot.failures) or (known is not None and known.unaided_us < 0):
+        return SatelliteFix(snapshot.t_us, _NAN, _NAN, _NAN, math.nan, kind=_NO_FIX)
+    sigma, speed_sigma = (_RESOLUTION,) * 3, _RESOLUTION
+    if known is not None:
+        pose, motion = known.pose_covariance, known.velocity_covariance
+        sigma = (math.sqrt(pose[0]), math.sqrt(pose[6]), math.sqrt(pose[11]))
+        speed_sigma = math.sqrt(max(motion[0], motion[6], motion[11]))
+    return SatelliteFix(snapshot.t_us, estimate.p_WB, estimate.v_WB, sigma, speed_sigma)
 
 
 def _scaled(place: Vec3) -> tuple[int, int, int]:

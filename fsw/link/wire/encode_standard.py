@@ -158,11 +158,13 @@ def orbit_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireVal
 
 def as_asked(motion: MotionSetpoint) -> tuple[tuple[float, ...], int]:
     """A setpoint as it came: position to yaw rate, and POSITION_TARGET_TYPEMASK."""
-    groups = ((motion.p, 0x007), (motion.v, 0x038), (motion.a, 0x1C0))
-    mask = sum(ignored for vector, ignored in groups if vector is None)
+    open_axes = (math.nan,) * 3
+    vectors = [vector or open_axes for vector in (motion.p, motion.v, motion.a)]
+    numbers = [number for vector in vectors for number in vector]
+    mask = sum(1 << bit for bit, number in enumerate(numbers) if math.isnan(number))
     mask |= (0x400 if motion.yaw is None else 0) | (0x800 if motion.yaw_rate is None else 0)
-    numbers = tuple(number for vector, _ in groups for number in vector or (0.0, 0.0, 0.0))
-    return (*numbers, motion.yaw or 0.0, motion.yaw_rate or 0.0), mask
+    used = [0.0 if math.isnan(number) else number for number in numbers]
+    return (*used, motion.yaw or 0.0, motion.yaw_rate or 0.0), mask
 
 
 def boot_ms(t_us: int) -> int:

@@ -38,6 +38,7 @@ COMMAND_ACK: Final = 77
 SET_ATTITUDE_TARGET: Final = 82
 ATTITUDE_TARGET: Final = 83
 SET_POSITION_TARGET_LOCAL_NED: Final = 84
+SET_POSITION_TARGET_GLOBAL_INT: Final = 86
 POSITION_TARGET_LOCAL_NED: Final = 85
 HIL_ACTUATOR_CONTROLS: Final = 93
 HIGHRES_IMU: Final = 105
@@ -63,6 +64,9 @@ MESSAGE_INTERVAL: Final = 244
 EXTENDED_SYS_STATE: Final = 245
 STATUSTEXT: Final = 253
 SETUP_SIGNING: Final = 256
+LOGGING_DATA: Final = 266
+LOGGING_DATA_ACKED: Final = 267
+LOGGING_ACK: Final = 268
 PROTOCOL_VERSION: Final = 300
 ODOMETRY: Final = 331
 PARAM_ERROR: Final = 345
@@ -90,6 +94,8 @@ JOINT_ENCODERS: Final = 60212
 
 SYSTEM_ID: Final = 1  # the vehicle
 AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1: speaks common.xml
-PANDION: Final = 191  # MAV_COMP_ID_ONBOARD_COMPUTER: speaks the dialect, with its own sequence
+# MAV_COMP_ID_USER1, for private use, so that no companion computer has it: speaks the dialect, with
+# its own sequence.
+PANDION: Final = 25
 PATH_PLANNER: Final = 195  # MAV_COMP_ID_PATHPLANNER: the scenario's pilot, on the simulator link
 SIMULATOR: Final = 200  # component of the simulated sensors, which also lets them fail

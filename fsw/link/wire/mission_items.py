@@ -9,25 +9,61 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from fsw.flight.bounds import MAX_SPEED, MAX_STAY, MAX_YAW
+from fsw.flight.bounds import MAX_REPEATS, MAX_SPEED, MAX_STAY, MAX_YAW, circle_problem
 from fsw.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
 
 # MAV_CMD
 NAV_WAYPOINT: Final = 16
 NAV_LOITER_UNLIMITED: Final = 17
+NAV_LOITER_TURNS: Final = 18
 NAV_LOITER_TIME: Final = 19
 NAV_RETURN: Final = 20
 NAV_LAND: Final = 21
 NAV_TAKEOFF: Final = 22
+NAV_LOITER_TO_ALT: Final = 31
 NAV_DELAY: Final = 93
+DO_JUMP: Final = 177
 DO_CHANGE_SPEED: Final = 178
 DO_SET_ROI_LOCATION: Final = 195
 DO_SET_ROI_NONE: Final = 197
 DO_SET_ROI: Final = 201
 NAV_RALLY_POINT: Final = 5100
+
+# What is for a payload that this vehicle does not have, and leaves its way as it is.
+SKIPPED: Final[dict[int, str]] = {
+    189: "DO_LAND_START",
+    200: "DO_CONTROL_VIDEO",
+    202: "DO_DIGICAM_CONFIGURE",
+    203: "DO_DIGICAM_CONTROL",
+    204: "DO_MOUNT_CONFIGURE",
+    205: "DO_MOUNT_CONTROL",
+    206: "DO_SET_CAM_TRIGG_DIST",
+    214: "DO_SET_CAM_TRIGG_INTERVAL",
+    260: "OBLIQUE_SURVEY",
+    530: "SET_CAMERA_MODE",
+    531: "SET_CAMERA_ZOOM",
+    532: "SET_CAMERA_FOCUS",
+    1000: "DO_GIMBAL_MANAGER_PITCHYAW",
+    1001: "DO_GIMBAL_MANAGER_CONFIGURE",
+    2000: "IMAGE_START_CAPTURE",
+    2001: "IMAGE_STOP_CAPTURE",
+    2003: "DO_TRIGGER_CONTROL",
+    2500: "VIDEO_START_CAPTURE",
+    2501: "VIDEO_STOP_CAPTURE",
+}
+# What a mission relies on: without it, it would be another one.
+_MISSING: Final[dict[int, str]] = {
+    181: "DO_SET_RELAY: this vehicle has no relay",
+    183: "DO_SET_SERVO: this vehicle has no servo outputs",
+    187: "DO_SET_ACTUATOR: the joints follow from where the end-effector is to be",
+    207: "DO_FENCE_ENABLE: the fence is always in force",
+    208: "DO_PARACHUTE: this vehicle has no parachute",
+    211: "DO_GRIPPER: this vehicle has no gripper",
+    42600: "DO_WINCH: this vehicle has no winch",
+}
 
 # MAV_FRAME
 GLOBAL_FRAMES: Final = frozenset({0, 5})
@@ -47,6 +83,7 @@ NO_PLACE: Final = 2**31 - 1  # x or y of an item that names none, as MAVLink wri
 LONGEST_STAY: Final = MAX_STAY  # s
 WIDEST_ACCEPTANCE: Final = 10.0  # m
 USUAL_ACCEPTANCE: Final = 0.1  # m
+USUAL_RADIUS: Final = 2.0  # m, of a circle that names none
 
 Locate = Callable[[float, float, float], Vec3]
 """Local NED [m] of a latitude and longitude [deg] and an altitude above the sea [m]."""
@@ -77,8 +114,11 @@ class BadItem(Exception):
 def read_step(item: MissionItem, locate: Locate) -> MissionStep:
     """What an item means to this vehicle, or ``BadItem``."""
     reader = _READERS.get(item.command)
+    if reader is None and item.command in SKIPPED:
+        return MissionStep(MissionAction.SKIP, stop_after=not item.autocontinue)
     if reader is None:
-        raise BadItem(UNSUPPORTED, f"command {item.command} is not one of this vehicle's missions")
+        unknown = f"command {item.command} is not one of this vehicle's missions"
+        raise BadItem(UNSUPPORTED, _MISSING.get(item.command, unknown))
     return reader(item, locate)
 
 
@@ -106,6 +146,8 @@ def horizontal_place(item: MissionItem, locate: Locate) -> Vec2:
         raise BadItem(UNSUPPORTED_FRAME, f"frame {item.frame} is not supported for this item")
     for number, metres in ((5, north), (6, east)):
         if not abs(metres) <= MAX_DISTANCE:
+            if _is_nowhere(item, locate):
+                raise _bad(number, "latitude and longitude are both 0, which is no place here")
             raise _bad(number, f"{math.hypot(north, east):.0f} m from the origin is too far")
     return north, east
 
@@ -116,23 +158,63 @@ def _waypoint(item: MissionItem, locate: Locate) -> MissionStep:
         raise _bad(1, f"a stay of {hold:g} s is outside 0 to {LONGEST_STAY:g} s")
     if not _within(acceptance, WIDEST_ACCEPTANCE):
         raise _bad(2, f"an acceptance of {acceptance:g} m is outside 0 to {WIDEST_ACCEPTANCE:g} m")
-    return _go(item, locate, hold, acceptance or USUAL_ACCEPTANCE)
+    place = _place(item, locate, "a waypoint needs a place")
+    return _go(item, place, hold, acceptance or USUAL_ACCEPTANCE)
 
 
 def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep:
     if not _within(item.params[0], LONGEST_STAY):
         raise _bad(1, f"a stay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
-    return _go(item, locate, item.params[0], USUAL_ACCEPTANCE)
+    return _loiter(item, locate, item.params[0])
 
 
 def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep:
-    return _go(item, locate, math.inf, USUAL_ACCEPTANCE)
+    return _loiter(item, locate, math.inf)
 
 
-def _go(item: MissionItem, locate: Locate, hold: float, accept: float) -> MissionStep:
+def _loiter_to_height(item: MissionItem, locate: Locate) -> MissionStep:
+    """Radius and exit are a fixed wing's: parameter 4 is no heading here."""
+    return _loiter(replace(item, params=(*item.params[:3], math.nan)), locate, 0.0)
+
+
+def _loiter_turns(item: MissionItem, locate: Locate) -> MissionStep:
+    """Parameter 1 is the number of turns, 3 the radius, negative anticlockwise; 0: the usual."""
+    turns, radius = item.params[0], item.params[2]
+    if math.isnan(radius) or radius == 0.0:
+        radius = USUAL_RADIUS
+    step = _loiter_to_height(item, locate)
+    problem = circle_problem(radius, turns)
+    if problem is not None:
+        raise BadItem(INVALID, problem)
+    return replace(step, action=MissionAction.CIRCLE, radius=radius, turns=turns)
+
+
+def _loiter(item: MissionItem, locate: Locate, hold: float) -> MissionStep:
+    """At a place, or at a height where the vehicle is by then."""
+    here = _is_nowhere(item, locate)
+    place = (0.0, 0.0, _z(item, locate)) if here else _place(item, locate, "a place is missing")
+    return replace(_go(item, place, hold, USUAL_ACCEPTANCE), here=here)
+
+
+def _jump(item: MissionItem, _: Locate) -> MissionStep:
+    """Parameter 1 is the item to go on with, 2 how often; -1: without end."""
+    target, repeats = item.params[:2]
+    if not (0.0 <= target < _MOST_ITEMS and target == int(target)):
+        raise _bad(1, f"{target:g} is no number of an item")
+    if not (-1.0 <= repeats <= MAX_REPEATS and repeats == int(repeats)):
+        raise _bad(2, f"{repeats:g} jumps are outside 0 to {MAX_REPEATS}, or -1 without end")
+    return MissionStep(
+        MissionAction.JUMP,
+        target=int(target),
+        repeats=int(repeats),
+        stop_after=not item.autocontinue,
+    )
+
+
+def _go(item: MissionItem, place: Vec3, hold: float, accept: float) -> MissionStep:
     return MissionStep(
         action=MissionAction.GO,
-        position=_place(item, locate, "a waypoint needs a place"),
+        position=place,
         above_home=item.frame in HOME_FRAMES,
         yaw=_heading(item.params[3]),
         hold_s=hold,
@@ -155,7 +237,7 @@ def _take_off(item: MissionItem, locate: Locate) -> MissionStep:
 
 def _land(item: MissionItem, locate: Locate) -> MissionStep:
     yaw = _heading(item.params[3])
-    if item.x == NO_PLACE and item.y == NO_PLACE:
+    if _is_nowhere(item, locate):
         return MissionStep(MissionAction.LAND, yaw=yaw)
     position = (*horizontal_place(item, locate), 0.0)  # the descent is the landing's
     return MissionStep(MissionAction.LAND, position, yaw=yaw, acceptance=USUAL_ACCEPTANCE)
@@ -204,11 +286,15 @@ def _look(item: MissionItem, locate: Locate) -> MissionStep:
     raise _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
 
 
+_MOST_ITEMS: Final = float(1 << 16)
 _MAX_HEADING: Final = math.degrees(MAX_YAW)
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     NAV_WAYPOINT: _waypoint,
     NAV_LOITER_UNLIMITED: _loiter_unlimited,
     NAV_LOITER_TIME: _loiter_time,
+    NAV_LOITER_TURNS: _loiter_turns,
+    NAV_LOITER_TO_ALT: _loiter_to_height,
+    DO_JUMP: _jump,
     NAV_RETURN: _return,
     NAV_LAND: _land,
     NAV_TAKEOFF: _take_off,
@@ -218,6 +304,15 @@ _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     DO_SET_ROI_NONE: _look_away,
     DO_SET_ROI: _look,
 }
+
+
+def _is_nowhere(item: MissionItem, locate: Locate) -> bool:
+    """Whether an item names no place: NaN, or 0, 0 on Earth, where the origin is elsewhere."""
+    if item.x == item.y == NO_PLACE:
+        return True
+    if item.frame not in GLOBAL_FRAMES | HOME_FRAMES or item.x or item.y:
+        return False
+    return not math.hypot(*locate(0.0, 0.0, 0.0)[:2]) <= MAX_DISTANCE
 
 
 def _place(item: MissionItem, locate: Locate, missing: str) -> Vec3:

@@ -11,7 +11,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fsw.barriers.cbf_row import cbf_lower_bound
-from fsw.barriers.safe_approach import BarrierTuning, safe_approach_slope, safe_approach_speed
+from fsw.barriers.safe_approach import (
+    LOUD,
+    BarrierTuning,
+    safe_approach_slope,
+    safe_approach_speed,
+)
 
 alphas = st.floats(0.1, 10.0)
 slopes = st.floats(0.5, 10.0)
@@ -108,3 +113,24 @@ def test_a_rate_too_fast_is_refused_with_the_fastest_that_is_not(period: float) 
         BarrierTuning(slope=1.01 * most, gamma=most).check_sampling(period)
     with pytest.raises(ValueError, match=rf"gamma is .*; .* must not exceed {most} 1/s"):
         BarrierTuning(slope=most, gamma=1.01 * most).check_sampling(period)
+
+
+@given(st.floats(0.0, 2.0), st.floats(0.0, 0.5))
+def test_lambda_that_follows_is_never_below_its_least_nor_above_itself(
+    recent: float, least: float
+) -> None:
+    tuning = BarrierTuning(lambda_=0.35)
+    found = tuning.following(recent, least)
+    assert min(least or 0.35, 0.35) <= found <= 0.35
+    if recent >= LOUD:
+        assert found == 0.35
+
+
+@pytest.mark.parametrize("recent", [math.inf, math.nan, 5.0])
+def test_lambda_is_whole_where_nothing_is_known_of_the_disturbance(recent: float) -> None:
+    assert BarrierTuning(lambda_=0.35).following(recent, 0.2) == 0.35
+
+
+@pytest.mark.parametrize("least", [0.0, 0.35, 0.9])
+def test_lambda_does_not_follow_where_there_is_no_lower_one(least: float) -> None:
+    assert BarrierTuning(lambda_=0.35).following(0.0, least) == 0.35

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,17 @@ from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
 from fsw.shapes.zones import zone_arrays
 from fsw.signals import SafeSet, Shape, Vec3, Zone
-from tests.fsw.barriers.horizons import MODEL, NODES, PERIOD, TUNING, Case, random_case, safe_speed
+from tests.fsw.barriers.horizons import (
+    BETA,
+    MODEL,
+    NODES,
+    PERIOD,
+    POINTS,
+    TUNING,
+    Case,
+    random_case,
+    safe_speed,
+)
 from tests.fsw.mpc.requests import below, hovering, planned, planner, request
 from tests.fsw.random_states import random_estimate, vec3
 from tests.fsw.shapes import by_coal
@@ -231,3 +242,22 @@ def test_the_layout_is_kinds_and_sides_in_order() -> None:
     assert layout(SafeSet((out, kept_in))) == layout(SafeSet((other, kept_in)))
     assert layout(SafeSet((out, kept_in))) != layout(SafeSet((kept_in, out)))
     assert layout(SafeSet((out,))) != layout(SafeSet((out, target_sphere((0.0, 0.0, 0.0), 1.0))))
+
+
+def test_rows_ask_for_less_after_little_disturbance_but_not_in_a_sphere_that_follows() -> None:
+    front, sphere = wall((-1.0, 0.0, 0.0), -1.0, 0.1), target_sphere((0.0, 0.0, -0.2), 0.3)
+    case = random_case(np.random.default_rng(3))
+    rows = ZoneRows(
+        SafeSet((front, sphere)), POINTS, MODEL, (TUNING, TUNING), least_lambda=0.5 * TUNING.lambda_
+    )
+    rows.refill(case.horizon(), case.targets)
+    whole = rows.rows.lower_bound.copy()
+    rows.refill(case.horizon(), replace(case.targets, recent_disturbance=0.0))
+    less = whole - rows.rows.lower_bound
+    node, at_wall = rows.rows.node, rows.rows.slack % 2 == 0
+    expected = (1.0 - BETA**node) * 0.5 * TUNING.lambda_
+    assert less[at_wall] == pytest.approx(expected[at_wall])
+    assert not less[~at_wall].any()
+    # Nothing is left of it where a disturbance is known to be there, or is not known.
+    rows.refill(case.horizon(), replace(case.targets, recent_disturbance=math.inf))
+    assert np.array_equal(rows.rows.lower_bound, whole)

@@ -287,3 +287,21 @@ def test_a_vertical_disturbance_is_met_by_thrust_at_once() -> None:
         expected = 3.5 * (GRAVITY + LAW.gains.k_vertical_disturbance * d)
         assert thrust == pytest.approx(expected)
         assert 0.9 < LAW.gains.k_vertical_disturbance < 1.2
+
+
+def test_what_was_observed_is_remembered_at_once_and_forgotten_slowly() -> None:
+    """A push of 0.1 s in still air; a gentle one later does not shorten its memory."""
+    memory, v, history = Observed(CALM, CALM, recent=0.0), 0.0, []
+    for tick in range(2000):
+        push = 0.8 if 500 <= tick < 550 else 0.1 if tick >= 1000 else 0.0
+        v += 0.002 * push
+        memory = observe(memory, (v, 0.0, 0.0), CALM, BRISK, 0.002)
+        history.append(memory.recent)
+    assert max(history[:500]) < 1e-12
+    assert history[500 + 20] > 0.7  # 40 ms after it began
+    assert history[550 + 500] > 0.4  # a second after it ended
+    assert history[-1] == pytest.approx(0.8 * math.exp(-1450 * 0.002 / 2.0), rel=0.05)
+
+
+def test_a_disturbance_that_was_never_observed_counts_as_a_large_one() -> None:
+    assert Observed(CALM, CALM).recent >= 0.8

@@ -25,6 +25,7 @@ from fsw.control.tube import (
     Tube,
     all_axes,
     all_axes_up_to,
+    base_after,
     beyond_covered,
     estimate_tube,
     impulse_responses,
@@ -416,3 +417,13 @@ def test_a_push_that_turns_stays_within_what_clearances_have_grown_by(
     reach = np.abs(_position_under(np.concatenate((first, after)))[len(first) :]).max()
     assert reach < kept
     assert kept <= 0.8 * _tube().base + _tube().base_wind + 1e-9, "what is printed"
+
+
+def test_a_disturbance_that_begins_pushes_no_further_than_is_said_for_each_instant() -> None:
+    """Steps, and the adversary of each instant, which reaches it exactly."""
+    after = base_after(AIRFRAME, TUNING, _gains(), DT)
+    assert after[-1] == pytest.approx(_tube().base, rel=1e-3)
+    assert (np.diff(after) >= 0.0).all()
+    pushed = np.abs(_position_under(0.8 * np.ones(len(after))))
+    assert (pushed <= 0.8 * after[: len(pushed)] + 1e-6).all()
+    assert pushed.max() > 0.7 * 0.8 * after[-1]

@@ -240,7 +240,8 @@ def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
     assert not verdict.lost(5.0 + redundancy.WINDOWS[-1])
     fires = tuple([ratio if of & silent else 0.0 for of in redundancy.OF])
     verdict = judged(verdict, fires, 5.0 + later, holds_attitude=True, lost=lost)
-    assert not (verdict.is_on or verdict.wrong)
+    assert not verdict.is_on
+    assert not verdict.wrong
 
 
 def test_integrals_begin_anew_when_the_vehicle_stands() -> None:

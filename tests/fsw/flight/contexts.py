@@ -21,6 +21,7 @@ STANDING = CommandContext(
     mission=MissionProgress(),
     mission_refusal="no mission: none was uploaded",
     setpoint_fresh=False,
+    setpoint_problem="",
     position=(0.0, 0.0, 0.0),
     yaw=0.0,
     joints=(0.0, 0.0),

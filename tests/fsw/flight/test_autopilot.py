@@ -361,7 +361,7 @@ def test_what_is_refused_is_told_and_counted_whoever_refuses_it() -> None:
             Severity.CRITICAL,
             "mission refused: step 0: the place is more than 1000 m from the origin",
         ),
-        (Severity.CRITICAL, "target refused: position out of range"),
+        (Severity.CRITICAL, "target refused: position out of range: 2000 m, at most 1000 m"),
         (Severity.CRITICAL, "ball refused: it is too large"),
     ]
     assert outputs.snapshot.safety.refusals == 3

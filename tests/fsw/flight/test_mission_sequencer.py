@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from fsw.flight.bounds import mission_problem
 from fsw.flight.mission_sequencer import (
     MissionContext,
     MissionFlight,
@@ -63,6 +65,7 @@ class Flown:
     texts: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     next_mode: Mode | None = None
+    look_at: Vec3 | None = None
 
     def fly(self, seconds: float = math.inf) -> Flown:
         end_us = self.t_us + min(seconds, 2e4) * 1e6
@@ -72,13 +75,20 @@ class Flown:
             here = project(self.flight.segment.at(self.t_us), self.safe_set)
             self.points.append(here)
             where = MissionContext(
-                self.t_us, self.blocked(here.p_WE), self.height, self.home_z, self.safe_set
+                self.t_us,
+                self.blocked(here.p_WE),
+                self.height,
+                self.home_z,
+                self.safe_set,
+                self.look_at,
             )
             count = self.flight.progress.reached_count
             self.flight, event = advance(self.flight, where, PACE)
             if self.flight.progress.reached_count > count:
                 self.reached.append(self.flight.progress.reached)
             self.next_mode = event.next_mode
+            if event.looks:
+                self.look_at = event.look_at
             if event.text:
                 self.texts.append(event.text)
         return self
@@ -144,6 +154,103 @@ def test_steps_come_in_order_and_each_is_stayed_at() -> None:
     assert 2.0 <= len(there) * STEP_US * 1e-6 <= 2.3
     assert flown.points[-1].p_WE == (1.0, 1.0, -1.5)
     assert flown.texts[-1] == "mission complete"
+
+
+def circle(radius: float, turns: float, **more: object) -> MissionStep:
+    return MissionStep(
+        A.CIRCLE,
+        (2.0, 1.0, -1.5),
+        radius=radius,
+        turns=turns,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+@pytest.mark.parametrize("radius", [1.5, -0.75])
+@pytest.mark.parametrize("look_at", [None, (2.0, 1.0, 0.0)])
+def test_a_circle_is_flown_as_often_and_the_way_round_that_it_says(
+    radius: float, look_at: Vec3 | None
+) -> None:
+    looking = [MissionStep(A.LOOK_AT, look_at)] if look_at is not None else []
+    flown = start(*looking, circle(radius, 2.0), go(0.0, 0.0, -1.0)).fly()
+    assert flown.next_mode is Mode.HOLD
+    assert flown.reached == list(range(len(looking) + 2))
+    on_it = [
+        one
+        for one in flown.points
+        if abs(math.dist(one.p_WE[:2], (2.0, 1.0)) - abs(radius)) < 1e-6
+        and abs(one.p_WE[2] + 1.5) < 1e-9
+    ]
+    bearings = [math.atan2(one.p_WE[1] - 1.0, one.p_WE[0] - 2.0) for one in on_it]
+    turned = sum(math.remainder(b - a, 2.0 * math.pi) for a, b in itertools.pairwise(bearings))
+    assert turned == pytest.approx(math.copysign(4.0 * math.pi, radius), abs=1e-3)
+    for before, after in itertools.pairwise(flown.points):
+        assert math.hypot(*after.v_WE) <= PACE.speed + 1e-9
+        assert math.hypot(*after.a_WE) <= PACE.acceleration + 1e-9
+        moved = math.dist(before.p_WE, after.p_WE)
+        assert moved <= (PACE.speed + 1e-9) * 1e-6 * STEP_US
+    if look_at is not None:
+        looks = [one.yaw for one in on_it[1:]]
+        away = [math.remainder(b - y - math.pi, 2.0 * math.pi)
+                for b, y in zip(bearings[1:], looks, strict=True)]  # fmt: skip
+        assert max(map(abs, away)) < 0.01
+
+
+def test_a_circle_where_the_vehicle_is_begins_there() -> None:
+    flown = start(circle(1.0, 0.5, here=True)).fly()
+    assert flown.reached == [0]
+    assert flown.points[-1].p_WE == pytest.approx((-1.0, 0.0, -1.5), abs=1e-6)
+
+
+def jump(target: int, repeats: int) -> MissionStep:
+    return MissionStep(A.JUMP, target=target, repeats=repeats)
+
+
+def test_a_jump_is_taken_as_often_as_it_says_and_again_in_the_next_flight() -> None:
+    flown = start(go(0.1, 0.0, -1.0), go(0.2, 0.0, -1.0), jump(0, 2), go(0.3, 0.0, -1.0)).fly()
+    assert flown.reached == [0, 1, 2, 0, 1, 2, 0, 1, 2, 3]
+    assert flown.texts.count("mission step 2: jump to step 0, 1 of 2") == 1
+    assert flown.flight.progress.state is MissionState.COMPLETE
+    again = Flown(begun(flown.flight, START, PACE)).fly()
+    assert again.reached == flown.reached
+
+
+def test_a_mission_that_ends_with_a_jump_ends_after_its_last_repetition() -> None:
+    flown = start(go(0.1, 0.0, -1.0), jump(0, 1)).fly()
+    assert flown.reached == [0, 1, 0, 1]
+    assert flown.next_mode is Mode.HOLD
+    assert flown.flight.progress.state is MissionState.COMPLETE
+    endless = start(go(0.1, 0.0, -1.0), jump(0, -1)).fly(300.0)
+    assert endless.next_mode is None
+    assert endless.reached.count(0) > 10
+    assert endless.flight.progress.state is MissionState.ACTIVE
+
+
+def test_what_is_for_a_camera_is_passed_over_without_a_stop() -> None:
+    skip = MissionStep(A.SKIP)
+    flown = start(skip, go(0.1, 0.0, -1.0), skip, skip, go(0.2, 0.0, -1.0), skip).fly()
+    assert flown.reached == [0, 1, 2, 3, 4, 5]
+    assert flown.flight.progress.state is MissionState.COMPLETE
+
+
+@pytest.mark.parametrize(
+    ("steps", "number"),
+    [
+        ((jump(0, -1),), 0),
+        ((jump(3, 1), go(0.0, 0.0, -1.0)), 0),
+        ((go(0.0, 0.0, -1.0), jump(-1, 1)), 1),
+        ((go(0.0, 0.0, -1.0), jump(2, -1), MissionStep(A.SKIP), jump(1, -1)), 1),
+        ((go(0.0, 0.0, -1.0), jump(0, 5000)), 1),
+        ((circle(0.1, 1.0),), 0),
+    ],
+)
+def test_a_jump_or_circle_that_leads_nowhere_is_named(
+    steps: tuple[MissionStep, ...], number: int
+) -> None:
+    wrong = mission_problem(steps)
+    assert wrong is not None
+    assert wrong[0] == number
+    assert mission_problem((go(0.0, 0.0, -1.0), jump(0, -1))) is None
 
 
 def test_a_speed_holds_for_the_legs_that_follow_and_for_a_jump_behind_it() -> None:

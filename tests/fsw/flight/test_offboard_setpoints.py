@@ -81,8 +81,22 @@ def test_a_motion_is_refused_beyond_its_range_in_any_direction(
             value = tuple(c * share * most if c else 0.0 for c in vector)
             setpoint = MotionSetpoint(False, **{name: value})  # type: ignore[arg-type]
             reported = motion_refusal(setpoint)
-            assert (reported == f"{words} out of range") is refused
             assert (reported is None) is not refused
+            if reported is not None and not math.isnan(share):
+                assert reported.startswith(f"{words} out of range: ")
+                assert f"at most {most:g} m" in reported
+
+
+def test_an_axis_that_every_vector_leaves_open_is_named() -> None:
+    held = MotionSetpoint(False, p=(math.nan, math.nan, -2.0), v=(0.5, 0.1, math.nan))
+    assert motion_refusal(held) is None
+    for p, v, axis in (
+        ((math.nan, math.nan, -2.0), (0.5, math.nan, 0.0), "east"),
+        ((math.nan, 1.0, math.nan), (0.5, 0.0, math.nan), "down"),
+        ((math.nan, 1.0, 1.0), None, "north"),
+    ):
+        reported = motion_refusal(MotionSetpoint(False, p=p, v=v))
+        assert reported == f"{axis} has no position, velocity or acceleration"
 
 
 @pytest.mark.parametrize(("name", "most"), [("yaw", 4.0 * math.pi), ("yaw_rate", 10.0)])

@@ -28,6 +28,7 @@ LIMITS = SetpointLimits()
 STILL = ReferenceState(False, (0.0, 0.0, -2.0), (0.0, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0))
 WALL = SafeSet((wall((-1.0, 0.0, 0.0), -3.0, 0.1),))
 BARRIER = BarrierTuning(alpha=2.0, slope=4.0)
+NAN = math.nan
 number = st.floats(-30.0, 30.0)
 vector = st.tuples(number, number, number)
 
@@ -61,6 +62,18 @@ def test_a_velocity_is_taken_up_at_the_allowed_acceleration() -> None:
     path = run(STILL, PositionGoal(MotionSetpoint(False, v=(1.0, 0.0, 0.0))), 2.0)
     assert path[1].v[0] == pytest.approx(0.1 * LIMITS.acceleration)
     assert path[-1].v == pytest.approx((1.0, 0.0, 0.0))
+
+
+def test_each_axis_follows_its_own_position_velocity_or_acceleration() -> None:
+    held = MotionSetpoint(False, p=(NAN, NAN, -3.0), v=(0.5, -0.25, NAN))
+    path = run(STILL, PositionGoal(held), 20.0)
+    assert path[-1].p[2] == pytest.approx(-3.0, abs=0.02)
+    assert path[-1].v == pytest.approx((0.5, -0.25, 0.0), abs=0.01)
+    pushed = MotionSetpoint(False, p=(NAN, 0.0, NAN), v=(NAN, NAN, 0.1), a=(0.2, NAN, NAN))
+    end = run(STILL, PositionGoal(pushed), 2.0)[-1]
+    assert end.v[0] == pytest.approx(0.4, abs=0.01)
+    assert end.v[2] == pytest.approx(0.1)
+    assert end.p[1] == 0.0
 
 
 def test_a_velocity_along_the_heading_turns_with_it() -> None:

@@ -12,10 +12,12 @@ from typing import Any
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
+from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
+from fsw.link.sent_frames import SentFrames
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
@@ -88,6 +90,12 @@ class Ground:
         """Let the vehicle read what has arrived."""
         self.link.read(self.t_us, 4096)
 
+    def fly_silently(self, ticks: int) -> None:
+        """Let some ticks pass, and what is sent wait for who listens."""
+        for _ in range(ticks):
+            self.t_us += 2_000
+            self.links.publish(outputs_at(self.t_us))
+
     def fly(self, ticks: int, **changes: Any) -> list[Frame]:
         """Let some ticks pass; keyword arguments replace fields of the snapshot."""
         frames = []
@@ -109,6 +117,7 @@ def ground_station(
     api: bool = False,
     key_file: KeyFile | None = None,
     times: SignedTimes | None = None,
+    sent: SentFrames | None = None,
 ) -> Iterator[Ground]:
     """A link to a ground station, or to a program, of its own."""
     station, inbox, clock = station_socket(), Inbox(), ManualClock()
@@ -122,6 +131,7 @@ def ground_station(
         lambda: clock.now_us,
         lambda t, frame: recorded.append((t, frame)),
         services,
+        sent,
     )
     links = GroundLinks([link], 2_000, lambda: clock.now_us)
     try:
@@ -142,6 +152,7 @@ def whole_vehicle(folder: Path) -> Iterator[Ground]:
         ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
         MissionService(MissionStore(Site(_nowhere, _as_it_is, lambda: 0.1, lambda *_: 0.0))),
         LogService(logs),
+        LogStreamService(logs),
         FtpService(vehicle_files(logs)),
         TimeService(),
     )

@@ -119,7 +119,7 @@ SNAPSHOT = FlightSnapshot(
     plan=PLAN,
     plan_status=SolverStatus.TIME_LIMIT,
     counters=PlannerCounters(plans=10, missed_deadlines=1, fallbacks=2),
-    safety=SafetyCounters(departures=5, breaches=3, interventions=7),
+    safety=SafetyCounters(departures=5, breaches=3, interventions=7, refusals=4),
     constraints=ConstraintReport(
         ConstraintKind.WALLS,
         (0.3, 0.2, 0.4),

@@ -19,15 +19,22 @@ from pymavlink.dialects.v10 import common as old_protocol
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
+from fsw.link.sent_frames import SentFrames
+from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
+from fsw.ports import LinkLosses
 from fsw.signals import BatteryState, CommandAck, Mode, Severity, StatusText
+from messages import dialect
 from messages.frames import Frame, FrameWriter, as_version_1, split
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
 
 HEARTBEAT = (0, 6, 8, 0, 4, 3)
+MANUAL_CONTROL, MANUAL = 69, (0, 0, 500, 0, 0, 1, *(0,) * 10)
+# mavros, that of ROS 1, MAVSDK on a companion computer, others, the vehicle's own, pymavlink's.
+IDENTITIES = [(1, 191), (1, 240), (1, 195), (1, 192), (2, 191), (1, 1), (1, 25), (255, 0), (3, 1)]
 
 
 @pytest.fixture
@@ -49,7 +56,7 @@ def test_streams_leave_at_their_rates_in_sensor_time(ground: Ground) -> None:
 
 def test_each_component_counts_its_own_sequence(ground: Ground) -> None:
     frames = ground.fly(200)
-    for component in (1, 191):
+    for component in (1, 25):
         sequences = [frame.sequence for frame in frames if frame.component_id == component]
         assert sequences == [n % 256 for n in range(len(sequences))]
 
@@ -233,11 +240,78 @@ def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
     other.close()
 
 
-def test_our_own_frames_sent_back_are_ignored(ground: Ground) -> None:
-    echo = station_socket()
-    ground.polled(FrameWriter(1, 191).frame(ids.HEARTBEAT, *HEARTBEAT), echo)
+@pytest.mark.parametrize("version", [2, 1])
+def test_our_own_frames_sent_back_are_dropped_and_counted(ground: Ground, version: int) -> None:
+    if version == 1:
+        ping = FrameWriter(255, 190).frame(ids.PING, 1, 2, 0, 0)
+        ground.polled(as_version_1(ping) or b"")
+    before, echo = ground.link.accepted, station_socket()
+    sent: list[bytes] = []
+    for _ in range(200):
+        ground.fly_silently(1)
+        sent += ground.datagrams()
+    assert {datagram[0] for datagram in sent} <= {0xFD, 0xFE}
+    for datagram in sent:
+        ground.polled(datagram, echo)
+    frames = [frame for datagram in sent for frame in split(datagram)]
+    assert {frame.component_id for frame in frames} == ({1, 25} if version == 2 else {1})
     assert echo.getsockname() not in ground.link.peers
+    assert counts(ground)["echoes_dropped"] == len(frames)
+    assert ground.link.accepted == before
     echo.close()
+
+
+@pytest.mark.parametrize("who", IDENTITIES, ids=lambda who: f"{who[0]}-{who[1]}")
+def test_a_program_of_any_identity_is_answered(who: tuple[int, int]) -> None:
+    program = dialect.MAVLink(None, srcSystem=who[0], srcComponent=who[1])
+    asked = (
+        dialect.MAVLink_heartbeat_message(18, 8, 192, 0, 4, 3),  # mavros'
+        dialect.MAVLink_ping_message(1, 2, 0, 0),
+        dialect.MAVLink_command_long_message(1, 1, 512, 0, ids.AUTOPILOT_VERSION, *(0,) * 6),
+    )
+    with ground_station(services=(TimeService(),)) as ground:
+        ground.fly(5)
+        for message in asked:
+            ground.polled(message.pack(program))
+        assert ground.link.accepted == len(asked)
+        found = {frame.message_id: frame.payload_values for frame in ground.heard()}
+        assert found[ids.PING] == (1, 2, *who)
+        assert found[ids.COMMAND_ACK][:2] == (512, 0)
+        assert found[ids.COMMAND_ACK][-2:] == who
+        assert ids.AUTOPILOT_VERSION in found
+        assert counts(ground)["echoes_dropped"] == 0
+
+
+def test_what_one_link_sent_is_known_on_the_other() -> None:
+    """A router between both sends the frames of each to the other."""
+    sent = SentFrames()
+    with ground_station(sent=sent) as gcs, ground_station(sent=sent, api=True) as api:
+        gcs.fly_silently(10)
+        for datagram in gcs.datagrams():
+            api.polled(datagram)
+        assert api.link.accepted == 0
+        assert api.link.echoes > 0
+
+
+def test_a_memory_of_what_was_sent_is_bounded_and_keeps_the_newest() -> None:
+    sent = SentFrames()
+    writer = FrameWriter(1, 1)
+    frames = [writer.frame(ids.PING, number, 0, 0, 0) for number in range(40_000)]
+    for frame in frames:
+        sent.add([frame])
+    assert all(frame in sent for frame in frames[-8000:])
+    assert sum(frame in sent for frame in frames) < 17_000
+
+
+def test_what_is_not_answered_is_counted_by_its_name(ground: Ground) -> None:
+    station = FrameWriter(255, 190)
+    for _ in range(3):
+        ground.polled(station.frame(MANUAL_CONTROL, *MANUAL))
+    ground.polled(station.frame(ids.PARAM_REQUEST_LIST, 7, 1))
+    found = counts(ground)
+    assert found["unhandled"] == {"MANUAL_CONTROL": 3}
+    assert found["for_others"] == 1
+    assert ground.links.losses == LinkLosses(unhandled=3)
 
 
 @pytest.mark.requirement("REQ-LINK-5")

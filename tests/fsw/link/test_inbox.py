@@ -28,7 +28,7 @@ NEWS: dict[str, tuple[str, Callable[[Inbox], None]]] = {
     "station": ("ground_station_heard", frame(ids.HEARTBEAT, 0, 6, 8, 0, 4, 3)),
     "refused": (
         "refused_setpoints",
-        frame(ids.SET_ATTITUDE_TARGET, 0, *(float("nan"),) * 4, *NONE, 0.5, 1, 1, 0),
+        frame(ids.SET_ATTITUDE_TARGET, 0, *(float("nan"),) * 4, *NONE, 0.5, 9, 1, 0),
     ),
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from fsw.link.inbox import Inbox
+from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sim_link import Pacing, SimLink
 from fsw.link.text_limiter import TextLimiter
 from fsw.link.wire import message_ids as ids
@@ -519,6 +520,19 @@ def test_garbage_releases_no_tick(wire: Wire) -> None:
 
 
 INJECT = CommandRequest(420, (0.0, 1.0, 0.0, NAN, NAN, NAN, NAN), 245, 190, confirmation=1)
+
+
+@pytest.mark.parametrize("sender", [(255, 0), (0, 0), (1, 1), (1, 191)])
+def test_a_sender_of_any_identity_gets_the_simulator_s_answer(sender: tuple[int, int]) -> None:
+    """pymavlink's component is 0 unless it is told another; no frame can be sent in that name."""
+    routed = RoutedCommands()
+    routed.add(replace(INJECT, source_system=sender[0], source_component=sender[1]))
+    (frame,) = split(routed.due(1_000_000))
+    named = CommandAck(420, 0, frame.system_id, frame.component_id)
+    assert routed.answered([named]) == [CommandAck(420, 0, *sender)]
+    routed.add(replace(INJECT, source_system=sender[0], source_component=sender[1]))
+    routed.due(1_000_000)
+    assert routed.given_up(2_000_000) == [CommandAck(420, 4, *sender)]
 
 
 def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_back(

@@ -122,3 +122,23 @@ def test_the_surfaces_of_sc_count_from_the_clearance_and_from_the_first_node(whe
     targets = TargetPoints(np.zeros((N + 1, 3)), np.zeros((N + 1, 3)), np.zeros(N + 1))
     values = [quadratic(cost, horizon, guess, targets)[0] for cost in (changed, usual)]
     assert values[0] == values[1] > 0.0
+
+
+@pytest.mark.parametrize("where", ["walls", "sphere"])
+def test_a_terminal_set_asks_of_the_last_node_alone_that_braking_suffices(where: str) -> None:
+    config = replace(CONFIG, controller="hc", tightening=0.05, hard_terminal=True)
+    distances, ends = parts_of(config, MODEL, SETS[where]).barriers
+    assert isinstance(distances, ZoneRows)
+    assert isinstance(ends, ZoneRows)
+    assert distances.rows.node.min() == 1
+    assert set(ends.rows.node) == {N}
+    start, guess = np.zeros(19), np.zeros(INPUTS * N)
+    start[0], start[3] = 0.5, 0.9  # towards the wall, and out of the sphere
+    horizon = Linearisation(MODEL)
+    horizon.refill(start, guess)
+    ends.refill(horizon, TargetPoints(np.zeros((N + 1, 3)), np.zeros((N + 1, 3)), np.zeros(N + 1)))
+    bound = ends.rows.gradient.any(axis=1)
+    assert bound.any()
+    # At rest that is the distance of the tightening, whatever h was at the start.
+    slope = CONFIG.walls.slope if where == "walls" else CONFIG.workspace.slope
+    assert ends.rows.lower_bound[bound] == pytest.approx(slope * 0.05)

@@ -10,8 +10,10 @@ from fsw.barriers.safe_approach import BarrierTuning, safe_approach_speed
 from fsw.parameters.consistency import (
     Finding,
     analyse,
+    base_reach,
     loop_tube,
     refusals,
+    return_room,
     sampled_robustness,
     stand_off,
 )
@@ -170,3 +172,38 @@ def test_the_end_effector_is_said_to_follow_the_base_where_the_arm_gives_way() -
         "across the arm's plane and along it, by"
         in _findings(rigid, WALLS)["end-effector tube"].statement
     )
+
+
+def _following(least: float) -> FlightConfig:
+    config = flight_config()
+    return replace(config, planner=replace(config.planner, lambda_min=least))
+
+
+def test_a_lambda_that_is_back_too_late_is_refused_with_the_least_that_is_enough() -> None:
+    finding = _findings(_following(0.15), WALLS)["return of lambda"]
+    assert not finding.holds
+    assert finding.refuses
+    assert "SAFE_LAMBDA_MIN >= 0.195 m/s is enough" in finding.statement
+    assert _findings(_following(0.195), WALLS)["return of lambda"].holds
+
+
+def test_a_lambda_that_does_not_follow_has_nothing_to_return_from() -> None:
+    assert "return of lambda" not in _findings(_following(0.0), WALLS)
+    assert "return of lambda" not in _findings(_following(0.35), WALLS)
+    assert "return of lambda" not in _findings(_following(0.1), SPHERE)
+
+
+def test_the_room_at_the_return_grows_with_what_is_kept_up_to_that_of_the_tube() -> None:
+    config = flight_config()
+    loop = loop_tube(config)
+    rooms = [return_room(config, loop, least) for least in (0.1, 0.2, 0.3, 0.35)]
+    assert rooms == sorted(rooms)
+    whole = stand_off(config.planner.walls) - base_reach(loop, config.surroundings)
+    assert rooms[-1] == pytest.approx(whole, abs=1e-4)
+
+
+def test_a_slower_planner_brings_lambda_back_later() -> None:
+    config = flight_config()
+    slower = replace(config, plan_delay_ticks=100)
+    loop = loop_tube(config)
+    assert return_room(slower, loop, 0.2) < return_room(config, loop, 0.2) - 0.002

@@ -48,7 +48,7 @@ def test_a_contradiction_is_a_sentence_with_both_names(
     ("degrees", "tilt", "refused"),
     [
         (5.0, 18.0, "is to be 0 or at least 15 deg above the 25 deg of the loops"),
-        (39.9, 18.0, "is to be 0 or at least 15 deg above the 25 deg of the loops"),
+        (39.0, 18.0, "is to be 0 or at least 15 deg above the 25 deg of the loops"),
         (44.0, 30.0, "is to be 0 or at least 15 deg above PLN_TILT_MAX, 30"),
         (40.0, 18.0, ""),
         (45.0, 30.0, ""),

@@ -37,10 +37,14 @@ def test_each_parameter_is_described_as_the_format_wants_it() -> None:
         for key, value in described.items():
             assert isinstance(value, ALLOWED[key]), key
         assert re.fullmatch(r"[.\-a-zA-Z0-9_{}]{1,16}", described["name"])
-        assert described["type"] == "Float"
-        repeats = FACT_BY_NAME.get(described["name"])
-        if repeats is None or not repeats.repeats:
-            assert described["min"] <= described["default"] <= described["max"]
+        assert described["min"] <= described["default"] <= described["max"]
+        numbers = [described[key] for key in ("default", "min", "max")]
+        if described["type"] == "Int32":
+            assert all(isinstance(number, int) for number in numbers)
+            assert described["decimalPlaces"] == 0
+        else:
+            assert described["type"] == "Float"
+            assert all(isinstance(number, float) for number in numbers)
         for choice in described.get("values", ()):
             assert set(choice) == {"value", "description"}
 

@@ -4,14 +4,17 @@ import math
 import re
 from collections import Counter
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 import pytest
 
+from fsw.parameters.facts import FACTS
 from fsw.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
 from fsw.parameters.float32 import as_text, nearest_decimal
 from fsw.parameters.registry import BY_NAME, NO_PARAMETERS, PARAMETERS, Parameter
 from fsw.tuning import flat, number_at, tuned
+from tests.fsw.parameters import px4_types
 
 
 def numbers(config: FlightConfig) -> list[str]:
@@ -123,3 +126,27 @@ def test_tuning_leaves_what_it_does_not_name() -> None:
 def test_numbers_that_contradict_each_other_are_refused_by_their_dataclass() -> None:
     with pytest.raises(ValueError, match="barrier slope is 20"):
         tuned(FlightConfig(), (("planner.walls.slope", 20.0),))
+
+
+def test_px4_s_names_have_px4_s_types() -> None:
+    types = {name: parameter.default for name, parameter in BY_NAME.items()} | {
+        fact.name: BY_NAME[fact.repeats].default if fact.repeats else fact.value for fact in FACTS
+    }
+    for names, kind in ((px4_types.INT32, int), (px4_types.FLOAT, float)):
+        assert [name for name in names if type(types[name]) is not kind] == []
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
+def test_what_counts_or_chooses_is_an_integer_and_nothing_else_is(parameter: Parameter) -> None:
+    field = attrgetter(parameter.path)(FlightConfig())
+    if parameter.choices or (isinstance(field, int) and parameter.scale == 1.0):
+        assert parameter.integer
+    if parameter.integer:
+        assert type(parameter.default) is int
+        assert parameter.name in px4_types.INT32 or isinstance(field, int | str)
+        assert parameter.refusal(parameter.least + 0.5) is not None
+        assert float(parameter.least).is_integer()
+        assert float(parameter.most).is_integer()
+    else:
+        assert type(parameter.default) is float
+        assert parameter.name not in px4_types.INT32

@@ -14,7 +14,6 @@ from pymavlink.mavparm import MAVParmDict
 
 from fsw.parameters import storage
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.kept_file import ParameterFile
 from fsw.parameters.registry import BY_NAME, PARAMETERS
 from fsw.parameters.storage import as_params, as_parm, load, parse, save
@@ -38,9 +37,9 @@ def by_mavproxy(path: Path) -> dict[str, float]:
 def value_sets(draw: st.DrawFn) -> dict[str, float]:
     chosen = draw(st.lists(st.sampled_from(PARAMETERS), unique=True, min_size=1))
     return {
-        p.name: nearest_decimal(draw(st.floats(p.least, p.most, width=64)))
+        p.name: p.kept(draw(st.floats(p.least, p.most, width=64)))
         for p in chosen
-        if p.refusal(nearest_decimal(p.least)) is None
+        if p.refusal(p.least) is None
     }
 
 
@@ -51,6 +50,9 @@ def test_both_formats_bring_every_value_back(values: dict[str, float]) -> None:
     for text in (as_params(inside), as_parm(inside)):
         loaded = parse(text)
         assert loaded.values == inside
+        assert {n: type(v) for n, v in loaded.values.items()} == {
+            n: int if BY_NAME[n].integer else float for n in inside
+        }
         assert loaded.complaints == ()
 
 
@@ -83,9 +85,61 @@ def test_a_params_file_has_qgroundcontrol_s_columns() -> None:
     assert line.split("\t") == ["1", "1", "PID_YAW_P", "5.5", "9"]
 
 
+def test_an_integer_has_qgroundcontrol_s_type_of_it() -> None:
+    values = {"NAV_DLL_ACT": 3, "LND_SPEED": 0.3}
+    rows = [row.split("\t") for row in as_params(values).splitlines() if row[0] != "#"]
+    assert [row[2:] for row in rows] == [["LND_SPEED", "0.3", "9"], ["NAV_DLL_ACT", "3", "6"]]
+    assert "NAV_DLL_ACT      3\n" in as_parm(values)
+
+
+@pytest.mark.parametrize(
+    "line", ["1\t1\tNAV_DLL_ACT\t3\t9", "NAV_DLL_ACT,3.000000", "NAV_DLL_ACT 3", "NAV_DLL_ACT 3e0"]
+)
+def test_a_file_of_a_vehicle_that_knew_no_integers_is_still_read(line: str) -> None:
+    loaded = parse(line)
+    assert (loaded.values, loaded.complaints) == ({"NAV_DLL_ACT": 3}, ())
+    assert isinstance(loaded.values["NAV_DLL_ACT"], int)
+
+
+@pytest.mark.parametrize(
+    ("px4", "ours"), [("MPC_XY_VEL_MAX", "STR_V_MAX"), ("MPC_TKO_SPEED", "TKO_SPEED")]
+)
+def test_px4_s_name_of_a_parameter_sets_it(px4: str, ours: str) -> None:
+    assert parse(f"{px4} 1.25").values == {ours: 1.25}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16-le", "utf-16-be"])
+def test_what_an_editor_of_windows_writes_is_read_from_its_first_line_on(
+    encoding: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "bom.param"
+    mark = "" if encoding == "utf-8-sig" else "\ufeff"
+    path.write_bytes(f"{mark}MIS_TAKEOFF_ALT,2\r\nNAV_DLL_ACT,3\r\n".encode(encoding))
+    loaded = load(path)
+    assert (loaded.values, loaded.complaints) == ({"MIS_TAKEOFF_ALT": 2.0, "NAV_DLL_ACT": 3}, ())
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_link_stays_one_and_what_it_leads_to_is_written(there: bool, tmp_path: Path) -> None:
+    target, link = tmp_path / "elsewhere" / "vehicle.params", tmp_path / "link.params"
+    target.parent.mkdir()
+    if there:
+        save(target, {"PID_YAW_P": 5.0})
+    link.symlink_to(target)
+    save(link, {"PID_YAW_P": 6.0})
+    assert link.is_symlink()
+    assert load(target).values == {"PID_YAW_P": 6.0}
+    assert [file.name for file in target.parent.iterdir()] == ["vehicle.params"]
+
+
 @pytest.mark.parametrize(
     ("line", "why"),
     [
+        ("NAV_DLL_ACT 2.5", "NAV_DLL_ACT is an INT32 and must be a whole number"),
+        ("FD_FAIL_R 60.5", "FD_FAIL_R is an INT32 and must be a whole number"),
+        ("SAFE_OWNER nan", "SAFE_OWNER is an INT32 and must be a whole number"),
+        ("COM_OBL_RC_ACT 0", "COM_OBL_RC_ACT is to be one of 3 Return"),
+        ("MAV_TYPE 13", "MAV_TYPE is read only and 2 here"),
         ("1\t1\tNOT_OURS\t1\t9", "NOT_OURS is unknown"),
         ("PID_YAW_P five", "five is not a number"),
         ("PID_YAW_P nan", "PID_YAW_P is to be 0..50, nan is refused"),

@@ -92,10 +92,12 @@ def test_it_reads_the_private_messages_and_takes_none_for_loss(prompt: Prompt) -
 
 def test_it_sets_a_parameter(prompt: Prompt) -> None:
     known = PARAMETERS[0]
-    for wanted in (0.5 * (known.default + known.most), known.default):
-        prompt.says("", command=f"param set {known.name} {wanted}")
-        time.sleep(3.0)  # it repeats each second what was not answered, and says nothing
-        prompt.says(rf"{known.name} +{wanted:.0f}", command=f"param show {known.name}")
+    middle = 0.5 * (known.default + known.most)
+    for name, values in ((known.name, (middle, known.default)), ("NAV_DLL_ACT", (3, 2))):
+        for wanted in values:
+            prompt.says("", command=f"param set {name} {wanted}")
+            time.sleep(3.0)  # it repeats each second what was not answered, and says nothing
+            prompt.says(rf"{name} +{wanted:.0f}", command=f"param show {name}")
 
 
 def test_it_lists_and_fetches_files(prompt: Prompt, earlier: bytes) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import html
+import itertools
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -61,6 +63,36 @@ def test_table_4_has_a_row_for_everyone_in_every_case(table4: Report) -> None:
     }
     everyone = {"naive", "hc", "hc-tightened", "sc", "blf"}
     assert fair == {(name, case) for name in everyone for case in CASES} | {("naive-centred", "II")}
+
+
+def test_table_4_at_speed_has_every_tightening_and_scenarios_of_its_own() -> None:
+    report = study("table4")(replace(TINY, family="dash"), Campaign(0))
+    assert {row["scenario"] for row in report.rows} == {
+        "dash", "dash-calm", "chase", "chase-calm"
+    }  # fmt: skip
+    names = {row["controller"] for row in report.rows if row["case"] == "I"}
+    assert "hc-tightened-100-mm" in names
+    assert {(row["controller"], row["case"], row["disturbance"]) for row in report.rows} >= set(
+        TABLE_4
+    )
+
+
+def test_rivals_have_their_settings_and_a_front_of_what_nobody_beats(tmp_path: Path) -> None:
+    tiny = replace(TINY, family="dash", duration_s=0.2)
+    report = study("rivals")(tiny, Campaign(0))
+    families = {row["family"] for row in report.rows}
+    assert {"naive", "hc", "hc softened, n = 20", "hc softened, terminal set", "sc"} < families
+    for case, air in itertools.product(CASES, (False, True)):
+        rows = [r for r in report.rows if (r["case"], r["disturbance"]) == (case, air)]
+        for row in (r for r in rows if r["on_front"]):
+            assert row["passed"] == row["total"]
+            assert not any(
+                other["te_m"] <= row["te_m"] and other["worst_margin_m"] > row["worst_margin_m"]
+                for other in rows
+                if other["passed"] == other["total"]
+            )
+        assert any(row["on_front"] for row in rows)
+    assert "<svg" in write(report, tiny, (), "rivals", tmp_path).read_text()
 
 
 def test_rows_are_json_without_numbers_that_are_none(table4: Report, tmp_path: Path) -> None:
@@ -135,6 +167,7 @@ def test_default_seeds_are_fresh() -> None:
         (["table4", "--duration", "nan"], "duration"),
         (["table4", "--workers=-1"], "from 0 to 1024"),
         (["robustness", "--sensors", "mokap"], "did you mean mocap"),
+        (["table4", "--scenario", "dahs"], "did you mean dash"),
         (["table4", "--sedes", "1:2"], "did you mean --seeds"),
     ],
 )

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from fsw.flight.modes.offboard import Offboard, accept_setpoints, is_fresh, report
+from fsw.flight.modes.offboard import (
+    Offboard,
+    accept_setpoints,
+    current_problem,
+    is_fresh,
+    report,
+)
 from fsw.flight.setpoint_generator import PositionGoal, ReferenceState
 from fsw.flight.state import FlightState, OffboardMemory, SetpointMemory
 from fsw.signals import (
     AttitudeSetpoint,
+    Home,
     JointSetpoint,
     Mode,
     MotionSetpoint,
     OffboardReport,
+    PositionFrom,
     SensorFrame,
     SetpointKind,
+    StatusText,
     TickInputs,
     Vec3,
 )
@@ -40,6 +50,7 @@ SENSORS = SensorFrame(
     qd_arm=(0.0, 0.0),
 )
 NOW_US = 10_000_000
+NAN = math.nan
 HERE: Vec3 = (0.0, 0.0, -2.0)
 
 
@@ -47,19 +58,29 @@ def reported(t_us: int = NOW_US, **fields: Any) -> TickInputs:
     return TickInputs(replace(SENSORS, t_us=t_us), **fields)
 
 
+def accepted(
+    memory: OffboardMemory,
+    inputs: TickInputs,
+    texts: list[StatusText] | None = None,
+    vehicle: FlightState | None = None,
+) -> OffboardMemory:
+    state = replace(vehicle or flying(Mode.OFFBOARD), offboard=memory)
+    return accept_setpoints(state, inputs, CONFIG, [] if texts is None else texts)
+
+
 def hearing(**memory: Any) -> FlightState:
     return replace(flying(Mode.OFFBOARD), offboard=OffboardMemory(**memory))
 
 
 def test_the_newest_of_motion_and_attitude_counts_and_joints_count_beside_them() -> None:
-    memory = accept_setpoints(OffboardMemory(), reported(motion=MOTION), CONFIG)
+    memory = accepted(OffboardMemory(), reported(motion=MOTION))
     assert (memory.motion, memory.attitude, memory.motion_us) == (MOTION, None, NOW_US)
-    memory = accept_setpoints(memory, reported(NOW_US + 1, attitude=ATTITUDE), CONFIG)
+    memory = accepted(memory, reported(NOW_US + 1, attitude=ATTITUDE))
     assert (memory.motion, memory.attitude, memory.motion_us) == (None, ATTITUDE, NOW_US + 1)
-    memory = accept_setpoints(memory, reported(NOW_US + 2, joints=JOINTS), CONFIG)
+    memory = accepted(memory, reported(NOW_US + 2, joints=JOINTS))
     assert (memory.attitude, memory.joints) == (ATTITUDE, JOINTS)
     assert (memory.motion_us, memory.joints_us) == (NOW_US + 1, NOW_US + 2)
-    memory = accept_setpoints(memory, reported(NOW_US + 3, motion=MOTION), CONFIG)
+    memory = accepted(memory, reported(NOW_US + 3, motion=MOTION))
     assert (memory.motion, memory.attitude, memory.joints) == (MOTION, None, JOINTS)
     assert (memory.accepted, memory.refused) == (4, 0)
 
@@ -72,9 +93,71 @@ def test_what_is_out_of_range_is_counted_and_not_kept() -> None:
         joints=JointSetpoint((9.0, 0.0)),
         refused_setpoints=4,
     )
-    assert accept_setpoints(before, wild, CONFIG) == replace(before, refused=2 + 4 + 3)
-    mixed = accept_setpoints(before, replace(wild, joints=JOINTS, refused_setpoints=0), CONFIG)
+    refused = accepted(before, wild)
+    assert refused.problem.startswith("joint 1 at 516 deg")
+    assert (refused.motion, refused.motion_us) == (MOTION, 5)
+    assert (refused.accepted, refused.refused) == (7, 2 + 4 + 3)
+    mixed = accepted(before, replace(wild, joints=JOINTS, refused_setpoints=0))
     assert (mixed.accepted, mixed.refused) == (8, 4)
+
+
+def test_the_reason_of_a_refusal_is_a_text_every_few_seconds_and_the_answer_to_the_mode() -> None:
+    memory, texts = OffboardMemory(), list[StatusText]()
+    for k in range(200):  # 10 s at 20 Hz
+        wrong = reported(
+            NOW_US + 50_000 * k, refused_setpoints=1, setpoint_problem="forces are not supported"
+        )
+        memory = accepted(memory, wrong, texts)
+    assert [one.text for one in texts] == ["setpoint refused: forces are not supported"] * 2
+    now_us = NOW_US + 50_000 * 199
+    state = hearing(problem=memory.problem, problem_us=memory.problem_us)
+    problem = current_problem(CONFIG, state, now_us)
+    refusal = OFFBOARD.refusal(replace(READY, setpoint_fresh=False, setpoint_problem=problem))
+    assert refusal == "not offboard: setpoints are refused: forces are not supported"
+    dropped = OFFBOARD.waits(state, now_us)
+    assert dropped == "offboard cancelled: setpoints were refused: forces are not supported"
+    later = OFFBOARD.waits(state, now_us + 600_000)
+    assert later == "offboard cancelled: setpoints stopped before arming"
+    # One for another vehicle has no reason that is ours to tell.
+    foreign, texts = accepted(OffboardMemory(), reported(refused_setpoints=1), texts), []
+    assert (foreign.refused, foreign.problem, texts) == (1, "", [])
+
+
+def test_a_position_from_the_vehicle_or_above_home_is_a_place_from_its_arrival_on() -> None:
+    facing_east = vehicle_at((1.0, 2.0, -3.0))._replace(yaw=0.5 * math.pi)
+    state = flying(Mode.OFFBOARD)
+    vehicle = replace(state.vehicle, home=Home((5.0, 5.0, -0.25), 0.0))
+    state = replace(state, vehicle=vehicle, estimate=facing_east)
+
+    def place(motion: MotionSetpoint, at: FlightState = state) -> Vec3 | None:
+        kept = accepted(OffboardMemory(), reported(motion=motion), vehicle=at).motion
+        assert kept is None or kept.p_from is PositionFrom.ORIGIN
+        return None if kept is None else kept.p
+
+    offset = MotionSetpoint(False, p=(1.0, 0.0, -0.5), p_from=PositionFrom.VEHICLE)
+    assert place(offset) == (2.0, 2.0, -3.5)
+    assert place(replace(offset, along_heading=True)) == pytest.approx((1.0, 3.0, -3.5))
+    tip = place(replace(offset, of_end_effector=True))
+    assert tip is not None
+    assert tip[2] > -3.4, "it counts from the end-effector, which hangs below"
+    above = MotionSetpoint(False, p=(1.0, 0.0, -2.0), p_from=PositionFrom.HOME_HEIGHT)
+    assert place(above) == (1.0, 0.0, -2.25)
+    for motion, without in (
+        (offset, replace(state, estimate=None)),
+        (above, replace(state, vehicle=replace(state.vehicle, home=None))),
+        (replace(offset, p=(1000.0, 0.0, 0.0)), state),
+    ):
+        assert place(motion, without) is None
+
+
+def test_an_open_axis_moves_by_its_velocity_and_stays_open_as_time_goes_on() -> None:
+    held = MotionSetpoint(False, p=(NAN, NAN, -3.0), v=(0.5, -0.25, NAN))
+    state = hearing(motion=held, motion_us=NOW_US)
+    goal = OFFBOARD.aim(state, vehicle_at(HERE, t_us=NOW_US + 200_000)).setpoint.goal
+    assert goal is not None
+    assert goal.motion.p is not None
+    assert goal.motion.p[2] == -3.0
+    assert math.isnan(goal.motion.p[0])
 
 
 @pytest.mark.parametrize("heard", ["motion_us", "joints_us"])

@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import random
 import struct
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 
 import pytest
 
-from fsw.link.files.flight_logs import FlightLogs
+from fsw.link.files.flight_logs import MARK, FlightLogs
 from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.ftp_tree import Directory
@@ -165,8 +167,9 @@ def test_reading_gives_the_file(client: Client, size: int) -> None:
     assert answer.refusal == Refusal.END_OF_FILE
 
 
-@pytest.mark.parametrize("size", [80, MAX_DATA])
-def test_bursts_give_the_file(client: Client, size: int) -> None:
+@pytest.mark.parametrize("size", [0, 4, 80, MAX_DATA])
+def test_bursts_give_the_file_in_pieces_as_large_as_fit(client: Client, size: int) -> None:
+    """PX4 does so too: autopilot-tools asks for pieces of 4 bytes, MAVProxy for 80."""
     session, total = client.open("files/a")
     read = b""
     while len(read) < total:
@@ -176,6 +179,7 @@ def test_bursts_give_the_file(client: Client, size: int) -> None:
             assert piece.sequence == (client.sequence + number) & 0xFFFF
             assert piece.offset == len(read)
             assert piece.complete == (number == len(pieces))
+            assert len(piece.data) == min(MAX_DATA, total - len(read))
             read += piece.data
     assert read == CONTENT
     (end,) = client.burst(session, total, size)
@@ -437,3 +441,55 @@ def test_a_sparse_log_beyond_4_gib_is_read_from_the_disk_up_to_there(tmp_path: P
     assert (last.data, last.complete) == (b"nearl", True)
     client.send(Opcode.BURST_READ_FILE, session=session, offset=LAST - 500, size=MAX_DATA)
     assert sum(len(piece.data) for piece in client.polled()) == 500
+
+
+def flown(folder: Path, name: str, begun: str, mark: bytes) -> bytes:
+    """A flight of a vehicle that began at a time (UTC); what is in its log."""
+    (folder / name).mkdir()
+    (folder / name / "flight.ulg").write_bytes(name.encode())
+    (folder / name / MARK).write_bytes(mark)
+    begun_s = datetime.fromisoformat(f"{begun}+00:00").timestamp()
+    os.utime(folder / name / MARK, (begun_s, begun_s))
+    return name.encode()
+
+
+@pytest.mark.parametrize("root", ["/log", "/fs/microsd/log", "/fs/microsd/log/", "log"])
+def test_logs_are_where_px4_has_them_by_date(tmp_path: Path, root: str) -> None:
+    """What autopilot-tools does: the newest by date and time of all in the folders of a folder."""
+    parameters = tmp_path / "v.params"
+    mark = bytes(parameters.resolve())
+    flown(tmp_path, "b", "2026-11-24T23:59:59", mark)
+    flown(tmp_path, "c", "2026-11-24T23:59:59", mark)
+    flown(tmp_path, "a", "2026-11-24T01:02:03", mark)
+    flown(tmp_path, "of another", "2026-11-24T02:00:00", b"/another.params")
+    (tmp_path / "now").mkdir()
+    (tmp_path / "now" / "flight.ulg").write_bytes(b"now")
+    logs = FlightLogs(tmp_path / "now", parameters)
+    client = Client(FtpService(vehicle_files(logs)))
+    today = time.strftime("%Y-%m-%d", time.gmtime((tmp_path / "now" / MARK).stat().st_mtime))
+    assert client.names(root) == ["D2026-11-24", "D2026-11-25", f"D{today}"]
+    folder = root.rstrip("/")
+    assert client.names(f"{folder}/2026-11-24") == ["F01_02_03.ulg\t1", "F23_59_59.ulg\t1"]
+    assert client.names(f"{folder}/2026-11-25") == ["F00_00_00.ulg\t1"]
+    (newest,) = client.names(f"{folder}/{today}")
+    name, size = newest[1:].split("\t")
+    datetime.strptime(f"{today} {Path(name).stem}", "%Y-%m-%d %H_%M_%S")
+    assert size == "3"
+    session, _ = client.open(f"{folder}/{today}/{name}")
+    assert client.burst(session, 0, 4)[0].data == b"now"
+    erasure = logs.erase()
+    while not erasure.done:
+        time.sleep(0.001)
+    assert client.names(root) == [f"D{today}"]
+
+
+def test_a_flight_keeps_its_date_when_it_is_an_earlier_one(tmp_path: Path) -> None:
+    parameters = tmp_path / "v.params"
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "flight.ulg").write_bytes(b"x")
+    before = FlightLogs(tmp_path / "first", parameters).all[-1]
+    (tmp_path / "first" / "flight.ulg").write_bytes(b"it went on for long")
+    os.utime(tmp_path / "first" / "flight.ulg", (4e9, 4e9))
+    (earlier, _) = FlightLogs(tmp_path / "second", parameters).all
+    assert (earlier.flight, earlier.begun_s) == ("first", before.begun_s)

@@ -12,14 +12,18 @@ from typing import Any
 import pytest
 
 from fsw.flight.tuned_autopilot import TunedAutopilot
+from fsw.link.services.mission_remarks import fence_remarks
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import Kind, MissionStore, Site
 from fsw.parameters.flight_config import flight_config
+from fsw.shapes.half_space import wall
+from fsw.shapes.vertical_cylinder import column
 from fsw.signals import (
     TARGET_SPHERE,
     MissionAction,
     MissionProgress,
     MissionState,
+    MissionStep,
     Mode,
     SafeSet,
     Vec3,
@@ -31,7 +35,7 @@ from tests.fsw.zones import of_kind
 
 NAN = math.nan
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 1, 2, 3, 4
-INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
+INVALID, INVALID_SEQUENCE, DENIED, CANCELLED = 5, 13, 14, 15
 MISSION, FENCE, RALLY = Kind.MISSION, Kind.FENCE, Kind.RALLY
 
 WAYPOINTS: list[Item] = [
@@ -229,6 +233,88 @@ def test_a_bad_item_ends_the_upload_with_its_result_and_the_reason(
     assert "item 1: " in client.texts()
     assert word in client.texts()
     same(client.download(), WAYPOINTS)
+
+
+# As QGroundControl and MAVSDK write a survey, with the frames and parameters of their own.
+SURVEY: list[Item] = [
+    {"command": 22, "frame": 6, "z": 1.5, "x": 470_000_100, "y": 80_000_200},
+    {"command": 530, "frame": 2, "params": (0.0, 2.0, NAN, NAN)},
+    {"command": 205, "frame": 2, "params": (-90.0, 0.0, 0.0, 0.0)},
+    {"command": 16, "x": 5_000, "y": -12_345, "z": -1.3, "params": (2.0, 0.2, 0.0, 90.0)},
+    {"command": 206, "frame": 2, "params": (5.0, 0.0, 1.0, 0.0)},
+    {"command": 18, "x": 10_000, "y": 0, "z": -1.5, "params": (1.0, 0.0, 2.0, 1.0)},
+    {"command": 177, "frame": 2, "params": (3.0, 2.0, 0.0, 0.0)},
+    {"command": 2000, "frame": 2, "params": (0.0, 2.0, 0.0, NAN)},
+    {"command": 2501, "frame": 2},
+    {"command": 21, "frame": 6, "x": 0, "y": 0, "z": 0.0},
+]
+
+
+def test_a_survey_of_qgroundcontrol_is_taken_and_what_is_skipped_is_told(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    assert client.upload(SURVEY) == ACCEPTED
+    skipped = "1 SET_CAMERA_MODE, 2 DO_MOUNT_CONTROL, 4 DO_SET_CAM_TRIGG_DIST"
+    assert f"{skipped}, 7 IMAGE_START_CAPTURE and 1 more" in client.texts()
+    same(client.download(), SURVEY)
+    update = vehicle.store.take_update()
+    assert update is not None
+    assert update.steps is not None
+    assert [step.action for step in update.steps][4:7] == [
+        MissionAction.SKIP, MissionAction.CIRCLE, MissionAction.JUMP,
+    ]  # fmt: skip
+
+
+def test_a_mission_that_cannot_start_or_leaves_the_fence_is_told_at_upload(
+    vehicle: Vehicle,
+) -> None:
+    client = vehicle.client()
+    assert client.upload(BOX, FENCE) == ACCEPTED
+    far = {"command": 16, "x": 120_000, "y": 0, "z": -1.3}
+    assert client.upload([WAYPOINTS[2], far]) == ACCEPTED
+    texts = client.texts()
+    assert "mission accepted, but it cannot start: no mission: on the ground" in texts
+    assert "mission leaves the fence on the way to item 1 by 3.10 m" in texts
+    # The other way round: the fence comes later.
+    assert client.upload([], FENCE) == ACCEPTED
+    further = {**far, "x": 130_000}
+    assert client.upload([WAYPOINTS[0], further]) == ACCEPTED
+    client.pump(0.1)
+    assert "by 4.10 m" not in client.texts()
+    assert client.upload(BOX, FENCE) == ACCEPTED
+    client.pump(0.1)
+    assert "mission leaves the fence on the way to item 1 by 4.10 m" in client.texts()
+
+
+def test_a_leg_through_a_column_and_a_circle_over_a_wall_leave_the_fence() -> None:
+    def go(north: float, east: float) -> MissionStep:
+        return MissionStep(MissionAction.GO, (north, east, -1.5))
+
+    column_at = SafeSet((column((5.0, 0.2), 1.0),))
+    assert "item 1 by 0.80 m" in fence_remarks((go(0.0, 0.0), go(10.0, 0.0)), column_at, None)[0]
+    assert fence_remarks((go(0.0, 0.0), go(0.0, 9.0)), column_at, None) == ()
+    walls = SafeSet((wall((1.0, 0.0, 0.0), -3.0, 0.1),))
+    circle = MissionStep(MissionAction.CIRCLE, (0.0, 0.0, -1.5), radius=-4.0, turns=1.0)
+    assert "item 0 by 1.10 m" in fence_remarks((circle,), walls, None)[0]
+    back = MissionStep(MissionAction.JUMP, target=0, repeats=1)
+    jumping = (go(10.0, 0.0), go(10.0, 5.0), go(0.0, 5.0), go(0.0, 0.0), back)
+    assert "item 0 by" in fence_remarks(jumping, column_at, None)[0]
+
+
+@pytest.mark.parametrize(
+    ("items", "result", "why"),
+    [
+        ([{"command": 211, "frame": 2, "params": (1.0, 0.0, NAN, NAN)}], UNSUPPORTED, "no gripper"),
+        ([{"command": 177, "frame": 2, "params": (9.0, 1.0, 0.0, 0.0)}], INVALID, "item 9 of 0"),
+        ([{"command": 177, "frame": 2, "params": (0.0, -1.0, 0.0, 0.0)}], INVALID, "without end"),
+    ],
+)
+def test_what_a_mission_relies_on_and_is_not_there_refuses_it(
+    vehicle: Vehicle, items: list[Item], result: int, why: str
+) -> None:
+    client = vehicle.client()
+    assert client.upload(items) == result
+    assert "mission refused: item 0: " in client.texts()
+    assert why in client.texts()
 
 
 def test_a_float_item_that_is_no_place_is_refused(vehicle: Vehicle) -> None:

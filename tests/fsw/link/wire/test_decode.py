@@ -310,8 +310,14 @@ def test_a_sphere_that_contains_nothing_is_refused(radius: float) -> None:
             "target sphere refused: radius [m] is 3.4e+38",
         ),
         (shape(1, clearance=10.5), "ball refused: a clearance of 10.5 m"),
-        (target(**{"position[2]": -1000.5}), "target refused: position out of range"),
-        (target(**{"velocity[0]": 20.5}), "target refused: velocity out of range"),
+        (
+            target(**{"position[2]": -1000.5}),
+            "target refused: position out of range: 1000.5 m, at most 1000 m",
+        ),
+        (
+            target(**{"velocity[0]": 20.5}),
+            "target refused: velocity out of range: 20.5 m/s, at most 20 m/s",
+        ),
     ],
 )
 def test_what_is_out_of_bounds_is_refused_with_the_bound_and_who_sent_it(

@@ -8,7 +8,7 @@ import pytest
 
 from fsw.link.inbox import Inbox, Received
 from fsw.link.wire import message_ids as ids
-from fsw.signals import AttitudeSetpoint, JointSetpoint, MotionSetpoint
+from fsw.signals import AttitudeSetpoint, JointSetpoint, MotionSetpoint, Origin, PositionFrom
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
 NAN = math.nan
@@ -33,6 +33,17 @@ def taken(*frames: Frame) -> Received:
     received = inbox.take()
     assert inbox.take() == Received()
     return received
+
+
+def assert_refused(wrong: Frame, why: str = "") -> None:
+    received = taken(wrong)
+    assert received == Received(refused_setpoints=1, setpoint_problem=received.setpoint_problem)
+    assert received.setpoint_problem.partition(";")[0] == why.partition(";")[0]
+
+
+def same(one: MotionSetpoint | None, other: MotionSetpoint) -> bool:
+    """Equal, NaN to NaN."""
+    return repr(one) == repr(other)
 
 
 def body(mask: int, **changes: float) -> Frame:
@@ -60,24 +71,104 @@ def test_a_number_that_is_masked_may_be_nan_and_one_that_is_used_may_not() -> No
     assert taken(body(0x9F8, vx=NAN, afz=NAN, yaw_rate=NAN)).motion is not None
     for field, mask in (("x", 0x9F8), ("vz", 0x9C7), ("afy", 0xC3F), ("yaw", 0x9F8)):
         for bad in (NAN, math.inf):
-            assert taken(body(mask, **{field: bad})) == Received(refused_setpoints=1)
+            assert_refused(body(mask, **{field: bad}), "a number that type_mask uses is not finite")
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "why"),
     [
-        {"coordinate_frame": 6},
-        {"coordinate_frame": 0},
-        {"coordinate_frame": 8},  # a position in the body's frame
-        {"target_system": 9},
-        {"target_system": 1, "target_component": 100},
-        {"type_mask": 0x9F9},  # part of a position
-        {"type_mask": 0x9FF},  # nothing at all
-        {"type_mask": 0xE3F},  # a force
+        ({"coordinate_frame": 6}, "frame 6 is not one of 1, 7, 8, 9, 12"),
+        ({"coordinate_frame": 0}, "frame 0 is not one of 1, 7, 8, 9, 12"),
+        ({"coordinate_frame": 8}, "a position in frame 8 is ambiguous; use 1, 7 or 9"),
+        ({"target_system": 9}, ""),
+        ({"target_system": 1, "target_component": 100}, ""),
+        ({"type_mask": 0x9F9}, "north has no position, velocity or acceleration"),
+        ({"type_mask": 0x9FF}, "type_mask ignores position, velocity and acceleration"),
+        ({"type_mask": 0xE3F}, "forces are not supported"),
+        ({"x": 2000.0}, "position out of range: 2000 m, at most 1000 m"),
+        (
+            {"type_mask": 0x9FA, "coordinate_frame": 9},
+            "in frame 9, x and y are used together or not at all",
+        ),
     ],
 )
-def test_what_is_of_no_use_is_refused_and_counted(wrong: dict[str, float]) -> None:
-    assert taken(body(0x9F8, **wrong)) == Received(refused_setpoints=1)
+def test_what_is_of_no_use_is_refused_and_counted_and_the_reason_kept(
+    wrong: dict[str, float], why: str
+) -> None:
+    assert_refused(body(0x9F8, **{"y": 0.0, "z": -3.0, **wrong}), why)
+
+
+@pytest.mark.parametrize("force", [0, 0x200])  # clients set the bit of forces that they ignore
+def test_an_axis_is_used_by_itself_as_px4_takes_it(force: int) -> None:
+    """MAVROS and apmplanner: velocity north and east with a height held."""
+    held = MotionSetpoint(False, p=(NAN, NAN, -3.0), v=V, yaw=YAW)
+    assert same(taken(body(0x9C3 | force)).motion, held)
+    sliding = MotionSetpoint(False, p=(1.0, NAN, -3.0), v=(NAN, 0.5, NAN))
+    assert same(taken(body(0xDEA | force)).motion, sliding)
+
+
+@pytest.mark.parametrize("frame_number", [7, 9, 12])
+def test_a_position_may_count_from_the_vehicle(frame_number: int) -> None:
+    setpoint = taken(body(0x9F8, coordinate_frame=frame_number)).motion
+    assert setpoint == MotionSetpoint(
+        False,
+        p=P,
+        yaw=YAW,
+        along_heading=frame_number != 7,
+        p_from=PositionFrom.VEHICLE,
+    )
+
+
+def on_earth(mask: int, **changes: float) -> Frame:
+    fields = {
+        **{name: value for name, value in NUMBERS.items() if name not in "xyz"},
+        "lat_int": 473977509,
+        "lon_int": 85456080,
+        "alt": 2.5,
+        "yaw": YAW,
+        "type_mask": mask,
+        "coordinate_frame": 6,
+        "yaw_rate": YAW_RATE,
+    }
+    return frame(ids.SET_POSITION_TARGET_GLOBAL_INT, **{**fields, **changes})
+
+
+@pytest.mark.parametrize("frame_number", [0, 5, 3, 6])
+def test_mavsdk_s_global_setpoints_are_taken_to_the_local_frame(frame_number: int) -> None:
+    """MAVSDK sends frames 5 and 6 with mask 0x9F8, MAVROS any; see set_position_global."""
+    inbox = Inbox(Origin(47.3977508, 8.5456072, 488.0))
+    inbox.accept(on_earth(0x9F8, coordinate_frame=frame_number))
+    setpoint = inbox.take().motion
+    assert setpoint is not None
+    assert setpoint.p is not None
+    above_home = frame_number in (3, 6)
+    expected = PositionFrom.HOME_HEIGHT if above_home else PositionFrom.ORIGIN
+    assert setpoint.p_from is expected
+    assert setpoint.p[0] == pytest.approx(0.0111, abs=1e-3)
+    assert setpoint.p[1] == pytest.approx(0.0602, abs=1e-3)
+    assert setpoint.p[2] == pytest.approx(-2.5 if above_home else 485.5)
+    assert (setpoint.v, setpoint.a, setpoint.yaw, setpoint.yaw_rate) == (None, None, YAW, None)
+    assert taken(on_earth(0x9C7)).motion == MotionSetpoint(False, v=V, yaw=YAW)
+    height = taken(on_earth(0x9C3, coordinate_frame=frame_number)).motion
+    assert height is not None
+    assert height.p is not None
+    assert math.isnan(height.p[0])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ({"coordinate_frame": 11}, "frame 11 counts heights from terrain, which is not known"),
+        ({"coordinate_frame": 1}, "frame 1 is not global: 0, 5, or 3, 6 above home"),
+        ({"lat_int": 950000000}, "95, 8.54561 is no place on Earth"),
+        ({"type_mask": 0x9F9}, "latitude and longitude are used together or not at all"),
+        ({"alt": NAN}, "a number that type_mask uses is not finite"),
+    ],
+)
+def test_a_global_setpoint_of_no_use_is_refused_with_its_reason(
+    wrong: dict[str, float], why: str
+) -> None:
+    assert_refused(on_earth(0x9F8, **wrong), why)
 
 
 def test_a_velocity_may_be_along_the_heading() -> None:
@@ -96,25 +187,30 @@ def test_an_attitude_or_rates_with_a_thrust() -> None:
     assert taken(attitude(0x80)).attitude == AttitudeSetpoint(0.5, None, (0.25, 0.0, 0.0))
     assert taken(attitude(7, body_roll_rate=NAN)).attitude == level
     assert taken(attitude(0x80, **{"q[1]": NAN})).refused_setpoints == 0
-    for mask, bad in (
-        (7, {"thrust": NAN}),
-        (7, {"q[2]": NAN}),
-        (0x80, {"body_yaw_rate": math.inf}),
-        (0x87, {}),
-        (0x47, {}),
-        (7, {"target_system": 3}),
-    ):
-        assert taken(attitude(mask, **bad)) == Received(refused_setpoints=1)  # type: ignore[arg-type]
+    wrong: tuple[tuple[int, dict[str, float], str], ...] = (
+        (7, {"thrust": NAN}, "thrust out of range"),
+        (7, {"q[2]": NAN}, "the quaternion is not of length 1"),
+        (7, {"q[0]": 2.0}, "the quaternion is not of length 1"),
+        (0x80, {"body_yaw_rate": math.inf}, "body rates out of range"),
+        (0x87, {}, "type_mask ignores the attitude and a body rate"),
+        (0x47, {}, "an attitude needs a thrust, which type_mask ignores"),
+        (7, {"target_system": 3}, ""),
+    )
+    for mask, bad, why in wrong:
+        assert_refused(attitude(mask, **bad), why)
 
 
 def test_joints_and_the_end_effector_of_our_own_dialect() -> None:
     joints = {"position[0]": 0.5, "position[1]": -0.25, "joint_count": 2}
     setpoint = frame(ids.ARM_JOINT_SETPOINT, **joints)
     assert taken(setpoint) == Received(joints=JointSetpoint((0.5, -0.25)))
-    for bad in ({"position[1]": NAN}, {"joint_count": 3}, {"target_component": 7}):
-        assert taken(frame(ids.ARM_JOINT_SETPOINT, **{**joints, **bad})) == Received(
-            refused_setpoints=1
-        )
+    wrong: tuple[tuple[dict[str, float], str], ...] = (
+        ({"position[1]": NAN}, "a joint angle is not finite"),
+        ({"joint_count": 3}, "it is for 3 joints"),
+        ({"target_component": 7}, ""),
+    )
+    for bad, why in wrong:
+        assert_refused(frame(ids.ARM_JOINT_SETPOINT, **{**joints, **bad}), why)
     point = {"position[2]": -1.0, "type_mask": 0xDF8, "coordinate_frame": 1}
     now = taken(frame(ids.END_EFFECTOR_TARGET, **point))
     assert now == Received(motion=MotionSetpoint(True, p=(0.0, 0.0, -1.0)))
@@ -144,14 +240,14 @@ def test_only_a_ground_station_s_heartbeat_is_one() -> None:
     assert not inbox.take().station_heard
 
 
-@pytest.mark.parametrize("message_id", [82, 84, 60201, 60202])
+@pytest.mark.parametrize("message_id", [82, 84, 86, 60201, 60202])
 def test_whatever_numbers_come_nothing_raises(message_id: int) -> None:
     inbox = Inbox()
     for value in (NAN, math.inf, -math.inf, 1e30, -1.0, 0.0):
         for mask in (0, 7, 0x80, 0xFF):
             names = wire_fields(message_id)
             whole = {"type_mask", "target_system", "target_component", "coordinate_frame",
-                     "joint_count", "time_usec", "time_boot_ms"}  # fmt: skip
+                     "joint_count", "time_usec", "time_boot_ms", "lat_int", "lon_int"}  # fmt: skip
             values = [0 if name in whole else value for name in names]
             if "type_mask" in names:
                 values[names.index("type_mask")] = mask

@@ -116,7 +116,7 @@ TELLING: dict[int, dict[str, Any]] = {
     ids.ARM_JOINT_STATE: {"joint_count": 2, "time_usec": 3_004_000},
     ids.ARM_JOINT_SETPOINT: {"joint_count": 2},
     ids.END_EFFECTOR_TARGET: {"yaw": 0.3, "coordinate_frame": 1},
-    ids.SETPOINT_STATUS: {"accepted": 5, "refused": 2, "age_us": 40_000, "kind": 0},
+    ids.SETPOINT_STATUS: {"accepted": 5, "refused": 2, "age_us": 40_000, "kind": 0, "refusals": 4},
     ids.BARRIER_MARGIN: {
         "margin_min": 0.2, "margin_min_index": 1, "count": 3, "constraint_kind": 1,
         "active_mask": 0b010, "slack_max": 0.25,
@@ -248,6 +248,30 @@ def test_a_receiver_that_never_had_a_fix_shows_no_place() -> None:
     raw = read_back(stream_of(ids.GPS_RAW_INT), known)
     assert (raw.fix_type, raw.satellites_visible, raw.lat, raw.lon, raw.alt) == (1, 3, 0, 0, 0)
     assert (raw.h_acc, raw.v_acc, raw.vel) == (0, 0, 0)
+
+
+def test_a_place_that_is_known_without_a_receiver_is_a_fix() -> None:
+    """dronekit, mavkit and libmav wait for one; the accuracy is that of what was simulated."""
+    here = read_back(stream_of(ids.GLOBAL_POSITION_INT))
+    for report, accuracy in ((None, (1, 1)), (replace(REPORT, fix=None), (26, 35))):
+        raw = read_back(stream_of(ids.GPS_RAW_INT), replace(SNAPSHOT, estimator=report))
+        assert (raw.fix_type, raw.satellites_visible) == (3, 255)
+        assert (raw.lat, raw.lon, raw.alt) == (here.lat, here.lon, here.alt)
+        assert (raw.h_acc, raw.v_acc) == accuracy
+        assert (raw.eph, raw.epv, raw.time_usec) == (65535, 65535, SNAPSHOT.t_us)
+        assert raw.vel == round(100.0 * math.hypot(*SNAPSHOT.estimate.v_WB[:2]))
+
+
+@pytest.mark.parametrize(
+    "condition", [Condition.AIDING_LOST, Condition.POSITION_LOST, Condition.ESTIMATE_INVALID]
+)
+def test_a_place_that_nothing_measures_is_no_fix(condition: Condition) -> None:
+    for report in (None, replace(REPORT, fix=None)):
+        lost = replace(SNAPSHOT, estimator=report, failures=(condition.value,))
+        raw = read_back(stream_of(ids.GPS_RAW_INT), lost)
+        assert (raw.fix_type, raw.lat, raw.lon, raw.h_acc) == (1, 0, 0, 0)
+    never = replace(SNAPSHOT, estimator=replace(REPORT, fix=None, unaided_us=-1), failures=())
+    assert read_back(stream_of(ids.GPS_RAW_INT), never).fix_type == 1
 
 
 def test_a_log_that_fails_takes_its_bit_away() -> None:

@@ -119,6 +119,65 @@ def test_loitering_is_staying() -> None:
     assert step(item(items.NAV_LOITER_UNLIMITED)).hold_s == math.inf
 
 
+@pytest.mark.parametrize("nowhere", [(0, 0), (items.NO_PLACE, items.NO_PLACE)])
+@pytest.mark.parametrize("frame", [RELATIVE, GLOBAL])
+def test_an_item_without_a_place_stays_where_the_vehicle_is(
+    nowhere: tuple[int, int], frame: int
+) -> None:
+    """MAVSDK and Mission Planner write 0, 0 where they mean no place."""
+    place = (*nowhere, 401.5 if frame == GLOBAL else 1.5)
+    landing = step(item(items.NAV_LAND, frame, place=place))
+    assert (landing.action, landing.position) == (MissionAction.LAND, None)
+    for command in (items.NAV_LOITER_UNLIMITED, items.NAV_LOITER_TIME, items.NAV_LOITER_TO_ALT):
+        loiter = step(item(command, frame, place=place))
+        assert loiter.here
+        assert loiter.position == (0.0, 0.0, -1.5)
+    wrong = refused(item(items.NAV_WAYPOINT, frame, place=place))
+    assert (wrong.result, "place" in wrong.reason) == (10, True)
+    assert "5" not in wrong.reason, "no distance to a place that was not meant"
+
+
+def test_zero_zero_is_a_place_in_the_local_frame_and_where_the_origin_is_near() -> None:
+    assert step(item(items.NAV_LAND, LOCAL, place=(0, 0, 0.0))).position == (0.0, 0.0, 0.0)
+
+    def at_zero(latitude: float, longitude: float, altitude: float) -> Vec3:
+        return latitude * 111_000.0, longitude * 111_000.0, -altitude
+
+    landing = read_step(item(items.NAV_LAND, RELATIVE, place=(0, 0, 0.0)), at_zero)
+    assert landing.position == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("radius", "flown"), [(3.0, 3.0), (-2.5, -2.5), (0.0, 2.0), (NAN, 2.0)])
+def test_turns_about_a_place_are_a_circle(radius: float, flown: float) -> None:
+    circle = step(item(items.NAV_LOITER_TURNS, params=(2.0, 1.0, radius, 1.0)))
+    assert circle.action is MissionAction.CIRCLE
+    assert (circle.turns, circle.radius, circle.yaw) == (2.0, flown, None)
+    assert circle.position == (1.0, -2.0, -1.5)
+    for turns, size in ((0.0, 2.0), (-1.0, 2.0), (NAN, 2.0), (1e9, 2.0), (1.0, 0.1), (1.0, 1e9)):
+        wrong = refused(item(items.NAV_LOITER_TURNS, params=(turns, 0.0, size, 0.0)))
+        assert wrong.result == 5
+
+
+def test_a_jump_names_an_item_and_how_often() -> None:
+    jump = step(item(items.DO_JUMP, MISSION, (3.0, 2.0, 0.0, 0.0)))
+    assert (jump.action, jump.target, jump.repeats) == (MissionAction.JUMP, 3, 2)
+    assert step(item(items.DO_JUMP, MISSION, (0.0, -1.0, NAN, NAN))).repeats == -1
+    for number, wrong in ((6, (-1.0, 1.0)), (6, (NAN, 1.0)), (6, (0.5, 1.0)), (7, (0.0, 1e9)),
+                          (7, (0.0, NAN)), (7, (0.0, -2.0)), (7, (0.0, 0.5))):  # fmt: skip
+        assert refused(item(items.DO_JUMP, MISSION, (*wrong, 0.0, 0.0))).result == number
+
+
+@pytest.mark.parametrize("command", sorted(items.SKIPPED))
+def test_an_item_of_a_camera_is_skipped_whatever_it_says(command: int) -> None:
+    skipped = step(item(command, MISSION, (NAN, 7.0, -1.0, NAN), (0, 0, NAN)))
+    assert skipped == MissionStep(MissionAction.SKIP)
+
+
+def test_an_item_that_a_mission_relies_on_is_refused_by_its_name() -> None:
+    wrong = refused(item(211, MISSION, (1.0, 0.0, NAN, NAN)))
+    assert (wrong.result, wrong.reason) == (3, "DO_GRIPPER: this vehicle has no gripper")
+
+
 def test_a_rally_point_is_a_place_and_nothing_else() -> None:
     rally = item(items.NAV_RALLY_POINT, 3, place=(470_001_000, 80_000_000, 5.0))
     assert read_rally(rally, locate) == pytest.approx((11.1, 0.0), abs=0.01)

@@ -16,6 +16,12 @@ function send(message) {
   socket.send(protocol.serialize(message, sequence++ % 256), vehicle.port, vehicle.address)
 }
 
+// A negative INT32 has the bits of a NaN, of which JavaScript keeps no more than that: null.
+function value({ paramValue, paramType }) {
+  if (paramType !== 6 || Number.isNaN(paramValue)) return paramValue
+  return new Int32Array(new Float32Array([paramValue]).buffer)[0]
+}
+
 function command(number, ...params) {
   const message = new common.CommandLong()
   message.targetSystem = 1
@@ -55,7 +61,7 @@ stream.pipe(new MavLinkPacketSplitter()).pipe(new MavLinkPacketParser()).on('dat
     seen.mode = data.customMode
     seen.armed = (data.baseMode & 128) !== 0
   }
-  if (type === common.ParamValue) seen.parameters[data.paramId] = data.paramValue
+  if (type === common.ParamValue) seen.parameters[data.paramId] = value(data)
   if (type === common.CommandAck) seen.acks[data.command] = data.result
 })
 

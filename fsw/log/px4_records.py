@@ -1,0 +1,235 @@
+"""Records of the topics that PX4's tools draw, each at its own rate; see ``px4_topics``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, Final
+
+from fsw.control.attitude import attitude_reference
+from fsw.flight.conditions import Condition
+from fsw.flight.estimator_report import ABSOLUTE, HEIGHT, LEVEL_VELOCITY, RELATIVE
+from fsw.flight.estimator_report import VERTICAL_VELOCITY as CLIMB
+from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_global
+from fsw.geometry.vectors import dot
+from fsw.log import px4_topics as topics
+from fsw.log.packed import Packed
+from fsw.model.airframe import GRAVITY
+from fsw.signals import FlightSnapshot, Origin, PlanInput, PredictionState, Vec3, Vec4
+
+_TORQUE_US: Final = 10_000
+_SETPOINTS_US: Final = 50_000
+_PLACE_US: Final = 200_000
+_SECOND_US: Final = 1_000_000
+_VIBRATION_SHARE: Final = 0.01  # of a change that is taken over, as in PX4
+_FIX_3D: Final = 3  # GPS_FIX_TYPE
+_NAN: Final = math.nan
+_UNKNOWN: Final[Vec3] = (_NAN, _NAN, _NAN)
+_POSITION_LOST: Final = frozenset(
+    {Condition.ESTIMATE_INVALID.value, Condition.POSITION_LOST.value, Condition.ATTITUDE_LOST.value}
+)
+_ATTITUDE_LOST: Final = frozenset({Condition.ESTIMATE_INVALID.value, Condition.ATTITUDE_LOST.value})
+_ROTOR: Final = frozenset({Condition.ROTOR_LOST.value, Condition.ROTOR_FAILED.value})
+
+_TORQUE: Final = Packed(topics.VEHICLE_TORQUE_SETPOINT)
+_THRUST: Final = Packed(topics.VEHICLE_THRUST_SETPOINT)
+_ATTITUDE: Final = Packed(topics.VEHICLE_ATTITUDE_SETPOINT, topics.VEHICLE_RATES_SETPOINT)
+_PLACE: Final = Packed(topics.VEHICLE_GLOBAL_POSITION, topics.VEHICLE_GPS_POSITION)
+_SLOW: Final = Packed(topics.BATTERY_STATUS, topics.VEHICLE_IMU_STATUS)
+_FLAGS: Final = Packed(topics.FAILSAFE_FLAGS)
+_LOAD: Final = Packed(topics.CPULOAD)
+
+
+class Px4Records:
+    """Remembers when each was written last, and what the inertial unit measured."""
+
+    def __init__(self, per_newton: float, origin: Origin) -> None:
+        """Start a log; a rotor's thrust times ``per_newton`` [1/N] is its share of the largest."""
+        self._per_newton = per_newton
+        self._origin = origin
+        # Numbers of the intervals that were written last.
+        self._torque = self._setpoints = self._place = self._second = -1
+        self._failures: tuple[str, ...] = ()
+        self._accel = self._gyro = _UNKNOWN
+        self._shaken = self._turned = 0.0  # m/s^2, rad/s
+
+    def add(self, snapshot: FlightSnapshot, out: bytearray) -> None:
+        """Append what is due in this tick."""
+        t_us = snapshot.t_us
+        if t_us // _TORQUE_US != self._torque:
+            self._torque = t_us // _TORQUE_US
+            out += self._torques(snapshot)
+        interval = t_us // _SETPOINTS_US
+        if interval == self._setpoints and snapshot.failures is self._failures:
+            return
+        new_failures = snapshot.failures != self._failures
+        self._failures = snapshot.failures
+        if interval != self._setpoints:
+            self._setpoints = interval
+            out += self._setpoint_records(snapshot)
+        if t_us // _PLACE_US != self._place:
+            self._place = t_us // _PLACE_US
+            out += _place(snapshot, self._origin)
+        second = t_us // _SECOND_US
+        if second != self._second:
+            out += self._slow(snapshot)
+        if second != self._second or new_failures:
+            self._second = second
+            out += _failsafe_flags(snapshot)
+
+    def feel(self, accel: Vec3, gyro: Vec3) -> None:
+        """Take what the inertial unit measured next.
+
+        Specific force ``accel`` [m/s^2, FRD] and body rates ``gyro`` [rad/s, FRD].
+        """
+        (ax, ay, az), (gx, gy, gz) = self._accel, self._gyro
+        shaken = math.hypot(accel[0] - ax, accel[1] - ay, accel[2] - az)
+        turned = math.hypot(gyro[0] - gx, gyro[1] - gy, gyro[2] - gz)
+        if shaken + turned < math.inf:  # no number yet, or none any more
+            self._shaken += _VIBRATION_SHARE * (shaken - self._shaken)
+            self._turned += _VIBRATION_SHARE * (turned - self._turned)
+        self._accel, self._gyro = accel, gyro
+
+    def _torques(self, snapshot: FlightSnapshot) -> bytes:
+        k, (rear, left, front, right) = self._per_newton, snapshot.actuators.rotor_thrust
+        yaw = 0.5 * k * (rear + front - left - right)
+        torque = (k * (left - right), k * (front - rear), yaw)
+        return _TORQUE.pack((*_TORQUE.heads, snapshot.t_us, *torque))
+
+    def _setpoint_records(self, snapshot: FlightSnapshot) -> bytes:
+        t_us = snapshot.t_us
+        thrust = (0.0, 0.0, -0.25 * self._per_newton * sum(snapshot.actuators.rotor_thrust))
+        found = _THRUST.pack((*_THRUST.heads, t_us, *thrust))
+        plan = snapshot.plan_state
+        if plan is None:
+            return found
+        attitude, rates = _ATTITUDE.heads
+        return found + _ATTITUDE.pack(
+            (
+                *(attitude, t_us, *_attitude(plan, snapshot.plan_input), plan.yaw_rate, *thrust),
+                *(rates, t_us, *planned_rates(plan), *thrust),
+            )
+        )
+
+    def _slow(self, snapshot: FlightSnapshot) -> bytes:
+        battery, (status, imu) = snapshot.battery, _SLOW.heads
+        left = battery.time_left if math.isfinite(battery.time_left) else _NAN
+        return _SLOW.pack(
+            (
+                *(status, snapshot.t_us, battery.voltage, battery.current),
+                *(1e3 * battery.consumed, battery.remaining, left, int(battery.charge)),
+                *(imu, snapshot.t_us, self._shaken, self._turned),
+            )
+        )
+
+
+def origin_of(numbers: Mapping[str, float]) -> Origin:
+    """Where the local frame begins, by the numbers of a configuration."""
+    names = [f"origin.{part.name}" for part in fields(Origin)]
+    if not all(name in numbers for name in names):
+        return DEFAULT_ORIGIN
+    return Origin(*(float(numbers[name]) for name in names))
+
+
+def cpu_load(t_us: int, load: float, memory: float) -> bytes:
+    """A record of cpuload: the ``load`` [1] of the tick, and the share of ``memory`` [1]."""
+    return _LOAD.pack((*_LOAD.heads, t_us, load, memory))
+
+
+def validity(snapshot: FlightSnapshot) -> tuple[bool, bool, bool, bool]:
+    """Whether level position, height, level velocity and climb are known, as PX4 says it."""
+    if not _POSITION_LOST.isdisjoint(snapshot.failures):
+        return False, False, False, False
+    known = snapshot.estimator
+    if known is None:
+        return True, True, True, True
+    flags = known.flags
+    return (
+        bool(flags & (RELATIVE | ABSOLUTE)),
+        bool(flags & HEIGHT),
+        bool(flags & LEVEL_VELOCITY),
+        bool(flags & CLIMB),
+    )
+
+
+def planned_rates(plan: PredictionState) -> Vec3:
+    """Body rates [rad/s, FRD] that turn the thrust as a plan's acceleration and jerk say."""
+    roll, pitch, _ = attitude_reference(plan.a, plan.yaw)
+    # The body's z axis is along the specific force that is to be given, which turns with the jerk.
+    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    sy, cy = math.sin(plan.yaw), math.cos(plan.yaw)
+    x = (cp * cy, cp * sy, -sp)
+    y = (sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp)
+    force = math.hypot(plan.a[0], plan.a[1], GRAVITY - plan.a[2])
+    if not force > 0.0 or not abs(cr) > 0.0:
+        return _NAN, _NAN, _NAN
+    turning = (-plan.j[0] / force, -plan.j[1] / force, 0.0)
+    p, q = -dot(turning, y), dot(turning, x)
+    return p, q, (plan.yaw_rate * cp - q * sr) / cr
+
+
+def _attitude(plan: PredictionState, u: PlanInput | None) -> Vec4:
+    """Quaternion [w, x, y, z] of the attitude for the acceleration in force."""
+    euler = attitude_reference(plan.a if u is None else u.a, plan.yaw)
+    cr, cp, cy = (math.cos(0.5 * angle) for angle in euler)
+    sr, sp, sy = (math.sin(0.5 * angle) for angle in euler)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def _place(snapshot: FlightSnapshot, origin: Origin) -> bytes:
+    known, (estimated, received) = snapshot.estimator, _PLACE.heads
+    here = _on_earth(origin, snapshot.estimate.p_WB)
+    level, vertical = (
+        (_NAN, _NAN) if known is None else (known.level_accuracy, known.vertical_accuracy)
+    )
+    north, east, _ = snapshot.estimate.v_WB
+    reading: tuple[Any, ...] = (*here, level, vertical, _NAN, _NAN, _NAN, math.hypot(north, east))
+    kind, satellites = (_FIX_3D if validity(snapshot)[0] else 1), 0
+    fix = None if known is None else known.fix
+    if fix is not None:
+        sigma = fix.position_sigma
+        reading = (
+            *(*_on_earth(origin, fix.p), math.hypot(sigma[0], sigma[1]), sigma[2], _NAN, _NAN),
+            *(fix.velocity_sigma, math.hypot(fix.v[0], fix.v[1])),
+        )
+        kind, satellites = fix.kind & 0xFF, fix.satellites & 0xFF
+    return _PLACE.pack(
+        (
+            *(estimated, snapshot.t_us, *here, level, vertical),
+            *(received, snapshot.t_us, *reading, kind, satellites),
+        )
+    )
+
+
+def _on_earth(origin: Origin, p: Vec3) -> Vec3:
+    """Latitude and longitude [deg] and altitude [m]; NaN where ``p`` [m, NED] is not known."""
+    if not all(map(math.isfinite, p)):
+        return _NAN, _NAN, _NAN
+    return to_global(origin, p)
+
+
+def _failsafe_flags(snapshot: FlightSnapshot) -> bytes:
+    active = frozenset(snapshot.failures)
+    level, height, level_speed, climb = validity(snapshot)
+    charge = int(snapshot.battery.charge)
+    return _FLAGS.pack(
+        (
+            *(*_FLAGS.heads, snapshot.t_us),
+            *(not _ATTITUDE_LOST.isdisjoint(active), not height),
+            *(not level, not (level_speed and climb)),
+            snapshot.mission.total == 0,
+            Condition.SETPOINTS_LOST.value in active,
+            Condition.DATALINK_LOST.value in active,
+            charge,
+            Condition.FLIGHT_TIME_LOW.value in active,
+            Condition.FENCE_BREACH.value in active,
+            Condition.TILT_LOST.value in active,
+            not _ROTOR.isdisjoint(active),
+        )
+    )
