@@ -55,7 +55,7 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
         "tune": ("pandion.tune", "improve parameters on some flights, judge them on others"),
         "search": (
             "pandion.search",
-            "search for a scenario that decides between controllers, judged on other seeds",
+            "search for a scenario that decides between controllers",
         ),
         "faults": ("pandion.faults", "let something fail in flight, compare with what must happen"),
         "reproduce": ("pandion.reproduce", "fly a table or a figure of the paper again"),

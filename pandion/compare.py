@@ -98,7 +98,7 @@ def _sentence(one: Difference, confidence: float) -> str:
     pairs = "the same flights" if one.paired else "other flights"
     judged = one.worse or one.better or "no difference shown"
     return (
-        f"{one.name}: {one.flights[0]} and {one.flights[1]} flights, {pairs}; {margin}; least "
+        f"{one.name}: {one.flights[0]} and {one.flights[1]} flights, {pairs}; {margin}; minimum "
         f"margin {least}; violations {one.violations[0]} -> {one.violations[1]} "
         f"({share} of the difference: {low:+.2g} to {high:+.2g} %): {judged}"
     )

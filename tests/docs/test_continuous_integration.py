@@ -57,8 +57,8 @@ def test_the_recipe_passes_a_good_night_and_fails_a_worse_one(tmp_path: Path) ->
     assert same.returncode == 0, same.stdout + same.stderr
     assert "no difference shown" in same.stdout
     shutil.rmtree(tmp_path / "runs" / "tonight")
-    heavy = text.replace("[0.95, 1.05]", "[1.4, 1.5]")
-    (tmp_path / "nightly.toml").write_text(heavy, encoding="utf-8")
+    windy = text.replace("[0.0, 0.2]", "[6.0, 6.2]")
+    (tmp_path / "nightly.toml").write_text(windy, encoding="utf-8")
     worse = night()
     assert worse.returncode == 1, worse.stdout + worse.stderr
     assert (tmp_path / "runs" / "tonight" / JOURNAL).exists()
