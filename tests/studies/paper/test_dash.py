@@ -1,4 +1,4 @@
-"""At speed the barrier decides: what fails and what does not in the first 20 s, calm."""
+"""At speed the barrier decides: what fails and what does not in the first 20 s."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from studies.paper.cases import Case, configuration, scenario, softened, tighten
 
 
 @cache
-def flown(case: Case, controller: str, more_mm: int = 0, *, soft: bool = False) -> Outcome:
+def flown(
+    case: Case, controller: str, more_mm: int = 0, *, soft: bool = False, disturbed: bool = False
+) -> Outcome:
     """A flight of 20 s, which has the first dash."""
     config = configuration("full", controller)
     if controller == "hc":
         config = tightened(softened(config) if soft else config, 1e-3 * max(more_mm, 1))
-    calm = scenario(case, disturbed=False, duration_s=20.0, family="dash")
-    return Job("full", calm, config, 0).row()
+    path = scenario(case, disturbed=disturbed, duration_s=20.0, family="dash")
+    return Job("full", path, config, 1000).row()
 
 
 @pytest.mark.parametrize("case", ["I", "II"])
@@ -31,25 +33,19 @@ def test_blf_completes_with_room_to_spare(case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", ["I", "II"])
-def test_naive_and_hc_fail(case: Case) -> None:
-    for name in ("naive", "hc"):
-        row = flown(case, name)
-        assert not row.completed
-        assert row.margin_m is not None
-        assert row.margin_m < -0.01
-
-
-@pytest.mark.parametrize(("case", "more_mm"), [("I", 100), ("II", 40), ("II", 60)])
-def test_no_tightening_is_enough_where_braking_in_time_needs_a_longer_look(
-    case: Case, more_mm: int
-) -> None:
-    row = flown(case, "hc", more_mm)
+@pytest.mark.parametrize("controller", ["naive", "hc"])
+def test_naive_and_hc_fail_in_disturbance(case: Case, controller: str) -> None:
+    row = flown(case, controller, disturbed=True)
     assert not row.completed
-    assert row.failures  # there was no plan
+    assert row.margin_m is not None
+    assert row.margin_m < -0.01
 
 
-def test_softened_rows_give_way_by_more_than_they_were_tightened() -> None:
-    assert not flown("I", "hc", 100, soft=True).completed
+def test_no_tightening_is_enough_at_a_wall_that_is_seen_too_late() -> None:
+    hard, soft = flown("I", "hc", 100), flown("I", "hc", 100, soft=True)
+    assert not hard.completed
+    assert hard.failures  # there was no plan
+    assert not soft.completed  # its rows gave way by more than they were tightened
 
 
 def test_the_vehicle_takes_the_paths_as_they_are() -> None:
