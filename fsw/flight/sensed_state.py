@@ -39,6 +39,7 @@ _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held 
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
+_SIGMAS = 3.0  # by which a height may be wrong
 _LOW = 0.1  # m of the legs above the ground, below which they may touch it
 _LATELY = 0.02  # s, in which a fault is one of now
 _UNHELD_US = 300_000  # without a pose, after which poses do not hold the attitude any more
@@ -191,7 +192,8 @@ class SensedState:
     def _is_aloft(self, state: FlightState, now: float) -> bool:
         """Whether the vehicle flies so high at ``now`` [s] that its legs cannot touch the ground.
 
-        By the rangefinder where there is one: the estimate may be what is wrong.
+        By the rangefinder where there is one, because the estimate may be what is wrong; else by
+        that, as far as it knows its height.
         """
         estimate, vehicle = state.estimate, state.vehicle
         if estimate is None or not vehicle.flies:
@@ -199,7 +201,7 @@ class SensedState:
         legs, seen = self._cascade.law.airframe.leg_length, vehicle.range
         if seen is not None and 0.0 <= now - seen.time < self._stale:
             return seen.distance * estimate.R_WB[8] - legs > _LOW
-        return -estimate.p_WB[2] - legs > _LOW
+        return -estimate.p_WB[2] - legs - _SIGMAS * state.aiding.height_sigma > _LOW
 
     def _told(
         self,
