@@ -97,7 +97,7 @@ def test_the_scene_is_the_snapshot_that_was_sent() -> None:
     assert scene.base_target == pytest.approx((1.1, 2.1, -3.1))
     assert scene.minimum == pytest.approx(0.2)
     assert [one.margin for one in scene.margins] == pytest.approx([0.3, 0.2, 0.4])
-    assert scene.safety == (3, 5, 7)
+    assert scene.safety == (3, 5, 7, 4)
     assert scene.solver is not None
     assert (scene.solver.status, scene.solver.total) == ("time limit", pytest.approx(703e-6))
     assert (scene.mode, scene.armed) == ("hold", True)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fsw.estimation import redundancy
-from fsw.estimation.error_state import FILTER
+from fsw.estimation.error_state import BG, FILTER
 from fsw.estimation.redundancy import (
     EVERY,
     EVIDENCE,
@@ -45,10 +45,16 @@ class Wrong(NamedTuple):
     turning: Vec3 = NONE  # rad/s, of the pose's attitude
     gaining: Vec3 = NONE  # m/s^2, of the measured place
     magnetic: Vec3 = NONE  # rad/s, of the field
+    iron: Vec3 = NONE  # Gauss, body
 
 
-def flown(wrong: Wrong, suite: str, seconds: float, seed: int = 1) -> list[Verdict]:
-    """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added."""
+def flown(
+    wrong: Wrong, suite: str, seconds: float, seed: int = 1, yaw: float = 0.0
+) -> list[Verdict]:
+    """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added.
+
+    It turns about its vertical at up to a rate ``yaw`` [rad/s].
+    """
     random = np.random.default_rng(seed)
     x: Any = np.zeros(1, FILTER)
     evidence, verdict, found = np.zeros(1, EVIDENCE), Verdict(), []
@@ -59,6 +65,7 @@ def flown(wrong: Wrong, suite: str, seconds: float, seed: int = 1) -> list[Verdi
     for tick in range(round((SETTLED + seconds) / TICK)):
         now, late = TICK * tick, TICK * tick > SETTLED
         w = 0.1 * np.sin(now * np.array([1.3, 1.7, 0.9]) + (0.0, 1.0, 2.0))
+        w += (0.0, 0.0, yaw * math.sin(0.5 * now))
         rates = w + (np.array(wrong.blow) if late else 0.0)
         alpha = (w - spun) / TICK
         spun = w
@@ -97,6 +104,7 @@ def flown(wrong: Wrong, suite: str, seconds: float, seed: int = 1) -> list[Verdi
                 fix = (True, now, where, (*fast, 0.0), 0.015, 0.1)  # type: ignore[assignment]
             seen = matrix_from_quaternion(turned(q, *field_off))
             body = np.array(rotate_back(seen, FIELD)) + 3e-3 * random.standard_normal(3)
+            body += np.array(wrong.iron)
             field = (True, now, tuple(body.tolist()), (1.0, 0.0, 0.0, 0.0), 0.01, 0.0)  # type: ignore[assignment]
         look(evidence, x, now, pose, fix, field, not verdict.is_on)
         ratios = tuple(evidence[0]["ratio"].tolist())
@@ -199,6 +207,30 @@ def test_a_slow_turn_stays_undecided_for_long_and_is_over_when_it_ends() -> None
     assert last.suspects == Source.POSE | Source.GYRO
     now = EVERY * len(verdicts)
     assert now - last.since > UNDECIDED
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("iron", [(0.015, 0.0, 0.0), (0.0, -0.012, 0.012)])
+def test_iron_that_turns_with_the_vehicle_is_nobody_s_fault(iron: Vec3) -> None:
+    for seed in range(2):
+        verdicts = flown(Wrong(iron=iron), "satellites", 12.0, seed, yaw=1.0)
+        assert not suspected(verdicts)
+
+
+@pytest.mark.parametrize(("sigma", "follows"), [(3e-4, False), (3e-3, True)])
+def test_a_bias_that_is_known_well_moves_slowly_in_what_it_is_compared_with(
+    sigma: float, follows: bool
+) -> None:
+    """A frame that turns is learnt as a bias of the gyro within seconds."""
+    x: Any = np.zeros(1, FILTER)
+    s = x.view(np.recarray)[0]
+    s.covariance[BG, BG] = s.covariance[BG + 1, BG + 1] = s.covariance[BG + 2, BG + 2] = sigma**2
+    for tick in range(round(8.0 / TICK)):
+        s.gyro_bias[2] = 0.0 if TICK * tick < SETTLED else 0.01
+        redundancy.witness(
+            s, matrix_from_quaternion((1.0, 0.0, 0.0, 0.0)), TICK, (0.0, 0.0, 0.0, G)
+        )
+    assert bool(s.baseline[5] > 0.005) is follows
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:

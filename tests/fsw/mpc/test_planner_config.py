@@ -32,7 +32,9 @@ PARTS = {
     "planner.soft": SoftWeights(),
     "planner": PlannerConfig(),
 }
-ROW = re.compile(r"^\| `\w+` \| ([^|]+) \| ([^|]*) \|.*\| `([\w.]+)\.(\w+)` \|$", re.MULTILINE)
+ROW = re.compile(
+    r"^\| `\w+` \| (?:INT32|FLOAT) \| ([^|]+) \| ([^|]*) \|.*\| `([\w.]+)\.(\w+)` \|$", re.MULTILINE
+)
 
 
 @pytest.mark.parametrize("part", PARTS)

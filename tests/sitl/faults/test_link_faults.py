@@ -99,6 +99,7 @@ class Vehicle:
     asked: tuple[Injection, ...] = ()
     counts: ExchangeCounts = field(default_factory=ExchangeCounts)
     silent_since: int | None = None
+    held_s: float | None = None
     received: list[list[int]] = field(default_factory=list)  # message ids by step
 
     def send_ahead(self, datagram: bytes) -> None:
