@@ -67,7 +67,7 @@ def names(sources: Source) -> str:
 NOBODY: Final = Source(0)
 G, A, M, P, N, B = Source
 # Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
-# into the world is the gyro's as well: see ``_sources``.
+# into the world is the gyro's and the magnetometer's as well: see ``_sources``.
 GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN = range(10)
 OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N)
 COUNT: Final = len(OF)
@@ -664,8 +664,8 @@ def judged(
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
-    Where nothing that is used ``holds_attitude``, the gyro does. What is ``lost`` says nothing, and
-    is known to be of no use without this law.
+    Where nothing that is used ``holds_attitude``, gyro and magnetometer do. What is ``lost`` says
+    nothing, and is known to be of no use without this law.
     """
     of = _sources(holds_attitude)
     used = [k for k in range(COUNT) if not of[k] & (verdict.wrong | lost)]
@@ -714,7 +714,8 @@ def judged(
 def _sources(holds_attitude: bool) -> tuple[Source, ...]:
     if holds_attitude:
         return OF
-    return tuple([one | G if k in (AN, MN) else one for k, one in enumerate(OF)])
+    # The magnetometer turns the heading, and with it what is felt.
+    return tuple([one | G | B if k in (AN, MN) else one for k, one in enumerate(OF)])
 
 
 def _with_return(
