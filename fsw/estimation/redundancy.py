@@ -74,8 +74,9 @@ COUNT: Final = len(OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
 # makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], what is
-# felt beside the rotors [m/s, FRD], and the time itself [s].
-SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN, AGE = 0, 4, 7, 10, 13, 16, 19, 22, 25, 28
+# felt beside the rotors [m/s, FRD], the time itself [s], and whether the gyro's bias is known.
+SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
+AGE, KNOWN = 28, 29
 WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
 EVERY: Final = 0.02  # s, between looks
 _LONG: Final = 3.0  # s, over which means of half a second are compared
@@ -88,7 +89,7 @@ _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
 _BASELINE_SHARE: Final = 0.3  # of the time since the vehicle flies, if that is less: biases settle
 # A bias that is known so well moves slowly: if it does not, something turns that must not.
-_SETTLED: Final = 1e-3  # rad/s, deviation of each axis
+_SETTLED: Final = 5e-4  # rad/s, deviation of each axis
 _BASELINE_SETTLED: Final = 60.0  # s
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 _LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
@@ -181,7 +182,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
     share = dt / min(max(_BASELINE_SHARE * W[AGE], dt), _BASELINE)
     of_gyro, M = share, x.covariance
     if max(M[BG, BG], M[BG + 1, BG + 1], M[BG + 2, BG + 2]) < _SETTLED * _SETTLED:
-        of_gyro = dt / _BASELINE_SETTLED
+        of_gyro = dt / _BASELINE_SETTLED if W[KNOWN] > 0.0 else 1.0
+        W[KNOWN] = 1.0
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
         W[FELT + i] += dt * (felt[i] + down)

@@ -7,7 +7,7 @@ carry less than the weight, the loops open and rotors idle. In the air the vehic
 its velocity shows it within 0.1 s: even an accelerometer that is wrong by 3 m/s^2 shows 6.8 of
 free fall's 9.8, and on the ground no more than 3. Then the loops close again.
 
-Where rotors' thrusts stand in for the inertial unit the ground must not carry any of the weight:
+Where rotors' torques stand in for the gyro the ground must not carry any of the weight:
 what the legs feel would be taken for a tilt. Then rotors stop as soon as the legs are close above
 the ground, and the vehicle falls less far than its legs stand.
 
@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.plan_exchange import without_plan
 from fsw.flight.state import FlightState, VehicleMemory
 from fsw.frozen import replace
@@ -113,7 +112,7 @@ def feel_ground(
     To be asked where a descent is commanded.
     """
     vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
-    if state.aiding.has_lost(Sensor.IMU) and is_close(config, state, estimate):
+    if state.aiding.gyro_lost and is_close(config, state, estimate):
         return state, True
     if vehicle.unloaded is None:
         if not sum(state.cascade.rotors) < _CONTACT * config.airframe.mass * GRAVITY:

@@ -347,6 +347,8 @@ def _aiding(
         height_sigma=math.sqrt(max(pose[11], 0.0)),
         lost=lost,
         attitude_held=by_pose or not any(one.sensor is _IMU for one in lost),
+        gyro_lost=bool(verdict.wrong & Source.GYRO)
+        or any(one.sensor is _IMU and one.fault is SensorFault.STALE for one in lost),
         disputed_us=max(round(1e6 * (now - verdict.since)), 1) if verdict.contradicts else 0,
         suspects=names(verdict.suspects),
     )

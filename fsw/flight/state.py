@@ -235,6 +235,7 @@ class Aiding(NamedTuple):
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
     attitude_held: bool = True  # by inertial unit or pose; False: rotors' thrusts stand in
+    gyro_lost: bool = False  # rotors' torques stand in
     disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
     suspects: str = ""  # of which one is wrong then
 

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.land_detector import (
     feel_ground,
     height_above_ground,
@@ -17,7 +16,7 @@ from fsw.flight.land_detector import (
     stands,
     with_range,
 )
-from fsw.flight.state import AIDED, Aiding, FlightState, LostSensor
+from fsw.flight.state import AIDED, Aiding, FlightState
 from fsw.measurements import RangeSample
 from fsw.signals import Mode, Vec3
 from tests.fsw.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
@@ -115,14 +114,14 @@ def test_the_rangefinder_says_whether_the_ground_is_near_else_the_estimate(
 def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
     height: float, sigma: float, sample: RangeSample | None, landed: bool
 ) -> None:
-    """And with an inertial unit they carry it down to the ground."""
+    """And with a gyro they carry it down to the ground."""
     state = flying(Mode.DESCEND, range=sample)
     carries = state.cascade._replace(rotors=(0.25 * WEIGHT,) * 4)
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
-    for lost in ((LostSensor(Sensor.IMU, SensorFault.STALE, 0),), ()):
-        aiding = Aiding(height_sigma=sigma, lost=lost)
+    for lost in (True, False):
+        aiding = Aiding(height_sigma=sigma, gyro_lost=lost)
         found = feel_ground(CONFIG, replace(state, cascade=carries, aiding=aiding), estimate)
-        assert found[1] is (landed and bool(lost))
+        assert found[1] is (landed and lost)
 
 
 def test_a_distance_that_is_too_short_counts_once_a_second_one_says_so() -> None:
