@@ -44,7 +44,7 @@ TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
-WITNESS: Final = 30  # integrals: see redundancy.py
+WITNESS: Final = 28  # integrals: see redundancy.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(

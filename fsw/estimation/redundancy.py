@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation.error_state import BG, WITNESS, vec3
+from fsw.estimation.error_state import WITNESS, vec3
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.model.airframe import GRAVITY
@@ -73,10 +73,9 @@ OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N)
 COUNT: Final = len(OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
-# makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], what is
-# felt beside the rotors [m/s, FRD], the time itself [s], and whether the gyro's bias is known.
+# makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], and what
+# is felt beside the rotors [m/s, FRD].
 SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
-AGE, KNOWN = 28, 29
 WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
 EVERY: Final = 0.02  # s, between looks
 _LONG: Final = 3.0  # s, over which means of half a second are compared
@@ -87,10 +86,6 @@ _MEASURED: Final = 1  # column of what is measured, after the time: place and at
 _AT: Final = 8  # column of the integrals at its time
 _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
-_BASELINE_SHARE: Final = 0.3  # of the time since the vehicle flies, if that is less: biases settle
-# A bias that is known so well moves slowly: if it does not, something turns that must not.
-_SETTLED: Final = 5e-4  # rad/s, deviation of each axis
-_BASELINE_SETTLED: Final = 60.0  # s
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 _LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
@@ -178,12 +173,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
     b = x.baseline
     felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
     made = rotate(R, (0.0, 0.0, -model[3]))
-    W[AGE] += dt
-    share = dt / min(max(_BASELINE_SHARE * W[AGE], dt), _BASELINE)
-    of_gyro, M = share, x.covariance
-    if max(M[BG, BG], M[BG + 1, BG + 1], M[BG + 2, BG + 2]) < _SETTLED * _SETTLED:
-        of_gyro = dt / _BASELINE_SETTLED if W[KNOWN] > 0.0 else 1.0
-        W[KNOWN] = 1.0
+    share = dt / _BASELINE
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
         W[FELT + i] += dt * (felt[i] + down)
@@ -197,7 +187,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):
             b[i] += share * (x.accel_bias[i] - b[i])
-            b[3 + i] += of_gyro * (x.gyro_bias[i] - b[3 + i])
+            b[3 + i] += share * (x.gyro_bias[i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
 
 

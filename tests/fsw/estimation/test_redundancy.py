@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fsw.estimation import redundancy
-from fsw.estimation.error_state import BG, FILTER
+from fsw.estimation.error_state import FILTER
 from fsw.estimation.redundancy import (
     EVERY,
     EVIDENCE,
@@ -215,22 +215,6 @@ def test_iron_that_turns_with_the_vehicle_is_nobody_s_fault(iron: Vec3) -> None:
     for seed in range(2):
         verdicts = flown(Wrong(iron=iron), "satellites", 12.0, seed, yaw=1.0)
         assert not suspected(verdicts)
-
-
-@pytest.mark.parametrize(("sigma", "follows"), [(3e-4, False), (3e-3, True)])
-def test_a_bias_that_is_known_well_moves_slowly_in_what_it_is_compared_with(
-    sigma: float, follows: bool
-) -> None:
-    """A frame that turns is learnt as a bias of the gyro within seconds."""
-    x: Any = np.zeros(1, FILTER)
-    s = x.view(np.recarray)[0]
-    s.covariance[BG, BG] = s.covariance[BG + 1, BG + 1] = s.covariance[BG + 2, BG + 2] = sigma**2
-    for tick in range(round(8.0 / TICK)):
-        s.gyro_bias[2] = 0.0 if TICK * tick < SETTLED else 0.01
-        redundancy.witness(
-            s, matrix_from_quaternion((1.0, 0.0, 0.0, 0.0)), TICK, (0.0, 0.0, 0.0, G)
-        )
-    assert bool(s.baseline[5] > 0.005) is follows
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
