@@ -81,6 +81,11 @@ class Field:
         return 1 if self.type == "char" else self.count or 1
 
 
+def floats(*names: str, note: str = "") -> tuple[Field, ...]:
+    """Fields of one number each, all with the same ``note``."""
+    return tuple(Field(name, "float", note=note) for name in names)
+
+
 def doubles(name: str, size: int, note: str) -> Field:
     """A field of double precision: an array, or with ``size`` 0 a single value."""
     return Field(name, "double", size, note)

@@ -66,6 +66,18 @@ def quaternion_from_matrix(R: Mat3) -> Vec4:
     return q if q[0] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
 
 
+def quaternion_from_euler(euler: Vec3) -> Vec4:
+    """Quaternion [w, x, y, z], body to NED, of ZYX Euler angles ``euler`` [rad, NED to body]."""
+    cr, cp, cy = (math.cos(0.5 * angle) for angle in euler)
+    sr, sp, sy = (math.sin(0.5 * angle) for angle in euler)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
 @compilable
 def rotate(R: Mat3, v: Vec3) -> Vec3:
     """World components of ``v`` [any unit, FRD]."""

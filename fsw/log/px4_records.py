@@ -12,6 +12,7 @@ from fsw.flight.conditions import Condition
 from fsw.flight.estimator_report import ABSOLUTE, HEIGHT, LEVEL_VELOCITY, RELATIVE
 from fsw.flight.estimator_report import VERTICAL_VELOCITY as CLIMB
 from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_global
+from fsw.geometry.rotation import quaternion_from_euler
 from fsw.geometry.vectors import dot
 from fsw.log import px4_topics as topics
 from fsw.log.packed import Packed
@@ -171,15 +172,7 @@ def planned_rates(plan: PredictionState) -> Vec3:
 
 def _attitude(plan: PredictionState, u: PlanInput | None) -> Vec4:
     """Quaternion [w, x, y, z] of the attitude for the acceleration in force."""
-    euler = attitude_reference(plan.a if u is None else u.a, plan.yaw)
-    cr, cp, cy = (math.cos(0.5 * angle) for angle in euler)
-    sr, sp, sy = (math.sin(0.5 * angle) for angle in euler)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
+    return quaternion_from_euler(attitude_reference(plan.a if u is None else u.a, plan.yaw))
 
 
 def _place(snapshot: FlightSnapshot, origin: Origin) -> bytes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from messages.ulog import Field, Topic
+from messages.ulog import Field, Topic, floats
 
 FAST: Final = "100 Hz; every tick with `LOG_PROFILE` 1"
 TORQUE: Final = "100 Hz"
@@ -18,10 +18,6 @@ SETPOINTS: Final = "20 Hz"
 SETPOINTS_IN_FLIGHT: Final = "in flight, 20 Hz"
 PLACE: Final = "5 Hz"
 SECOND: Final = "every second"
-
-
-def _floats(*names: str, note: str = "") -> tuple[Field, ...]:
-    return tuple(Field(name, "float", note=note) for name in names)
 
 
 def _bools(*names: str, note: str = "") -> tuple[Field, ...]:
@@ -46,7 +42,7 @@ VEHICLE_ATTITUDE_SETPOINT: Final = Topic(
     SETPOINTS_IN_FLIGHT,
     (
         Field("q_d", "float", 4, "[w, x, y, z], body to NED"),
-        *_floats("yaw_sp_move_rate", note="rad/s"),
+        *floats("yaw_sp_move_rate", note="rad/s"),
         Field("thrust_body", "float", 3, "-1 to 1 of the largest"),
     ),
 )
@@ -55,7 +51,7 @@ VEHICLE_RATES_SETPOINT: Final = Topic(
     "Body rates with which the running plan turns its thrust",
     SETPOINTS_IN_FLIGHT,
     (
-        *_floats("roll", "pitch", "yaw", note="rad/s, body"),
+        *floats("roll", "pitch", "yaw", note="rad/s, body"),
         Field("thrust_body", "float", 3, "-1 to 1 of the largest"),
     ),
 )
@@ -66,8 +62,8 @@ VEHICLE_GLOBAL_POSITION: Final = Topic(
     (
         Field("lat", "double", note="deg"),
         Field("lon", "double", note="deg"),
-        *_floats("alt", note="m above mean sea level"),
-        *_floats("eph", "epv", note="m, standard deviation; NaN: exact states"),
+        *floats("alt", note="m above mean sea level"),
+        *floats("eph", "epv", note="m, standard deviation; NaN: exact states"),
     ),
 )
 VEHICLE_GPS_POSITION: Final = Topic(
@@ -78,10 +74,10 @@ VEHICLE_GPS_POSITION: Final = Topic(
         Field("latitude_deg", "double", note="deg"),
         Field("longitude_deg", "double", note="deg"),
         Field("altitude_msl_m", "double", note="m"),
-        *_floats("eph", "epv", note="m, standard deviation"),
-        *_floats("hdop", "vdop", note="not known: NaN"),
-        *_floats("s_variance_m_s", note="m/s, standard deviation"),
-        *_floats("vel_m_s", note="m/s, level"),
+        *floats("eph", "epv", note="m, standard deviation"),
+        *floats("hdop", "vdop", note="not known: NaN"),
+        *floats("s_variance_m_s", note="m/s, standard deviation"),
+        *floats("vel_m_s", note="m/s, level"),
         Field("fix_type", "uint8_t", note="GPS_FIX_TYPE"),
         Field("satellites_used", "uint8_t", note="255: not said"),
     ),
@@ -91,11 +87,11 @@ BATTERY_STATUS: Final = Topic(
     "Battery, as modelled and corrected by what is measured of it",
     SECOND,
     (
-        *_floats("voltage_v", note="V, under load"),
-        *_floats("current_a", note="A"),
-        *_floats("discharged_mah", note="mA h"),
-        *_floats("remaining", note="share of the capacity"),
-        *_floats("time_remaining_s", note="s; NaN: not known"),
+        *floats("voltage_v", note="V, under load"),
+        *floats("current_a", note="A"),
+        *floats("discharged_mah", note="mA h"),
+        *floats("remaining", note="share of the capacity"),
+        *floats("time_remaining_s", note="s; NaN: not known"),
         Field("warning", "uint8_t", note="0 none, 1 low, 2 critical, 3 emergency"),
     ),
 )
@@ -104,8 +100,8 @@ VEHICLE_IMU_STATUS: Final = Topic(
     "Vibration of the inertial unit, as PX4 computes it: 1 % of each change is added",
     SECOND,
     (
-        *_floats("accel_vibration_metric", note="m/s^2"),
-        *_floats("gyro_vibration_metric", note="rad/s"),
+        *floats("accel_vibration_metric", note="m/s^2"),
+        *floats("gyro_vibration_metric", note="rad/s"),
     ),
 )
 FAILSAFE_FLAGS: Final = Topic(
@@ -129,8 +125,8 @@ CPULOAD: Final = Topic(
     "The tick's share of its period, and memory; of real time alone",
     SECOND,
     (
-        *_floats("load", note="median execution time over the period"),
-        *_floats("ram_usage", note="largest so far over the machine's"),
+        *floats("load", note="median execution time over the period"),
+        *floats("ram_usage", note="largest so far over the machine's"),
     ),
 )
 PX4_TOPICS: Final = (

@@ -20,7 +20,7 @@ from fsw.measurements import (
     RangeSample,
     Sample,
 )
-from messages.ulog import Field, Topic, doubles
+from messages.ulog import Field, Topic, doubles, floats
 
 TEXT_SIZE: Final = 140  # characters of an input's text in one record
 MARGINS: Final = 16
@@ -31,10 +31,6 @@ DETAIL: Final = "50 Hz; every tick with `LOG_PROFILE` 1"
 DETAIL_IN_FLIGHT: Final = "in flight, 20 Hz; every tick with `LOG_PROFILE` 1"
 PLANNING: Final = "every planning cycle"
 CHANGE: Final = "on change"
-
-
-def _floats(*names: str, note: str = "") -> tuple[Field, ...]:
-    return tuple(Field(name, "float", note=note) for name in names)
 
 
 def _vector(name: str, size: int, note: str) -> Field:
@@ -72,11 +68,11 @@ VEHICLE_LOCAL_POSITION: Final = Topic(
     "Estimate of the body origin",
     DETAIL,
     (
-        *_floats("x", "y", "z", note="m, NED"),
-        *_floats("vx", "vy", "vz", note="m/s, NED"),
-        *_floats("heading", note="rad"),
+        *floats("x", "y", "z", note="m, NED"),
+        *floats("vx", "vy", "vz", note="m/s, NED"),
+        *floats("heading", note="rad"),
         *(Field(name, "bool") for name in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid")),
-        *_floats("dist_bottom", note="m, above the origin: the ground is taken for flat"),
+        *floats("dist_bottom", note="m, above the origin: the ground is taken for flat"),
         Field("dist_bottom_valid", "bool", note="a rangefinder is used"),
     ),
 )
@@ -111,11 +107,11 @@ VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
     "State of the running plan: body origin",
     DETAIL_IN_FLIGHT,
     (
-        *_floats("x", "y", "z", note="m, NED"),
-        *_floats("vx", "vy", "vz", note="m/s, NED"),
+        *floats("x", "y", "z", note="m, NED"),
+        *floats("vx", "vy", "vz", note="m/s, NED"),
         _vector("acceleration", 3, "m/s^2, NED, of the plan's state"),
-        *_floats("yaw", note="rad"),
-        *_floats("yawspeed", note="rad/s"),
+        *floats("yaw", note="rad"),
+        *floats("yawspeed", note="rad/s"),
     ),
 )
 ARM_JOINT_SETPOINT: Final = Topic(
@@ -128,7 +124,7 @@ PLAN_INPUT: Final = Topic(
     "plan_input",
     "The paper's u in force; with the joints' in `arm_joint_setpoint`",
     DETAIL_IN_FLIGHT,
-    (_vector("a", 3, "m/s^2, NED"), *_floats("yaw_acc", note="rad/s^2")),
+    (_vector("a", 3, "m/s^2, NED"), *floats("yaw_acc", note="rad/s^2")),
 )
 BARRIER_MARGIN: Final = Topic(
     "barrier_margin",
@@ -142,7 +138,7 @@ BARRIER_MARGIN: Final = Topic(
             "more zones, the least of each zone",
         ),
         _vector("barrier", MARGINS, "h, m/s, same order; active at or below 0"),
-        *_floats("minimum", note="m"),
+        *floats("minimum", note="m"),
         Field("kind", "uint8_t", note="0 none, 1 walls, 2 workspace, 3 obstacles and walls"),
         Field("count", "uint8_t", note="number of valid entries"),
         Field("argmin", "uint8_t"),
@@ -155,7 +151,7 @@ BARRIER_MARGIN: Final = Topic(
             "m, kept from each zone beyond its clearance because the estimate is not sure; NaN: no "
             "such zone, or exact states",
         ),
-        *_floats("lacking", note="m, what the zone with the least room for that lacks"),
+        *floats("lacking", note="m, what the zone with the least room for that lacks"),
     ),
 )
 END_EFFECTOR: Final = Topic(
@@ -167,7 +163,7 @@ END_EFFECTOR: Final = Topic(
         _vector("v", 3, "m/s, NED"),
         _vector("p_ref", 3, "m, NED; NaN without a reference"),
         _vector("v_ref", 3, "m/s, NED"),
-        *_floats("yaw_ref", note="rad"),
+        *floats("yaw_ref", note="rad"),
     ),
 )
 MPC_REQUEST: Final = Topic(
@@ -200,9 +196,9 @@ MPC_STATUS: Final = Topic(
         Field("plans", "uint32_t"),
         Field("missed_deadlines", "uint32_t"),
         Field("fallbacks", "uint32_t"),
-        *_floats("cost"),
-        *_floats("slack_max", note="m/s; softening of a barrier"),
-        *_floats("linearise_us", "solve_us", "total_us", note="wall time; NaN in lockstep"),
+        *floats("cost"),
+        *floats("slack_max", note="m/s; softening of a barrier"),
+        *floats("linearise_us", "solve_us", "total_us", note="wall time; NaN in lockstep"),
         Field("sqp_iterations", "uint16_t"),
         Field("solver_iterations", "uint16_t"),
         Field("status", "uint8_t", note="PANDION_SOLVER_STATUS of the last cycle"),
@@ -230,7 +226,7 @@ FAILURE_DETECTOR_STATUS: Final = Topic(
     (
         Field("fd_motor", "bool", note="a rotor has failed"),
         Field("motor_failure_mask", "uint16_t", note="bit 0: rear, left, front, right"),
-        *_floats("motor_effectiveness", note="thrust over command of that rotor, as allocated"),
+        *floats("motor_effectiveness", note="thrust over command of that rotor, as allocated"),
         Field("motor_lost", "bool", note="it gives nothing"),
         Field("motor_disobeys", "bool", note="it gives something else than is commanded"),
         Field("joint_state", "uint8_t", 2, "0 sound, 1 stuck, 2 limp"),
@@ -245,10 +241,10 @@ VEHICLE_COMMAND: Final = Topic(
     "Received command",
     "each",
     (
-        *_floats("param1", "param2", "param3", "param4", note="NaN: not used"),
+        *floats("param1", "param2", "param3", "param4", note="NaN: not used"),
         Field("param5", "double"),
         Field("param6", "double"),
-        *_floats("param7"),
+        *floats("param7"),
         Field("command", "uint32_t", note="MAV_CMD"),
         Field("source_system", "uint8_t"),
         Field("source_component", "uint16_t"),
@@ -286,8 +282,8 @@ LOOP_TIMING: Final = Topic(
         Field("late_ticks", "uint32_t"),
         Field("skipped_ticks", "uint32_t"),
         Field("period_us", "uint32_t"),
-        *_floats("execution_p50_us", "execution_p99_us", "execution_max_us"),
-        *_floats("lateness_p50_us", "lateness_p99_us", "lateness_max_us"),
+        *floats("execution_p50_us", "execution_p99_us", "execution_max_us"),
+        *floats("lateness_p50_us", "lateness_p99_us", "lateness_max_us"),
         Field("group", "uint8_t", note="PANDION_RATE_GROUP"),
     ),
 )
@@ -376,14 +372,14 @@ ESTIMATOR_STATUS: Final = Topic(
     "Accuracy, and innovations over their limits",
     _ESTIMATED,
     (
-        *_floats("pos_horiz_accuracy", note="m, of north and east together"),
-        *_floats("pos_vert_accuracy", note="m, standard deviation"),
-        *_floats("hdg_test_ratio", "vel_test_ratio", "pos_test_ratio", note="1: refused"),
-        *_floats("hgt_test_ratio", "hagl_test_ratio", note="1: refused"),
-        *_floats("vel_accuracy", note="m/s, standard deviation, largest axis"),
-        *_floats("tilt_accuracy", note="rad, standard deviation, the larger of roll and pitch"),
-        *_floats("unaided", note="s since a position was used last"),
-        *_floats("pose_delay", note="s"),
+        *floats("pos_horiz_accuracy", note="m, of north and east together"),
+        *floats("pos_vert_accuracy", note="m, standard deviation"),
+        *floats("hdg_test_ratio", "vel_test_ratio", "pos_test_ratio", note="1: refused"),
+        *floats("hgt_test_ratio", "hagl_test_ratio", note="1: refused"),
+        *floats("vel_accuracy", note="m/s, standard deviation, largest axis"),
+        *floats("tilt_accuracy", note="rad, standard deviation, the larger of roll and pitch"),
+        *floats("unaided", note="s since a position was used last"),
+        *floats("pose_delay", note="s"),
         Field("reset_count", "uint32_t", note="jumps of the estimate"),
         Field("solution_status_flags", "uint16_t", note="ESTIMATOR_STATUS_FLAGS"),
         Field("faults", "char", 96, "sensors with something wrong, and what"),
@@ -395,7 +391,7 @@ ESTIMATOR_STATUS: Final = Topic(
             note="PX4's bits of what was refused: 0 velocity, 1 position, 2 height, 6 heading, "
             "9 height above ground",
         ),
-        *_floats("time_slip", note="s; the filter goes by the sensors' clock alone: 0"),
+        *floats("time_slip", note="s; the filter goes by the sensors' clock alone: 0"),
     ),
 )
 ESTIMATOR_INNOVATIONS: Final = Topic(
@@ -404,15 +400,15 @@ ESTIMATOR_INNOVATIONS: Final = Topic(
     _ESTIMATED,
     (
         _vector("gps_hvel", 2, "m/s"),
-        *_floats("gps_vvel", note="m/s"),
+        *floats("gps_vvel", note="m/s"),
         _vector("gps_hpos", 2, "m"),
-        *_floats("gps_vpos", note="m"),
+        *floats("gps_vpos", note="m"),
         _vector("ev_hpos", 2, "m"),
-        *_floats("ev_vpos", note="m"),
+        *floats("ev_vpos", note="m"),
         _vector("ev_attitude", 3, "rad, body"),
-        *_floats("baro_vpos", note="m"),
-        *_floats("rng_vpos", note="m"),
-        *_floats("heading", note="rad, of the magnetometer"),
+        *floats("baro_vpos", note="m"),
+        *floats("rng_vpos", note="m"),
+        *floats("heading", note="rad, of the magnetometer"),
     ),
 )
 ESTIMATOR_SENSOR_BIAS: Final = Topic(

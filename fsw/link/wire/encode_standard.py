@@ -11,11 +11,11 @@ from typing import Final
 
 from fsw.control.attitude import attitude_reference
 from fsw.geometry.geodesy import to_global
-from fsw.geometry.rotation import euler_zyx, quaternion_from_matrix
+from fsw.geometry.rotation import euler_zyx, quaternion_from_euler, quaternion_from_matrix
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot, Mode, MotionSetpoint, SetpointKind, Vec3, Vec4
+from fsw.signals import FlightSnapshot, Mode, MotionSetpoint, SetpointKind, Vec3
 
 _QUADROTOR: Final = 2  # MAV_TYPE
 _ARMED: Final = 128  # MAV_MODE_FLAG
@@ -119,7 +119,9 @@ def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
     thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
     plan, u = snapshot.plan_state, snapshot.plan_input
     yaw = snapshot.estimate.yaw if plan is None else plan.yaw
-    quaternion = _quaternion(attitude_reference((0.0, 0.0, 0.0) if u is None else u.a, yaw))
+    quaternion = quaternion_from_euler(
+        attitude_reference((0.0, 0.0, 0.0) if u is None else u.a, yaw)
+    )
     return (boot_ms(snapshot.t_us), *quaternion, 0.0, 0.0, 0.0, thrust, _RATES_IGNORED)
 
 
@@ -170,15 +172,3 @@ def as_asked(motion: MotionSetpoint) -> tuple[tuple[float, ...], int]:
 def boot_ms(t_us: int) -> int:
     """Milliseconds of the vehicle's time ``t_us`` [us], as MAVLink counts them."""
     return (t_us // 1000) & _U32
-
-
-def _quaternion(euler: Vec3) -> Vec4:
-    """Quaternion [w, x, y, z] of ZYX Euler angles [rad]."""
-    cr, cp, cy = (math.cos(0.5 * angle) for angle in euler)
-    sr, sp, sy = (math.sin(0.5 * angle) for angle in euler)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
