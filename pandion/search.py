@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from command_line.options import group, json_file, option, read, switch
 from command_line.output import json_text
-from command_line.values import whole
-from pandion.campaign_run import begin, exit_code
-from pandion.cluster_options import ClusterOptions
+from pandion.campaign_run import begin
+from pandion.search_task import SearchTaskOptions, run_task
 
 if TYPE_CHECKING:
     from studies.search.scenario_search import Found
@@ -19,45 +16,22 @@ DECIDES, NOTHING = 0, 1  # exit codes
 DISTURBED, CALM = "found.toml", "found-calm.toml"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SearchOptions:
-    """One search."""
-
-    file: Path | None = option("FILE.toml", "a campaign file with a table [search]", Path)
-    example: bool = switch("--example", "print such a file to begin with")
-    seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
-    cluster: ClusterOptions = group(ClusterOptions)
-    out: Path | None = option(
-        "--out DIR",
-        f"where {DISTURBED}, {CALM} and the journal go; the same command goes on with a journal "
-        "that is there (default a new one in runs/)",
-        Path,
-    )
-    json: str | None = json_file("what was found")
-
-
 def main(argv: list[str]) -> int:
     """Search; returns the exit code."""
     what = "Search for a scenario that decides between controllers, judged on other seeds."
-    options = read(SearchOptions, "pandion search", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
+    return run_task("search", what, argv, _example, _search)
 
-    pin_numerics_to_one_thread()  # before NumPy loads
+
+def _example() -> Path:
     from studies.search.scenario_search import EXAMPLE
 
-    if options.example:
-        print(EXAMPLE.read_text(encoding="utf-8"), end="")
-        return DECIDES
-    return exit_code("search", lambda: _search(options))
+    return EXAMPLE
 
 
-def _search(options: SearchOptions) -> int:
-    from studies.campaign.keys import CampaignError
+def _search(options: SearchTaskOptions, file: Path) -> int:
     from studies.search.scenario_search import as_json, load_task, search, sentences
 
-    if options.file is None:
-        raise CampaignError("give a file; `pandion search --example` prints one")
-    task = load_task(options.file)
+    task = load_task(file)
     work = f"{task.candidates} candidates, {len(task.marks)} controllers"
     run = begin("search", options, task.plan, work)
 

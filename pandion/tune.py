@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from command_line.options import group, json_file, option, read, switch
 from command_line.output import json_text
-from command_line.values import whole
-from pandion.campaign_run import begin, exit_code
-from pandion.cluster_options import ClusterOptions
+from pandion.campaign_run import begin
+from pandion.search_task import SearchTaskOptions, run_task
 
 if TYPE_CHECKING:
     from studies.search.tune import Outcome
@@ -19,45 +16,22 @@ BETTER, NOTHING = 0, 1  # exit codes
 PARAMS = "tuned.params"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TuneOptions:
-    """One tuning."""
-
-    file: Path | None = option("FILE.toml", "a campaign file with a table [tune]", Path)
-    example: bool = switch("--example", "print such a file to begin with")
-    seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
-    cluster: ClusterOptions = group(ClusterOptions)
-    out: Path | None = option(
-        "--out DIR",
-        f"where {PARAMS} and the journal go; the same command goes on with a journal that is there "
-        "(default a new one in runs/)",
-        Path,
-    )
-    json: str | None = json_file("what was found")
-
-
 def main(argv: list[str]) -> int:
     """Tune; returns the exit code."""
     what = "Improve parameters against a cost and a chance constraint, judged on other flights."
-    options = read(TuneOptions, "pandion tune", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
+    return run_task("tune", what, argv, _example, _tune)
 
-    pin_numerics_to_one_thread()  # before NumPy loads
+
+def _example() -> Path:
     from studies.search.tune import EXAMPLE
 
-    if options.example:
-        print(EXAMPLE.read_text(encoding="utf-8"), end="")
-        return BETTER
-    return exit_code("tune", lambda: _tune(options))
+    return EXAMPLE
 
 
-def _tune(options: TuneOptions) -> int:
-    from studies.campaign.keys import CampaignError
+def _tune(options: SearchTaskOptions, file: Path) -> int:
     from studies.search.tune import as_json, load_task, sentences, tune
 
-    if options.file is None:
-        raise CampaignError("give a file; `pandion tune --example` prints one")
-    task = load_task(options.file)
+    task = load_task(file)
     work = f"{task.candidates} candidates of {task.plan.count} flights"
     run = begin("tune", options, task.plan, work)
 

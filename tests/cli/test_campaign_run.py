@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pandion.campaign_run import begin, exit_code
-from pandion.tune import TuneOptions
+from pandion.search_task import SearchTaskOptions
 from studies.campaign.campaign import SchedulerGoneError
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import parse_plan
@@ -53,11 +53,11 @@ def test_a_directory_of_that_name_is_made_where_none_is_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    run = begin("tune", TuneOptions(), parse_plan(PLAN, "tiny", tmp_path), "2 flights")
+    run = begin("tune", SearchTaskOptions(), parse_plan(PLAN, "tiny", tmp_path), "2 flights")
     assert run.folder.is_dir()
     assert run.folder.parent == Path("runs")
     assert "tune-tiny" in run.folder.name
-    assert f"tiny, 2 flights, {TuneOptions().cluster.words}" in capsys.readouterr().out
+    assert f"tiny, 2 flights, {SearchTaskOptions().cluster.words}" in capsys.readouterr().out
 
 
 def test_an_answer_that_cannot_be_written_is_said(
@@ -65,9 +65,9 @@ def test_an_answer_that_cannot_be_written_is_said(
 ) -> None:
     plan = parse_plan(PLAN, "tiny", tmp_path)
     target = tmp_path / "there.json"
-    options = TuneOptions(out=tmp_path / "out", json=str(target))
+    options = SearchTaskOptions(out=tmp_path / "out", json=str(target))
     assert begin("tune", options, plan, "2 flights").written("{}")
     assert target.read_text() == "{}"
-    options = TuneOptions(out=tmp_path / "out", json=str(tmp_path / "none" / "there.json"))
+    options = SearchTaskOptions(out=tmp_path / "out", json=str(tmp_path / "none" / "there.json"))
     assert not begin("tune", options, plan, "2 flights").written("{}")
     assert "pandion tune: cannot write" in capsys.readouterr().err
