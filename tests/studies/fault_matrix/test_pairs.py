@@ -139,3 +139,14 @@ def test_two_faults_are_flown_and_each_begins_at_its_time() -> None:
     of_battery = next(said.after_s for said in flight.warnings if "battery" in said.text)
     assert 0.5 <= of_gyro < 0.75
     assert 2.0 <= of_battery < 3.5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("seed", "number"),
+    [(91, 3), (91, 9), (91, 14), (91, 64), (91, 100), (91, 120), (91, 126)]
+    + [(137, 15), (211, 65), (307, 36), (307, 86)],
+)
+def test_pairs_that_touched_something_once_touch_nothing(seed: int, number: int) -> None:
+    drawn = draw(seed, number, not_flown())
+    assert judge_pair(drawn, drawn.row(), known_limits()).differs == ()
