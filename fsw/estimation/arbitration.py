@@ -79,7 +79,8 @@ class Arbitration:
         if evidence is None:
             return begun(memory), found
         if not aloft:
-            return _near_the_ground(memory), found
+            unheard = not (evidence[0]["count"] or memory.verdict.is_on)
+            return (memory if unheard else _anew(memory)), found
         if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
             return memory, found
         return self._look(memory, now, found)
@@ -204,15 +205,11 @@ def begun(memory: FusionMemory) -> FusionMemory:
     return memory._replace(verdict=verdict, trail=None, trail_before=None)
 
 
-def _near_the_ground(memory: FusionMemory) -> FusionMemory:
+def _anew(memory: FusionMemory) -> FusionMemory:
     """The memory without what has been compared so far: rotors do not explain what legs feel."""
-    evidence, verdict = memory.verdict.evidence, memory.verdict
-    if evidence is None or not (evidence[0]["count"] or verdict.is_on):
-        return memory
     x = memory.numbers.copy()
     x["suspect"] = 0
-    verdict = verdict.acquitted()._replace(evidence=np.zeros(1, EVIDENCE))
-    return memory._replace(numbers=x, verdict=verdict, trail=None, trail_before=None)
+    return begun(memory._replace(numbers=x, verdict=memory.verdict.acquitted()))
 
 
 def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:

@@ -40,7 +40,7 @@ _BACK_RATE: Final = 1.5  # 1/s
 
 def is_hurried(aiding: Aiding, unaided_us: int) -> bool:
     """Whether the estimate gets worse with time: without a position for long, or an attitude."""
-    return aiding.unaided_us >= unaided_us or not aiding.attitude_held
+    return aiding.unaided_us >= unaided_us or not aiding.holds_attitude(unaided_us)
 
 
 class Descent:

@@ -146,7 +146,8 @@ def inertial_is_lost(context: FailsafeContext) -> bool:
     Satellites and rotors hold it for longer where only one half of the unit is lost.
     """
     aiding, now_us = context.state.aiding, context.estimate.t_us
-    if aiding.attitude_held or not context.state.vehicle.flies:
+    held = aiding.holds_attitude(context.limits.aiding_loss_us)
+    if held or not context.state.vehicle.flies:
         return False
     return any(
         one.sensor is Sensor.IMU

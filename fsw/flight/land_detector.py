@@ -32,7 +32,7 @@ _SINKS: Final = 0.15  # m/s; slower than a landing, faster than the rebound of t
 _FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free fall, at worst
 _SIGMAS: Final = 3.0  # by which a height may be wrong
 _CLOSE: Final = 0.1  # m of the legs above the ground; from there it falls at 1.4 m/s
-_RANGE_US: Final = 300_000  # in which a distance is one of now
+_RANGE_AGE: Final = 0.3  # s, in which a distance is one of now
 _CONTACT_US: Final = 100_000  # of contact before loops open
 _DOUBTED_US: Final = 1_000_000  # the same where height or velocity say that there is no ground
 _SURE_US: Final = 200_000  # with open loops, in which a fall is seen
@@ -46,9 +46,8 @@ def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
 def with_range(vehicle: VehicleMemory, sample: RangeSample) -> VehicleMemory:
     """The vehicle after a ``sample`` of the rangefinder; one that is too short does not count."""
     last, used = vehicle.range_newest, sample
-    recent = last is not None and 0.0 <= sample.time - last.time < 1e-6 * _RANGE_US
-    if last is not None and recent and last.distance > sample.distance:
-        used = replace(sample, distance=last.distance)
+    if last is not None and 0.0 <= sample.time - last.time < _RANGE_AGE:
+        used = replace(sample, distance=max(last.distance, sample.distance))
     return replace(vehicle, range=used, range_newest=sample)
 
 
@@ -70,11 +69,8 @@ def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate
 
     By the rangefinder where there is one, else by the estimate, as far as that knows its height.
     """
-    limits, aiding, measured = (
-        config.limits,
-        state.aiding,
-        _measured_height(config, state, estimate),
-    )
+    limits, aiding = config.limits, state.aiding
+    measured = _measured_now(config, state, estimate)
     if measured is not None:
         height, sigma = measured
     elif aiding.unaided_us >= limits.aiding_loss_us:
@@ -87,21 +83,42 @@ def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate
 def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
     """Whether legs are less than 0.1 m above the ground: nothing that is known says otherwise."""
     height, sigma = height_above_ground(config, estimate), state.aiding.height_sigma
-    measured = _measured_height(config, state, estimate)
+    measured = _measured_now(config, state, estimate)
     if measured is None:
         return height < _CLOSE and _SIGMAS * sigma < _CLOSE
     return measured[0] < _CLOSE and height - _SIGMAS * sigma < _CLOSE
 
 
+def _measured_now(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> Vec2 | None:
+    now, legs = 1e-6 * estimate.t_us, config.airframe.leg_length
+    return _measured_height(state.vehicle.range, now, estimate, legs, _RANGE_AGE)
+
+
+def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool:
+    """Whether the vehicle flies so high at ``now`` [s] that its ``legs`` [m] cannot touch anything.
+
+    By the rangefinder's reading, if that is not ``oldest`` [s], because the estimate may be what is
+    wrong; else by that, as far as it knows its height.
+    """
+    estimate, vehicle = state.estimate, state.vehicle
+    if estimate is None or not vehicle.flies:
+        return False
+    measured = _measured_height(vehicle.range, now, estimate, legs, oldest)
+    if measured is not None:
+        return measured[0] > _CLOSE
+    return -estimate.p_WB[2] - legs - _SIGMAS * state.aiding.height_sigma > _CLOSE
+
+
 def _measured_height(
-    config: FlightConfig, state: FlightState, estimate: StateEstimate
+    seen: RangeSample | None, now: float, estimate: StateEstimate, legs: float, oldest: float
 ) -> Vec2 | None:
-    """Height of the legs above the ground by the rangefinder [m], and its deviation [m]."""
-    seen = state.vehicle.range
-    if seen is None or not 0 <= estimate.t_us - round(1e6 * seen.time) < _RANGE_US:
+    """Height of the ``legs`` [m, long] above the ground [m], and its deviation [m].
+
+    By what the rangefinder has ``seen``; None if that is ``oldest`` [s] or more at ``now`` [s].
+    """
+    if seen is None or not 0.0 <= now - seen.time < oldest:
         return None
-    height = seen.distance * estimate.R_WB[8] - config.airframe.leg_length
-    return height, math.sqrt(max(seen.variance, 0.0))
+    return seen.distance * estimate.R_WB[8] - legs, math.sqrt(max(seen.variance, 0.0))
 
 
 def feel_ground(

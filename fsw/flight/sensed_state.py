@@ -22,6 +22,7 @@ from fsw.estimation.tuning import EstimatorTuning
 from fsw.estimation.turned_covariance import Vec6
 from fsw.flight.estimator_report import AIDS_PLACE, estimator_report, unaided, unknown_report
 from fsw.flight.jump import on_return, told
+from fsw.flight.land_detector import is_aloft
 from fsw.flight.missed_ticks import missed_inputs
 from fsw.flight.state import Aiding, FlightState, LostSensor
 from fsw.frozen import made, replace
@@ -39,10 +40,7 @@ _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held 
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
-_SIGMAS = 3.0  # by which a height may be wrong
-_LOW = 0.1  # m of the legs above the ground, below which they may touch it
 _LATELY = 0.02  # s, in which a fault is one of now
-_UNHELD_US = 300_000  # without a pose, after which poses do not hold the attitude any more
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
 
@@ -64,6 +62,7 @@ class SensedState:
         self._cascade = cascade
         self._tuning = tuning
         self._stale = tuning.stale_time
+        self._legs = cascade.law.airframe.leg_length
 
     def warm_up(self) -> None:
         """Compile every kernel."""
@@ -127,7 +126,7 @@ class SensedState:
             now = 1e-6 * one.sensors.t_us
             memory = _memory(state, now)
             memory, estimate = self._fusion.take_in(memory, one.samples, now)
-            aloft = self._is_aloft(state, now)
+            aloft = is_aloft(state, now, self._legs, self._stale)
             memory, found = self._fusion.catch_up(memory, one.samples, now, estimate, aloft=aloft)
             state = replace(state, fusion=memory, estimate=found or estimate or state.estimate)
         return state, inputs
@@ -148,7 +147,7 @@ class SensedState:
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
-        aloft = self._is_aloft(state, now)
+        aloft = is_aloft(state, now, self._legs, self._stale)
         memory, found = self._fusion.catch_up(memory, inputs.samples, now, known, aloft=aloft)
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
@@ -188,20 +187,6 @@ class SensedState:
         report = estimator_report(memory, covariance, lasting, estimate, memory.now, self._stale)
         drifted = math.sqrt(max(0.0, *covariance.diagonal()[P : P + 3].tolist()))
         return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
-
-    def _is_aloft(self, state: FlightState, now: float) -> bool:
-        """Whether the vehicle flies so high at ``now`` [s] that its legs cannot touch the ground.
-
-        By the rangefinder where there is one, because the estimate may be what is wrong; else by
-        that, as far as it knows its height.
-        """
-        estimate, vehicle = state.estimate, state.vehicle
-        if estimate is None or not vehicle.flies:
-            return False
-        legs, seen = self._cascade.law.airframe.leg_length, vehicle.range
-        if seen is not None and 0.0 <= now - seen.time < self._stale:
-            return seen.distance * estimate.R_WB[8] - legs > _LOW
-        return -estimate.p_WB[2] - legs - _SIGMAS * state.aiding.height_sigma > _LOW
 
     def _told(
         self,
@@ -335,10 +320,8 @@ def _aiding(
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
     pose, V = report.pose_covariance, report.velocity_covariance
-    unaided_us = max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0
-    by_pose = aid.sensor is Sensor.POSE and unaided_us < _UNHELD_US
     return Aiding(
-        unaided_us=unaided_us,
+        unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
         position_sigma=drifted,
@@ -346,7 +329,6 @@ def _aiding(
         attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
         height_sigma=math.sqrt(max(pose[11], 0.0)),
         lost=lost,
-        attitude_held=by_pose or not any(one.sensor is _IMU for one in lost),
         gyro_lost=bool(verdict.wrong & Source.GYRO)
         or any(one.sensor is _IMU and one.fault is SensorFault.STALE for one in lost),
         disputed_us=max(round(1e6 * (now - verdict.since)), 1) if verdict.contradicts else 0,

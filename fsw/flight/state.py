@@ -234,10 +234,17 @@ class Aiding(NamedTuple):
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
-    attitude_held: bool = True  # by inertial unit or pose; False: rotors' thrusts stand in
     gyro_lost: bool = False  # rotors' torques stand in
     disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
     suspects: str = ""  # of which one is wrong then
+
+    def holds_attitude(self, unaided_us: int) -> bool:
+        """Whether an inertial unit does, or a pose less than ``unaided_us`` [us] ago.
+
+        Else the rotors' model stands in, and the attitude gets worse with time.
+        """
+        by_pose = self.pose is Sensor.POSE and self.unaided_us < unaided_us
+        return by_pose or not self.has_lost(Sensor.IMU)
 
     def has_lost(self, sensor: Sensor) -> bool:
         """Whether a sensor that every tick needs is of no use."""

@@ -260,6 +260,19 @@ def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
     assert not verdict.wrong
 
 
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_field_that_has_turned_the_heading_is_a_suspect_beside_the_gyro() -> None:
+    """It turns what is felt as well, where no pose holds the attitude."""
+    ratios = [0.0] * redundancy.COUNT
+    ratios[redundancy.GB], ratios[redundancy.AN] = 1.4, 1.1
+    verdict = Verdict()
+    for look_ in range(20):
+        now = EVERY * look_
+        verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
+    assert verdict.suspects == Source.GYRO | Source.COMPASS
+    assert not verdict.wrong
+
+
 def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
     x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
     level: NDArray[np.float64] = np.eye(3).ravel()

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.descent import Descent
 from fsw.flight.modes.descend import Descend
 from fsw.flight.plan_exchange import nominal_at_rest
-from fsw.flight.state import Aiding
+from fsw.flight.state import Aiding, LostSensor
 from fsw.flight.uncertain_clearance import KeptSet
 from fsw.shapes.half_space import wall
 from fsw.signals import Mode, SafeSet, StateEstimate, Vec3
@@ -21,7 +22,9 @@ HIGH: Vec3 = (1.0, 2.0, -5.0)
 HERE = vehicle_at(HIGH)
 AIDED = Aiding()
 BLIND = Aiding(unaided_us=10**6, velocity_sigma=0.5, height_sigma=9.0)
-ON_ROTORS = Aiding(attitude_held=False, height_sigma=9.0)
+ON_ROTORS = Aiding(
+    pose=Sensor.GNSS, lost=(LostSensor(Sensor.IMU, SensorFault.STALE, 0),), height_sigma=9.0
+)
 LOST = BLIND._replace(velocity_sigma=1.1)
 LIMITS = CONFIG.limits
 

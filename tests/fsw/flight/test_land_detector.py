@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from fsw.flight.land_detector import (
     feel_ground,
     height_above_ground,
+    is_aloft,
     may_be_low,
     standing_unclear,
     stands,
@@ -122,6 +123,28 @@ def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
         aiding = Aiding(height_sigma=sigma, gyro_lost=lost)
         found = feel_ground(CONFIG, replace(state, cascade=carries, aiding=aiding), estimate)
         assert found[1] is (landed and lost)
+
+
+@pytest.mark.parametrize(
+    ("height", "sigma", "sample", "aloft"),
+    [
+        (0.11, 0.0, None, True),
+        (0.09, 0.0, None, False),
+        (0.4, 0.11, None, False),  # as far as it knows: in dead reckoning it may have landed
+        (0.4, 0.09, None, True),
+        (0.0, 0.5, seen(0.2), True),  # the rangefinder knows better
+        (2.0, 0.0, seen(0.05), False),
+        (2.0, 0.0, seen(0.05, age_s=0.6), True),  # it did
+    ],
+)
+def test_legs_that_may_touch_the_ground_are_not_aloft(
+    height: float, sigma: float, sample: RangeSample | None, aloft: bool
+) -> None:
+    estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
+    state = replace(flying(range=sample), aiding=Aiding(height_sigma=sigma), estimate=estimate)
+    legs = CONFIG.airframe.leg_length
+    assert is_aloft(state, 2.0, legs, oldest=0.5) is aloft
+    assert not is_aloft(replace(state, estimate=None), 2.0, legs, oldest=0.5)
 
 
 def test_a_distance_that_is_too_short_counts_once_a_second_one_says_so() -> None:

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from fsw.flight.state import FlightState, OffboardMemory, VehicleMemory, is_young
+from fsw.estimation.sensor_fault import Sensor, SensorFault
+from fsw.flight.state import (
+    Aiding,
+    FlightState,
+    LostSensor,
+    OffboardMemory,
+    VehicleMemory,
+    is_young,
+)
 from fsw.signals import STOPPED, Mode, PlannerCounters, SafeSet, SolverStatus
 
 
@@ -14,6 +22,25 @@ def test_a_vehicle_flies_while_it_is_armed_and_not_on_the_ground(mode: Mode) -> 
     for landed in (True, False):
         vehicle = VehicleMemory(mode=mode, landed=landed)
         assert (vehicle.armed, vehicle.flies) == (armed, armed and not landed)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("pose", "unaided_us", "lost", "held"),
+    [
+        (Sensor.POSE, 0, Sensor.IMU, True),
+        (Sensor.POSE, 249_999, Sensor.IMU, True),
+        (Sensor.POSE, 250_000, Sensor.IMU, False),
+        (Sensor.GNSS, 0, Sensor.IMU, False),
+        (Sensor.GNSS, 10**7, Sensor.ENCODERS, True),
+    ],
+)
+def test_a_pose_or_the_inertial_unit_holds_the_attitude(
+    pose: Sensor, unaided_us: int, lost: Sensor, held: bool
+) -> None:
+    gone = (LostSensor(lost, SensorFault.STALE, 0),)
+    aiding = Aiding(pose=pose, unaided_us=unaided_us, lost=gone)
+    assert aiding.holds_attitude(250_000) is held
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,67 @@
+"""Who is heard, and what suspicion does to a filter."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fsw.estimation.error_state import BG
+from fsw.estimation.fusion_memory import FusionMemory, at_start
+from fsw.estimation.redundancy import NOBODY, Source
+from fsw.estimation.sensor_fusion import SensorFusion
+from fsw.estimation.tuning import EstimatorTuning
+from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.signals import Vec3, Vec4
+
+FUSION = SensorFusion(EstimatorTuning())
+HOVERS: Vec4 = (0.0, 0.0, 0.0, 9.81)  # what rotors make of it
+TICK = 0.002
+POSES_UNTIL, WRONG_FROM = 3.0, 4.0  # s
+LEVEL: Vec4 = (1.0, 0.0, 0.0, 0.0)
+FINE: Vec3 = (1e-6, 1e-6, 1e-6)
+
+
+def hovered(
+    *, turns: float = 0.0, angle: float = 0.0, poses: bool = True
+) -> tuple[FusionMemory, Source]:
+    """The memory after 5 s, and all who were suspects.
+
+    In the last second the gyro says that the vehicle ``turns`` [rad/s] about its vertical, and
+    encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second.
+    """
+    memory, accused, random = at_start(), NOBODY, np.random.default_rng(3)
+    for tick in range(round(5.0 / TICK)):
+        t, now = TICK * tick, 1.0 + TICK * tick
+        wrong = t > WRONG_FROM
+        a, b, c, d, e, f = random.standard_normal(6).tolist()
+        rate = 1e-3 * a, 1e-3 * b, 1e-3 * c + (turns if wrong else 0.0)
+        reading = (angle if wrong else 1e-5) * (tick % 2)
+        samples: list[Sample] = [
+            JointSample(now, (reading, 0.0)),
+            ImuSample(now, (0.02 * d, 0.02 * e, -9.81 + 0.02 * f), rate),
+        ]
+        if tick % 5 == 0 and (poses or t < POSES_UNTIL):
+            place = 1e-3 * d, 1e-3 * e, -1.5 + 1e-3 * f
+            samples.insert(0, PoseSample(now, place, LEVEL, FINE, FINE))
+        memory, _ = FUSION.step(memory, samples, now, model=HOVERS)
+        accused |= memory.verdict.accused
+    return memory, accused
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_gyro_is_not_doubted_where_nothing_measured_could_find_its_bias() -> None:
+    """Suspicion alone ended a flight whose tilt was known to 0.1 deg, because its sigma grew."""
+    memory, accused = hovered(turns=0.3, poses=False)
+    assert accused & Source.GYRO
+    M = memory.numbers[0]["covariance"]
+    assert max(math.sqrt(M[BG + k, BG + k]) for k in range(3)) < 0.25
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_rotors_are_no_witness_while_nobody_knows_how_the_arm_moves() -> None:
+    memory, accused = hovered()
+    assert (accused, memory.verdict.lost(memory.now)) == (NOBODY, NOBODY)
+    memory, _ = hovered(angle=0.5)
+    assert memory.verdict.lost(memory.now) == Source.MODEL
