@@ -217,6 +217,14 @@ def test_iron_that_turns_with_the_vehicle_is_nobody_s_fault(iron: Vec3) -> None:
         assert not suspected(verdicts)
 
 
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("turning", [(2.0, 0.0, 0.0), (0.0, -1.5, 1.5)])
+def test_a_field_that_turns_as_the_rotors_turn_nothing_is_named(turning: Vec3) -> None:
+    """Gyro and field contradict each other, and the rotors know who is right."""
+    verdicts = flown(Wrong(magnetic=turning), "satellites", 0.6)
+    assert named(verdicts) == Source.COMPASS
+
+
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
     fires = [0.0] * redundancy.COUNT
     fires[redundancy.GM], fires[redundancy.GP] = 5.0, 5.0
