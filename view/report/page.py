@@ -25,9 +25,10 @@ _POLICY: Final = (
     "img-src data: blob:"
 )
 _PAIR: Final = 2  # flights of which the second is compared with the first
-# A number with its unit, and perhaps the limit that both flights share.
+# A number with its unit, and perhaps the limit that both flights share, or the part that it is of.
 _NUMBER: Final = re.compile(
-    r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d]*)?|%)"
+    r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d,]*)?|%)"
+    r"(?:, [\w/]+)?"
 )
 Rows = Sequence[tuple[str, str]]
 
