@@ -24,7 +24,7 @@ LOCAL: Final = ("127.0.0.1", "localhost")
 _TITLE: Final = re.compile(rb"<title>[^<]*</title>")
 _VISERS_ICON: Final = re.compile(rb'(<link\s+rel="icon"\s+)href="[^"]*"')
 _ROOT: Final = re.compile(rb'(<div id="root">)</div>')
-# viser is dark if the address says so; its sheet of a phone is 20 em wide, and what we show is wider.
+# viser is dark if the address says so; its sheet of a phone is 20 em wide, what we show is wider.
 _HEAD: Final = """
 <style>
 :root { color-scheme: light dark; }

@@ -1,4 +1,4 @@
-"""Whole pages as a reader sees them, to be looked at: on a screen, on a phone, in the dark, on paper.
+"""Whole pages as a reader sees them, to be looked at: on screens, on a phone, dark, on paper.
 
 They are not kept: ``make pictures`` writes them to ``build/pictures``.
 """
