@@ -73,8 +73,10 @@ function fit(figure, print) {
 // of the screen, as it was turned, scaled.
 function paint(figure, look, print) {
   const element = document.getElementById(figure.name);
-  element.style.zoom = print ? PRINTED.width / element.clientWidth : "";
-  Plotly.relayout(element, look);
+  const { width } = element._fullLayout;
+  element.style.zoom = print ? PRINTED.width / width : "";
+  const size = print ? { width, autosize: false } : { width: null, autosize: true };
+  Plotly.relayout(element, { ...look, ...size });
   element._fullLayout.scene._scene.glplot.redraw();
 }
 
