@@ -639,6 +639,18 @@ class Verdict(NamedTuple):
             named=NOBODY,
         )
 
+    def unasked(self, now: float) -> Verdict:
+        """The verdict at ``now`` [s] where nobody is asked, as on the ground.
+
+        What was named is believed again after as long as if it agreed: its own checks are left.
+        """
+        agreed = tuple([now if since == math.inf else since for since in self.agreed])
+        wrong = self.wrong
+        for one, since in zip(Source, agreed, strict=True):
+            if now - since >= _AGREES:
+                wrong &= ~one
+        return self._replace(wrong=wrong, agreed=agreed)
+
     def hearing_nothing_of(self, silent: Source, now: float) -> Verdict:
         """The verdict with what says nothing at ``now`` [s]."""
         if not silent:
