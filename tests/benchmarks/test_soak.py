@@ -57,6 +57,17 @@ def test_what_a_short_life_takes_once_is_no_growth_of_an_hour_and_handles_count_
     assert "planner: memory, growth" in [row.name for row in judge([flown]) if not row.passed]
 
 
+@pytest.mark.parametrize(("seconds", "passes"), [(500.0, True), (3600.0, False)])
+def test_what_is_taken_once_fails_an_hour_and_no_soak_of_minutes(
+    seconds: float, passes: bool
+) -> None:
+    each = [one._replace(at_s=one.at_s * seconds / STEADY[-1].at_s) for one in STEADY]
+    grows = [one._replace(resident_mb=100.0 + 18.0 * one.at_s / 3600.0) for one in each]
+    flown = replace(FINE, glances=FINE.glances | {"fsw 1": grows}, flown_s=seconds)
+    failed = [row.name for row in judge([flown]) if not row.passed and "memory" in row.name]
+    assert failed == ([] if passes else ["fsw: memory, growth"])
+
+
 @pytest.mark.parametrize(
     ("flown", "fails"),
     [
