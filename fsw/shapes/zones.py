@@ -94,22 +94,17 @@ def acceleration_of(zones: Array, zone: int) -> Vec3:
 def velocity_of(zones: Array, zone: int, t_us: int) -> Vec3:
     """Velocity [m/s, NED] of one of the ``zones`` (zones, columns) [SI] of ``moving_zones``."""
     v = zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
-    return add_scaled(v, acceleration_of(zones, zone), _elapsed(zones, zone, t_us))
+    return add_scaled(v, acceleration_of(zones, zone), 1e-6 * (t_us - zones[zone, _MOVE + 6]))
 
 
 @compilable
 def moved_by(zones: Array, zone: int, t_us: int) -> Vec3:
     """How far one of the ``zones`` (zones, columns) [SI] of ``moving_zones`` is at a time [m]."""
-    elapsed = _elapsed(zones, zone, t_us)
+    elapsed = 1e-6 * (t_us - zones[zone, _MOVE + 6])
     v = zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
     mean = add_scaled(v, acceleration_of(zones, zone), 0.5 * elapsed)
     p = zones[zone, _MOVE + 3], zones[zone, _MOVE + 4], zones[zone, _MOVE + 5]
     return add_scaled(p, mean, elapsed)
-
-
-@compilable
-def _elapsed(zones: Array, zone: int, t_us: int) -> float:
-    return 1e-6 * (t_us - zones[zone, _MOVE + 6])
 
 
 @compilable
