@@ -22,6 +22,9 @@ def document(title: str, parts: Iterable[str], style: str = "", head: str = "") 
     body = "\n".join(parts)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<link rel='icon' href='{ICON}'>\n"
         f"{head}<title>{html.escape(title)}</title>\n<style>\n{css}</style>\n</head>\n"
         f"<body>\n{body}\n</body>\n</html>\n"
     )

@@ -99,7 +99,7 @@ def _sentence(one: Difference, confidence: float) -> str:
     judged = one.worse or one.better or "no difference shown"
     return (
         f"{one.name}: {one.flights[0]} and {one.flights[1]} flights, {pairs}; {margin}; minimum "
-        f"margin {least}; violations {one.violations[0]} -> {one.violations[1]} "
+        f"margin {least}; violations or not completed {one.violations[0]} -> {one.violations[1]} "
         f"({share} of the difference: {low:+.2g} to {high:+.2g} %): {judged}"
     )
 

@@ -3,7 +3,9 @@
 import os
 import signal
 import tempfile
+from collections import defaultdict
 
+import pytest
 from hypothesis import settings
 
 from pandion.own_modules import put_first
@@ -27,3 +29,20 @@ os.environ["MAVLINK20"] = "1"
 
 # A shell has what it starts in the background ignore interrupts, and so would all that we start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave of a test that is ``drawn`` so many parameters in ``make test``, evenly spread."""
+    families: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("drawn") is not None:
+            families[item.nodeid.partition("[")[0]].append(item)
+    for members in families.values():
+        mark = members[0].get_closest_marker("drawn")
+        assert mark is not None
+        (count,) = mark.args
+        kept = {k * len(members) // count for k in range(count)}
+        for place, item in enumerate(members):
+            if place not in kept:
+                item.add_marker("long")

@@ -24,6 +24,22 @@ LOCAL: Final = ("127.0.0.1", "localhost")
 _TITLE: Final = re.compile(rb"<title>[^<]*</title>")
 _VISERS_ICON: Final = re.compile(rb'(<link\s+rel="icon"\s+)href="[^"]*"')
 _ROOT: Final = re.compile(rb'(<div id="root">)</div>')
+# viser is dark if the address says so; its sheet of a phone is 20 em wide, what we show is wider.
+_HEAD: Final = """
+<style>
+:root { color-scheme: light dark; }
+@media (max-width: 36em) {
+  [style*="width: 20em"] { width: 100% !important; }
+  .mantine-Paper-root[style*="width: 20em"] { max-height: 45% !important; }
+}
+</style>
+<script>
+if (matchMedia("(prefers-color-scheme: dark)").matches) {
+  const asked = new URL(location);
+  asked.searchParams.set("darkMode", "");
+  history.replaceState(null, "", asked);
+}
+</script>"""
 # The script that draws the scene replaces it.
 _LOADING: Final = (
     '<p style="font: 16px system-ui, sans-serif; margin: 40vh auto 0; text-align: center">'
@@ -106,13 +122,16 @@ def _own_pages_only(title: str) -> Iterator[None]:
 
 
 def titled(response: Any, title: str) -> Any:
-    """The same response, a page with ``title``, our icon and a word while the scene loads."""
+    """The same response, a page with ``title``, our icon and a word while the scene loads.
+
+    It is dark where the browser asks for that, and fits a phone.
+    """
     if response is None or "text/html" not in response.headers.get("Content-Type", ""):
         return response
     packed = response.headers.get("Content-Encoding") == "gzip"
     body = gzip.decompress(response.body) if packed else response.body
     for was, becomes in (
-        (_TITLE, f"<title>{html.escape(title)} - Pandion</title>"),
+        (_TITLE, f"<title>{html.escape(title)} - Pandion</title>{_HEAD}"),
         (_VISERS_ICON, rf'\g<1>href="{ICON}"'),
         (_ROOT, rf"\g<1>{_LOADING}</div>"),
     ):

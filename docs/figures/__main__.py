@@ -1,4 +1,6 @@
-"""Draw ``docs/images`` again: ``make pictures``, or ``python -m docs.figures [FLIGHTS]``.
+"""Draw ``docs/images`` again, and whole pages into ``build/pictures`` for somebody to look at.
+
+``make pictures``, or ``python -m docs.figures [FLIGHTS]``.
 
 Flies the pictured flights first, unless FLIGHTS is a directory that has them already.
 """
@@ -20,10 +22,13 @@ from docs.figures.dash_animation import draw_dash_animation
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
+from docs.figures.pages import draw_pages, fly_campaign
 from docs.figures.screens import draw_inspector, draw_report
 from docs.figures.view import draw_view
 
-IMAGES = Path(__file__).parents[1] / "images"
+ROOT = Path(__file__).parents[2]
+IMAGES = ROOT / "docs" / "images"
+PAGES = ROOT / "build" / "pictures"
 # Scenario and suite of sensors; the first is the flight of `make run`.
 PICTURED = {("walls", "mocap"): "flight.svg", ("branches", "perfect"): "branches.svg"}
 SHOWN = ("branches", "perfect")  # on the page of pandion view
@@ -67,12 +72,13 @@ def draw_all(flights: Path) -> None:
         draw_dash_animation(dash, four, IMAGES / "dash.webp")
         for flown, name in PICTURED.items():
             draw_flight(fly(*flown, flights), IMAGES / name)
-    pictured = fly(*next(iter(PICTURED)), flights)
+    pictured, shown = (fly(*flown, flights) for flown in (next(iter(PICTURED)), SHOWN))
     try:
-        draw_view(fly(*SHOWN, flights), IMAGES / "view.png")
+        draw_view(shown, IMAGES / "view.png")
         draw_animation(pictured, IMAGES / "flight.webp")
         draw_report(pictured, IMAGES / "report.png")
         draw_inspector(pictured, IMAGES / "top.png")
+        draw_pages([pictured, shown], fly_campaign(flights), PAGES)
     except NoBrowser as missing:
         print(f"the pictures of pages stay as they are: {missing}")
     numbers = [recorded(fly(*flown, flights)) for flown in FLOWN]
@@ -86,4 +92,4 @@ if __name__ == "__main__":
     else:
         with tempfile.TemporaryDirectory() as made:
             draw_all(Path(made))
-    print(f"drew {IMAGES}")
+    print(f"drew {IMAGES}, and to be looked at {PAGES}")

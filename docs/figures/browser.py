@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import io
 import json
 import shutil
 import subprocess
@@ -17,9 +18,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final, cast
 
+from PIL import Image
+
 _NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 _START_S: Final = 30.0
 _ANSWER_S: Final = 120.0  # drawing in software, on a busy machine
+_PIECE_PX: Final = 4000
+A4_IN: Final = (8.27, 11.69)
+LETTER_IN: Final = (8.5, 11.0)
 
 
 class NoBrowser(Exception):
@@ -112,6 +118,28 @@ class Page:
         shot = self.call("Page.captureScreenshot", format="png")
         path.write_bytes(base64.b64decode(shot["data"]))
 
+    def screenshot_whole(self, path: Path) -> None:
+        """Write the page as PNG down to its end, in pieces: a browser draws no more at once."""
+        width, height = self.value("[innerWidth, document.documentElement.scrollHeight]")
+        whole = Image.new("RGB", (width, height))
+        for top in range(0, height, _PIECE_PX):
+            clip = {"x": 0, "y": top, "width": width, "height": min(_PIECE_PX, height - top)}
+            shot = self.call(
+                "Page.captureScreenshot", format="png", captureBeyondViewport=True,
+                clip={**clip, "scale": 1},
+            )  # fmt: skip
+            with Image.open(io.BytesIO(base64.b64decode(shot["data"]))) as piece:
+                whole.paste(piece, (0, top))
+        whole.save(path)
+
+    def print_to(self, path: Path, paper_in: tuple[float, float]) -> None:
+        """Print the page as PDF on sheets of a width and height [inch]."""
+        width, height = paper_in
+        printed = self.call(
+            "Page.printToPDF", paperWidth=width, paperHeight=height, printBackground=True
+        )
+        path.write_bytes(base64.b64decode(printed["data"]))
+
     def _draw(self) -> None:
         """Wait until two more frames are drawn."""
         self.call("Runtime.evaluate", expression=_TWO_FRAMES, awaitPromise=True)
@@ -157,8 +185,12 @@ def chromium() -> str | None:
 
 
 @contextlib.contextmanager
-def page(width: int = 1440, height: int = 900) -> Iterator[Page]:
+def page(
+    width: int = 1440, height: int = 900, *, dark: bool = False, phone: bool = False
+) -> Iterator[Page]:
     """A page of ``width`` and ``height`` [px], drawn in software so that it needs no graphics card.
+
+    It asks for ``dark`` colours, and is laid out as on a ``phone``.
 
     Raises:
         NoBrowser: There is none, or it does not start.
@@ -173,7 +205,8 @@ def page(width: int = 1440, height: int = 900) -> Iterator[Page]:
             [
                 program, "--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
                 "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars",
-                "--no-first-run", "--disable-background-networking", "--disable-extensions",
+                "--no-first-run", "--disable-background-networking", "--disable-component-update",
+                "--disable-extensions", "--disable-quic", "--disable-sync",
                 "--remote-debugging-port=0", "--remote-allow-origins=*",
                 f"--user-data-dir={profile}", f"--window-size={width},{height}", "about:blank",
             ],
@@ -185,8 +218,10 @@ def page(width: int = 1440, height: int = 900) -> Iterator[Page]:
                 opened = Page(socket)
                 opened.call(
                     "Emulation.setDeviceMetricsOverride", width=width, height=height,
-                    deviceScaleFactor=1, mobile=False,
+                    deviceScaleFactor=1, mobile=phone,
                 )  # fmt: skip
+                scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+                opened.call("Emulation.setEmulatedMedia", features=[scheme])
                 yield opened
         finally:
             browser.terminate()

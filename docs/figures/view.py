@@ -17,19 +17,19 @@ from view.page import address, open_server
 SIZE = (1440, 900)
 _TIME = "document.querySelector('[data-pandion=time]')?.textContent"
 # viser warns that it draws without a graphics card.
-_CLOSE = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+CLOSE = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
 
 
 @contextmanager
 def shown_in_browser(
-    directory: Path, width_px: int, height_px: int
+    directory: Path, width_px: int, height_px: int, *, dark: bool = False, phone: bool = False
 ) -> Iterator[tuple[Page, LogFlight, LogPage]]:
     """A flight's page in a browser's window.
 
     Raises:
         NoBrowser: There is no Chromium.
     """
-    with page(width_px, height_px) as browser:
+    with page(width_px, height_px, dark=dark, phone=phone) as browser:
         flight = LogFlight(directory)
         server = open_server("127.0.0.1", 0, flight.title)
         shown = LogPage(server, flight)
@@ -52,7 +52,7 @@ def draw_view(directory: Path, target: Path) -> None:
         NoBrowser: There is no Chromium.
     """
     with shown_in_browser(directory, *SIZE) as (browser, flight, _):
-        browser.value(_CLOSE)
+        browser.value(CLOSE)
         browser.press_on("worst margin")
         assert flight.worst is not None
         browser.wait_for(time_is(flight.worst.t - flight.begin), 60.0)

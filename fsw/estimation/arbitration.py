@@ -79,8 +79,9 @@ class Arbitration:
         if evidence is None:
             return begun(memory), found
         if not aloft:
-            unheard = not (evidence[0]["count"] or memory.verdict.is_on)
-            return (memory if unheard else _anew(memory)), found
+            if evidence[0]["count"] or memory.verdict.is_on:
+                memory = _anew(memory)
+            return (_unasked(memory, now) if memory.verdict.wrong else memory), found
         if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
             return memory, found
         return self._look(memory, now, found)
@@ -210,6 +211,16 @@ def _anew(memory: FusionMemory) -> FusionMemory:
     x = memory.numbers.copy()
     x["suspect"] = 0
     return begun(memory._replace(numbers=x, verdict=memory.verdict.acquitted()))
+
+
+def _unasked(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory at ``now`` [s] with what was named in flight believed again, once it is time."""
+    verdict = memory.verdict.unasked(now)
+    x = memory.numbers
+    if verdict.wrong is not memory.verdict.wrong:
+        x = x.copy()
+        x["out"] = _halves(verdict.wrong)
+    return memory._replace(numbers=x, verdict=verdict)
 
 
 def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:

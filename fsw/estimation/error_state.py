@@ -95,6 +95,10 @@ FILTER: Final = np.dtype(
         ("encoder_steady", np.int64),
         ("encoder_calm", np.int64),
         ("encoder_doubted", np.int64),
+        ("encoder_zero", float, (2,)),  # rad, by which readings have leapt so far
+        # Of what is doubted: how far readings have leapt [rad], and in which time [s].
+        ("encoder_leap", float, (2,)),
+        ("encoder_leapt", float),
         # What is known of the biases while the readings are of no use.
         ("kept_bias", float, (6,)),
         ("kept_variance", float, (6,)),

@@ -44,6 +44,7 @@ _DOUBTED_RATE = 0.5  # rad/s
 _SCALE_RATE = 0.06
 _SCALE_MOST = 6.0
 _SCALE_FROM = 2.0
+_SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
 
@@ -87,7 +88,8 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
     more = min(0.5 * squared / rows, _SCALE_MOST) - _SCALE_FROM
-    x.noise_scale[scaled] = max(1.0, max(x.noise_scale[scaled], 1.0) * math.exp(_SCALE_RATE * more))
+    scale = max(x.noise_scale[scaled], 1.0) * math.exp(_SCALE_RATE * more)
+    x.noise_scale[scaled] = min(max(scale, 1.0), _SCALE_LIMIT)
 
 
 @compilable

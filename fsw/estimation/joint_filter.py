@@ -10,7 +10,8 @@ the same covariance, because they are read together.
 
 A reading tells of the past. The state stays at the time of the newest one, and a ring keeps what
 torques have made of the joints since; the present follows from both. So readings may be late, or
-few. One that is far from what is expected is not believed (``imu.doubt``).
+few. One that is far from what is expected is not believed (``imu.doubt``). One that has leapt, as
+no joint can, and then follows the joint again has another zero.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ _DISTURBANCE_AT_START: Final = 30.0  # rad/s^2
 _FAR: Final = 0.1  # rad
 _SIGMAS: Final = 6.0
 _MOST_SIGMA: Final = 0.03  # rad; of a wider one garbage would pass
-_FASTEST: Final = 10.0  # rad/s, from one reading to the next
+# By how much a joint moves from one reading to the next, with the noise of both.
+_FASTEST: Final = 10.0  # rad/s
+_NEAR: Final = 0.02  # rad
 _NONE: Final = SensorFault.NONE.value
 _REPEATED: Final = SensorFault.REPEATED.value
 _TOO_OLD: Final = SensorFault.TOO_OLD.value
@@ -76,27 +79,51 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
     if not time > before:
         return _REPEATED
     apart = min(time - before, 1.0)
-    first, second = angles
-    change = max(abs(first - x.encoders[0]), abs(second - x.encoders[1]))
-    x.encoders[0], x.encoders[1], x.encoders[2] = first, second, time
-    steady = change <= _FAR + _FASTEST * apart
-    x.encoder_steady = x.encoder_steady + 1 if steady else 0
+    steps = angles[0] - x.encoders[0], angles[1] - x.encoders[1]
+    x.encoders[0], x.encoders[1], x.encoders[2] = angles[0], angles[1], time
+    if max(abs(steps[0]), abs(steps[1])) <= _NEAR + _FASTEST * apart:
+        x.encoder_steady += 1
+    else:
+        x.encoder_steady, x.encoder_leapt = 0, x.encoder_leapt + apart
+        for i in range(2):
+            x.encoder_leap[i] += steps[i]
     if time < x.joint_time:  # older than what the ring reaches back to
         return _TOO_OLD
     _advance(x, law, time)
-    stray = max(abs(first - x.joints[0, 0]), abs(second - x.joints[1, 0]))
-    sigma = min(math.sqrt(x.joint_variance[0, 0]), _MOST_SIGMA)
-    far, before_it = stray > _FAR + _SIGMAS * sigma, x.encoder_doubted
+    far, before_it = _is_far(x, angles), x.encoder_doubted
     x.encoder_doubted, x.encoder_calm = doubt(
         x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
     )
     if x.encoder_doubted > 0:
         return _JUMP
     if before_it > 0 and far:
-        begin(x, law, time, angles)
-        return _NONE
+        _move_zero(x)
+        if _is_far(x, angles):
+            begin(x, law, time, (angles[0] - x.encoder_zero[0], angles[1] - x.encoder_zero[1]))
+            return _NONE
+    x.encoder_leap[0], x.encoder_leap[1], x.encoder_leapt = 0.0, 0.0, 0.0
     _correct(x, law, angles)
     return _NONE
+
+
+@compilable
+def _is_far(x: Any, angles: Vec2) -> bool:
+    """Whether a reading is farther from what is expected than the filter may be wrong."""
+    sigma, stray = min(math.sqrt(x.joint_variance[0, 0]), _MOST_SIGMA), 0.0
+    for i in range(2):
+        stray = max(stray, abs(angles[i] - x.encoder_zero[i] - x.joints[i, 0]))
+    return stray > _FAR + _SIGMAS * sigma
+
+
+@compilable
+def _move_zero(x: Any) -> None:
+    """Take what no joint can have moved in the time for a zero that has moved.
+
+    What garbage has leapt adds up to how the joint has moved meanwhile.
+    """
+    for i in range(2):
+        if abs(x.encoder_leap[i]) > _NEAR + _FASTEST * x.encoder_leapt:
+            x.encoder_zero[i] += x.encoder_leap[i]
 
 
 @compilable
@@ -105,6 +132,7 @@ def begin(x: Any, law: Any, time: float, angles: Vec2) -> None:
     x.joint_time = time
     while x.pushed < x.pushes_end and x.pushes[x.pushed % PUSHES, 0] <= time:
         x.pushed += 1
+    x.encoder_leap[0], x.encoder_leap[1], x.encoder_leapt = 0.0, 0.0, 0.0
     C = x.joint_variance
     for i in range(3):
         for j in range(3):
@@ -175,9 +203,10 @@ def _move(x: Any, law: Any, u1: float, u2: float, dt: float) -> None:
 def _correct(x: Any, law: Any, angles: Vec2) -> None:
     C = x.joint_variance
     total = C[0, 0] + law.encoder_noise * law.encoder_noise
+    most = _SIGMAS * math.sqrt(total)  # of a reading that is just believed, and may be garbage
     g0, g1, g2 = C[0, 0] / total, C[1, 0] / total, C[2, 0] / total
     for i in range(2):
-        surprise = angles[i] - x.joints[i, 0]
+        surprise = min(max(angles[i] - x.encoder_zero[i] - x.joints[i, 0], -most), most)
         x.joints[i, 0] += g0 * surprise
         x.joints[i, 1] += g1 * surprise
         x.joints[i, 2] += g2 * surprise

@@ -68,8 +68,8 @@ NOBODY: Final = Source(0)
 G, A, M, P, N, B = Source
 # Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
 # into the world is the gyro's and the magnetometer's as well: see ``_sources``.
-GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN = range(10)
-OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N)
+GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB = range(11)
+OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N, M | B)
 COUNT: Final = len(OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
@@ -244,7 +244,7 @@ def _with_aids(
     if fix[0]:
         _unit_and_fix(s, now, k, fix[4], fix[5], learns)
     if field[0]:
-        _gyro_and_field(s, now, k, field[4], bias)
+        _unit_and_field(s, now, k, field[4], bias, learns)
 
 
 @compilable
@@ -514,21 +514,36 @@ def _field_off(a: Array, b: Array) -> Vec3:
 
 
 @compilable
-def _gyro_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3) -> None:
-    """How the Earth's field, known to ``noise`` [Gauss], turns in body axes against the gyro.
+def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns: bool) -> None:
+    """How the Earth's field turns in body axes against gyro and rotors.
 
-    A turn about the field is not seen. The gyro's ``bias`` [rad/s, FRD].
+    It is known to ``noise`` [Gauss], the gyro's ``bias`` [rad/s, FRD]; a turn about it is not seen.
     """
-    last = s.aid_count[2] - 1
-    first = _before(s, 2, last, WINDOWS[k], 0.03)
+    T, last = WINDOWS[k], s.aid_count[2] - 1
+    middle = _before(s, 2, last, T, 0.03)
+    if middle < 0:
+        return
+    c, b = s.aids[2, last % _AIDS], s.aids[2, middle % _AIDS]
+    over, off, v = c[0] - b[0], _field_off(b, c), vec3(c, _MEASURED)
+    off = off[0] / over, off[1] / over, off[2] / over
+    iron = _IRON * _size(rotation_vector(_apart(b, c, _AT + SAID)))
+    noise = _NOISE_SIGMAS * noise / max(_size(v), 1e-3)
+    _note(s, now, GB, k, _across(bias, v, off), _GYRO_OFF + (iron + noise) / over)
+    first = _before(s, 2, middle, T, 0.03)
     if first < 0:
         return
-    b, a = s.aids[2, last % _AIDS], s.aids[2, first % _AIDS]
-    over, off, v = b[0] - a[0], _field_off(a, b), vec3(b, _MEASURED)
-    r = _across(bias, v, (off[0] / over, off[1] / over, off[2] / over))
-    iron = _IRON * _size(rotation_vector(_apart(a, b, _AT + SAID)))
-    noise = _NOISE_SIGMAS * noise / max(_size(v), 1e-3)
-    _note(s, now, GB, k, r, _GYRO_OFF + (iron + noise) / over)
+    a = s.aids[2, first % _AIDS]
+    before, off0 = b[0] - a[0], _field_off(a, b)
+    turn, turn0 = _difference(c, b, _AT + TURN, over), _difference(b, a, _AT + TURN, before)
+    spun, spun0 = _difference(c, b, _AT + SPUN2, over), _difference(b, a, _AT + SPUN2, before)
+    r = (
+        turn[0] - turn0[0] - spun[0] + spun0[0] + off[0] - off0[0] / before,
+        turn[1] - turn0[1] - spun[1] + spun0[1] + off[1] - off0[1] / before,
+        turn[2] - turn0[2] - spun[2] + spun0[2] + off[2] - off0[2] / before,
+    )
+    iron += _IRON * _size(rotation_vector(_apart(a, b, _AT + SAID)))
+    aloud = (iron + 2.0 * noise) / over
+    _note_model(s, now, MB, k, _across(r, v, (0.0, 0.0, 0.0)), _TURN_OFF_AIDED, aloud, learns)
 
 
 @compilable
@@ -623,6 +638,18 @@ class Verdict(NamedTuple):
             sum=0.0,
             named=NOBODY,
         )
+
+    def unasked(self, now: float) -> Verdict:
+        """The verdict at ``now`` [s] where nobody is asked, as on the ground.
+
+        What was named is believed again after as long as if it agreed: its own checks are left.
+        """
+        agreed = tuple([now if since == math.inf else since for since in self.agreed])
+        wrong = self.wrong
+        for one, since in zip(Source, agreed, strict=True):
+            if now - since >= _AGREES:
+                wrong &= ~one
+        return self._replace(wrong=wrong, agreed=agreed)
 
     def hearing_nothing_of(self, silent: Source, now: float) -> Verdict:
         """The verdict with what says nothing at ``now`` [s]."""

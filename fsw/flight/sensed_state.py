@@ -39,6 +39,7 @@ _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
+_SET_BACK = 0.1  # s; a clock that goes back by more has been set to another time
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
 _LATELY = 0.02  # s, in which a fault is one of now
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
@@ -347,10 +348,11 @@ def _recently(aid: Health) -> float:
 def _memory(state: FlightState, now: float) -> FusionMemory:
     """The filter's memory at ``now`` [s].
 
-    After a first stamp that was ahead of all others every reading is older than what it left.
+    After a first stamp that was ahead of all others every reading is older than what it left. A
+    clock that is set back by little is waited for: of what was known nothing is lost.
     """
     before = state.fusion
-    return at_start() if before is None or now < before.now else before
+    return at_start() if before is None or now < before.now - _SET_BACK else before
 
 
 def _is_back(before: FusionMemory, memory: FusionMemory, now: float) -> bool:

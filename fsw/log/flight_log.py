@@ -20,6 +20,7 @@ from typing import Final
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.px4_records import cpu_load, origin_of
 from fsw.log.topics import TOPICS
+from fsw.parameters.facts import FACTS
 from fsw.ports import GroupTiming
 from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
@@ -139,7 +140,9 @@ def _memory() -> float:
 def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
     """Everything before the first record, with the shape of the inputs, to read them back."""
     exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
-    named = {**subject.numbers, **subject.parameters}
+    # Those that only state what is so are for PX4's tools: Flight Review shows MAV_TYPE.
+    stated = {fact.name: fact.value for fact in FACTS if not fact.repeats}
+    named = {**stated, **subject.numbers, **subject.parameters}
     facts: dict[str, str | int] = {
         "sys_name": "Pandion",
         "ver_data_format": 2,  # of PX4's topics: degrees and metres of vehicle_gps_position

@@ -155,13 +155,14 @@ def _maps(rows: Sequence[CampaignRow], result: CampaignResult) -> list[str]:
         return []
     some = rows[:: max(1, len(rows) // _MOST_POINTS)] if len(rows) > _MOST_POINTS else rows
     bad = [row for row in rows if row.violated]
+    good = [row for row in some if not row.violated]
     lines = -(-len(keys) // 2)
     drawn = sheet(lines, 2, 11.0, 2.6 * lines)
     axes = [ax for line in drawn.axes for ax in line]
     for ax, key in zip(axes, keys, strict=False):
         # In points squared: seen where there are few, apart where there are many.
         seen = min(max(4000.0 / max(len(some), 1), 5.0), 30.0)
-        for of, colour, size in ((some, BASE, seen), (bad, WALL, max(seen, 14.0))):
+        for of, colour, size in ((good, BASE, seen), (bad, WALL, max(seen, 14.0))):
             there = [row for row in of if row.margin_m is not None and key in row.values]
             x = np.array([row.values[key] for row in there])
             y = np.array([1e3 * row.margin_m for row in there if row.margin_m is not None])

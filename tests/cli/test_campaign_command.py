@@ -217,6 +217,7 @@ def test_a_flight_that_cannot_be_flown_is_refused_in_a_sentence(
     assert len(said.strip().splitlines()) == 1
 
 
+@pytest.mark.long
 def test_a_campaign_gives_a_server_its_flights_and_fails_where_it_must(
     campaign: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -160,6 +160,7 @@ def test_a_campaign_that_is_not_as_it_was_flown_is_not_certified(
     assert main([str(directory)]) == 0
 
 
+@pytest.mark.long
 def test_a_row_that_was_forged_with_its_digests_is_found_by_flying_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

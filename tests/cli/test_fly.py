@@ -212,6 +212,7 @@ def test_a_signal_ends_everything_within_two_seconds_with_a_verdict(
     assert frozen or result["mpc"]["p50_us"] > 0.0
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("pace", "to_all"),
     [

@@ -62,6 +62,7 @@ def exit_code(arguments: list[str]) -> object:
         return end.code
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

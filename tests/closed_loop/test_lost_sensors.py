@@ -94,6 +94,7 @@ def test_telemetry_knows_which_sensor_is_lost(kind: type, name: str) -> None:
     assert flight.snapshot.sensors_lost == (name,)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-3")
 def test_how_sure_the_estimate_is_is_not_judged_while_no_position_is_measured() -> None:
     """By what it was after half a minute without, no push would be told for the whole flight."""

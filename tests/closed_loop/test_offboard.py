@@ -104,6 +104,7 @@ LONG_AT_WALLS = {
 }
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(
     "attack",
@@ -132,6 +133,7 @@ def among_branches() -> Scenario:
     return replace(walls(AFAR, disturbed=True), walls=(), obstacles=obstacles)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(
     "attack", ["the end-effector behind the wall", "5 m/s at the wall", "nose down"]

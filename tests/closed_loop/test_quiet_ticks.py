@@ -66,6 +66,7 @@ def flown(
     return result, sent, whole
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     ("name", "seconds", "push", "most_whole"),
     [

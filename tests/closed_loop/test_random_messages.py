@@ -20,6 +20,7 @@ def flown(seed: int, seconds: float) -> None:
     assert outcome.refusals > 0
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-6", "REQ-SAFE-7")
 @pytest.mark.parametrize("seed", [1, 2])
 def test_seconds_of_random_messages_end_no_flight(seed: int) -> None:

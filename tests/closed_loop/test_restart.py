@@ -68,6 +68,7 @@ def take_off(flight: Flight) -> None:
     flight.step(command(TAKEOFF))
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-12", "REQ-ACT-6")
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
 def test_what_had_failed_flies_again_after_a_restart_and_not_before(suite: str) -> None:
@@ -165,6 +166,7 @@ def test_what_falls_is_not_restarted(ended_by: tuple[float, ...]) -> None:
     assert flight.texts[-1] == "not restarted: the vehicle must have been at rest for a second"
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-12")
 @pytest.mark.parametrize("lost", ["all", "pose"])
 def test_what_does_not_know_its_motion_is_restarted_when_it_must_have_come_down(lost: str) -> None:

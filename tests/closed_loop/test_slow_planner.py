@@ -68,6 +68,7 @@ class SlowFlight(Flight):
         self.closed.planner = OneAtATime(self)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-PLAN-1", "REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("takes_ms", "missed", "given_up", "brakes"),

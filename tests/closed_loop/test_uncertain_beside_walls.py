@@ -39,6 +39,7 @@ def east(flight: Flight) -> float:
     return flight.state.estimate.p_WB[1]
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-11")
 @pytest.mark.parametrize(
     "spoil",

@@ -17,6 +17,7 @@ SECONDS = 9.0  # from the fault on; a landing takes five
 in_long = pytest.mark.long
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("suite", ["mocap", "vio", "rtk", "gnss"])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=in_long) for k in range(1, 20))])

@@ -52,6 +52,7 @@ def reading(name: str) -> Message:
     return d.MAVLink_param_request_read_message(1, 1, name.encode(), -1)
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("who", COMPANIONS, ids=lambda who: f"{who[0]}-{who[1]}")
 def test_mavros_starts_whatever_its_identity(vehicle: Connected, who: tuple[int, int]) -> None:
     """Its plugins: version, home, time, lists of each kind, a rate, a bool, parameters."""

@@ -75,6 +75,7 @@ def test_there_is_an_example_of_each() -> None:
     assert [title for title, _ in DIFFS] == list(CHECKS)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("title", "diff"), DIFFS, ids=[title for title, _ in DIFFS])
 def test_the_example_applies_and_does_what_it_says(title: str, diff: str, tmp_path: Path) -> None:
     files = set(re.findall(r"^\+\+\+ b/(.+)$", diff, re.MULTILINE))

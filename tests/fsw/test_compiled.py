@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from fsw import compiled
+from tests.mutation import plain_compiled
 
 
 @dataclass(frozen=True)
@@ -35,3 +38,12 @@ def test_a_second_layout_of_a_class_is_refused() -> None:
     compiled.packed(Outer(Inner(True, (1.5, 2.0)), 0.5))
     with pytest.raises(TypeError, match="records of Outer have two layouts"):
         compiled.packed(Outer(Inner(True, (1.5, 2.0, 3.0)), 0.5))
+
+
+def test_what_stands_in_under_mutation_has_every_function_and_reads_alike() -> None:
+    names = {name for name, one in vars(compiled).items() if inspect.isfunction(one)}
+    ours = {n for n in names if getattr(compiled, n).__module__ == compiled.__name__}
+    assert {name for name in ours if not name.startswith("_")} <= set(vars(plain_compiled))
+    for module in (compiled, plain_compiled):
+        law = module.packed(Outer(Inner(True, (1.5, 2.0)), 0.5)).view(np.recarray)[0]
+        assert (law.inner.gains[1], law.lag) == (2.0, 0.5)

@@ -17,6 +17,7 @@ def test_every_reader_has_a_function_and_packages() -> None:
     assert SET_UPS.keys() == PACKAGES.keys()
 
 
+@pytest.mark.drawn(6)
 @pytest.mark.requirement("REQ-LINK-6", "REQ-LINK-9")
 @pytest.mark.parametrize("name", SET_UPS)
 def test_no_input_that_was_kept_is_a_finding(name: str) -> None:

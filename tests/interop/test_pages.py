@@ -13,7 +13,11 @@ from tests.interop.vehicle import FAST, Vehicle
 
 PACING = FAST
 PROGRAMS = [
-    pytest.param(fence.text, id=f"{page.stem}-{fence.line}")
+    pytest.param(
+        fence.text,
+        id=f"{page.stem}-{fence.line}",
+        marks=[pytest.mark.long] if "mavsdk" in page.stem else [],  # it waits a real minute
+    )
     for page in PAGES
     for fence in fences(page)
     if fence.mark == "run in" and fence.reason == "tests/interop/test_pages.py"

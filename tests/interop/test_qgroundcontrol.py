@@ -191,6 +191,7 @@ def test_everything_was_answered_in_time(station: Station) -> None:
     assert slowest[0][1] < PATIENCE_S
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     ("tool", "options", "shows"),
     [

@@ -64,6 +64,7 @@ def pymavlink_sender(system_id=1, component_id=191, sequence=0):
     return sender
 
 
+@pytest.mark.drawn(6)
 @pytest.mark.parametrize("name", SPOKEN)
 @settings(max_examples=30)
 @given(data=st.data())

@@ -40,5 +40,12 @@ def of_fixed_types(kernel: Callable[..., Any]) -> Callable[..., Any]:
     return kernel
 
 
-def packed(numbers: Any) -> list[Any]:
-    return [numbers]
+class _Record(list[Any]):
+    """An array of one record, whose fields are those of the numbers themselves."""
+
+    def view(self, _: Any) -> _Record:
+        return self
+
+
+def packed(numbers: Any) -> _Record:
+    return _Record([numbers])

@@ -71,6 +71,7 @@ def test_the_barrier_is_the_last_message_of_each_step(clean: Capture) -> None:
             assert len(stamps) == 1
 
 
+@pytest.mark.long
 def test_neither_a_bad_network_nor_speed_changes_the_flight(clean: Capture, tmp_path: Path) -> None:
     network = Misbehaviour(lost=0.004, doubled=0.2, late=0.003)
     bad = fly_through(network, tmp_path, *FLIGHT, "--speed", "2")

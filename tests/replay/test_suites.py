@@ -37,6 +37,7 @@ def snapshot(ticks: Ticks) -> tuple[FlightSnapshot, EstimatorReport]:
     return last, last.estimator
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-TIME-8")
 @pytest.mark.parametrize("suite", ["perfect", "mocap", "vio", "rtk"])
 def test_a_flight_of_a_suite_is_replayed_to_the_byte(suite: str, tmp_path: Path) -> None:

@@ -158,6 +158,7 @@ def points_of(parts: Parts, b: int, places: Array, random: np.random.Generator) 
     return np.asarray(begin + share * (end - begin) + ways)
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("word", SHAPES)
 def test_no_point_of_a_part_is_nearer_and_its_bound_is_below(word: str) -> None:
     random, parts = np.random.default_rng(3), as_arrays(PARTS, VEHICLE)

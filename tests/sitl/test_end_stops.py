@@ -83,6 +83,7 @@ def test_thrown_across_by_full_torque_it_goes_eight_degrees_beyond_at_most(
     assert 0.0 < beyond_stops(states) < math.radians(8.0)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("gravity", [0.0, GRAVITY])
 def test_stops_only_take_energy_away(gravity: float) -> None:
     """No friction: nothing else could."""

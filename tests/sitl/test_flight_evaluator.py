@@ -50,6 +50,7 @@ def looked(evaluator: FlightEvaluator, passed: Array, before_s: float) -> bool:
     return record_if_clear(by.table, by.parts, aim, passed, instants, *room) >= 0.0
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("name", ["walls", "workspace", "branches"])
 def test_the_quick_look_records_what_the_slow_one_does(name: str) -> None:
     random = np.random.default_rng(3)

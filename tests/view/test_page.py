@@ -65,3 +65,6 @@ def test_a_page_has_our_title_and_icon_and_says_that_it_loads(packed: bool) -> N
     assert f'href="{ICON}"' in page
     assert '<div id="root"><p' in page
     assert "loading the scene" in page
+    head = page[: page.index("</head>")]
+    assert "prefers-color-scheme: dark" in head
+    assert "max-width: 36em" in head

@@ -116,7 +116,7 @@ def test_bars_are_the_margins_and_limits_of_the_result(drawn: dict[str, Any]) ->
         "front/end_effector": 1e3 * WORST_M, "front/base": 50.0,
     }  # fmt: skip
     (used,) = drawn["limits"]["data"]
-    assert (used["x"], used["y"]) == (["tilt"], [25.0])
+    assert (used["y"], used["x"]) == (["tilt"], [25.0])
 
 
 def test_the_tracking_error_is_the_distance_to_the_reference(drawn: dict[str, Any]) -> None:
@@ -167,6 +167,7 @@ def test_a_page_of_two_flights_says_their_difference() -> None:
     assert difference("58.76 of 60.00 deg", "59.00 of 60.00 deg") == "+0.24 deg"
     assert difference("5.94 %", "6.00 %") == "+0.06 %"
     assert difference("3", "5") == "+2"
+    assert difference("40.8 mm, left/joint2", "37.0 mm, amid/base") == "-3.8 mm"
     assert difference("88.6 mm / 152.2 mm", "83.5 mm / 152.3 mm") == "-5.1 mm / +0.1 mm"
     assert difference("0.77 / 7.8 / 15 ms", "0.70 / 6.8 / 14 ms") == "-0.07 / -1.0 / -1 ms"
     for one, other in (("mocap", "rtk"), ("1 mm", "1 m"), ("1 / 2", "1 / 2 / 4"), ("", "1")):

@@ -309,20 +309,23 @@ def limits(flights: Sequence[Reported]) -> Chart:
         uses = flight.result.get("limits", {})
         if uses:
             traces.append({
-                "type": "bar", "name": flight.label, "x": [name.replace("_", " ") for name in uses],
-                "y": [_percent(use["largest"], use["most"]) for use in uses.values()],
+                "type": "bar", "orientation": "h", "name": flight.label,
+                "y": [name.replace("_", " ") for name in uses],
+                "x": [_percent(use["largest"], use["most"]) for use in uses.values()],
                 "hovertext": [
                     f"{use['largest']:.3g} of {use['most']:.3g} {use['unit']}, {use['at_s']:.2f} s"
                     for use in uses.values()
                 ],
                 "marker": {"color": COLOURS[k % len(COLOURS)]},
             })  # fmt: skip
+    bars = sum(len(trace["y"]) for trace in traces)
     layout = {
-        "height": 300,
-        "yaxis": {"title": {"text": "largest use [%]"}, "rangemode": "tozero"},
-        "xaxis": {"automargin": True},
+        "height": 18 * bars + 110,
+        "xaxis": {"title": {"text": "largest use [%]"}, "rangemode": "tozero"},
+        "yaxis": {"automargin": True, "autorange": "reversed"},
+        "bargap": 0.25,
         "shapes": [{
-            "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 100, "y1": 100,
+            "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": 100, "x1": 100,
             "line": {"color": LIMIT, "width": 1, "dash": "dash"},
         }],
     }  # fmt: skip
@@ -355,9 +358,9 @@ def solver(flights: Sequence[Reported]) -> Chart:
         })  # fmt: skip
     layout = {
         "height": 330,
-        "xaxis": {"title": {"text": "complete cycle [ms]"}, "type": "log", "domain": [0.0, 0.6],
+        "xaxis": {"title": {"text": "cycle [ms]"}, "type": "log", "domain": [0.0, 0.6],
                   "range": [-1, 2.2]},
-        "xaxis2": {"title": {"text": "iterations of the optimiser"}, "domain": [0.66, 1.0]},
+        "xaxis2": {"title": {"text": "iterations"}, "domain": [0.66, 1.0]},
         "yaxis": {"title": {"text": "share of cycles"}, "range": [0, 1.02]},
         "shapes": [
             {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": at, "x1": at,
@@ -366,6 +369,7 @@ def solver(flights: Sequence[Reported]) -> Chart:
         ],
     }  # fmt: skip
     note = (
+        "Of the complete planning cycle and of the optimiser. "
         f"Dashed: {_DEADLINE_MS:g} ms, when the plan takes effect, and the period of "
         f"{_PERIOD_MS:g} ms. "
     )

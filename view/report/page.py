@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from command_line.html_page import ICON, document, table
+from command_line.html_page import document, table
 from command_line.output import json_text
 from view.report.chart import Chart
 from view.report.charts import charts, worst_sentence
@@ -25,9 +25,10 @@ _POLICY: Final = (
     "img-src data: blob:"
 )
 _PAIR: Final = 2  # flights of which the second is compared with the first
-# A number with its unit, and perhaps the limit that both flights share.
+# A number with its unit, and perhaps the limit that both flights share, or the part that it is of.
 _NUMBER: Final = re.compile(
-    r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d]*)?|%)"
+    r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d,]*)?|%)"
+    r"(?:, [\w/]+)?"
 )
 Rows = Sequence[tuple[str, str]]
 
@@ -36,12 +37,7 @@ def page(flights: Sequence[Reported], summaries: Mapping[str, Rows]) -> str:
     """The page of flights; ``summaries`` are the rows of each one's result table, by label."""
     title = "Flight report: " + ", ".join(dict.fromkeys(flight.label for flight in flights))
     figures = charts(flights)
-    head = (
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<meta name="color-scheme" content="light dark">\n'
-        f"<link rel='icon' href='{ICON}'>\n"
-    )
+    head = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
     parts = [
         f"<header><h1>{html.escape(title)}</h1>",
         *(_verdict(flight, alone=len(flights) == 1) for flight in flights),

@@ -22,6 +22,7 @@ _AROUND_M: Final = 0.35  # of the paths that a wall is drawn
 _BODY_OPACITY, _CLEARANCE_OPACITY = 0.3, 0.1
 # Row of the places at which a part is marked; rotors and legs at the base.
 _NEAR: Final = {"link1": 2, "joint2": 2, "link2": 3, "end_effector": 3}
+_AXIS: Final = "#6e7781"  # seen on white and on a dark screen: a scene is not recoloured for paper
 _MOST_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
 
 
@@ -49,9 +50,9 @@ def paths(flights: Sequence[Reported]) -> Chart:
         "height": 560,
         "scene": {
             "aspectmode": "data",
-            "xaxis": {"title": {"text": "east [m]"}},
-            "yaxis": {"title": {"text": "north [m]"}},
-            "zaxis": {"title": {"text": "up [m]"}},
+            "xaxis": {"title": {"text": "east [m]"}, "color": _AXIS},
+            "yaxis": {"title": {"text": "north [m]"}, "color": _AXIS},
+            "zaxis": {"title": {"text": "up [m]"}, "color": _AXIS},
             "camera": {
                 "eye": {"x": -1.0, "y": -1.3, "z": 0.9},
                 "center": {"x": 0, "y": 0, "z": -0.1},

@@ -130,6 +130,7 @@ def test_several_zones_are_kept_at_once(p: Vec3, v: Vec3, wanted: Vec3) -> None:
             assert dot(n, result) >= needed - 1e-3  # type: ignore[arg-type]
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-SAFE-5")
 @pytest.mark.parametrize(
     ("speed", "eager"),
@@ -157,6 +158,7 @@ def test_a_vehicle_that_is_driven_at_a_wall_stops_in_front_of_it(
     assert x > 0.8 or eager == 0.0, "and it comes as close as it may"
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("keep_in", [False, True])
 @pytest.mark.parametrize("kind", [kind.name for kind in KINDS if not kind.follows_target])
 def test_the_margin_is_what_the_referee_sees_of_every_part(kind: str, keep_in: bool) -> None:

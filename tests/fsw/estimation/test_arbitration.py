@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fsw.estimation.error_state import BG
+from fsw.estimation.error_state import BG, NO_RATE
 from fsw.estimation.fusion_memory import FusionMemory, at_start
 from fsw.estimation.redundancy import NOBODY, Source
 from fsw.estimation.sensor_fusion import SensorFusion
@@ -65,3 +65,27 @@ def test_rotors_are_no_witness_while_nobody_knows_how_the_arm_moves() -> None:
     assert (accused, memory.verdict.lost(memory.now)) == (NOBODY, NOBODY)
     memory, _ = hovered(angle=0.5)
     assert memory.verdict.lost(memory.now) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("source", [Source.POSE, Source.GYRO | Source.COMPASS])
+def test_what_was_named_in_flight_is_believed_again_after_five_seconds_on_the_ground(
+    source: Source,
+) -> None:
+    """Nobody compares it there: it would be out until the vehicle is started anew."""
+    memory, _ = hovered()
+    agreed = tuple([math.inf if one & source else -math.inf for one in Source])
+    memory = memory._replace(verdict=memory.verdict._replace(wrong=source, agreed=agreed))
+    memory.numbers["out"] = NO_RATE if source & Source.GYRO else 0
+    began, now = memory.now, memory.now
+    while memory.verdict.wrong:
+        now += TICK
+        samples: list[Sample] = [
+            JointSample(now, (0.0, 0.0)),
+            ImuSample(now, (0.0, 0.0, -9.81 + 1e-3 * (now % 0.1)), (1e-4 * (now % 0.3), 0.0, 0.0)),
+        ]
+        memory, found = FUSION.take_in(memory, samples, now)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, aloft=False)
+        assert now - began < 5.1
+    assert now - began > 4.9
+    assert memory.numbers[0]["out"] == 0

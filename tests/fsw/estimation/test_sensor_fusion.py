@@ -501,6 +501,22 @@ def test_garbage_that_announces_a_jump_is_not_believed(suite: Suite) -> None:
     assert abs(flown.error()[:3]).max() < 0.3
 
 
+@pytest.mark.parametrize("sigma", [0.3, 5.0])
+def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
+    """Used so, it would hide that no position is measured, and the vehicle would wait for one."""
+    random = np.random.default_rng(3)
+
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, PoseSample) and sample.time > START + 1.0:
+            return replace(sample, position=tuple(random.normal(0.0, sigma, 3).tolist()))
+        return sample
+
+    flown = Flown(run(MOCAP, 8, 2.5), change)
+    assert max(flown.memory.numbers[0]["noise_scale"]) == 100.0
+    fused = flown.memory.of(Sensor.POSE).fused
+    assert START + 2.5 - fused[0] > 0.2
+
+
 def test_a_tick_leaves_the_memory_it_was_given_as_it_was() -> None:
     flown = run(MOCAP, 9, 0.3)
     fusion, memory = SensorFusion(MOCAP.tuning), at_start()
@@ -684,6 +700,7 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
     assert held.w_WB_B == pytest.approx(before.w_WB_B, abs=0.03), "not known: as it was"
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.parametrize("lost", [ImuSample, PoseSample])
 def test_a_covariance_stays_one_after_a_sensor_was_lost_and_back_for_long(lost: type) -> None:

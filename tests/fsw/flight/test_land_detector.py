@@ -194,6 +194,7 @@ def test_the_ground_is_felt_when_rotors_do_not_carry_and_nothing_falls() -> None
     assert landed_after(0.75) is None, "so light a vehicle flies"
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-MODE-9")
 @given(
     wrong=st.floats(-3.0, 3.0),

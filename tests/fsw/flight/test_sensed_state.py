@@ -37,6 +37,28 @@ def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
     assert 0.0 <= now - state.fusion.imu_came <= TICK
 
 
+@pytest.mark.parametrize("back", [0.0034, 0.017, 0.05])
+def test_a_clock_that_is_set_back_by_little_loses_nothing_of_what_was_known(back: float) -> None:
+    """With the poses gone there would be nothing to start anew from."""
+    state, flown = FlightState(), run(MOCAP, 1, 1.2)
+    for k, (now, samples) in enumerate(flown):
+        if k >= 300:
+            now -= back
+            samples = [
+                replace(one, time=one.time - back)
+                for one in samples
+                if not isinstance(one, PoseSample)
+            ]
+        state, _ = tick(state, round(1e6 * now), samples=tuple(samples))
+        assert k < 20 or state.estimate is not None
+    assert state.fusion is not None
+    assert state.fusion.started
+    assert state.fusion.restarts == 0
+    assert state.estimate is not None
+    k = flown.truth.at(now + back)
+    assert state.estimate.p_WB == pytest.approx(flown.truth.p[k], abs=0.1)
+
+
 def test_before_the_first_estimate_looks_at_sensors_are_as_rare_as_after_it() -> None:
     """Without encoders there is none; the pose comes for a while, and then no more."""
     state, told = FlightState(), []

@@ -84,6 +84,7 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     assert log.whole
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-LOG-1")
 def test_a_log_that_was_deleted_is_told_once_and_while_it_flies(tmp_path: Path) -> None:
     received: list[str] = []

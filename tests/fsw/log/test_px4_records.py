@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pyulog import ULog
+from pyulog.px4 import PX4ULog
 from scipy.spatial.transform import Rotation
 
 from fsw.control.attitude import attitude_reference
@@ -136,6 +137,7 @@ def test_planned_rates_are_the_derivative_of_the_planned_attitude() -> None:
 def test_a_place_on_earth_is_the_estimate_and_the_fix_the_receiver_s(tmp_path: Path) -> None:
     log = logged(tmp_path / "exact.ulg", iter([EXACT]))
     assert log.msg_info_dict["ver_data_format"] >= 2, "else Flight Review looks for lat and lon"
+    assert PX4ULog(log).get_mav_type() == "Quadrotor", "as Flight Review shows it"
     fix = rows(log, "vehicle_gps_position")
     place = [fix[name][0] for name in ("latitude_deg", "longitude_deg", "altitude_msl_m")]
     assert to_local(ORIGIN, *place) == pytest.approx(EXACT.estimate.p_WB, abs=1e-3)

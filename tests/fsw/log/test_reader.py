@@ -43,6 +43,7 @@ def logged(path: Path, given: list[TickInputs], lockstep: bool) -> list[TickInpu
     return [tick.inputs for tick in found if isinstance(tick, LoggedTick)]
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("seed", range(8))
 def test_every_input_of_every_tick_comes_back(seed: int, tmp_path: Path) -> None:
     """Made from the annotations: an input that is added later is in here without an edit."""
@@ -52,6 +53,7 @@ def test_every_input_of_every_tick_comes_back(seed: int, tmp_path: Path) -> None
     assert [digits(one) for one in found] == [digits(one) for one in given]
 
 
+@pytest.mark.long
 def test_each_input_is_missed_if_it_is_not_recorded(tmp_path: Path) -> None:
     """Field by field: only this one changes between two ticks, and the log shows it."""
     dice = random.Random(1)

@@ -156,6 +156,7 @@ def test_the_rotors_reach_as_far_as_their_blades_and_the_feet_as_far_as_the_legs
         assert parts[f"leg{k}"].end == foot.begin
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     "normal",
     [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (0.48, -0.6, 0.64)],

@@ -84,6 +84,7 @@ def soft_cost(program: QpData, x: Array) -> float:
     return cost(program, np.concatenate((inputs, program.least_slacks(inputs))))
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.parametrize("horizon", [1, 5, pytest.param(20, marks=pytest.mark.long)])
 @pytest.mark.parametrize("off", [0.05, 5.0], ids=["near", "far"])
 @pytest.mark.parametrize("safe_set", [SafeSet(), WALLS, SPHERE], ids=["open", "walls", "sphere"])

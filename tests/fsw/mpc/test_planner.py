@@ -46,6 +46,7 @@ def nodes_of(plan: Plan) -> Array:
     return MODEL.phi @ to_vector(plan.start) + MODEL.gamma @ flat(plan).ravel()
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("safe_set", [SafeSet(), AHEAD, SPHERE], ids=["open", "walls", "sphere"])
 def test_inputs_keep_their_limits_however_hard_the_target_pulls(safe_set: SafeSet) -> None:
     random, limits, plans = np.random.default_rng(1), CONFIG.limits, 0

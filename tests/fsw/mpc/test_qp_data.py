@@ -76,6 +76,7 @@ def targets_of(asked: Question) -> TargetPoints:
     return TargetPoints(asked.target_p, asked.target_v, asked.target_yaw)
 
 
+@pytest.mark.drawn(6)
 @pytest.mark.parametrize(
     "safe_set",
     [
@@ -125,6 +126,7 @@ def test_a_point_beside_a_wall_that_is_in_the_way_is_in_the_ocp(seed: int) -> No
     assert answer.slack_max == pytest.approx(float(expected.barrier_slack.max()), abs=0.01)
 
 
+@pytest.mark.drawn(6)
 @pytest.mark.parametrize("controller", ["hc", "sc", "blf"])
 @pytest.mark.parametrize(
     "direction",

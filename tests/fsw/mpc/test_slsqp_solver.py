@@ -104,6 +104,7 @@ SEARCHES = [
 ]
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize(("controller", "gradients"), SEARCHES)
 def test_both_optimisers_find_the_same_cost(controller: str, case: str, gradients: str) -> None:
@@ -230,6 +231,7 @@ def test_what_cannot_be_kept_is_infeasible() -> None:
     assert not answer.usable
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("controller", VARIANTS)
 def test_plans_come_back_through_the_planner(controller: str, case: str) -> None:

@@ -53,6 +53,7 @@ print(before - anonymous_mb())
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
 def test_what_only_building_needed_is_given_back() -> None:
     given_back = subprocess.run(

@@ -53,6 +53,7 @@ def modelled(tau: float, density: float, deviation: float, time_s: float) -> flo
     return math.sqrt(density * density / tau + markov)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("first", [0, 3], ids=["gyro", "accelerometer"])
 def test_the_allan_deviation_is_that_of_the_model(first: int) -> None:
     density, deviation, time_s = (1e-3, 4e-3, 2.0) if first == 0 else (8e-3, 2e-2, 2.0)

@@ -100,6 +100,7 @@ def drifted(seed: int, seconds: float, **keys: float) -> list[PoseMeasurement]:
     return [sensor.measure(EXACT, HOVER, 0, False) for _ in range(round(30 * seconds))]
 
 
+@pytest.mark.long
 def test_visual_odometry_walks_off_with_the_root_of_time_and_leaves_gravity_alone() -> None:
     ends = [drifted(seed, 20.0, drift_m=0.01, drift_deg=0.1)[-1] for seed in range(150)]
     z = np.array([one.p_WB[2] for one in ends]) - EXACT.p_WB[2]
@@ -132,6 +133,7 @@ def test_visual_odometry_jumps_back_to_near_the_truth_and_says_so() -> None:
     assert said[0].from_cameras_on_board
 
 
+@pytest.mark.long
 def test_visual_odometry_states_how_far_it_may_have_drifted() -> None:
     keys = {"drift_m": 0.01, "drift_deg": 0.3, "recognises_every_s": 8.0, "recognised_m": 0.002}
     ends = [drifted(seed, 10.0, position_m=0.001, **keys)[-1] for seed in range(300)]

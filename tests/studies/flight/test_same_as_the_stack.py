@@ -29,6 +29,7 @@ DURATION_S = 2.0
 SEED = 100
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("suite", "apart"),
     [("perfect", 1e-5), pytest.param("mocap", 3e-5, marks=pytest.mark.long)],

@@ -24,6 +24,7 @@ def flown(
     return Job("full", path, config, 1000).row()
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("case", ["I", "II"])
 def test_blf_completes_with_room_to_spare(case: Case) -> None:
     row = flown(case, "blf")
@@ -33,6 +34,7 @@ def test_blf_completes_with_room_to_spare(case: Case) -> None:
     assert not row.failures
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("case", ["I", "II"])
 @pytest.mark.parametrize("controller", ["naive", "hc"])
 def test_naive_and_hc_fail_in_disturbance(case: Case, controller: str) -> None:
@@ -42,6 +44,7 @@ def test_naive_and_hc_fail_in_disturbance(case: Case, controller: str) -> None:
     assert row.margin_m < -0.01
 
 
+@pytest.mark.long
 def test_no_tightening_is_enough_at_a_wall_that_is_seen_too_late() -> None:
     hard, soft = flown("I", "hc", 100), flown("I", "hc", 100, soft=True)
     assert not hard.completed

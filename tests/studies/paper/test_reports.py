@@ -77,6 +77,7 @@ def test_table_4_at_speed_has_every_tightening_and_scenarios_of_its_own() -> Non
     )
 
 
+@pytest.mark.long
 def test_rivals_have_their_settings_and_a_front_of_what_nobody_beats(tmp_path: Path) -> None:
     tiny = replace(TINY, family="dash", duration_s=0.2)
     report = study("rivals")(tiny, Campaign(0))
@@ -118,6 +119,7 @@ def test_a_page_of_tuning_seeds_says_so(table4: Report, tmp_path: Path) -> None:
     assert "not how well it carries over" in page
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("name", ["fig2", "fig6", "fig7", "fig8"])
 def test_a_figure_has_its_numbers_beside_it(name: str, tmp_path: Path) -> None:
     report = study(name)(TINY, Campaign(0, report=silent))
