@@ -17,7 +17,8 @@ import matplotlib as mpl
 
 from docs.figures.animation import draw_animation
 from docs.figures.browser import NoBrowser
-from docs.figures.dash import draw_dash
+from docs.figures.dash import draw_dash, fly_four, shown
+from docs.figures.dash_animation import draw_dash_animation
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
@@ -65,7 +66,10 @@ def draw_all(flights: Path) -> None:
         draw_architecture(IMAGES / "architecture.svg")
         draw_timing(IMAGES / "timing.svg")
         draw_frames(IMAGES / "frames.svg")
-        draw_dash(IMAGES / "dash.svg")
+        dash = shown()
+        four = fly_four(dash)
+        draw_dash(dash, four, IMAGES / "dash.svg")
+        draw_dash_animation(dash, four, IMAGES / "dash.webp")
         for flown, name in PICTURED.items():
             draw_flight(fly(*flown, flights), IMAGES / name)
     pictured, shown = (fly(*flown, flights) for flown in (next(iter(PICTURED)), SHOWN))

@@ -20,7 +20,7 @@ NO_PLAN: Final = "#8250df"
 NAMES: Final = {"naive": "Naive MPC", "hc": "MPC-HC", "sc": "MPC-SC", "blf": "MPC-BLF"}
 _SHOWN_S: Final = (3.5, 17.0)
 _ON_WHITE: Final = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
-_PLAN_S: Final = 0.1
+PLAN_S: Final = 0.1
 _SLOWER: Final = 0.1  # m/s, less than without a safety term: it brakes
 
 
@@ -30,6 +30,7 @@ class Dash:
 
     t: np.ndarray[Any, Any]  # (points,) s
     distance: dict[str, np.ndarray[Any, Any]]  # (points,) m to the wall, of base and others
+    along: dict[str, np.ndarray[Any, Any]]  # (points,) m beside the wall, of the same
     speed: np.ndarray[Any, Any]  # (points,) m/s of the base towards the wall
     failed_s: list[float]  # planning steps without a plan
     reason: str
@@ -52,19 +53,29 @@ def fly_dash(flown: Scenario, name: str) -> Dash:
         "reference": np.array([point.p_target for point in points]),
     }
     distance = {key: path @ n - wall.offset_m for key, path in paths.items()}
+    along = np.cross(n, (0.0, 0.0, 1.0))  # level, like the normal
     return Dash(
         t=t,
         distance=distance,
+        along={key: path @ along for key, path in paths.items()},
         speed=-np.gradient(distance["base"], t),
-        failed_s=[_PLAN_S * number for number in result.planner.failed_ids],
+        failed_s=[PLAN_S * number for number in result.planner.failed_ids],
         reason=result.truth.end_reason,
     )
 
 
-def draw_dash(target: Path) -> None:
-    """Fly and draw the four."""
-    flown = scenario("I", disturbed=False, duration_s=_SHOWN_S[1], family="dash")
-    flights = {name: fly_dash(flown, name) for name in NAMES}
+def shown() -> Scenario:
+    """The scenario, as far as it is drawn."""
+    return scenario("I", disturbed=False, duration_s=_SHOWN_S[1], family="dash")
+
+
+def fly_four(flown: Scenario) -> dict[str, Dash]:
+    """Fly every controller of ``NAMES``."""
+    return {name: fly_dash(flown, name) for name in NAMES}
+
+
+def draw_dash(flown: Scenario, flights: dict[str, Dash], target: Path) -> None:
+    """Draw the four over time."""
     figure, axes = plt.subplots(
         2, 4, figsize=(11.0, 5.2), sharex=True, sharey="row", layout="constrained"
     )
@@ -104,7 +115,7 @@ def _draw_distance(axes: Axes, flight: Dash, clearance: float) -> None:
             "contact", (flight.t[-1], 0.0), (4, 6), textcoords="offset points", fontsize=8
         )
     for t in flight.failed_s:
-        axes.axvspan(t, t + _PLAN_S, color=NO_PLAN, alpha=0.3, linewidth=0.0)
+        axes.axvspan(t, t + PLAN_S, color=NO_PLAN, alpha=0.3, linewidth=0.0)
     if flight.failed_s:
         first = flight.failed_s[0]
         axes.annotate(

@@ -9,8 +9,9 @@ that the loop takes to realise an acceleration,
           n\cdot a \ge -\gamma\,h - S'(d)\,n\cdot v + d_r =: b
 
 keeps h from falling faster than :math:`-\gamma h`, with :math:`d_r` left for what is not measured
-of the disturbance. An acceleration that is less is brought to b along n: the nearest one that
-keeps the condition, in closed form; several zones are satisfied one after the other, a few times.
+of the disturbance; a, like v, is relative to the zone. An acceleration that is less is brought to b
+along n: the nearest one that keeps the condition, in closed form; several zones are satisfied one
+after the other, a few times.
 
 Each part counts where it is nearest to the zone (``fsw.barriers.nearest_place``). Parts on the base
 are taken to move as its origin does. Parts on the arm count for the margin that
@@ -47,6 +48,7 @@ from fsw.shapes.zones import (
     FOLLOWS,
     KEEP_IN,
     PLANES,
+    acceleration_of,
     moved_by,
     surface_at,
     velocity_of,
@@ -146,7 +148,7 @@ def filtered(
             for which in range(int(zones[k, PLANES])):
                 if surface_at(zones, k, which, x, y, z).distance <= law.tuning.near:
                     wanted, lacked, least = _kept_off(
-                        law, probes, zones, k, which, shift, frame, v, a, wanted
+                        law, probes, zones, k, which, shift, estimate.t_us, frame, v, a, wanted
                     )
                     again, margin = again or lacked, min(margin, least)
         changed = changed or again
@@ -163,13 +165,15 @@ def _kept_off(
     zone: int,
     which: int,
     shift: NDArray[np.float64],
+    t_us: int,
     frame: NDArray[np.float64],
     v: Vec3,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
     """``filtered`` for one plane of one zone, once."""
-    relative, follows = subtract(v, velocity_of(zones, zone)), zones[zone, FOLLOWS] > 0.0
+    relative = subtract(v, velocity_of(zones, zone, t_us))
+    acceleration, follows = acceleration_of(zones, zone), zones[zone, FOLLOWS] > 0.0
     lacked, margin = False, math.inf
     ends_do = zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0  # which are spheres
     for j in range(1 if follows else probes.shape[0]):
@@ -181,8 +185,9 @@ def _kept_off(
             distance -= probes[j, RADIUS]
         margin = min(margin, distance + zones[zone, ADDED])
         if probes[j, ON] == ON_BASE and distance + zones[zone, ADDED] > -ROOM:
-            needed = _needed(law, follows, distance, dot(n, relative), dot(n, a))
-            lacking = min(needed, _fastest(law, dot(n, v), dot(n, a))) - dot(n, wanted)
+            along, away = dot(n, a), dot(n, acceleration)
+            needed = away + _needed(law, follows, distance, dot(n, relative), along - away)
+            lacking = min(needed, _fastest(law, dot(n, v), along)) - dot(n, wanted)
             if lacking > 0.0:
                 wanted, lacked = _within(law, add_scaled(wanted, n, lacking)), True
     return wanted, lacked, margin

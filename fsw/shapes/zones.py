@@ -9,6 +9,7 @@ from numba import literal_unroll
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
+from fsw.geometry.vectors import add_scaled
 from fsw.shapes import BY_NAME, KINDS
 from fsw.shapes.kind import NUMBERS, Surface
 from fsw.signals import EndEffectorTarget, SafeSet, Vec3
@@ -24,7 +25,8 @@ KIND, KEEP_IN, CLEARANCE, PLANES, FLAT, FOLLOWS, FIRST = range(7)
 """Which of KINDS; whether to keep in; clearance [m]; how many planes each place has; whether they
 are the same everywhere; whether it rides on the target and keeps the base alone; its numbers."""
 _MOVE = FIRST + NUMBERS  # behind them its velocity, where it is at a time, that time
-ADDED = _MOVE + 7  # m, in its clearance for an uncertain estimate
+_ACCELERATION = _MOVE + 7  # m/s^2, of a target: within 0.1 s its turning moves it by millimetres
+ADDED = _ACCELERATION + 3  # m, in its clearance for an uncertain estimate
 _COLUMNS = ADDED + 1
 
 NO_ZONES: Array = np.zeros((0, _COLUMNS))
@@ -77,25 +79,32 @@ def moving_zones(
         row[_MOVE : _MOVE + 3], row[_MOVE + 6] = zone.velocity, zone.t_us
         if row[FOLLOWS] > 0.0 and target is not None:
             row[_MOVE : _MOVE + 3], row[_MOVE + 3 : _MOVE + 6] = target.v_WE, target.p_WE
-            row[_MOVE + 6] = target.t_us
+            row[_MOVE + 6], row[_ACCELERATION : _ACCELERATION + 3] = target.t_us, target.a_WE
     return rows if target is not None else rows[rows[:, FOLLOWS] == 0.0]
 
 
 @compilable
-def velocity_of(zones: Array, zone: int) -> Vec3:
+def acceleration_of(zones: Array, zone: int) -> Vec3:
+    """Acceleration [m/s^2, NED] of one of the ``zones`` (zones, k) [SI] of ``moving_zones``."""
+    k = _ACCELERATION
+    return zones[zone, k], zones[zone, k + 1], zones[zone, k + 2]
+
+
+@compilable
+def velocity_of(zones: Array, zone: int, t_us: int) -> Vec3:
     """Velocity [m/s, NED] of one of the ``zones`` (zones, columns) [SI] of ``moving_zones``."""
-    return zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
+    v = zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
+    return add_scaled(v, acceleration_of(zones, zone), 1e-6 * (t_us - zones[zone, _MOVE + 6]))
 
 
 @compilable
 def moved_by(zones: Array, zone: int, t_us: int) -> Vec3:
     """How far one of the ``zones`` (zones, columns) [SI] of ``moving_zones`` is at a time [m]."""
     elapsed = 1e-6 * (t_us - zones[zone, _MOVE + 6])
-    return (
-        zones[zone, _MOVE + 3] + elapsed * zones[zone, _MOVE],
-        zones[zone, _MOVE + 4] + elapsed * zones[zone, _MOVE + 1],
-        zones[zone, _MOVE + 5] + elapsed * zones[zone, _MOVE + 2],
-    )
+    v = zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
+    mean = add_scaled(v, acceleration_of(zones, zone), 0.5 * elapsed)
+    p = zones[zone, _MOVE + 3], zones[zone, _MOVE + 4], zones[zone, _MOVE + 5]
+    return add_scaled(p, mean, elapsed)
 
 
 @compilable
@@ -145,7 +154,7 @@ def _shifts(
     for i in range(len(times_us)):
         for k in range(len(zones)):
             follows = zones[k, FOLLOWS] > 0.0
-            shift, velocity = moved_by(zones, k, times_us[i]), velocity_of(zones, k)
+            shift, velocity = moved_by(zones, k, times_us[i]), velocity_of(zones, k, times_us[i])
             for axis in range(3):
                 moved[i, k, axis] = p_target[i, axis] if follows else shift[axis]
                 velocities[i, k, axis] = v_target[i, axis] if follows else velocity[axis]

@@ -259,7 +259,7 @@ def _judged(
         "calm": left[0] + kept[1],
         "disturbed": kept[0] + left[1],
         "both": left[0] + left[1],
-        "either": min(left),
+        "either": _short_of_leaving(task, [*calm, *disturbed], min),
     }[mark.fails]
     te = tuple(float(np.mean([row.te_m or 0.0 for row in rows])) for rows in airs)
     short += max(te[0] - mark.te_calm_m, 0.0) + max(te[1] - mark.te_disturbed_m, 0.0)
@@ -282,11 +282,13 @@ def _short_of_keeping(task: Task, rows: Sequence[Outcome]) -> float:
     return max(short, 0.0 if all(row.completed for row in rows) else _UNFINISHED_M)
 
 
-def _short_of_leaving(task: Task, rows: Sequence[Outcome]) -> float:
-    """By the seed that stays farthest inside."""
+def _short_of_leaving(
+    task: Task, rows: Sequence[Outcome], of: Callable[[Iterator[float]], float] = max
+) -> float:
+    """By the flight that stays farthest inside, where all are to leave; ``min``: where one is."""
     if any(row.error for row in rows):
         return _UNFLOWN_M
-    return max(0.0, task.beyond_m + max(map(_margin, rows)))
+    return max(0.0, task.beyond_m + of(map(_margin, rows)))
 
 
 def sentences(found: Found) -> Iterator[str]:

@@ -10,10 +10,13 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from docs.figures.__main__ import FLOWN, PICTURED
-from docs.figures.dash import NAMES
+from docs.figures.dash import NAMES, Dash, shown
+from docs.figures.dash_animation import draw_dash_animation
 from docs.figures.diagrams import draw_architecture, draw_timing
 from docs.figures.flight import draw_flight, recorded
 from docs.figures.frames import draw_frames
@@ -81,6 +84,26 @@ def test_the_picture_of_four_controllers_says_who_hits_the_wall_and_who_brakes()
     assert any(text.startswith("infeasible from") for text in said)
     assert "of 100" not in verdicts[NAMES["blf"]]
     assert any(text.startswith("brakes from") for text in said)
+
+
+@pytest.mark.parametrize("name", ["dash.webp", "flight.webp"])
+def test_what_moves_is_small_enough_for_a_page_and_is_on_one(name: str) -> None:
+    assert (IMAGES / name).stat().st_size < 400_000
+    with Image.open(IMAGES / name) as moving:
+        assert getattr(moving, "n_frames", 1) > 30
+    assert f"docs/images/{name}" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_four_move_past_the_contact(tmp_path: Path) -> None:
+    t = np.arange(0.0, 6.0, 0.4)
+    paths = {key: np.maximum(1.0 - 0.2 * t, 0.0) for key in ("base", "end-effector", "reference")}
+    whole = Dash(t, paths, paths, 0.2 - 0.0 * t, [], "flew")
+    cut = {key: path[:14] for key, path in paths.items()}
+    hit = Dash(t[:14], cut, cut, whole.speed[:14], [4.8], "hit the wall")
+    flights = {"naive": hit, "hc": hit, "sc": whole, "blf": whole}
+    draw_dash_animation(shown(), flights, tmp_path / "moving.webp")
+    with Image.open(tmp_path / "moving.webp") as moving:
+        assert getattr(moving, "n_frames", 1) == 7  # from 2 s before 5.2 s to 0.6 s after
 
 
 @pytest.mark.parametrize(

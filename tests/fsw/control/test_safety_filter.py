@@ -236,6 +236,21 @@ def test_the_sphere_rides_on_the_target_and_holds_the_base_alone() -> None:
     assert result[0] > 0.5
 
 
+def test_who_turns_with_the_target_is_left_alone_and_who_does_not_is_turned() -> None:
+    turning = (0.0, 2.6, 0.0)
+    target = EndEffectorTarget(1_000_000, (1.0, 0.0, -1.0), (0.5, 0.0, 0.0), turning)
+    zones = moving_zones(SafeSet((target_sphere((0.0, 0.0, -0.2), 0.1),)), target)
+    # 0.1 s later, as far beside the centre as the law lets a vehicle be that moves like the sphere.
+    here = at((1.05, 0.013 - 0.05, -1.2), t_us=1_100_000)
+    same = (0.5, 0.26, 0.0)
+    result, changed, margin = filtered(LAW, POINTS, zones, here, same, turning, turning)
+    assert (result, changed) == (turning, False)
+    assert margin == pytest.approx(0.05)
+    result, changed, _ = filtered(LAW, POINTS, zones, here, same, turning, ZERO)
+    assert changed
+    assert result[1] > 1.0, "it would be left behind"
+
+
 def test_less_is_asked_for_with_a_negative_allowance() -> None:
     lenient = law_of(replace(STRICT, allowance=-1.0))
     args = ((AHEAD,), (0.85, 0.0, -1.0), (0.2, 0.0, 0.0), (0.5, 0.0, 0.0))

@@ -10,6 +10,7 @@ from fsw.shapes.box import box
 from fsw.shapes.half_space import wall
 from fsw.shapes.target_sphere import target_sphere
 from fsw.shapes.zones import (
+    acceleration_of,
     all_moving_zones,
     moved_by,
     moving_zones,
@@ -64,4 +65,12 @@ def test_the_nearest_plane_for_kernels_is_that_of_the_surface() -> None:
     found = tuple(nearest_plane(rows, k, p, 2_500_000) for k in range(len(rows)))
     assert found == surfaces(zones, p, 2_500_000)
     assert moved_by(rows, 0, 2_500_000) == (0.5, -1.0, 0.25)
-    assert velocity_of(rows, 0) == MOVING.velocity
+    assert velocity_of(rows, 0, 2_500_000) == MOVING.velocity
+
+
+def test_a_sphere_that_follows_turns_with_its_target() -> None:
+    target = EndEffectorTarget(1_000_000, (1.0, 2.0, 3.0), (0.5, 0.0, -1.0), (2.0, -3.0, 0.0))
+    rows = moving_zones(SafeSet((SPHERE,)), target)
+    np.testing.assert_allclose(moved_by(rows, 0, 1_200_000), (1.14, 1.94, 2.8))
+    np.testing.assert_allclose(velocity_of(rows, 0, 1_200_000), (0.9, -0.6, -1.0))
+    assert acceleration_of(rows, 0) == target.a_WE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -49,6 +50,17 @@ def test_no_tightening_is_enough_at_a_wall_that_is_seen_too_late() -> None:
     assert not hard.completed
     assert hard.failures  # there was no plan
     assert not soft.completed  # its rows gave way by more than they were tightened
+
+
+def test_the_safety_filter_takes_no_turn_of_the_target_for_a_breach() -> None:
+    """As `pandion fly` flies: with the filter, which the tables leave out."""
+    config = replace(configuration("full"), soft=False)
+    path = scenario("II", disturbed=True, duration_s=20.0, family="dash")
+    row = Job("full", path, config, 1000).row()
+    assert row.completed, row.reason
+    assert not row.modes
+    assert row.margin_m is not None
+    assert row.margin_m > 0.02
 
 
 def test_the_vehicle_takes_the_paths_as_they_are() -> None:

@@ -85,6 +85,18 @@ def test_a_scenario_is_found_that_decides_as_wanted(tmp_path: Path) -> None:
     assert as_json(found)["marks"][0]["fails"] == "both"
 
 
+def test_of_either_one_flight_that_is_not_completed_is_enough(tmp_path: Path) -> None:
+    def rare(job: Job) -> float:
+        if job.config.planner.hard_slack is not None:  # the softened one
+            return -0.1 if job.scenario.disturbances and job.seed % 2 else 0.5
+        return margin(job)
+
+    campaign: Any = Judged(rare)
+    found = search(load_task(write(tmp_path)), campaign, 1)
+    assert found.shortfall_m == 0.0
+    assert found.decides
+
+
 def test_the_judge_flies_the_whole_duration_with_other_seeds(tmp_path: Path) -> None:
     campaign: Any = Judged(margin)
     search(load_task(write(tmp_path)), campaign, 1)
