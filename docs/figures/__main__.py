@@ -72,13 +72,13 @@ def draw_all(flights: Path) -> None:
         draw_dash_animation(dash, four, IMAGES / "dash.webp")
         for flown, name in PICTURED.items():
             draw_flight(fly(*flown, flights), IMAGES / name)
-    pictured, shown = (fly(*flown, flights) for flown in (next(iter(PICTURED)), SHOWN))
+    pictured, watched = (fly(*flown, flights) for flown in (next(iter(PICTURED)), SHOWN))
     try:
-        draw_view(shown, IMAGES / "view.png")
+        draw_view(watched, IMAGES / "view.png")
         draw_animation(pictured, IMAGES / "flight.webp")
         draw_report(pictured, IMAGES / "report.png")
         draw_inspector(pictured, IMAGES / "top.png")
-        draw_pages([pictured, shown], fly_campaign(flights), PAGES)
+        draw_pages([pictured, watched], fly_campaign(flights), PAGES)
     except NoBrowser as missing:
         print(f"the pictures of pages stay as they are: {missing}")
     numbers = [recorded(fly(*flown, flights)) for flown in FLOWN]
