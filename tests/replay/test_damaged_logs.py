@@ -140,9 +140,11 @@ def test_what_is_wrong_is_named(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert was in whole
     log = tmp_path / "flight.ulg"
-    log.write_bytes(whole.replace(was, becomes, 1))
+    log.write_bytes(whole)
+    data = open_log(log).at if was.startswith(b"D") else 0  # numbers among definitions look so too
+    assert was in whole[data:]
+    log.write_bytes(whole[:data] + whole[data:].replace(was, becomes, 1))
     assert replay.main([str(log), "--verify"]) == 2
     sentence = capsys.readouterr().err
     assert reported in sentence
