@@ -56,6 +56,7 @@ def test_on_a_noisy_machine_there_is_no_pass_and_no_fail(noise: MachineNoise) ->
     assert result(judge(AT_BUDGET, BUDGETS), noise) == "too noisy"
 
 
+@pytest.mark.long
 def test_a_loop_that_only_sleeps_sees_the_machine_stand_still_and_leaves_nothing() -> None:
     before = _descendants()
     with BareLoops() as bare:

@@ -126,6 +126,7 @@ def one_refusal(directory: Path, capsys: pytest.CaptureFixture[str], *words: str
     return err
 
 
+@pytest.mark.long
 def test_a_campaign_that_is_not_as_it_was_flown_is_not_certified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

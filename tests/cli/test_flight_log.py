@@ -190,6 +190,7 @@ def test_export_to_mcap_reads_with_its_own_library(log: Path, tmp_path: Path) ->
     assert [values["q"][1] for _, values in found] == read["q[1]"].tolist()
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

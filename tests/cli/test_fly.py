@@ -246,6 +246,7 @@ def test_a_flight_without_an_end_is_ended_by_its_user(
         clean_up(process)
 
 
+@pytest.mark.long
 def test_children_die_with_a_killed_parent(tmp_path: Path) -> None:
     process = start("fly", "--api", "none", "--gcs", f"udp:127.0.0.1:{free_port()}", cwd=tmp_path)
     try:

@@ -96,7 +96,7 @@ def assert_linear(short: Callable[[], object], long: Callable[[], object]) -> No
     assert took < max(MOST_RATIO * seconds(short), RESOLVED_S)
 
 
-@pytest.mark.drawn(8)
+@pytest.mark.drawn(5)
 @pytest.mark.requirement("REQ-LINK-9")
 @pytest.mark.parametrize("kind", [*TOML, *OTHERS])
 def test_a_text_of_four_times_the_length_takes_about_four_times_as_long(kind: str) -> None:

@@ -189,6 +189,7 @@ def value_of(name: bytes, value: float, count: int, index: int) -> bytes:
     return FrameWriter(1, 1).frame(ids.PARAM_VALUE, value, count, index, name, 9)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("frame", "missing"),
     [

@@ -63,6 +63,7 @@ KILLED = r"FAIL fsw ended with code -9.*step \d{3,}"
 NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl did not end"
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("pace", "half", "number", "sentence"),
     [

@@ -48,6 +48,7 @@ def test_a_simulator_that_leaves_no_result_is_a_failure(tmp_path: Path) -> None:
     assert flown.failure == f"sitl ended without a result; see {tmp_path / 'sitl.log'}"
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("reported", [[], [SHUT_DOWN]])
 def test_a_process_that_has_to_be_killed_is_a_failure(reported: list[str], tmp_path: Path) -> None:
     begin_s = time.monotonic()

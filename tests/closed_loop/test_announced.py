@@ -63,6 +63,7 @@ def fastest(flight: Flight, seconds: float) -> float:
     return most
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-SAFE-7")
 @pytest.mark.parametrize(
     "zone",
@@ -135,6 +136,7 @@ def streamed(flight: Flight, moved: Vec3, begin_s: float, end_s: float, lasts_s:
     return most
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(
     ("moved", "lasts_s"),

@@ -53,6 +53,7 @@ def test_a_weak_rotor_is_named_once_and_the_vehicle_lands_with_it() -> None:
     assert sent[1] / sent[3] == pytest.approx(1.0 / 0.6, rel=0.15)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-ACT-1")
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
 @pytest.mark.parametrize("lost", ["encoder", "vio"])

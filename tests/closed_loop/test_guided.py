@@ -287,6 +287,7 @@ def test_a_lost_ground_station_is_acted_upon_as_the_parameter_says(action: int, 
         assert flight.snapshot.failsafe_from is None, "the pilot has taken it back"
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("action", "mode"), [(3, Mode.RETURN), (4, Mode.LAND), (5, Mode.HOLD)])
 def test_lost_set_points_are_acted_upon_as_the_parameter_says(action: int, mode: Mode) -> None:
     flight = hovering(config=limits(setpoint_loss_action=action))

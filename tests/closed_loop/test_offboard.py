@@ -381,6 +381,7 @@ def any_setpoint(chance: random.Random) -> dict[str, Any]:
     return {**chance.choice(kinds), **(joints if chance.random() < 0.4 else {})}
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(
     "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))]

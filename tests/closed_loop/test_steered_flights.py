@@ -231,6 +231,7 @@ def test_a_vehicle_that_slides_when_it_comes_down_is_not_flown_against_the_groun
     assert not flight.snapshot.armed, "while it still slides"
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("arm_deg", [(0.0, 30.0), (40.0, 45.0), (-30.0, 60.0)])
 def test_the_fastest_landing_that_can_be_set_does_not_fight_the_ground(
     arm_deg: tuple[float, float],

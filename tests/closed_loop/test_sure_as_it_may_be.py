@@ -82,6 +82,7 @@ def test_with_a_suites_errors_the_estimate_is_not_too_sure(suite: str) -> None:
     assert not too_sure(suite, flights=24, seconds=6.0)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-2")
 def test_a_few_flights_on_satellites_are_not_too_sure() -> None:
     assert not too_sure("rtk", flights=4, seconds=4.0)

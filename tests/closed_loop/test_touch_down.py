@@ -56,6 +56,7 @@ def stopped_at(suite: str, seed: int, wrong: Vec3, from_s: float) -> float | Non
     return None
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-9")
 @pytest.mark.parametrize(
     ("suite", "seed", "wrong", "from_s"),
@@ -83,6 +84,7 @@ def test_nor_does_any_other(suite: str, seed: int) -> None:
     assert height is None or height < ALMOST
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-9")
 @pytest.mark.parametrize("mass", [0.8, 1.2])
 @pytest.mark.parametrize("suite", ["perfect", "rtk"])

@@ -165,6 +165,7 @@ class OnePush:
         return step + 1
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-ACT-10")
 @pytest.mark.parametrize(
     ("value", "torque", "felt"),

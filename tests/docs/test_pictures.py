@@ -94,6 +94,7 @@ def test_what_moves_is_small_enough_for_a_page_and_is_on_one(name: str) -> None:
     assert f"docs/images/{name}" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_the_four_move_past_the_contact(tmp_path: Path) -> None:
     t = np.arange(0.0, 6.0, 0.4)
     paths = {key: np.maximum(1.0 - 0.2 * t, 0.0) for key in ("base", "end-effector", "reference")}

@@ -105,6 +105,7 @@ def test_its_component_metadata(station: Station) -> None:
     assert (events["type"], events["fileCrc"]) == (4, metadata_crc(document))
 
 
+@pytest.mark.long
 def test_the_arming_checks_as_events_and_those_that_were_lost(station: Station) -> None:
     newest = station.hear(lambda m: m.get_type() == "CURRENT_EVENT_SEQUENCE", 5.0).sequence
     assert station.command(401) == 0

@@ -130,6 +130,7 @@ NEAR_A_LIMIT = [
 ]  # fmt: skip
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("q_arm", "along", "lean", "which"), NEAR_A_LIMIT)
 def test_an_arm_that_would_have_to_pass_a_limit_takes_the_nearest_pose_within_them(
     q_arm: Vec2, along: float, lean: float, which: int

@@ -106,6 +106,7 @@ def test_garbage_is_not_believed_and_the_torques_carry_on() -> None:
     assert arm.error < 0.15, "of friction that is not modelled, in half a second"
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.parametrize("by", [(0.2, 0.0), (0.0, -1.3), (0.3, 0.3), (1.0, -2.0)])
 @pytest.mark.parametrize("until", [1.52, 1.8, 3.0])
 def test_a_zero_that_has_moved_is_named_and_the_joint_is_followed_on(

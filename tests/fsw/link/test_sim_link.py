@@ -276,6 +276,7 @@ class Flight:
 AHEAD, BACK = (500_000, 6_000_000), (-10_000, -100_000, -500_000)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-TIME-4")
 @pytest.mark.parametrize("measured", [False, True], ids=["exact", "measured"])
 @pytest.mark.parametrize("jump_us", [-500_000, 6_000_000])

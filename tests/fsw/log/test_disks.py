@@ -50,6 +50,7 @@ def small_disk() -> Iterator[None]:
     signal.signal(signal.SIGXFSZ, handler)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-LOG-1")
 @pytest.mark.parametrize(
     "lockstep",

@@ -148,6 +148,7 @@ def test_items_in_floats_are_taken_and_given(vehicle: Vehicle) -> None:
     assert (items[1].x, items[1].y) == pytest.approx((0.5, -1.2345))
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_network_that_loses_doubles_and_reorders_changes_nothing(
     vehicle: Vehicle, seed: int
