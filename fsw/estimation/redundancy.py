@@ -111,6 +111,7 @@ _RATE: Final = 4.0  # rad/s
 _NOISE: Final = 20.0  # deviations of a place that is extrapolated
 # Deciding.
 _LEAD: Final = 1.0
+_DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
 _MOST: Final = 25.0  # of one residual
 _SURE: Final = 3.0  # sum of leads
 _QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
@@ -686,7 +687,7 @@ def judged(
     Where nothing that is used ``holds_attitude``, gyro and magnetometer do. What is ``lost`` says
     nothing, and is known to be of no use without this law.
     """
-    of = _sources(holds_attitude)
+    of = _sources(holds_attitude, verdict.wrong)
     used = [k for k in range(COUNT) if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)
@@ -699,6 +700,7 @@ def judged(
         if one & (verdict.wrong | lost) or not any(of[k] & one and ratios[k] > 0.0 for k in used):
             continue
         cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in used if not of[k] & one)
+        cost[one] -= _DISTURBED if one is B else 0.0
     first, *others = sorted(cost, key=cost.__getitem__)
     lead = cost[others[0]] - cost[first] if others else math.inf
     suspects = NOBODY
@@ -730,11 +732,12 @@ def judged(
     return convicted.acquitted()._replace(named=named)
 
 
-def _sources(holds_attitude: bool) -> tuple[Source, ...]:
+def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:
     if holds_attitude:
         return OF
-    # The magnetometer turns the heading, and with it what is felt.
-    return tuple([one | G | B if k in (AN, MN) else one for k, one in enumerate(OF)])
+    # A magnetometer that is used turns the heading, and with it what is felt.
+    turn = G | B & ~wrong
+    return tuple([one | turn if k in (AN, MN) else one for k, one in enumerate(OF)])
 
 
 def _with_return(

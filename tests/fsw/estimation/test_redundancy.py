@@ -220,6 +220,17 @@ def test_iron_that_turns_with_the_vehicle_is_nobody_s_fault(iron: Vec3) -> None:
 
 
 @pytest.mark.requirement("REQ-EST-13")
+def test_where_rotors_half_know_it_the_field_is_suspected_and_not_the_gyro() -> None:
+    ratios = [0.0] * redundancy.COUNT
+    ratios[redundancy.GB], ratios[redundancy.MB] = 1.8, 0.7
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=False)
+    assert verdict.suspects == Source.COMPASS
+    ratios[redundancy.GM], ratios[redundancy.MB] = 1.3, 0.0
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=False)
+    assert verdict.suspects & Source.GYRO
+
+
+@pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("turning", [(2.0, 0.0, 0.0), (0.0, -1.5, 1.5)])
 def test_a_field_that_turns_as_the_rotors_turn_nothing_is_named(turning: Vec3) -> None:
     """Gyro and field contradict each other, and the rotors know who is right."""
@@ -281,6 +292,9 @@ def test_a_field_that_has_turned_the_heading_is_a_suspect_beside_the_gyro() -> N
         verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
     assert verdict.suspects == Source.GYRO | Source.COMPASS
     assert not verdict.wrong
+    without = verdict._replace(wrong=Source.COMPASS)
+    without = judged(without, tuple(ratios), now, holds_attitude=False)
+    assert without.suspects & Source.GNSS, "the heading of one that is not used turns nothing"
 
 
 def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
