@@ -35,6 +35,10 @@ _REPEATS: Final[dict[type, int]] = {
     PressureSample: 40,
     RangeSample: 40,
 }
+# In one message, so many numbers that are not 0 repeat themselves while others do not: an axis is
+# stuck. A fix has coarse places, and by chance one of them says the same for a second.
+_ALIKE: Final[dict[type, int]] = {PoseSample: 1, GnssSample: 2}
+_IN_A_ROW: Final = 5
 _SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
 _QUIET: Final = 10.0  # s without a fault, until the same one is told again at once
 _LASTS: Final = 1.0  # s, for which one that came back sooner must last; gaps are no longer
@@ -69,6 +73,7 @@ class Health(NamedTuple):
     fault: SensorFault = SensorFault.NONE  # the last one
     fault_at: float = -math.inf  # s
     known: tuple[FaultSeen, ...] = ()  # of every kind of fault so far, the last one
+    alike: tuple[int, ...] = ()  # how often in a row each number was the same, of what has noise
 
     def fault_now(self, came: float, now: float, stale: float) -> SensorFault:
         """What is wrong at ``now`` [s] with a sensor that ``came`` [s] last.
@@ -132,21 +137,33 @@ def arrived(
         return health.with_fault(SensorFault.REPEATED, now), SensorFault.REPEATED
     numbers = numbers_of(sample)
     repeats = health.repeats + 1 if numbers == health.numbers and not still() else 0
+    alike = _alike(health, numbers) if type(sample) in _ALIKE and not still() else ()
     if isinstance(sample, GnssSample) and not sample.has_fix:
         fault = SensorFault.NO_FIX
     elif not math.isfinite(sum(numbers)):
         fault = SensorFault.NOT_FINITE
     elif not _plausible(sample, tuning):
         fault = SensorFault.IMPLAUSIBLE
-    elif repeats > _REPEATS[type(sample)]:
+    elif repeats > _REPEATS[type(sample)] or _is_stuck(sample, alike):
         fault = SensorFault.STUCK
     else:
         fault = SensorFault.NONE
     apart = min(sample.time - health.time, _LONGEST_APART)
     # By position: the names of all fields cost as much as the checks.
     sensor, seen, rest = health.sensor, health.seen + 1, health[7:]
-    health = Health(sensor, sample.time, now, apart, seen, numbers, repeats, *rest)
+    health = Health(sensor, sample.time, now, apart, seen, numbers, repeats, *rest[:-1], alike)
     return (health.with_fault(fault, now) if fault else health), fault
+
+
+def _alike(health: Health, numbers: tuple[float, ...]) -> tuple[int, ...]:
+    before = health.alike or (0,) * len(numbers)
+    same = zip(before, health.numbers or numbers, numbers, strict=True)
+    return tuple([count + 1 if new == old and new else 0 for count, old, new in same])
+
+
+def _is_stuck(sample: Aiding, alike: tuple[int, ...]) -> bool:
+    repeat = [count for count in alike if count >= _IN_A_ROW]
+    return len(repeat) >= _ALIKE.get(type(sample), len(alike) + 1)
 
 
 def numbers_of(sample: Aiding) -> tuple[float, ...]:

@@ -517,6 +517,37 @@ def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
     assert START + 2.5 - fused[0] > 0.2
 
 
+@pytest.mark.requirement("REQ-EST-11")
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("suite", [MOCAP, RTK], ids=["mocap", "rtk"])
+def test_an_axis_that_repeats_itself_is_stuck_while_the_others_go_on(
+    suite: Suite, axis: int
+) -> None:
+    held: list[Sample] = []
+
+    def change(now: float, sample: Sample) -> Sample:
+        if not isinstance(sample, PoseSample | GnssSample) or sample.time < START + 1.0:
+            return sample
+        held.append(sample)
+        first = held[0]
+        assert isinstance(first, type(sample))
+        place = list(sample.position)
+        place[axis] = first.position[axis]
+        x, y, z = place
+        if isinstance(sample, PoseSample):
+            return replace(sample, position=(x, y, z))
+        assert isinstance(first, GnssSample)
+        velocity = list(sample.velocity)
+        velocity[axis] = first.velocity[axis]
+        u, v, w = velocity
+        return replace(sample, position=(x, y, z), velocity=(u, v, w))
+
+    seconds = 1.5 if suite is MOCAP else 3.0
+    sensor = Sensor.POSE if suite is MOCAP else Sensor.GNSS
+    assert (sensor, SensorFault.STUCK) in Flown(run(suite, 8, seconds), change).found
+    assert (sensor, SensorFault.STUCK) not in Flown(run(suite, 8, seconds)).found
+
+
 def test_a_tick_leaves_the_memory_it_was_given_as_it_was() -> None:
     flown = run(MOCAP, 9, 0.3)
     fusion, memory = SensorFusion(MOCAP.tuning), at_start()
