@@ -517,7 +517,7 @@ def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
     assert START + 2.5 - fused[0] > 0.2
 
 
-@pytest.mark.requirement("REQ-EST-11")
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("suite", [MOCAP, RTK], ids=["mocap", "rtk"])
 def test_an_axis_that_repeats_itself_is_stuck_while_the_others_go_on(
