@@ -46,6 +46,7 @@ _SUSPECTED_SPEED: Final = 0.3  # m/s
 _SUSPECTED_RATE: Final = 0.5  # rad/s
 _SUSPECTED_TURN: Final = 0.03  # rad
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
+_USED: Final = 0.5  # s; what was refused for longer finds no bias
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
 _ROUNDING: Final = 1e-9  # s
 
@@ -128,10 +129,12 @@ class Arbitration:
         return True, time, sample.field, NO_TURN, self._tuning.mag_noise, 0.0
 
     def _aided(self, memory: FusionMemory, now: float) -> Source:
-        """Who measures places at ``now`` [s] and is not named."""
+        """Who measures places that are used at ``now`` [s], and is not named."""
         found = NOBODY
         for sensor, source in ((Sensor.POSE, Source.POSE), (Sensor.GNSS, Source.GNSS)):
-            if now - memory.of(sensor).came <= self._tuning.stale_time:
+            health = memory.of(sensor)
+            used = now - min(health.fused, default=-math.inf) <= _USED
+            if used and now - health.came <= self._tuning.stale_time:
                 found |= source
         return found & ~memory.verdict.wrong
 

@@ -73,6 +73,7 @@ _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 # wrong by as much before it is found out.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
+_JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
 _SOURCES: Final = {
     PoseSample: Source.POSE,
     GnssSample: Source.GNSS,
@@ -369,7 +370,9 @@ class SensorFusion:
         """Let the filter go on ``until`` [s], fuse what it reaches, and predict the present."""
         waits = memory.waiting
         if waits and waits[0].time <= until:
-            if (len(waits) == 1 or waits[1].time > until) and self._is_plain(memory, waits[0]):
+            if (len(waits) == 1 or waits[1].time > until) and self._is_plain(
+                memory, waits[0], asked.times[0]
+            ):
                 memory, known, fused = self._do_with_pose(memory, asked, waits[0], until)
                 if fused:
                     return memory, known
@@ -381,7 +384,7 @@ class SensorFusion:
                 memory = self._fuse_first(memory, asked.times[0])
         return self._do(memory, asked, kernels.END, until)
 
-    def _is_plain(self, memory: FusionMemory, one: Waiting) -> bool:
+    def _is_plain(self, memory: FusionMemory, one: Waiting, now: float) -> bool:
         """Whether a sample is a pose as most are: of a frame that stays, and has not jumped."""
         sample = one.sample
         return (
@@ -389,6 +392,7 @@ class SensorFusion:
             and not sample.drifts
             and memory.reset_counter in (None, sample.reset_counter)
             and memory.delay_sigma == self.tuning.pose_delay_sigma
+            and not any(self._long_refused(memory, now))
         )
 
     def _do_with_pose(
@@ -487,12 +491,25 @@ class SensorFusion:
             drifts = sample.drifts
             if drifts:
                 memory = self._with_frame(memory, sample, announced)
-        previous = memory.numbers[0].copy() if announced and drifts else None
+        refused = self._long_refused(memory, now) if isinstance(sample, PoseSample) else ()
+        kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
         ratio = self._update.fuse(memory, one)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
+        passes = [r <= 1.0 and long for r, long in zip(ratio, refused, strict=False)]
+        if any(passes) and not _is_small(sample, innovation):
+            # By now the gate is so wide that of garbage some is within it: a run has to say so.
+            memory.numbers[0] = kept
+            ratio = tuple([max(r, _JUST_REFUSED) for r in ratio])
+        previous = kept if announced and drifts else None
         return self._judged(
             memory, one, ratio, innovation, now, announced=announced, previous=previous
         )
+
+    def _long_refused(self, memory: FusionMemory, now: float) -> tuple[bool, ...]:
+        """Whether each half of the last pose was refused, and has been for long."""
+        health, most = memory.of(Sensor.POSE), self.tuning.reset_time
+        halves = zip(health.ratio, health.fused, strict=False)
+        return tuple([1.0 < ratio < math.inf and now - used > most for ratio, used in halves])
 
     def _judged(
         self,

@@ -24,12 +24,13 @@ FINE: Vec3 = (1e-6, 1e-6, 1e-6)
 
 
 def hovered(
-    *, turns: float = 0.0, angle: float = 0.0, poses: bool = True
+    *, turns: float = 0.0, angle: float = 0.0, poses: bool = True, garbage: bool = False
 ) -> tuple[FusionMemory, Source]:
     """The memory after 5 s, and all who were suspects.
 
     In the last second the gyro says that the vehicle ``turns`` [rad/s] about its vertical, and
-    encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second.
+    encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second, or
+    ``garbage`` in their place.
     """
     memory, accused, random = at_start(), NOBODY, np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -42,8 +43,10 @@ def hovered(
             JointSample(now, (reading, 0.0)),
             ImuSample(now, (0.02 * d, 0.02 * e, -9.81 + 0.02 * f), rate),
         ]
-        if tick % 5 == 0 and (poses or t < POSES_UNTIL):
-            place = 1e-3 * d, 1e-3 * e, -1.5 + 1e-3 * f
+        good = poses or t < POSES_UNTIL
+        if tick % 5 == 0 and (good or garbage):
+            scatter = 1e-3 if good else 20.0
+            place = scatter * d, scatter * e, -1.5 + scatter * f
             samples.insert(0, PoseSample(now, place, LEVEL, FINE, FINE))
         memory, _ = FUSION.step(memory, samples, now, model=HOVERS)
         accused |= memory.verdict.accused
@@ -51,9 +54,10 @@ def hovered(
 
 
 @pytest.mark.requirement("REQ-EST-13")
-def test_a_gyro_is_not_doubted_where_nothing_measured_could_find_its_bias() -> None:
+@pytest.mark.parametrize("garbage", [False, True])
+def test_a_gyro_is_not_doubted_where_nothing_measured_could_find_its_bias(garbage: bool) -> None:
     """Suspicion alone ended a flight whose tilt was known to 0.1 deg, because its sigma grew."""
-    memory, accused = hovered(turns=0.3, poses=False)
+    memory, accused = hovered(turns=0.3, poses=False, garbage=garbage)
     assert accused & Source.GYRO
     M = memory.numbers[0]["covariance"]
     assert max(math.sqrt(M[BG + k, BG + k]) for k in range(3)) < 0.25
