@@ -9,7 +9,7 @@ import pytest
 
 from command_line.html_page import document, table
 from docs.figures.browser import LETTER_IN, Page, page
-from docs.figures.pages import PHONE_PX
+from docs.figures.pages import DESKTOP_PX, PHONE_PX
 from docs.figures.view import shown_in_browser
 from pandion.report import write_report
 from tests.view import flights
@@ -53,6 +53,15 @@ def test_a_report_on_a_phone_is_as_wide_as_it_and_keeps_its_axes(on_a_phone: Pag
     assert on_a_phone.value(OVERLAPS) == []
     height = on_a_phone.value("document.getElementById('margins')._fullLayout._size.h")
     assert height > 180.0, "the legend has taken the axes' room"
+
+
+def test_no_table_of_a_report_is_cut_on_a_screen(tmp_path: Path) -> None:
+    report = write_report([flights.write_flight(tmp_path / "flown")], tmp_path / "report.html")
+    with page(*DESKTOP_PX) as browser:
+        browser.open(report.as_uri())
+        browser.wait_for(DRAWN, 120.0)
+        cut = "[...document.querySelectorAll('table')].filter(e => e.scrollWidth > e.clientWidth)"
+        assert browser.value(f"{cut}.length") == 0
 
 
 def test_a_number_of_the_table_of_events_is_not_cut_in_two(on_a_phone: Page) -> None:
