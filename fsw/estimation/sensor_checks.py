@@ -35,9 +35,9 @@ _REPEATS: Final[dict[type, int]] = {
     PressureSample: 40,
     RangeSample: 40,
 }
-# In one message, so many numbers that are not 0 repeat themselves while others do not: an axis is
-# stuck. A fix has coarse places, and by chance one of them says the same for a second.
-_ALIKE: Final[dict[type, int]] = {PoseSample: 1, GnssSample: 2}
+# How many numbers of a message, of those that are not 0, repeat themselves where an axis is stuck
+# and the others are not. A fix has coarse places: by chance one of them says the same for a second.
+_OF_AN_AXIS: Final[dict[type, int]] = {PoseSample: 1, GnssSample: 2}
 _IN_A_ROW: Final = 5
 _SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
 _QUIET: Final = 10.0  # s without a fault, until the same one is told again at once
@@ -66,14 +66,13 @@ class Health(NamedTuple):
     apart: float = 0.0  # s, of its time stamp from the one before
     seen: int = 0  # samples so far
     numbers: tuple[float, ...] = ()  # of that sample
-    repeats: int = 0  # how often in a row they were the same
+    repeats: tuple[int, ...] = ()  # how often in a row each of them was the same
     fused: tuple[float, ...] = ()  # s, when each part of it was fused last
     ratio: tuple[float, ...] = ()  # chi-square over gate, of each part
     innovation: tuple[float, ...] = ()  # of each part: m, m/s, rad
     fault: SensorFault = SensorFault.NONE  # the last one
     fault_at: float = -math.inf  # s
     known: tuple[FaultSeen, ...] = ()  # of every kind of fault so far, the last one
-    alike: tuple[int, ...] = ()  # how often in a row each number was the same, of what has noise
 
     def fault_now(self, came: float, now: float, stale: float) -> SensorFault:
         """What is wrong at ``now`` [s] with a sensor that ``came`` [s] last.
@@ -136,34 +135,41 @@ def arrived(
     if sample.time <= health.time:
         return health.with_fault(SensorFault.REPEATED, now), SensorFault.REPEATED
     numbers = numbers_of(sample)
-    repeats = health.repeats + 1 if numbers == health.numbers and not still() else 0
-    alike = _alike(health, numbers) if type(sample) in _ALIKE and not still() else ()
+    repeats = _repeats(health, numbers)
+    if any(repeats) and still():
+        repeats = (0,) * len(numbers)
     if isinstance(sample, GnssSample) and not sample.has_fix:
         fault = SensorFault.NO_FIX
     elif not math.isfinite(sum(numbers)):
         fault = SensorFault.NOT_FINITE
     elif not _plausible(sample, tuning):
         fault = SensorFault.IMPLAUSIBLE
-    elif repeats > _REPEATS[type(sample)] or _is_stuck(sample, alike):
+    elif _is_stuck(sample, numbers, repeats):
         fault = SensorFault.STUCK
     else:
         fault = SensorFault.NONE
     apart = min(sample.time - health.time, _LONGEST_APART)
     # By position: the names of all fields cost as much as the checks.
     sensor, seen, rest = health.sensor, health.seen + 1, health[7:]
-    health = Health(sensor, sample.time, now, apart, seen, numbers, repeats, *rest[:-1], alike)
+    health = Health(sensor, sample.time, now, apart, seen, numbers, repeats, *rest)
     return (health.with_fault(fault, now) if fault else health), fault
 
 
-def _alike(health: Health, numbers: tuple[float, ...]) -> tuple[int, ...]:
-    before = health.alike or (0,) * len(numbers)
-    same = zip(before, health.numbers or numbers, numbers, strict=True)
-    return tuple([count + 1 if new == old and new else 0 for count, old, new in same])
+def _repeats(health: Health, numbers: tuple[float, ...]) -> tuple[int, ...]:
+    """How often in a row each of the ``numbers`` [SI] of a sample has been the same."""
+    if not health.numbers:
+        return (0,) * len(numbers)
+    same = zip(health.repeats, health.numbers, numbers, strict=True)
+    return tuple([count + 1 if new == old else 0 for count, old, new in same])
 
 
-def _is_stuck(sample: Aiding, alike: tuple[int, ...]) -> bool:
-    repeat = [count for count in alike if count >= _IN_A_ROW]
-    return len(repeat) >= _ALIKE.get(type(sample), len(alike) + 1)
+def _is_stuck(sample: Aiding, numbers: tuple[float, ...], repeats: tuple[int, ...]) -> bool:
+    """Whether all ``numbers`` [SI] of a sample repeat themselves, or those of an axis do."""
+    if min(repeats) > _REPEATS[type(sample)]:
+        return True
+    needed = _OF_AN_AXIS.get(type(sample))
+    of_axis = [k for k, one in zip(repeats, numbers, strict=True) if k >= _IN_A_ROW and one]
+    return needed is not None and len(of_axis) >= needed
 
 
 def numbers_of(sample: Aiding) -> tuple[float, ...]:
