@@ -82,7 +82,7 @@ class Arbitration:
         if not aloft:
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)
-            return (_unasked(memory, now) if memory.verdict.wrong else memory), found
+            return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
         if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
             return memory, found
         return self._look(memory, now, found)
@@ -216,9 +216,9 @@ def _anew(memory: FusionMemory) -> FusionMemory:
     return begun(memory._replace(numbers=x, verdict=memory.verdict.acquitted()))
 
 
-def _unasked(memory: FusionMemory, now: float) -> FusionMemory:
+def _on_ground(memory: FusionMemory, now: float) -> FusionMemory:
     """The memory at ``now`` [s] with what was named in flight believed again, once it is time."""
-    verdict = memory.verdict.unasked(now)
+    verdict = memory.verdict.on_ground(now)
     x = memory.numbers
     if verdict.wrong is not memory.verdict.wrong:
         x = x.copy()

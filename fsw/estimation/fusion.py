@@ -31,6 +31,7 @@ from fsw.estimation.error_state import (
 )
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
+from fsw.geometry.vectors import clamp
 from fsw.signals import Vec3, Vec4
 
 _LEAST_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
@@ -89,7 +90,7 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
         squared += y[k] * y[k]
     more = min(0.5 * squared / rows, _SCALE_MOST) - _SCALE_FROM
     scale = max(x.noise_scale[scaled], 1.0) * math.exp(_SCALE_RATE * more)
-    x.noise_scale[scaled] = min(max(scale, 1.0), _SCALE_LIMIT)
+    x.noise_scale[scaled] = clamp(scale, 1.0, _SCALE_LIMIT)
 
 
 @compilable

@@ -23,6 +23,7 @@ from fsw.compiled import compilable
 from fsw.estimation.error_state import PUSHES
 from fsw.estimation.imu import doubt
 from fsw.estimation.sensor_fault import SensorFault
+from fsw.geometry.vectors import clamp
 from fsw.signals import Vec2
 
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
@@ -90,7 +91,8 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
     if time < x.joint_time:  # older than what the ring reaches back to
         return _TOO_OLD
     _advance(x, law, time)
-    far, before_it = _is_far(x, angles), x.encoder_doubted
+    said = _less_zero(x, angles)
+    far, before_it = _is_far(x, said), x.encoder_doubted
     x.encoder_doubted, x.encoder_calm = doubt(
         x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
     )
@@ -98,12 +100,18 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
         return _JUMP
     if before_it > 0 and far:
         _move_zero(x)
-        if _is_far(x, angles):
-            begin(x, law, time, (angles[0] - x.encoder_zero[0], angles[1] - x.encoder_zero[1]))
-            return _NONE
+        said = _less_zero(x, angles)
     x.encoder_leap[0], x.encoder_leap[1], x.encoder_leapt = 0.0, 0.0, 0.0
-    _correct(x, law, angles)
+    if before_it > 0 and _is_far(x, said):
+        begin(x, law, time, said)
+    else:
+        _correct(x, law, said)
     return _NONE
+
+
+@compilable
+def _less_zero(x: Any, angles: Vec2) -> Vec2:
+    return angles[0] - x.encoder_zero[0], angles[1] - x.encoder_zero[1]
 
 
 @compilable
@@ -111,7 +119,7 @@ def _is_far(x: Any, angles: Vec2) -> bool:
     """Whether a reading is farther from what is expected than the filter may be wrong."""
     sigma, stray = min(math.sqrt(x.joint_variance[0, 0]), _MOST_SIGMA), 0.0
     for i in range(2):
-        stray = max(stray, abs(angles[i] - x.encoder_zero[i] - x.joints[i, 0]))
+        stray = max(stray, abs(angles[i] - x.joints[i, 0]))
     return stray > _FAR + _SIGMAS * sigma
 
 
@@ -132,7 +140,6 @@ def begin(x: Any, law: Any, time: float, angles: Vec2) -> None:
     x.joint_time = time
     while x.pushed < x.pushes_end and x.pushes[x.pushed % PUSHES, 0] <= time:
         x.pushed += 1
-    x.encoder_leap[0], x.encoder_leap[1], x.encoder_leapt = 0.0, 0.0, 0.0
     C = x.joint_variance
     for i in range(3):
         for j in range(3):
@@ -206,7 +213,7 @@ def _correct(x: Any, law: Any, angles: Vec2) -> None:
     most = _SIGMAS * math.sqrt(total)  # of a reading that is just believed, and may be garbage
     g0, g1, g2 = C[0, 0] / total, C[1, 0] / total, C[2, 0] / total
     for i in range(2):
-        surprise = min(max(angles[i] - x.encoder_zero[i] - x.joints[i, 0], -most), most)
+        surprise = clamp(angles[i] - x.joints[i, 0], -most, most)
         x.joints[i, 0] += g0 * surprise
         x.joints[i, 1] += g1 * surprise
         x.joints[i, 2] += g2 * surprise

@@ -32,6 +32,7 @@ from fsw.compiled import compilable, kernel, of_fixed_types
 from fsw.estimation.error_state import WITNESS, vec3
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
+from fsw.geometry.vectors import add_scaled, norm, subtract
 from fsw.model.airframe import GRAVITY
 from fsw.signals import Mat3, Vec3, Vec4
 
@@ -337,7 +338,7 @@ def _is_near(row: Array, time: float, place: Vec3, q: Vec4, v: Vec3, room: Vec3)
     if not room[2] < math.inf:
         return near
     turn = rotation_vector(multiply(conjugate(_quaternion(row, _MEASURED + 3)), q))
-    return near and _size(turn) <= _RATE * dt + room[2]
+    return near and norm(turn) <= _RATE * dt + room[2]
 
 
 @compilable
@@ -355,14 +356,9 @@ def _before(s: Any, kind: int, at: int, window: float, room: float) -> int:
 
 
 @compilable
-def _size(a: Vec3) -> float:
-    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-
-
-@compilable
 def _note(s: Any, now: float, k: int, window: int, r: Vec3, threshold: float) -> None:
     """Keep a residual ``r`` [SI] over its ``threshold`` [SI]; a single one may be off."""
-    ratio = _size(r) / threshold
+    ratio = norm(r) / threshold
     s.both[k, window] = min(ratio, s.raw[k, window])
     s.raw[k, window] = ratio
     s.came[k] = now
@@ -377,7 +373,7 @@ def _note_model(
     usual = max(least, _MODEL_SIGMAS * math.sqrt(squares[window]))
     _note(s, now, k, window, r, usual + noise)
     if learns:
-        size = _size(r)
+        size = norm(r)
         squares[window] += EVERY / _LEARNING * (size * size - squares[window])
 
 
@@ -393,14 +389,9 @@ def _unit_and_model(s: Any, now: float, k: int, lasting: Vec3, learns: bool) -> 
     turn, force = _difference(b, a, 1 + TURN, last), _difference(b, d, 1 + BESIDE, over)
     turn0, spun0 = _difference(d, c, 1 + TURN, first), _difference(d, c, 1 + SPUN2, first)
     spun = _difference(b, a, 1 + SPUN2, last)
-    r = (
-        turn[0] - turn0[0] - spun[0] + spun0[0],
-        turn[1] - turn0[1] - spun[1] + spun0[1],
-        turn[2] - turn0[2] - spun[2] + spun0[2],
-    )
+    r = _turned_beside(turn, turn0, spun, spun0)
     _note_model(s, now, GM, k, r, _TURN_OFF, 0.0, learns)
-    r = (force[0] - lasting[0], force[1] - lasting[1], force[2] - lasting[2])
-    _note_model(s, now, AM, k, r, _FORCE_OFF[k], 0.0, learns)
+    _note_model(s, now, AM, k, subtract(force, lasting), _FORCE_OFF[k], 0.0, learns)
 
 
 @compilable
@@ -411,6 +402,17 @@ def _difference(b: Array, a: Array, column: int, over: float) -> Vec3:
         (b[column + 1] - a[column + 1]) / over,
         (b[column + 2] - a[column + 2]) / over,
     )
+
+
+@compilable
+def _over(a: Vec3, seconds: float) -> Vec3:
+    return a[0] / seconds, a[1] / seconds, a[2] / seconds
+
+
+@compilable
+def _turned_beside(rate: Vec3, rate0: Vec3, spun: Vec3, spun0: Vec3) -> Vec3:
+    """By how much a rate has changed [rad/s, FRD] beside what rotors have ``spun``."""
+    return add_scaled(subtract(subtract(rate, rate0), spun), spun0, 1.0)
 
 
 @compilable
@@ -454,19 +456,13 @@ def _unit_and_pose(
     before = b[0] - a[0]
     turn0, turn = rotation_vector(_apart(a, b, _MEASURED + 3)), rotation_vector(seen)
     spun0, spun = _difference(b, a, _AT + SPUN2, before), _difference(c, b, _AT + SPUN2, over)
-    r = (
-        turn[0] / over - turn0[0] / before - spun[0] + spun0[0],
-        turn[1] / over - turn0[1] / before - spun[1] + spun0[1],
-        turn[2] / over - turn0[2] / before - spun[2] + spun0[2],
-    )
+    r = _turned_beside(_over(turn, over), _over(turn0, before), spun, spun0)
     _note_model(s, now, MP_TURN, k, r, _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning, learns)
     bent = _bend(c, b, a, _MEASURED)
     felt, made = _bend(c, b, a, _AT + FELT2), _bend(c, b, a, _AT + MADE2)
     noise = _BEND_SIGMAS * math.sqrt(18.0) * sigma / (over * over)
-    r = (bent[0] - felt[0], bent[1] - felt[1], bent[2] - felt[2])
-    _note(s, now, AP, k, r, _ACCEL_OFF + noise)
-    r = (bent[0] - made[0], bent[1] - made[1], bent[2] - made[2])
-    _note_model(s, now, MP_FORCE, k, r, _FORCE_OFF_AIDED, noise, learns)
+    _note(s, now, AP, k, subtract(bent, felt), _ACCEL_OFF + noise)
+    _note_model(s, now, MP_FORCE, k, subtract(bent, made), _FORCE_OFF_AIDED, noise, learns)
 
 
 @compilable
@@ -484,10 +480,8 @@ def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns
     change = _difference(b, a, velocity, over)
     felt, made = _difference(b, a, _AT + FELT, over), _difference(b, a, _AT + MADE, over)
     noise = 2.5 * speed / over
-    r = (change[0] - felt[0], change[1] - felt[1], change[2] - felt[2])
-    _note(s, now, AN, k, r, _ACCEL_OFF + noise)
-    r = (change[0] - made[0], change[1] - made[1], change[2] - made[2])
-    _note_model(s, now, MN, k, r, _FORCE_OFF_AIDED, noise, learns)
+    _note(s, now, AN, k, subtract(change, felt), _ACCEL_OFF + noise)
+    _note_model(s, now, MN, k, subtract(change, made), _FORCE_OFF_AIDED, noise, learns)
     x, y, z = 0.0, 0.0, 0.0
     for j in range(first, last):
         c, d = s.aids[1, j % _AIDS], s.aids[1, (j + 1) % _AIDS]
@@ -526,9 +520,9 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
         return
     c, b = s.aids[2, last % _AIDS], s.aids[2, middle % _AIDS]
     over, off, v = c[0] - b[0], _field_off(b, c), vec3(c, _MEASURED)
-    off = off[0] / over, off[1] / over, off[2] / over
-    iron = _IRON * _size(rotation_vector(_apart(b, c, _AT + SAID)))
-    noise = _NOISE_SIGMAS * noise / max(_size(v), 1e-3)
+    off = _over(off, over)
+    iron = _IRON * norm(rotation_vector(_apart(b, c, _AT + SAID)))
+    noise = _NOISE_SIGMAS * noise / max(norm(v), 1e-3)
     _note(s, now, GB, k, _across(bias, v, off), _GYRO_OFF + (iron + noise) / over)
     first = _before(s, 2, middle, T, 0.03)
     if first < 0:
@@ -537,20 +531,17 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
     before, off0 = b[0] - a[0], _field_off(a, b)
     turn, turn0 = _difference(c, b, _AT + TURN, over), _difference(b, a, _AT + TURN, before)
     spun, spun0 = _difference(c, b, _AT + SPUN2, over), _difference(b, a, _AT + SPUN2, before)
-    r = (
-        turn[0] - turn0[0] - spun[0] + spun0[0] + off[0] - off0[0] / before,
-        turn[1] - turn0[1] - spun[1] + spun0[1] + off[1] - off0[1] / before,
-        turn[2] - turn0[2] - spun[2] + spun0[2] + off[2] - off0[2] / before,
-    )
-    iron += _IRON * _size(rotation_vector(_apart(a, b, _AT + SAID)))
-    aloud = (iron + 2.0 * noise) / over
-    _note_model(s, now, MB, k, _across(r, v, (0.0, 0.0, 0.0)), _TURN_OFF_AIDED, aloud, learns)
+    rate, rate0 = add_scaled(turn, off, 1.0), add_scaled(turn0, off0, 1.0 / before)
+    r = _turned_beside(rate, rate0, spun, spun0)
+    iron += _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
+    room = (iron + 2.0 * noise) / over
+    _note_model(s, now, MB, k, _across(r, v, (0.0, 0.0, 0.0)), _TURN_OFF_AIDED, room, learns)
 
 
 @compilable
 def _across(a: Vec3, v: Vec3, r: Vec3) -> Vec3:
     """What of ``a`` is at right angles to the field ``v`` [Gauss], added to ``r``, both [rad/s]."""
-    size = max(_size(v), 1e-3)
+    size = max(norm(v), 1e-3)
     along = (a[0] * v[0] + a[1] * v[1] + a[2] * v[2]) / (size * size)
     return r[0] + a[0] - along * v[0], r[1] + a[1] - along * v[1], r[2] + a[2] - along * v[2]
 
@@ -598,7 +589,7 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
         _note(s, now, GP, 4, r, _GYRO_OFF_LONG + noise)
     else:
         b = s.aids[kind, last % _AIDS]
-        iron = _IRON * _size(rotation_vector(_apart(a, b, _AT + SAID)))
+        iron = _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
         _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron / over)
 
 
@@ -640,8 +631,8 @@ class Verdict(NamedTuple):
             named=NOBODY,
         )
 
-    def unasked(self, now: float) -> Verdict:
-        """The verdict at ``now`` [s] where nobody is asked, as on the ground.
+    def on_ground(self, now: float) -> Verdict:
+        """The verdict at ``now`` [s] on the ground, where nothing is compared.
 
         What was named is believed again after as long as if it agreed: its own checks are left.
         """
