@@ -37,7 +37,9 @@ _LEAST_GLANCES: Final = 24  # two minutes, to say anything
 # some minutes is not what it takes in an hour. A planner that nothing happens to lives for half.
 _LEAST_LIFE: Final = 0.25
 _MOST_GROWTH_MB_H: Final = 10.0
-_ONCE_MB: Final = 4.0  # that a process takes at some time in its first ten minutes, and no more
+_ONCE_MB: Final = (
+    4.0  # that a process was seen to take once within eight minutes: no leak in so short
+)
 _MOST_FLIGHTS: Final = 3  # an hour: what is injected should not end them
 _MOST_GROUNDED: Final = 0.5  # of the time; a soak of a vehicle that stands says little
 _RECORDED: Final = ["COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"]
@@ -205,8 +207,8 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
     # What did not live for long enough is not judged, and says nothing.
     unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "planner", "sitl"))
     rows.append(Requirement("processes that were not seen for long enough", unjudged, 0, ""))
+    memory = max(_MOST_GROWTH_MB_H, _ONCE_MB / hours)
     for name, value in sorted(growth.items()):
-        memory = max(_MOST_GROWTH_MB_H, _ONCE_MB / hours)
         most, unit = (memory, "MB/h") if name.endswith("memory") else (0, "")
         rows.append(Requirement(f"{name}, growth", value, most, unit))
     return rows
