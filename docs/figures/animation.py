@@ -45,5 +45,18 @@ def draw_animation(directory: Path, target: Path) -> None:
             browser.screenshot(file)
             with Image.open(file) as whole:
                 pictures.append(whole.convert("RGB").crop(_CUT))
+    save_moving(pictures, [_LASTS_MS] * len(pictures), target)
+
+
+def save_moving(pictures: list[Image.Image], lasts_ms: list[int], target: Path) -> None:
+    """Write pictures as a WebP that moves and begins anew; each lasts so long [ms]."""
     first, *others = pictures
-    first.save(target, save_all=True, append_images=others, duration=_LASTS_MS, loop=0, quality=60)
+    first.save(
+        target,
+        save_all=True,
+        append_images=others,
+        duration=lasts_ms,
+        loop=0,
+        quality=55,
+        method=6,  # the slowest one, and the smallest file
+    )

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
+from docs.figures.animation import save_moving
 from docs.figures.dash import (
     BASE,
     END_EFFECTOR,
@@ -41,11 +42,7 @@ def draw_dash_animation(flown: Scenario, flights: dict[str, Dash], target: Path)
     shown = np.flatnonzero((t >= contact - _BEFORE_S) & (t <= contact + _AFTER_S))
     clearance = flown.walls[0].clearance_m
     pictures = [_picture(flights, int(k), clearance) for k in shown]
-    lasts = [_LASTS_MS] * (len(pictures) - 1) + [_STANDS_MS]
-    first, *others = pictures
-    first.save(
-        target, save_all=True, append_images=others, duration=lasts, loop=0, quality=70, method=6
-    )
+    save_moving(pictures, [_LASTS_MS] * (len(pictures) - 1) + [_STANDS_MS], target)
 
 
 def _picture(flights: dict[str, Dash], k: int, clearance: float) -> Image.Image:
