@@ -14,7 +14,7 @@ from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
 
 STEPS = 200
-ROUNDS = 7
+ROUNDS = 60  # a quarter of a second: longer than another process takes a core at once
 
 
 def _rival() -> Callable[[], None]:
