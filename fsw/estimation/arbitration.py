@@ -42,9 +42,11 @@ from fsw.measurements import GnssSample, MagneticSample, PoseSample
 from fsw.signals import StateEstimate
 
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
-# Of a suspect, the most that its bias may be off, and for how long it has been so [s].
+# Of a suspect: the most that its bias may be off, for how long it has been so [s], and the share of
+# it that residuals show. Places show a force late: half of it where windows are half full.
 _MOST: Final = (3.0, 0.5)  # m/s^2 and rad/s
 _FOR: Final = (0.1, 0.06)
+_SEEN: Final = (0.5, 1.0)
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
@@ -290,7 +292,8 @@ def _widened(x: Any, verdict: Verdict) -> Verdict:
     for half, ((source, _), bias, state) in enumerate(zip(_HALVES, (BA, BG), (V, TH), strict=True)):
         if not source & verdict.suspects:
             continue
-        size = min(redundancy.size_of(verdict.evidence, source), _MOST[half])
+        seen = redundancy.size_of(verdict.evidence, source)
+        size = min(seen / _SEEN[half], _MOST[half])
         x["model_walk"][half] = min(x["model_walk"][half], size)
         grown = size**2 - unknown[half] ** 2
         if grown > 0.0:

@@ -52,7 +52,11 @@ def test_whatever_is_wrong_with_it_is_told_and_nothing_is_touched(suite: str, se
         ("land", "gnss", [Fault("mag", "drifting", start_s=0.5, size=1.8)]),
         ("hold", "rtk", [Fault("accel", "drifting", start_s=0.3, size=1.2)]),
         ("trajectory", "rtk", [Fault("joint", "off", instance=1, start_s=3.0, duration_s=0.3)]),
-        ("mission", "rtk", [Fault("motor", "weak", instance=3, start_s=1.4, share=0.24)]),
+        (
+            "mission",
+            "rtk",
+            [Fault("motor", "weak", instance=3, start_s=1.4, duration_s=3.1, share=0.24)],
+        ),
     ],
 )
 @pytest.mark.parametrize("seed", range(3))
