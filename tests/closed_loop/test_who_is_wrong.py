@@ -52,11 +52,6 @@ def test_whatever_is_wrong_with_it_is_told_and_nothing_is_touched(suite: str, se
         ("land", "gnss", [Fault("mag", "drifting", start_s=0.5, size=1.8)]),
         ("hold", "rtk", [Fault("accel", "drifting", start_s=0.3, size=1.2)]),
         ("trajectory", "rtk", [Fault("joint", "off", instance=1, start_s=3.0, duration_s=0.3)]),
-        (
-            "mission",
-            "rtk",
-            [Fault("motor", "weak", instance=3, start_s=1.4, duration_s=3.1, share=0.24)],
-        ),
     ],
 )
 @pytest.mark.parametrize("seed", range(3))
@@ -65,7 +60,6 @@ def test_a_sound_gyro_is_not_tilted_by_what_it_is_suspected_for(
 ) -> None:
     """Its bias was unknown by 0.5 rad/s, whatever had been seen: 6 of 17 such flights crashed."""
     flight = fly(mode, tuple(faults), suite, 1700 + seed)
-    assert flight.contact != "wall", flight.ended
-    assert flight.contact == "" or faults[0].unit == "motor", flight.ended
+    assert flight.contact == "", flight.ended
     assert flight.away_m is not None
     assert flight.away_m < 5.0
