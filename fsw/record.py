@@ -35,6 +35,7 @@ PerJoint = Annotated[Floats, JOINTS]
 PerRotor = Annotated[Floats, ROTORS]
 
 _NUMBER: Final = 8  # bytes, of whole numbers and of others
+_NUMBERS, _ARRAY, _WHOLES = -1, -2, -3  # views of a whole record
 
 
 class Record:
@@ -59,19 +60,29 @@ class Record:
         cls.dtype, cls.size = np.dtype(layout, align=True), at
         assert cls.dtype.itemsize == at * _NUMBER
 
-    def __init__(self, numbers: Floats | None = None) -> None:
-        """Of zeros, or over ``numbers`` (size,) [SI], which it then shares."""
-        self.numbers = np.zeros(self.size) if numbers is None else numbers
-        self._views: dict[int, Any] = {}  # of arrays and records, by where they begin
+    def __init__(self, memory: Any = None) -> None:
+        """Of zeros, or over ``memory`` of as many numbers, which it then shares."""
+        self.memory = bytearray(self.size * _NUMBER) if memory is None else memory
+        self._views: dict[Any, Any] = {}  # of the whole, and of arrays and records in it
+
+    @property
+    def numbers(self) -> Floats:
+        """All numbers one after the other (size,) [SI]."""
+        views = self._views
+        if _NUMBERS not in views:
+            views[_NUMBERS] = np.frombuffer(self.memory)
+        numbers: Floats = views[_NUMBERS]
+        return numbers
 
     @property
     def array(self) -> NDArray[Any]:
         """The array of one record (1,), for a kernel."""
         if IN_PYTHON:
             return self  # type: ignore[return-value]
-        array = self._views.get(-1)
-        if array is None:
-            array = self._views[-1] = np.ndarray(1, self.dtype, self.numbers)
+        views = self._views
+        if _ARRAY not in views:
+            views[_ARRAY] = np.ndarray(1, self.dtype, self.memory)
+        array: NDArray[Any] = views[_ARRAY]
         return array
 
     def __getitem__(self, one: int) -> Self:
@@ -81,18 +92,15 @@ class Record:
 
     def copy(self) -> Self:
         """Another one with the same numbers."""
-        return type(self)(self.numbers.copy())
+        return type(self)(bytearray(self.memory))
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and self._bytes() == other._bytes()
+        return type(other) is type(self) and bytes(self.memory) == bytes(other.memory)
 
     __hash__ = None  # type: ignore[assignment]
 
-    def _bytes(self) -> bytes:
-        return self.numbers.tobytes()
-
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.numbers.copy(),)
+        return type(self), (bytearray(self.memory),)
 
     def __repr__(self) -> str:
         fields = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.dtype.names or ())
@@ -121,12 +129,16 @@ class _Whole(_Number):
     dtype = np.int64
 
     def __get__(self, record: Record | None, kind: Any = None) -> Any:
-        if record is None:
-            return self
-        return record.numbers[self._at : self._at + 1].view(np.int64).item()
+        return self if record is None else self._wholes(record).item(self._at)
 
     def __set__(self, record: Record, value: float) -> None:
-        record.numbers[self._at : self._at + 1].view(np.int64)[0] = value
+        self._wholes(record)[self._at] = value
+
+    def _wholes(self, record: Record) -> Any:
+        views = record._views
+        if _WHOLES not in views:
+            views[_WHOLES] = record.numbers.view(np.int64)
+        return views[_WHOLES]
 
 
 class _Several(_Number):
@@ -140,13 +152,11 @@ class _Several(_Number):
     def __get__(self, record: Record | None, kind: Any = None) -> Any:
         if record is None:
             return self
-        view = record._views.get(self._at)
-        if view is None:
+        views = record._views
+        if self._at not in views:
             view = record.numbers[self._at : self._at + self.count]
-            if self._kind is not None:
-                view = self._kind(view)
-            record._views[self._at] = view
-        return view
+            views[self._at] = view if self._kind is None else self._kind(view)
+        return views[self._at]
 
     def __set__(self, record: Record, value: Any) -> None:
         if self._kind is not None:
