@@ -8,7 +8,7 @@ import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from command_line.folders import NoHomeError, cache_folder
 from command_line.process import Events
@@ -48,6 +48,22 @@ class KernelCache:
 
     def _mark(self, folder: Path, what: str) -> Path:
         return folder / f"{what}-{self.compiler}.complete"
+
+
+def tell_layouts_apart(record: Any) -> None:
+    """Let numba tell records of different layouts apart; ``record`` is its class of their types.
+
+    It names code that other code calls by a number that it counts up in each process, so that of
+    two layouts, one from the disk, either could run the other's code, and silently gave its
+    numbers. And where a shorter record was compiled it takes a longer one that begins alike, with
+    no more than a warning.
+    """
+
+    def mangling_args(one: Any) -> tuple[str, tuple[str]]:
+        return "Record", (hashlib.sha256(one.name.encode()).hexdigest()[:16],)
+
+    record.mangling_args = property(mangling_args)
+    record.can_convert_to = lambda _one, _context, _other: None
 
 
 def kept_in(folder: Path) -> int:

@@ -14,13 +14,17 @@ from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from command_line.kernel_cache import KernelCache, kernel_cache
+from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
 
 # The shapes' kernels are called by a table of functions (fsw/shapes/zones.py), which numba has had
 # for years and still calls new.
 warnings.filterwarnings(
     "ignore", "First-class function type", numba.NumbaExperimentalFeatureWarning
 )
+tell_layouts_apart(numba.types.Record)
+
+IN_PYTHON: Final = bool(numba.config.DISABLE_JIT)
+"""Whether kernels are run as the Python they are, as NUMBA_DISABLE_JIT has it."""
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -123,23 +127,10 @@ def packed(numbers: Any) -> NDArray[Any]:
     A kernel reads ``packed(tuning)[0].kp`` as a law reads ``tuning.kp``; handing it over costs
     as much as one float, however many numbers are in it. Tuples become arrays: laws pick their
     entries by index. Whole numbers and truth values become floats.
-
-    Raises:
-        TypeError: An earlier record of this class had another layout.
     """
-    layout = _layout(numbers)
-    # numba names the machine code of a record's callees by a number that it counts up in each
-    # process, so that of two layouts, one from the disk cache, either can run the other's code.
-    # Seen: njit f(r), cached, calls njit g(r[0]); run it with layout A alone, then with B and A.
-    known = _LAYOUTS.setdefault(type(numbers), layout)
-    if known != layout:
-        raise TypeError(f"records of {type(numbers).__name__} have two layouts: {known}, {layout}")
-    array = np.zeros(1, dtype=layout)
+    array = np.zeros(1, dtype=_layout(numbers))
     array[0] = _values(numbers)
     return array
-
-
-_LAYOUTS: dict[type, np.dtype[Any]] = {}
 
 
 def _layout(value: Any) -> np.dtype[Any]:

@@ -11,13 +11,14 @@ import numba
 from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 
-from command_line.kernel_cache import KernelCache, kernel_cache
+from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
 
 # The shapes' kernels are called by a table of functions (sitl/distance.py), which numba has had for
 # years and still calls new.
 warnings.filterwarnings(
     "ignore", "First-class function type", numba.NumbaExperimentalFeatureWarning
 )
+tell_layouts_apart(numba.types.Record)
 
 P = ParamSpec("P")
 R = TypeVar("R")

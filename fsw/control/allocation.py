@@ -9,6 +9,7 @@ from fsw.geometry.vectors import clamp, clamp_magnitude
 from fsw.model.actuator_health import HEALTHY, ActuatorHealth, limits_of
 from fsw.model.airframe import Airframe
 from fsw.signals import Vec3, Vec4
+from fsw.tick_record import Health
 
 REAR: Final = 0
 LEFT: Final = 1
@@ -22,7 +23,7 @@ def allocate(
     torque: Vec3,
     thrust: float,
     yaw_limit: float,
-    health: ActuatorHealth = HEALTHY,
+    health: ActuatorHealth | Health = HEALTHY,
 ) -> Vec4:
     """Thrust of the rear, left, front and right rotor [N] of the '+' mixer, each within its limits.
 

@@ -25,6 +25,7 @@ from fsw.model.airframe import Airframe
 from fsw.model.kinematics import END_EFFECTOR, arm_points, links
 from fsw.model.prediction import to_vector
 from fsw.signals import PredictionState, StateEstimate, Vec2, Vec3, Vec4
+from fsw.tick_record import Estimate, PlanState
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,9 @@ class CompensationLimits:
 
 
 @compilable
-def planned_end_effector(airframe: Airframe, plan: PredictionState) -> tuple[Vec3, Vec3]:
+def planned_end_effector(
+    airframe: Airframe, plan: PredictionState | PlanState
+) -> tuple[Vec3, Vec3]:
     """World position and velocity of the end-effector in the plan's state."""
     points = np.empty((2, 2, 3))
     arm_points(to_vector(plan), airframe.link_length[0], airframe.link_length[1], points)
@@ -58,8 +61,8 @@ def planned_end_effector(airframe: Airframe, plan: PredictionState) -> tuple[Vec
 def lately_off_plan(
     limits: CompensationLimits,
     before: float,
-    estimate: StateEstimate,
-    plan: PredictionState,
+    estimate: StateEstimate | Estimate,
+    plan: PredictionState | PlanState,
     dt: float,
 ) -> float:
     """Largest recent distance [m] of the base from its plan, given that of a tick ``before`` [m].
@@ -76,8 +79,8 @@ def compensated_joints(
     limits: CompensationLimits,
     joint_limits: JointReferenceLimits,
     off_plan: float,
-    estimate: StateEstimate,
-    plan: PredictionState,
+    estimate: StateEstimate | Estimate,
+    plan: PredictionState | PlanState,
 ) -> tuple[Vec2, Vec2]:
     """Joint angles [rad] and rates [rad/s] that keep the end-effector on its planned path.
 
@@ -90,7 +93,7 @@ def compensated_joints(
     x, z, vx, vz = _within_correction(airframe, limits, off_plan, plan, (x, z, vx, vz))
     length = math.hypot(x, z)
     if length < 1e-3:
-        return plan.q_arm, plan.qd_arm
+        return (plan.q_arm[0], plan.q_arm[1]), (plan.qd_arm[0], plan.qd_arm[1])
     # A plan that is nearly straight has no side; the arm then stays on the one it is on.
     side = plan.q_arm[1] if abs(plan.q_arm[1]) >= _LEAST_BEND else estimate.q_arm[1]
     straight = l1 + l2
@@ -116,7 +119,7 @@ def _within_correction(
     airframe: Airframe,
     limits: CompensationLimits,
     off_plan: float,
-    plan: PredictionState,
+    plan: PredictionState | PlanState,
     seen: Vec4,
 ) -> Vec4:
     """The point, and how it moves, no further from the planned one than the correction reaches."""
@@ -145,13 +148,13 @@ def _within_correction(
 
 @compilable
 def _seen_from_base(
-    estimate: StateEstimate, p_WE: Vec3, v_WE: Vec3
+    estimate: StateEstimate | Estimate, p_WE: Vec3, v_WE: Vec3
 ) -> tuple[float, float, float, float]:
     """Where the point is in the arm's plane of the real body, and how it moves there."""
     R = estimate.R_WB
     x, y, z = rotate_back(R, subtract(p_WE, estimate.p_WB))
     ux, _, uz = rotate_back(R, subtract(v_WE, estimate.v_WB))
-    wx, wy, wz = estimate.w_WB_B
+    wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
     vx = ux - (wy * z - wz * y)
     vz = uz - (wx * y - wy * x)
     return x, z, vx, vz

@@ -8,11 +8,13 @@ from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
 from fsw.geometry.rotation import euler_zyx, wrap_angle
 from fsw.model.airframe import GRAVITY
+from fsw.record import Floats
 from fsw.signals import StateEstimate, Vec3
+from fsw.tick_record import Estimate
 
 
 @compilable
-def attitude_reference(a: Vec3, yaw: float) -> Vec3:
+def attitude_reference(a: Vec3 | Floats, yaw: float) -> Vec3:
     """Roll, pitch and ``yaw`` [rad] whose thrust gives ``a`` [m/s^2, NED] (exact, ZYX)."""
     c, s = math.cos(yaw), math.sin(yaw)
     forward, right = c * a[0] + s * a[1], -s * a[0] + c * a[1]
@@ -25,8 +27,8 @@ def attitude_reference(a: Vec3, yaw: float) -> Vec3:
 @compilable
 def attitude_pid(
     gains: PidGains,
-    integral: Vec3,
-    estimate: StateEstimate,
+    integral: Vec3 | Floats,
+    estimate: StateEstimate | Estimate,
     reference: Vec3,
     dt: float,
 ) -> tuple[Vec3, Vec3]:
@@ -36,8 +38,8 @@ def attitude_pid(
     ``integral`` [rad s, ZYX] and ``reference`` [rad, ZYX]. Tick length ``dt`` [s].
     """
     roll, pitch, yaw = euler_zyx(estimate.R_WB)
-    wx, wy, wz = estimate.w_WB_B
-    x, kept_x = pid_step(gains, integral[0], wrap_angle(reference[0] - roll), -wx, dt)
-    y, kept_y = pid_step(gains, integral[1], wrap_angle(reference[1] - pitch), -wy, dt)
-    z, kept_z = pid_step(gains, integral[2], wrap_angle(reference[2] - yaw), -wz, dt)
+    w = estimate.w_WB_B
+    x, kept_x = pid_step(gains, integral[0], wrap_angle(reference[0] - roll), -w[0], dt)
+    y, kept_y = pid_step(gains, integral[1], wrap_angle(reference[1] - pitch), -w[1], dt)
+    z, kept_z = pid_step(gains, integral[2], wrap_angle(reference[2] - yaw), -w[2], dt)
     return (x, y, z), (kept_x, kept_y, kept_z)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,13 @@ from fsw.control.gains import LoopGains, tracking_gains
 from fsw.control.height import height_pid
 from fsw.control.joint_reference import joint_reference
 from fsw.control.joints import (
-    JointMemory,
     accelerations_of,
     arm_dynamics,
     joint_torques,
-    joints_at_rest,
     observe_disturbance,
+    rest_joints,
     torques_of_failed,
 )
-from fsw.control.pid import PidGains
 from fsw.control.safety_filter import (
     FilterLaw,
     FilterTuning,
@@ -36,14 +34,12 @@ from fsw.control.safety_filter import (
 )
 from fsw.control.tilt_limit import limited_turn
 from fsw.control.tracking import (
-    Observed,
     TrackingLaw,
     follow_plan,
     observe,
     velocity_of_mass,
     wanted_accelerations,
 )
-from fsw.frozen import made
 from fsw.geometry.rotation import rotate_back, wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.model.actuator_health import (
@@ -52,10 +48,10 @@ from fsw.model.actuator_health import (
     ActuatorHealth,
     commanded_for,
     given,
+    note_health,
 )
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.body import Body, body_of
-from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.rotors import (
     MotionState,
     estimate_mass,
@@ -64,71 +60,40 @@ from fsw.model.rotors import (
     motion_state,
     rotor_decay,
 )
+from fsw.record import Floats
 from fsw.shapes.zones import NO_ZONES
-from fsw.signals import (
-    STOPPED,
-    ActuatorCommand,
-    Mat3,
-    PlanInput,
-    PredictionState,
-    StateEstimate,
-    Vec2,
-    Vec3,
-    Vec4,
+from fsw.signals import Mat3, PlanInput, PredictionState, StateEstimate, Vec2, Vec3, Vec4
+from fsw.tick_record import (
+    FILTER_ACTED,
+    FLOWN_ROTORS,
+    GATE_NEEDED,
+    IMPAIRED,
+    Estimate,
+    Tick,
+    new_tick,
 )
 
 Inner = Literal["tracking", "pid"]
-Guarded = tuple[bool, float]
-"""Whether the safety filter changed the acceleration, and the least margin that it saw [m]."""
-UNGUARDED: Guarded = (False, math.inf)
 Model = Vec4
 """What rotors make of it: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
 
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-_SOMEWHERE = StateEstimate(0, _NONE, _NONE, _LEVEL, _NONE, 0.0, (0.0, 0.0), (0.0, 0.0))
 
 
-class CascadeMemory(NamedTuple):
-    """What the fast loops carry from tick to tick."""
-
-    rotors: Vec4  # N, where the rotor model says they are
-    commanded: ActuatorCommand  # what was sent last tick, after the safety gate
-    observed: Observed
-    mass: float  # kg, weighed in flight
-    attitude: Vec3 = (0.0, 0.0, 0.0)  # rad s, integrals
-    height: float = 0.0  # m s, integral
-    joints: JointMemory = JointMemory((0.0, 0.0), (0.0, 0.0))
-    off_plan: float = 0.0  # m, largest deviation of late
-    health: ActuatorHealth = HEALTHY  # what has been found out about rotors and joints
-
-    def after_sending(self, sent: ActuatorCommand) -> CascadeMemory:
-        """The memory for the next tick, once the safety gate has decided."""
-        return self if sent is self.commanded else self._replace(commanded=sent)
+def at_rest(airframe: Airframe, estimate: StateEstimate) -> Tick:
+    """Record of a vehicle whose rotors stand still."""
+    r = new_tick(airframe.mass)
+    r.observed.v[:] = estimate.v_WB
+    rest_joints(r.joints, airframe, estimate)
+    return r
 
 
-def at_rest(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
-    """Memory of a vehicle whose rotors stand still."""
-    return CascadeMemory(
-        STOPPED.rotor_thrust,
-        STOPPED,
-        Observed(estimate.v_WB, _NONE),
-        airframe.mass,
-        joints=joints_at_rest(airframe, estimate),
-    )
-
-
-def in_hover(airframe: Airframe, estimate: StateEstimate) -> CascadeMemory:
-    """Memory of a vehicle taken over in hover."""
-    each = 0.25 * airframe.mass * GRAVITY
-    thrust = (each, each, each, each)
-    return CascadeMemory(
-        thrust,
-        ActuatorCommand(thrust, (0.0, 0.0)),
-        Observed(estimate.v_WB, _NONE),
-        airframe.mass,
-        joints=joints_at_rest(airframe, estimate),
-    )
+def in_hover(airframe: Airframe, estimate: StateEstimate) -> Tick:
+    """Record of a vehicle taken over in hover."""
+    r = at_rest(airframe, estimate)
+    r.rotors[:FLOWN_ROTORS] = r.sent.rotor_thrust[:FLOWN_ROTORS] = 0.25 * airframe.mass * GRAVITY
+    return r
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,237 +154,231 @@ class Cascade:
         )
         self.probes = filter_probes(clear.body)
         self.packed = packed(self.law)
-        memory = CascadeMemory(STOPPED.rotor_thrust, STOPPED, Observed(_NONE, _NONE), 1.0)
-        around = (NO_ZONES, self.probes)
-        example = (self.packed, memory, _SOMEWHERE, REST_STATE, REST_INPUT, 1, *around)
-        self._close_loops = machine_code(_close_loops, *example)
-        sent = memory.rotors, STOPPED.rotor_thrust, STOPPED.joint_torque
-        arm = _SOMEWHERE.w_WB_B, _SOMEWHERE.q_arm, _SOMEWHERE.qd_arm, _SOMEWHERE.specific_force
-        self._expected = machine_code(_expected, self.packed, *sent, *arm, 1.0)
+        example = self.packed, new_tick(airframe.mass).array
+        self._close_loops = machine_code(_close_loops, *example, 1, NO_ZONES, self.probes)
+        self._expected = machine_code(_expected, *example, _NONE, (0.0, 0.0), (0.0, 0.0), 1.0)
 
-    def motion(self, memory: CascadeMemory, estimate: StateEstimate) -> MotionState:
+    def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
-        rotors = lag_rotors(memory.rotors, _settling_at(memory), self.law.rotor_decay)
-        return motion_state(
-            self.law.airframe, memory.mass, estimate, rotors, memory.commanded.joint_torque[0]
-        )
+        sent, effectiveness = r.commanded, r.health.effectiveness.tolist()
+        settling_at = given(HEALTHY._replace(effectiveness=effectiveness), sent.rotor_thrust)
+        rotors = lag_rotors(r.rotors.tolist(), settling_at, self.law.rotor_decay)
+        return motion_state(self.law.airframe, r.mass, estimate, rotors, sent.joint_torque[0])
 
-    def expected(self, memory: CascadeMemory, estimate: StateEstimate) -> tuple[Vec2, Model]:
+    def expected(self, r: Tick, estimate: StateEstimate) -> tuple[Vec2, Model]:
         """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
-        return self._expected(
-            self.packed,
-            memory.rotors,
-            _settling_at(memory),
-            memory.commanded.joint_torque,
-            estimate.w_WB_B,
-            estimate.q_arm,
-            estimate.qd_arm,
-            estimate.specific_force,
-            memory.mass,
-        )
+        x = estimate
+        return self._expected(self.packed, r.array, x.w_WB_B, x.q_arm, x.qd_arm, x.specific_force)
 
-    def joint_acceleration(self, memory: CascadeMemory, estimate: StateEstimate) -> Vec2:
+    def joint_acceleration(self, r: Tick, estimate: StateEstimate) -> Vec2:
         """The joints' part of ``expected`` [rad/s^2]."""
-        return self.expected(memory, estimate)[0]
+        return self.expected(r, estimate)[0]
 
     def step(
         self,
-        memory: CascadeMemory,
+        before: Tick,
         estimate: StateEstimate,
         plan: PredictionState,
         u: PlanInput,
         ticks: int = 1,
         zones: NDArray[np.float64] = NO_ZONES,
-    ) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
-        """See ``close_loops``, of which this is the machine code; ``zones`` (zones, k) [SI]."""
-        sent, rotors, believed, mass, integrals, joints, off_plan, guarded = self._close_loops(
-            self.packed, memory, estimate, plan, u, ticks, zones, self.probes
-        )
-        command = made(ActuatorCommand, sent)
-        moved = made(Observed, believed), mass, *integrals, made(JointMemory, joints), off_plan
-        kept = made(CascadeMemory, (rotors, command, *moved, memory.health))
-        return command, kept, guarded
+        health: ActuatorHealth = HEALTHY,
+    ) -> Tick:
+        """The record after ``before``; see ``close_loops``, ``zones`` (zones, k) [SI]."""
+        after = before.copy()
+        after.give(estimate, plan, u)
+        if health is not HEALTHY or before.flags & IMPAIRED:
+            note_health(after.health, health)
+            after.flags = 0 if health is HEALTHY else IMPAIRED
+        self._close_loops(self.packed, after.array, ticks, zones, self.probes)
+        return after
 
 
 @compilable
 def close_loops(
+    r: Tick,
     law: CascadeLaw,
-    memory: CascadeMemory,
-    estimate: StateEstimate,
-    plan: PredictionState,
-    u: PlanInput,
     ticks: int,
     zones: NDArray[np.float64],
     probes: NDArray[np.float64],
-) -> tuple[ActuatorCommand, CascadeMemory, Guarded]:
-    """One tick, or several at once where some were missed.
+) -> None:
+    """One tick, or several at once where some were missed: from estimate and plan to a command.
 
-    Returns the actuator command, not yet gated, the memory to pass back after sending, and what the
-    safety filter found: about the ``zones`` (zones, k) [SI] of ``moving_zones``, for the ``probes``
-    (probes, 12) [SI] of ``filter_probes``.
+    Each law writes what those after it read; ``sent`` is the last command until the end, where the
+    new one takes its place, not yet gated. The safety filter keeps the ``probes`` (probes, 12) [SI]
+    of ``filter_probes`` off the ``zones`` (zones, k) [SI] of ``moving_zones``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
-    rotors, observed, health = memory.rotors, memory.observed, memory.health
-    settling_at = given(health, memory.commanded.rotor_thrust)
-    sound = health.joints[0] == SOUND and health.joints[1] == SOUND
-    for _ in range(ticks):
-        rotors = lag_rotors(rotors, settling_at, law.rotor_decay)
-    mass = estimate_mass(airframe, memory.mass, rotors, estimate.specific_force, dt * ticks)
-    motion = motion_state(airframe, mass, estimate, rotors, memory.commanded.joint_torque[0])
+    estimate = r.estimate
+    settle_rotors(r, law, ticks)
+    r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks)
+    motion = motion_state(airframe, r.mass, estimate, r.rotors, r.sent.joint_torque[0])
     arm = hanging_arm(airframe, estimate.q_arm)
     v = velocity_of_mass(estimate, arm.depth)
     for _ in range(ticks):
-        observed = observe(observed, v, motion.a, tuning.tracking, dt)
-    attitude, height, guarded = memory.attitude, memory.height, (False, math.inf)
-    if zones.shape[0] > 0 and law.filter.tuning.enabled > 0:
-        plan, u, guarded = _kept_off(law, zones, probes, estimate, motion, observed, plan, u)
+        observe(r.observed, v, motion.a, tuning.tracking, dt)
+    keep_off_zones(r, law, motion, zones, probes)
     if law.follows_plan:
-        (wdx, wdy), thrust = follow_plan(
-            law.tracking, mass, arm.depth, estimate, motion, observed, plan, u
-        )
-        wdz = u.yaw_acc + _yaw_correction(tuning.yaw, estimate, plan)
+        turn, thrust = turn_to_plan(r, law, motion, arm.depth)
         roll_inertia = arm.roll_inertia
     else:
-        (wdx, wdy, wdz), attitude = attitude_pid(
-            tuning.attitude, attitude, estimate, attitude_reference(u.a, plan.yaw), dt
-        )
+        turn, thrust = turn_by_pid(r, law)
         roll_inertia = airframe.inertia[0]  # the paper's loop knows no arm
-        thrust, height = height_pid(airframe, tuning.height, height, estimate, plan, u, dt)
-    wdx, wdy, wdz = limited_turn(airframe, estimate, motion.turning, (wdx, wdy, wdz))
-    wanted, off_plan = (plan.q_arm, plan.qd_arm), memory.off_plan
-    if law.follows_plan and tuning.compensate and sound:
-        off_plan = lately_off_plan(tuning.compensation, off_plan, estimate, plan, dt * ticks)
-        wanted = compensated_joints(
-            airframe, tuning.compensation, tuning.joint_limits, off_plan, estimate, plan
-        )
-    last = memory.joints.reference, memory.joints.reference_rate
-    q_ref, qd_ref = joint_reference(airframe, tuning.joint_limits, last, wanted, dt * ticks)
-    dynamics = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / mass, observed.d))
-    arm_memory = memory.joints
-    for _ in range(ticks):
-        arm_memory = observe_disturbance(arm_memory, dynamics, memory.commanded.joint_torque, dt)
-    joints, arm_memory = joint_torques(
-        airframe,
-        tuning.joint,
-        arm_memory,
-        estimate,
-        (q_ref, qd_ref, u.qdd_arm),
-        dynamics,
-        motion.turning[1],  # not what is commanded: the rotors take 40 ms to give it
-        dt,
-    )
-    if not sound:
-        joints = torques_of_failed(airframe, health.joints, joints, dynamics, motion.turning[1])
-    torque = _body_torque(airframe, roll_inertia, estimate, (wdx, wdy, wdz), joints[0])
-    thrusts = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit, health)
-    command = ActuatorCommand(commanded_for(health, thrusts), joints)
-    memory = CascadeMemory(
-        rotors, command, observed, mass, attitude, height, arm_memory, off_plan, health
-    )
-    return command, memory, guarded
+    turn = limited_turn(airframe, estimate, motion.turning, turn)
+    refer_joints(r, law, dt * ticks)
+    torques = drive_joints(r, law, motion, ticks)
+    torque = _body_torque(airframe, roll_inertia, estimate, turn, torques[0])
+    thrusts = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit, r.health)
+    send(r, airframe, commanded_for(r.health, thrusts), torques)
 
 
 @compilable
-def _kept_off(
+def settle_rotors(r: Tick, law: CascadeLaw, ticks: int) -> None:
+    """Where the rotors are by now. Reads sent, health; writes rotors."""
+    settling_at = given(r.health, r.sent.rotor_thrust)
+    for _ in range(ticks):
+        f = lag_rotors(r.rotors, settling_at, law.rotor_decay)
+        for i in range(FLOWN_ROTORS):
+            r.rotors[i] = f[i]
+
+
+@compilable
+def keep_off_zones(
+    r: Tick,
     law: CascadeLaw,
+    motion: MotionState,
     zones: NDArray[np.float64],
     probes: NDArray[np.float64],
-    estimate: StateEstimate,
-    motion: MotionState,
-    observed: Observed,
-    plan: PredictionState,
-    u: PlanInput,
-) -> tuple[PredictionState, PlanInput, Guarded]:
-    """The plan's state and input, changed such that the loops ask for a filtered acceleration."""
-    asked = u.a
+) -> None:
+    """What is flown: plan and input such that the loops ask for a filtered acceleration.
+
+    ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as of ``close_loops``. Reads
+    estimate, plan, u, observed; writes flown, flown_u, margin, flags.
+    """
+    r.flown, r.flown_u = r.plan, r.u
+    r.flags, r.margin = r.flags & IMPAIRED, math.inf
+    if zones.shape[0] == 0 or not law.filter.tuning.enabled > 0:
+        return
+    asked = (r.u.a[0], r.u.a[1], r.u.a[2])
     if law.follows_plan:
-        asked = wanted_accelerations(law.tracking, estimate, motion, observed, plan, u)
+        asked = wanted_accelerations(law.tracking, r.estimate, motion, r.observed, r.plan, r.u)
     level = law.filter.level
-    wanted = (
-        clamp_magnitude(asked[0], level),
-        clamp_magnitude(asked[1], level),
-        asked[2],
+    wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
+    a = add_scaled(motion.a, r.observed.d, 1.0)
+    safe, changed, margin = filtered(law.filter, probes, zones, r.estimate, r.observed.v, a, wanted)
+    r.margin = margin
+    if changed:
+        r.flags |= FILTER_ACTED
+        push = subtract(safe, asked)
+        for axis in range(2):
+            r.flown.a[axis] += push[axis]
+        for axis in range(3):
+            r.flown_u.a[axis] += push[axis]
+
+
+@compilable
+def turn_to_plan(r: Tick, law: CascadeLaw, motion: MotionState, depth: float) -> tuple[Vec3, float]:
+    """Angular acceleration [rad/s^2, FRD] and thrust [N] that follow the plan's state.
+
+    The centre of mass is ``depth`` [m] below the origin.
+    """
+    (x, y), thrust = follow_plan(
+        law.tracking, r.mass, depth, r.estimate, motion, r.observed, r.flown, r.flown_u
     )
-    a = add_scaled(motion.a, observed.d, 1.0)
-    safe, changed, margin = filtered(law.filter, probes, zones, estimate, observed.v, a, wanted)
-    if not changed:
-        return plan, u, (False, margin)
-    dx, dy, dz = subtract(safe, asked)
-    moved = PredictionState(
-        plan.p,
-        plan.v,
-        (plan.a[0] + dx, plan.a[1] + dy, plan.a[2]),
-        plan.j,
-        plan.s,
-        plan.yaw,
-        plan.yaw_rate,
-        plan.q_arm,
-        plan.qd_arm,
+    gains, plan = law.tuning.yaw, r.flown
+    error = wrap_angle(plan.yaw - r.estimate.yaw)
+    raw = gains.kp * error + gains.kd * (plan.yaw_rate - r.estimate.w_WB_B[2])
+    return (x, y, r.flown_u.yaw_acc + clamp_magnitude(raw, gains.limit)), thrust
+
+
+@compilable
+def turn_by_pid(r: Tick, law: CascadeLaw) -> tuple[Vec3, float]:
+    """The same by the paper's loops, of the plan's acceleration. Writes attitude, height."""
+    tuning, reference = law.tuning, attitude_reference(r.flown_u.a, r.flown.yaw)
+    turn, kept = attitude_pid(tuning.attitude, r.attitude, r.estimate, reference, law.dt)
+    for axis in range(3):
+        r.attitude[axis] = kept[axis]
+    thrust, r.height = height_pid(
+        law.airframe, tuning.height, r.height, r.estimate, r.flown, r.flown_u, law.dt
     )
-    a_d = (u.a[0] + dx, u.a[1] + dy, u.a[2] + dz)
-    return moved, PlanInput(a_d, u.yaw_acc, u.qdd_arm), (True, margin)
+    return turn, thrust
+
+
+@compilable
+def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
+    """What the joints are to do, ``seconds`` [s] later. Writes off_plan, joints.reference."""
+    airframe, tuning, k, plan = law.airframe, law.tuning, r.joints, r.flown
+    wanted = (plan.q_arm[0], plan.q_arm[1]), (plan.qd_arm[0], plan.qd_arm[1])
+    if law.follows_plan and tuning.compensate and _joints_are_sound(r):
+        r.off_plan = lately_off_plan(tuning.compensation, r.off_plan, r.estimate, plan, seconds)
+        wanted = compensated_joints(
+            airframe, tuning.compensation, tuning.joint_limits, r.off_plan, r.estimate, plan
+        )
+    last = (k.reference[0], k.reference[1]), (k.reference_rate[0], k.reference_rate[1])
+    q, qd = joint_reference(airframe, tuning.joint_limits, last, wanted, seconds)
+    for i in range(len(q)):
+        k.reference[i], k.reference_rate[i] = q[i], qd[i]
+
+
+@compilable
+def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> Vec2:
+    """Joint torques [N m] for the reference. Reads sent, mass, observed, health; writes joints."""
+    airframe, estimate = law.airframe, r.estimate
+    arm = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / r.mass, r.observed.d))
+    for _ in range(ticks):
+        observe_disturbance(r.joints, arm, r.sent.joint_torque, law.dt)
+    # Not what is commanded: the rotors take 40 ms to give it.
+    pitching = motion.turning[1]
+    torques = joint_torques(
+        r.joints, airframe, law.tuning.joint, estimate, r.flown_u.qdd_arm, arm, pitching, law.dt
+    )
+    if _joints_are_sound(r):
+        return torques
+    return torques_of_failed(airframe, r.health.joints, torques, arm, pitching)
+
+
+@compilable
+def send(r: Tick, airframe: Airframe, thrust: Vec4, torque: Vec2) -> None:
+    """The new command: ``thrust`` [N] and ``torque`` [N m]. Writes sent, flags."""
+    top, most = airframe.rotor_thrust_max, airframe.joint_torque_max
+    for i in range(len(thrust)):
+        r.sent.rotor_thrust[i] = thrust[i]
+        if not 0.0 <= thrust[i] <= top:
+            r.flags |= GATE_NEEDED
+    for j in range(len(torque)):
+        r.sent.joint_torque[j] = torque[j]
+        if not -most <= torque[j] <= most:
+            r.flags |= GATE_NEEDED
+
+
+@compilable
+def _joints_are_sound(r: Tick) -> bool:
+    return bool(r.health.joints[0] == SOUND and r.health.joints[1] == SOUND)
 
 
 @compiled
 def _close_loops(
     law: NDArray[Any],
-    memory: CascadeMemory,
-    estimate: StateEstimate,
-    plan: PredictionState,
-    u: PlanInput,
-    ticks: int,
+    ticks: NDArray[Any],
+    count: int,
     zones: NDArray[np.float64],
     probes: NDArray[np.float64],
-) -> tuple[
-    tuple[Vec4, Vec2],
-    Vec4,
-    tuple[Vec3, Vec3, Vec2, float],
-    float,
-    tuple[Vec3, float],
-    tuple[Vec2, Vec2, Vec2, Vec2, Vec2],
-    float,
-    Guarded,
-]:
-    """``close_loops`` that returns plain tuples, which leave machine code at half the cost."""
-    command, kept, guarded = close_loops(law[0], memory, estimate, plan, u, ticks, zones, probes)
-    return (
-        (command.rotor_thrust, command.joint_torque),
-        kept.rotors,
-        (
-            kept.observed.v,
-            kept.observed.d,
-            kept.observed.disturbance_bias,
-            kept.observed.recent,
-        ),
-        kept.mass,
-        (kept.attitude, kept.height),
-        (
-            kept.joints.reference,
-            kept.joints.momentum,
-            kept.joints.disturbance,
-            kept.joints.integral,
-            kept.joints.reference_rate,
-        ),
-        kept.off_plan,
-        guarded,
-    )
+) -> None:
+    close_loops(ticks[0], law[0], count, zones, probes)
 
 
 @kernel
 def _expected(
     laws: NDArray[Any],
-    rotors: Vec4,
-    commanded: Vec4,
-    torque: Vec2,
+    ticks: NDArray[Any],
     rate: Vec3,
     q_arm: Vec2,
     qd_arm: Vec2,
     specific_force: float,
-    mass: float,
 ) -> tuple[Vec2, Model]:
-    """Of the numbers that it needs alone: to hand over whole records takes longer than all else."""
-    airframe = laws[0].airframe
-    f = lag_rotors(rotors, commanded, laws[0].rotor_decay)
+    airframe, r = laws[0].airframe, ticks[0]
+    torque = r.sent.joint_torque
+    f = lag_rotors(r.rotors, given(r.health, r.sent.rotor_thrust), laws[0].rotor_decay)
     rolling = airframe.rotor_arm * (f[1] - f[3]) / hanging_arm(airframe, q_arm).roll_inertia
     yawing = airframe.yaw_per_thrust * (f[0] - f[1] + f[2] - f[3]) / airframe.inertia[2]
     pitching = (airframe.rotor_arm * (f[2] - f[0]) - torque[0]) / airframe.inertia[1]
@@ -428,25 +387,12 @@ def _expected(
     dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
     carried = airframe.joint_armature * pitching
     first, second = accelerations_of(dynamics, (torque[0] + carried, torque[1]))
-    model = rolling, pitching, yawing, (f[0] + f[1] + f[2] + f[3]) / mass
+    model = rolling, pitching, yawing, (f[0] + f[1] + f[2] + f[3]) / r.mass
     return (first - pitching, second), model
 
 
-def _settling_at(memory: CascadeMemory) -> Vec4:
-    """Thrust [N] of each rotor that the command sent last leads to."""
-    commanded = memory.commanded.rotor_thrust
-    return commanded if memory.health is HEALTHY else given(memory.health, commanded)
-
-
 @compilable
-def _yaw_correction(gains: PidGains, estimate: StateEstimate, plan: PredictionState) -> float:
-    error = wrap_angle(plan.yaw - estimate.yaw)
-    raw = gains.kp * error + gains.kd * (plan.yaw_rate - estimate.w_WB_B[2])
-    return clamp_magnitude(raw, gains.limit)
-
-
-@compilable
-def _field(estimate: StateEstimate, specific_thrust: float, d: Vec3) -> Vec2:
+def _field(estimate: Estimate, specific_thrust: float, d: Floats) -> Vec2:
     """Gravity minus the base's acceleration [m/s^2] along body x and z."""
     pushed_x, _, pushed_z = rotate_back(estimate.R_WB, d)
     return -pushed_x, specific_thrust - pushed_z
@@ -456,14 +402,14 @@ def _field(estimate: StateEstimate, specific_thrust: float, d: Vec3) -> Vec2:
 def _body_torque(
     airframe: Airframe,
     roll_inertia: float,
-    estimate: StateEstimate,
+    estimate: Estimate,
     wd: Vec3,
     joint1_torque: float,
 ) -> Vec3:
     """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
     inertia = airframe.inertia
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
-    wx, wy, wz = estimate.w_WB_B
+    wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
     return (
         roll_inertia * wd[0] + (iz - iy) * wy * wz,
         iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,

@@ -6,6 +6,7 @@ from fsw.compiled import compilable
 from fsw.control.pid import PidGains, pid_step
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.signals import PlanInput, PredictionState, StateEstimate
+from fsw.tick_record import Accelerations, Estimate, PlanState
 
 
 @compilable
@@ -13,9 +14,9 @@ def height_pid(
     airframe: Airframe,
     gains: PidGains,
     integral: float,
-    estimate: StateEstimate,
-    plan: PredictionState,
-    u: PlanInput,
+    estimate: StateEstimate | Estimate,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
     dt: float,
 ) -> tuple[float, float]:
     """Total thrust [N] that keeps the planned height, and the integral to pass back.

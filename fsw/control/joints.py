@@ -28,20 +28,12 @@ from fsw.control.pid import PidGains, pid_step
 from fsw.geometry.vectors import clamp, clamp_magnitude
 from fsw.model.actuator_health import SOUND, STUCK
 from fsw.model.airframe import Airframe
+from fsw.record import Floats
 from fsw.signals import StateEstimate, Vec2, Vec3
+from fsw.tick_record import Estimate, Joints
 
 _OBSERVER = 100.0  # rad/s
 _DISTURBANCE = 0.3  # N m; more than friction and gusts make, and less than the servo has
-
-
-class JointMemory(NamedTuple):
-    """What the joint loops carry from tick to tick."""
-
-    reference: Vec2  # rad, of the last tick
-    momentum: Vec2  # N m s, as the observer believes
-    disturbance: Vec2 = (0.0, 0.0)  # N m, as the observer believes
-    integral: Vec2 = (0.0, 0.0)  # rad s, of the errors
-    reference_rate: Vec2 = (0.0, 0.0)  # rad/s, of the last tick
 
 
 class ArmDynamics(NamedTuple):
@@ -53,84 +45,64 @@ class ArmDynamics(NamedTuple):
     drift: Vec2  # N m, what changes the momentum besides the torques
 
 
-def joints_at_rest(airframe: Airframe, estimate: StateEstimate) -> JointMemory:
-    """Memory of joint loops that begin."""
-    return JointMemory(estimate.q_arm, arm_dynamics(airframe, estimate, (0.0, 0.0)).momentum)
+def rest_joints(k: Joints, airframe: Airframe, estimate: StateEstimate) -> None:
+    """Let joint loops begin."""
+    k.numbers[:] = 0.0
+    momentum = arm_dynamics(airframe, estimate, (0.0, 0.0)).momentum
+    k.reference[: len(momentum)], k.momentum[: len(momentum)] = estimate.q_arm, momentum
 
 
 @compilable
-def observe_disturbance(
-    memory: JointMemory, arm: ArmDynamics, torque: Vec2, dt: float
-) -> JointMemory:
-    """The memory ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile."""
-    p1, d1 = _observed(memory.momentum[0], memory.disturbance[0], torque[0], arm, 0, dt)
-    p2, d2 = _observed(memory.momentum[1], memory.disturbance[1], torque[1], arm, 1, dt)
-    return JointMemory(
-        reference=memory.reference,
-        momentum=(p1, p2),
-        disturbance=(d1, d2),
-        integral=memory.integral,
-        reference_rate=memory.reference_rate,
-    )
-
-
-@compilable
-def _observed(
-    momentum: float, disturbance: float, torque: float, arm: ArmDynamics, joint: int, dt: float
-) -> Vec2:
-    predicted = momentum + dt * (torque + arm.drift[joint] + disturbance)
-    surprise = arm.momentum[joint] - predicted
-    believed = disturbance + _OBSERVER * _OBSERVER * dt * surprise
-    return predicted + 2.0 * _OBSERVER * dt * surprise, clamp_magnitude(believed, _DISTURBANCE)
+def observe_disturbance(k: Joints, arm: ArmDynamics, torque: Vec2 | Floats, dt: float) -> None:
+    """Momentum and disturbance ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile."""
+    for i in range(len(arm.momentum)):
+        predicted = k.momentum[i] + dt * (torque[i] + arm.drift[i] + k.disturbance[i])
+        surprise = arm.momentum[i] - predicted
+        k.momentum[i] = predicted + 2.0 * _OBSERVER * dt * surprise
+        believed = k.disturbance[i] + _OBSERVER * _OBSERVER * dt * surprise
+        k.disturbance[i] = clamp_magnitude(believed, _DISTURBANCE)
 
 
 @compilable
 def joint_torques(
+    k: Joints,
     airframe: Airframe,
     gains: PidGains,
-    memory: JointMemory,
-    estimate: StateEstimate,
-    reference: tuple[Vec2, Vec2, Vec2],
+    estimate: StateEstimate | Estimate,
+    qdd: Vec2 | Floats,
     arm: ArmDynamics,
     pitch_acceleration: float,
     dt: float,
-) -> tuple[Vec2, JointMemory]:
-    """Torques [N m] within the servos' limit (computed torque), and the memory to pass back.
+) -> Vec2:
+    """Torques [N m] within the servos' limit (computed torque). Writes the integrals in ``k``.
 
-    ``pitch_acceleration`` [rad/s^2] is the base's about body y. The reference has angles, rates and
-    accelerations [rad, rad/s, rad/s^2]; tick length ``dt`` [s].
+    ``pitch_acceleration`` [rad/s^2] is the base's about body y. Wanted are the angles and rates of
+    the reference in ``k`` and the accelerations ``qdd`` [rad/s^2]; tick length ``dt`` [s].
     """
-    q_ref, qd_ref, qdd_ref = reference
-    integral = memory.integral
-    wanted1, kept1 = pid_step(
-        gains, integral[0], q_ref[0] - estimate.q_arm[0], qd_ref[0] - estimate.qd_arm[0], dt
+    q, qd = estimate.q_arm, estimate.qd_arm
+    wanted1, k.integral[0] = pid_step(
+        gains, k.integral[0], k.reference[0] - q[0], k.reference_rate[0] - qd[0], dt
     )
-    wanted2, kept2 = pid_step(
-        gains, integral[1], q_ref[1] - estimate.q_arm[1], qd_ref[1] - estimate.qd_arm[1], dt
+    wanted2, k.integral[1] = pid_step(
+        gains, k.integral[1], k.reference[1] - q[1], k.reference_rate[1] - qd[1], dt
     )
-    qdd1, qdd2 = limited_acceleration(
-        airframe, estimate.q_arm, estimate.qd_arm, (wanted1 + qdd_ref[0], wanted2 + qdd_ref[1])
-    )
+    qdd1, qdd2 = limited_acceleration(airframe, q, qd, (wanted1 + qdd[0], wanted2 + qdd[1]))
     torque1, torque2 = torques_for(arm, (qdd1 + pitch_acceleration, qdd2))
     torque1 -= airframe.joint_armature * pitch_acceleration  # the motor turns with the base
     bound = airframe.joint_torque_max
-    torques = (
-        clamp_magnitude(torque1 - memory.disturbance[0], bound),
-        clamp_magnitude(torque2 - memory.disturbance[1], bound),
+    return (
+        clamp_magnitude(torque1 - k.disturbance[0], bound),
+        clamp_magnitude(torque2 - k.disturbance[1], bound),
     )
-    kept = JointMemory(
-        reference=q_ref,
-        momentum=memory.momentum,
-        disturbance=memory.disturbance,
-        integral=(kept1, kept2),
-        reference_rate=qd_ref,
-    )
-    return torques, kept
 
 
 @compilable
 def torques_of_failed(
-    airframe: Airframe, kinds: Vec2, torques: Vec2, arm: ArmDynamics, pitch_acceleration: float
+    airframe: Airframe,
+    kinds: Vec2 | Floats,
+    torques: Vec2,
+    arm: ArmDynamics,
+    pitch_acceleration: float,
 ) -> Vec2:
     """``torques`` [N m] of joints of which one at least has failed in one of the ``kinds`` [1].
 
@@ -154,7 +126,9 @@ _POLE = 30.0
 
 
 @compilable
-def limited_acceleration(airframe: Airframe, q: Vec2, qd: Vec2, qdd: Vec2) -> Vec2:
+def limited_acceleration(
+    airframe: Airframe, q: Vec2 | Floats, qd: Vec2 | Floats, qdd: Vec2
+) -> Vec2:
     """``qdd`` [rad/s^2] of the joints at ``q`` [rad] and ``qd`` [rad/s], as far as allowed."""
     most = airframe.joint_rate_max
     first = clamp(qdd[0], _POLE * (-most - qd[0]), _POLE * (most - qd[0]))
@@ -200,7 +174,9 @@ def accelerations_of(arm: ArmDynamics, torque: Vec2) -> Vec2:
 
 
 @compilable
-def arm_dynamics(airframe: Airframe, estimate: StateEstimate, field: Vec2) -> ArmDynamics:
+def arm_dynamics(
+    airframe: Airframe, estimate: StateEstimate | Estimate, field: Vec2
+) -> ArmDynamics:
     """The planar two-link arm (Lagrange form) in a ``field`` [m/s^2] along body x and z.
 
     The field is gravity minus the base's acceleration, which is what thrust and disturbance make of
@@ -209,7 +185,7 @@ def arm_dynamics(airframe: Airframe, estimate: StateEstimate, field: Vec2) -> Ar
     m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
     l1, c1, c2 = airframe.link_length[0], airframe.link_com[0], airframe.link_com[1]
     i1, i2 = airframe.link_inertia[0], airframe.link_inertia[1]
-    th1, th2 = estimate.q_arm
+    th1, th2 = estimate.q_arm[0], estimate.q_arm[1]
     field_x, field_z = field
     across1 = field_z * math.sin(th1) - field_x * math.cos(th1)
     across12 = field_z * math.sin(th1 + th2) - field_x * math.cos(th1 + th2)

@@ -42,6 +42,7 @@ from fsw.compiled import compilable
 from fsw.geometry.vectors import add_scaled, clamp, dot, subtract
 from fsw.model.body import CAPSULE, FORM, ON, ON_BASE, RADIUS, TURN, Body
 from fsw.model.linearisation import FRAME, put_arm, put_pose
+from fsw.record import Floats
 from fsw.shapes.zones import (
     ADDED,
     FLAT,
@@ -54,6 +55,7 @@ from fsw.shapes.zones import (
     velocity_of,
 )
 from fsw.signals import StateEstimate, Vec2, Vec3
+from fsw.tick_record import Estimate
 
 ROOM = 1.0  # m, that a vehicle may be outside of a zone and still draws back from it
 _PASSES = 4  # over all zones
@@ -121,8 +123,8 @@ def filtered(
     law: FilterLaw,
     probes: NDArray[np.float64],
     zones: NDArray[np.float64],
-    estimate: StateEstimate,
-    v: Vec3,
+    estimate: StateEstimate | Estimate,
+    v: Vec3 | Floats,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
@@ -167,7 +169,7 @@ def _kept_off(
     shift: NDArray[np.float64],
     t_us: int,
     frame: NDArray[np.float64],
-    v: Vec3,
+    v: Vec3 | Floats,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:

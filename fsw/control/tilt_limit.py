@@ -21,18 +21,21 @@ from fsw.compiled import compilable
 from fsw.geometry.vectors import clamp
 from fsw.model.airframe import Airframe
 from fsw.signals import StateEstimate, Vec2, Vec3
+from fsw.tick_record import Estimate
 
 _POLE = 12.0  # 1/s; quicker than the plan's own attitude (7), which it must not slow down
 
 
 @compilable
-def limited_turn(airframe: Airframe, estimate: StateEstimate, turning: Vec2, wd: Vec3) -> Vec3:
+def limited_turn(
+    airframe: Airframe, estimate: StateEstimate | Estimate, turning: Vec2, wd: Vec3
+) -> Vec3:
     """Angular acceleration ``wd`` [rad/s^2, FRD], as far as tilt and body rates allow.
 
     ``turning`` [rad/s^2] is the angular acceleration about body x and y that there is.
     """
     lag, R = airframe.rotor_lag, estimate.R_WB
-    wx, wy, wz = estimate.w_WB_B
+    wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
     zx, zy = wx + lag * turning[0], wy + lag * turning[1]
     most, most_yaw = airframe.body_rate_max
     x, y = _shortened(wd[0], wd[1], _POLE * zx, _POLE * zy, _POLE * most)

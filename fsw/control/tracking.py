@@ -30,11 +30,12 @@ from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.geometry.vectors import clamp_magnitude
 from fsw.model.airframe import GRAVITY, AttitudeLag
 from fsw.model.rotors import MotionState
+from fsw.record import Floats
 from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
+from fsw.tick_record import Accelerations, Estimate, Observed, PlanState
 
 _LEAST_SPECIFIC_THRUST = 2.0  # m/s^2; below it tilt hardly accelerates the vehicle
 _RECENT_S = 2.0  # in which a disturbance fades that is not seen again
-_NOT_KNOWN = 1.0  # m/s^2; nothing was observed yet, and what is to come may be large
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,50 +47,26 @@ class TrackingLaw:
     gains: TrackingGains
 
 
-class Observed(NamedTuple):
-    """What the observer believes between two velocity readings."""
-
-    v: Vec3  # m/s
-    d: Vec3  # m/s^2, disturbance acceleration
-    disturbance_bias: Vec2 = (0.0, 0.0)  # m/s^2, horizontal part of d that stays: wind
-    recent: float = _NOT_KNOWN  # m/s^2, largest horizontal d of late: at once up, slowly down
-
-
 @compilable
-def observe(memory: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) -> Observed:
-    """Velocity and disturbance a tick of ``dt`` [s] later.
+def observe(k: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) -> None:
+    """Velocity and disturbance a tick of ``dt`` [s] later, in what is ``k`` (known).
 
     A second-order observer with both poles at ``observer_bandwidth``: as quick as differencing the
     measured velocity ``v`` [m/s, NED], but the disturbance is a state and does not carry the
     reading's noise straight into the rotors, which produce ``a`` [m/s^2, NED].
     """
     bandwidth = tuning.observer_bandwidth
-    vx, dx = _observe_axis(memory.v[0], memory.d[0], v[0], a[0], bandwidth, dt)
-    vy, dy = _observe_axis(memory.v[1], memory.d[1], v[1], a[1], bandwidth, dt)
-    vz, dz = _observe_axis(memory.v[2], memory.d[2], v[2], a[2], bandwidth, dt)
-    share, most = min(dt / tuning.wind_time, 1.0), tuning.wind_limit
-    wind_x = clamp_magnitude(
-        memory.disturbance_bias[0] + share * (dx - memory.disturbance_bias[0]), most
-    )
-    wind_y = clamp_magnitude(
-        memory.disturbance_bias[1] + share * (dy - memory.disturbance_bias[1]), most
-    )
-    faded = memory.recent * (1.0 - min(dt / _RECENT_S, 1.0))
-    recent = max(math.sqrt(dx * dx + dy * dy), faded)
-    return Observed((vx, vy, vz), (dx, dy, dz), (wind_x, wind_y), recent)
-
-
-@compilable
-def _observe_axis(
-    believed_v: float, d: float, v: float, a: float, bandwidth: float, dt: float
-) -> Vec2:
-    """Velocity and disturbance of one axis, one tick on."""
-    predicted = believed_v + dt * (a + d)
-    surprise = v - predicted
-    return (
-        predicted + 2.0 * bandwidth * dt * surprise,
-        d + bandwidth * bandwidth * dt * surprise,
-    )
+    for axis in range(3):
+        predicted = k.v[axis] + dt * (a[axis] + k.d[axis])
+        surprise = v[axis] - predicted
+        k.v[axis] = predicted + 2.0 * bandwidth * dt * surprise
+        k.d[axis] += bandwidth * bandwidth * dt * surprise
+    share = min(dt / tuning.wind_time, 1.0)
+    for axis in range(2):
+        grown = k.disturbance_bias[axis] + share * (k.d[axis] - k.disturbance_bias[axis])
+        k.disturbance_bias[axis] = clamp_magnitude(grown, tuning.wind_limit)
+    faded = k.recent * (1.0 - min(dt / _RECENT_S, 1.0))
+    k.recent = max(math.sqrt(k.d[0] * k.d[0] + k.d[1] * k.d[1]), faded)
 
 
 class AxisState(NamedTuple):
@@ -143,12 +120,12 @@ def snap_command(
 @compilable
 def vertical_acceleration(
     law: TrackingLaw,
-    p: Vec3,
-    v: Vec3,
+    p: Vec3 | Floats,
+    v: Vec3 | Floats,
     a: Vec3,
     d: float,
-    plan: PredictionState,
-    u: PlanInput,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
 ) -> float:
     """Acceleration down [m/s^2] that the law asks for.
 
@@ -165,11 +142,11 @@ def vertical_acceleration(
 @compilable
 def wanted_accelerations(
     law: TrackingLaw,
-    estimate: StateEstimate,
+    estimate: StateEstimate | Estimate,
     motion: MotionState,
     observed: Observed,
-    plan: PredictionState,
-    u: PlanInput,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
 ) -> Vec3:
     """What ``follow_plan`` asks for on all axes [m/s^2, NED]."""
     p, v, a, j, s = estimate.p_WB, observed.v, motion.a, motion.j, motion.s
@@ -191,7 +168,7 @@ def wanted_accelerations(
 
 
 @compilable
-def velocity_of_mass(estimate: StateEstimate, depth: float) -> Vec3:
+def velocity_of_mass(estimate: StateEstimate | Estimate, depth: float) -> Vec3:
     """Velocity [m/s, NED] ``depth`` [m] below the origin, as far as rolling makes it another."""
     R, v, swing = estimate.R_WB, estimate.v_WB, depth * estimate.w_WB_B[0]
     return v[0] - swing * R[1], v[1] - swing * R[4], v[2]
@@ -202,11 +179,11 @@ def follow_plan(
     law: TrackingLaw,
     mass: float,
     depth: float,
-    estimate: StateEstimate,
+    estimate: StateEstimate | Estimate,
     motion: MotionState,
     observed: Observed,
-    plan: PredictionState,
-    u: PlanInput,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
 ) -> tuple[Vec2, float]:
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
@@ -236,11 +213,11 @@ def follow_plan(
 def _horizontal_snap(
     law: TrackingLaw,
     axis: int,
-    estimate: StateEstimate,
+    estimate: StateEstimate | Estimate,
     motion: MotionState,
     observed: Observed,
-    plan: PredictionState,
-    u: PlanInput,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
     aside: Vec2,
     share: float,
 ) -> float:

@@ -11,15 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fsw.control.actuator_watch import Watch, paused
-from fsw.control.cascade import (
-    UNGUARDED,
-    Cascade,
-    CascadeMemory,
-    Guarded,
-    KeepClear,
-    at_rest,
-    in_hover,
-)
+from fsw.control.cascade import Cascade, KeepClear, at_rest, in_hover
 from fsw.control.safety_gate import gate
 from fsw.control.tube import beyond_covered
 from fsw.estimation.estimator import estimate_state
@@ -81,6 +73,7 @@ from fsw.signals import (
     TickOutputs,
     Vec2,
 )
+from fsw.tick_record import FILTER_ACTED, GATE_NEEDED, Tick
 
 _STILL = SensorFrame(
     t_us=1_000_000,
@@ -103,7 +96,7 @@ class Controlled(NamedTuple):
     answer: Answer
     inputs: TickInputs
     state: FlightState  # with what was received, commanded and decided
-    memory: CascadeMemory  # of the loops, for the next tick
+    memory: Tick  # of the loops, for the next tick
     estimate: StateEstimate | None = None  # None: there has been none yet
     fusion: FusionMemory | None = None
     flown: bool = False  # the loops are closed
@@ -112,7 +105,6 @@ class Controlled(NamedTuple):
     u: PlanInput = REST_INPUT
     ticks: int = 1  # since the last one
     replaced: bool = False  # the command, by the safety gate
-    guarded: Guarded = UNGUARDED
     caught: CaughtUp | None = None  # what else is known, where that had to be known at once
 
 
@@ -224,9 +216,7 @@ class Autopilot:
         if flown and nominal is not None:
             nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, looped)
         followed = nominal if flown else None
-        sent, memory, replaced, guarded = self._actuate(
-            state, estimate, followed, u, looped, armed=armed
-        )
+        sent, memory, replaced = self._actuate(state, estimate, followed, u, looped, armed=armed)
         answer = Answer(sent, armed, vehicle.mode, tuple(acks), tuple(texts))
         # By position, as what follows: each is made in every tick, and names cost a microsecond.
         return Controlled(
@@ -242,7 +232,6 @@ class Autopilot:
             u,
             ticks,
             replaced,
-            guarded,
             caught,
         )
 
@@ -296,10 +285,10 @@ class Autopilot:
             texts = (*texts, *accuracy)
             announced = len(state.mission.announced.zones)
             safety = self._watch.breach(safety, estimate, state.constraints, announced, flies=flown)
-        pushed, margin = c.guarded
+        pushed, margin = flown and bool(memory.flags & FILTER_ACTED), memory.margin
         if pushed or safety.filter_us >= 0:
             safety = self._watch.filtered(safety, now_us, pushed=pushed)
-        if not margin >= 0.0:
+        if flown and not margin >= 0.0:
             safety = self._breached(state, safety, estimate, margin)
         damage, watch = self._see_damage(state, memory, estimate, c)
         state = FlightState(
@@ -543,11 +532,12 @@ class Autopilot:
         kept = self._room.limit(kept, report, estimate, target)
         return state if kept is state.kept else replace(state, kept=kept)
 
-    def _wind_room(self, memory: CascadeMemory) -> Vec2:
+    def _wind_room(self, memory: Tick) -> Vec2:
         """What the memory of wind in force can add to the tube [m, NED]."""
         if self.config.inner != "tracking":
             return 0.0, 0.0
-        return beyond_covered(self._safe_sets.loop_tube, memory.observed.disturbance_bias)
+        north, east = memory.observed.disturbance_bias.tolist()
+        return beyond_covered(self._safe_sets.loop_tube, (north, east))
 
     def _pose_error(
         self,
@@ -603,34 +593,37 @@ class Autopilot:
         ticks: int,
         *,
         armed: bool,
-    ) -> tuple[ActuatorCommand, CascadeMemory, bool, Guarded]:
+    ) -> tuple[ActuatorCommand, Tick, bool]:
         """Close the loops, idle or stay still; the safety gate is the last law.
 
         Without a ``nominal`` state nothing is flown. Also says whether the gate replaced the
-        command, and what the safety filter found.
+        command.
         """
-        last = memory = state.cascade
-        wanted, guarded, airframe = STOPPED, UNGUARDED, self.config.airframe
-        health = state.damage.health
-        if memory.health is not health:
-            memory = memory._replace(health=health)
+        last, airframe = state.cascade, self.config.airframe
         if nominal is not None:
-            zones = self.zones_now(state)
-            wanted, memory, guarded = self._cascade.step(memory, estimate, nominal, u, ticks, zones)
+            zones, health = self.zones_now(state), state.damage.health
+            memory = self._cascade.step(last, estimate, nominal, u, ticks, zones, health)
+            wanted = memory.commanded
+            if armed and not memory.flags & GATE_NEEDED:
+                return wanted, memory, False
         elif armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
             memory = at_rest(airframe, estimate)
+        else:
+            wanted, memory = STOPPED, last.copy()
         sent, replaced = gate(airframe, wanted, last.commanded, armed)
         if replaced:
             # The NaN is in the loops' new memory as well: discard that.
-            memory = last
-        return sent, memory.after_sending(sent), replaced, guarded
+            flags, margin, memory = memory.flags, memory.margin, last.copy()
+            memory.flags, memory.margin = flags, margin
+        memory.commanded = sent
+        return sent, memory, replaced
 
     def _see_damage(
         self,
         state: FlightState,
-        memory: CascadeMemory,
+        memory: Tick,
         estimate: StateEstimate,
         controlled: Controlled,
     ) -> tuple[Damage, Watch | None]:

@@ -11,13 +11,13 @@ from typing import Any, Final
 
 from fsw.compiled import machine_code, packed
 from fsw.control.actuator_watch import NONE, Watch, at_start, blank, watch
-from fsw.control.cascade import CascadeMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.state import Damage
 from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.rotors import rotor_decay
 from fsw.signals import ActuatorReport, StateEstimate, Vec2, Vec4
+from fsw.tick_record import Tick, of_joints
 
 ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
@@ -46,8 +46,8 @@ class DamageWatch:
         self,
         damage: Damage,
         memory: Watch | None,
-        sent: CascadeMemory,
-        now: CascadeMemory,
+        sent: Tick,
+        now: Tick,
         estimate: StateEstimate,
         ticks: int,
         *,
@@ -56,7 +56,7 @@ class DamageWatch:
     ) -> tuple[Damage, Watch]:
         """What is known of actuators a tick, or some ``ticks``, later, and the memory for the next.
 
-        The loops' memory ``sent`` holds what was commanded meanwhile, ``now`` their references.
+        The record ``sent`` holds what was commanded meanwhile, ``now`` their references.
         Where the encoders' ``angles_repeat``, a joint without torque may be one that is not seen.
         Where the angles are not known by encoders, joints are not judged.
         """
@@ -73,7 +73,7 @@ class DamageWatch:
             dt,
             thrust,
             torque,
-            now.joints.reference,
+            of_joints(now.joints.reference),
             estimate.w_WB_B,
             estimate.q_arm,
             estimate.qd_arm,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.control.cascade import CascadeMemory
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.fusion_memory import Reset
 from fsw.flight.state import FlightState
@@ -18,6 +17,7 @@ from fsw.geometry.rotation import (
 )
 from fsw.geometry.vectors import add_scaled, norm
 from fsw.signals import PredictionState, Severity, StateEstimate, StatusText
+from fsw.tick_record import Tick
 
 _TOLD: Final = 0.02  # m, of a jump that the operator reads about
 
@@ -43,17 +43,17 @@ def told(reset: Reset) -> str:
 
 
 def moved_along(
-    nominal: PredictionState | None, cascade: CascadeMemory, reset: Reset
-) -> tuple[PredictionState | None, CascadeMemory]:
+    nominal: PredictionState | None, cascade: Tick, reset: Reset
+) -> tuple[PredictionState | None, Tick]:
     """The plan's state and the observer's velocity, moved along with the estimate."""
     yaw = yaw_of(matrix_from_quaternion(reset.turn))
     if nominal is not None:
         nominal = nominal._replace(
             p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
         )
-    observed = cascade.observed
-    observed = observed._replace(v=add_scaled(observed.v, reset.velocity, 1.0))
-    return nominal, cascade._replace(observed=observed)
+    cascade = cascade.copy()
+    cascade.observed.v += reset.velocity
+    return nominal, cascade
 
 
 def on_return(found: StateEstimate, before: StateEstimate) -> tuple[Reset, list[StatusText]]:

@@ -132,7 +132,7 @@ def feel_ground(
     if state.aiding.gyro_lost and is_close(config, state, estimate):
         return state, True
     if vehicle.unloaded is None:
-        if not sum(state.cascade.rotors) < _CONTACT * config.airframe.mass * GRAVITY:
+        if not sum(state.cascade.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY:
             return in_the_air(state, estimate), False
         blind = state.aiding.unaided_us >= config.limits.aiding_loss_us
         expected = may_be_low(config, state, estimate) and (blind or sinking < _SINKS)

@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from fsw.control.cascade import CascadeMemory
-from fsw.control.joints import joints_at_rest
+from fsw.control.joints import rest_joints
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.flight.plan_exchange import measured_state, with_arm_in_bounds, without_plan
 from fsw.flight.state import FlightState
@@ -21,6 +20,7 @@ from fsw.measurements import Sample
 from fsw.model.rotors import MotionState
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import StateEstimate, TickInputs
+from fsw.tick_record import Tick
 
 # Since the last tick. The filter takes what is so old at once, and nothing that is older.
 READ_LATE_US: Final = round(1e6 * IMU_TOO_OLD)
@@ -47,17 +47,17 @@ def _without(samples: tuple[Sample, ...], t_us: int) -> tuple[Sample, ...]:
     return tuple([one for one in samples if not one.time <= 1e-6 * t_us])
 
 
-def loops_resumed(
-    config: FlightConfig, memory: CascadeMemory, estimate: StateEstimate
-) -> CascadeMemory:
-    """The loops' memory from which they go on: what they have learned, but no motion.
+def loops_resumed(config: FlightConfig, before: Tick, estimate: StateEstimate) -> Tick:
+    """The record from which loops go on: what they have learned, but no motion.
 
     Of the disturbance its lasting part is kept, wind.
     """
-    north, east = memory.observed.disturbance_bias
-    observed = memory.observed._replace(v=estimate.v_WB, d=(north, east, 0.0))
-    joints = joints_at_rest(config.airframe, estimate)
-    return memory._replace(observed=observed, joints=joints)
+    after = before.copy()
+    observed = after.observed
+    observed.v[:] = estimate.v_WB
+    observed.d[:2], observed.d[2] = observed.disturbance_bias, 0.0
+    rest_joints(after.joints, config.airframe, estimate)
+    return after
 
 
 def plan_resumed(

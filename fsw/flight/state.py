@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import field
+from functools import partial
 from typing import Final, NamedTuple
 
 from fsw.control.actuator_watch import Watch
-from fsw.control.cascade import CascadeMemory
-from fsw.control.tracking import Observed
 from fsw.estimation.frame_dropout import Dropout
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
@@ -23,7 +22,6 @@ from fsw.measurements import RangeSample
 from fsw.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import (
-    STOPPED,
     ActuatorReport,
     ArmingReport,
     AttitudeSetpoint,
@@ -48,6 +46,7 @@ from fsw.signals import (
     Vec2,
     Vec3,
 )
+from fsw.tick_record import Tick, new_tick
 from fsw.tuning import Tuning
 
 _NOWHERE: Vec3 = (0.0, 0.0, 0.0)
@@ -265,11 +264,7 @@ class FlightState:
     invalid_ticks: int = 0
     nominal: PredictionState | None = None  # where the running plan wants the vehicle now
     output_replaced: bool = False
-    cascade: CascadeMemory = field(
-        default_factory=lambda: CascadeMemory(
-            STOPPED.rotor_thrust, STOPPED, Observed(_NOWHERE, _NOWHERE), AIRFRAME.mass
-        )
-    )
+    cascade: Tick = field(default_factory=partial(new_tick, AIRFRAME.mass))
 
     vehicle: VehicleMemory = field(default_factory=VehicleMemory)
     mission: MissionMemory = field(default_factory=MissionMemory)

@@ -6,6 +6,7 @@ import math
 
 from fsw.compiled import compilable
 from fsw.geometry.vectors import clamp_magnitude
+from fsw.record import Floats
 from fsw.signals import Mat3, Vec3, Vec4
 
 
@@ -32,13 +33,13 @@ def matrix_from_quaternion(q: Vec4) -> Mat3:
 
 
 @compilable
-def yaw_of(R: Mat3) -> float:
+def yaw_of(R: Mat3 | Floats) -> float:
     """ZYX yaw of a rotation [rad]."""
     return math.atan2(R[3], R[0])
 
 
 @compilable
-def euler_zyx(R: Mat3) -> Vec3:
+def euler_zyx(R: Mat3 | Floats) -> Vec3:
     """Roll, pitch and yaw of a rotation [rad]."""
     return math.atan2(R[7], R[8]), -math.asin(clamp_magnitude(R[6], 1.0)), yaw_of(R)
 
@@ -90,9 +91,9 @@ def rotate(R: Mat3, v: Vec3) -> Vec3:
 
 
 @compilable
-def rotate_back(R: Mat3, v: Vec3) -> Vec3:
+def rotate_back(R: Mat3 | Floats, v: Vec3 | Floats) -> Vec3:
     """Body components of ``v`` [any unit, NED]."""
-    x, y, z = v
+    x, y, z = v[0], v[1], v[2]
     return (
         R[0] * x + R[3] * y + R[6] * z,
         R[1] * x + R[4] * y + R[7] * z,

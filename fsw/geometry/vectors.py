@@ -25,13 +25,13 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @compilable
-def add_scaled(a: Vec3, b: Vec3, scale: float) -> Vec3:
+def add_scaled(a: Vector, b: Vector, scale: float) -> Vec3:
     """``a`` [any unit, any frame] plus ``scale`` [a / b] times ``b`` [any unit, same frame]."""
     return a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]
 
 
 @compilable
-def subtract(a: Vec3, b: Vec3) -> Vec3:
+def subtract(a: Vector, b: Vector) -> Vec3:
     """``a`` [any unit, any frame] minus ``b`` [unit of a, the same frame]."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 

@@ -180,7 +180,7 @@ def fill_frame(state: Array, lengths: Vec2, frame: Array) -> None:
 
 
 @kernel
-def put_pose(frame: Array, p: Vec3, R: Mat3) -> None:
+def put_pose(frame: Array, p: Vec3 | Array, R: Mat3 | Array) -> None:
     """The base of a ``frame`` (FRAME,) [SI] at ``p`` [m, NED]; its velocity stays as it is."""
     for k in range(3):
         frame[_AT_P + k] = p[k]
@@ -207,7 +207,7 @@ def put_turning(frame: Array, v: Vec3, w: Vec3) -> None:
 
 
 @kernel
-def put_arm(frame: Array, q_arm: Vec2, qd_arm: Vec2, lengths: Vec2) -> None:
+def put_arm(frame: Array, q_arm: Vec2 | Array, qd_arm: Vec2 | Array, lengths: Vec2) -> None:
     """The arm in a ``frame`` (FRAME,) [SI]: ``q_arm`` [rad], ``qd_arm`` [rad/s], lengths [m]."""
     angle, rate = 0.0, 0.0
     for link in range(2):

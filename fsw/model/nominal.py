@@ -15,6 +15,7 @@ from fsw.frozen import made
 from fsw.model.airframe import Airframe
 from fsw.model.prediction import A, P, S, discretise
 from fsw.signals import PlanInput, PredictionState, Vec3
+from fsw.tick_record import Accelerations, PlanState
 
 REST_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
 REST_STATE = PredictionState(
@@ -66,26 +67,22 @@ class NominalModel:
 
 
 @compilable
-def state_of(n: Any) -> PredictionState:
-    """The state whose nineteen numbers, SI in the order of its fields, ``n`` begins with."""
-    return PredictionState(
-        (n[0], n[1], n[2]),
-        (n[3], n[4], n[5]),
-        (n[6], n[7], n[8]),
-        (n[9], n[10]),
-        (n[11], n[12]),
-        n[13],
-        n[14],
-        (n[15], n[16]),
-        (n[17], n[18]),
-    )
+def put_plan(into: PlanState, x: PredictionState) -> None:
+    """Write a state down."""
+    for i in range(3):
+        into.p[i], into.v[i], into.a[i] = x.p[i], x.v[i], x.a[i]
+    for i in range(2):
+        into.j[i], into.s[i] = x.j[i], x.s[i]
+    for i in range(len(x.q_arm)):
+        into.q_arm[i], into.qd_arm[i] = x.q_arm[i], x.qd_arm[i]
+    into.yaw, into.yaw_rate = x.yaw, x.yaw_rate
 
 
 @compilable
 def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
     """The state some ticks later under one input."""
     for _ in range(ticks):
-        x = _tick(model, x, u)
+        x = next_state(model, x, u)
     return x
 
 
@@ -97,14 +94,17 @@ def _advance(model: NDArray[Any], x: PredictionState, u: PlanInput, ticks: int) 
 
 
 @compilable
-def _tick(model: TickModel, x: PredictionState, u: PlanInput) -> PredictionState:
+def next_state(
+    model: TickModel, x: PredictionState | PlanState, u: PlanInput | Accelerations
+) -> PredictionState:
+    """The state one tick later."""
     rows = model.horizontal
     px, vx, ax, jx, sx = _axis(rows, x.p[0], x.v[0], x.a[0], x.j[0], x.s[0], u.a[0])
     py, vy, ay, jy, sy = _axis(rows, x.p[1], x.v[1], x.a[1], x.j[1], x.s[1], u.a[1])
     pz, vz, az = _climb(model.vertical, x.p[2], x.v[2], x.a[2], u.a[2])
     dt = model.dt
     half = 0.5 * dt * dt
-    (q1, q2), (qd1, qd2), (qdd1, qdd2) = x.q_arm, x.qd_arm, u.qdd_arm
+    q, qd, qdd = x.q_arm, x.qd_arm, u.qdd_arm
     return PredictionState(
         (px, py, pz),
         (vx, vy, vz),
@@ -113,8 +113,8 @@ def _tick(model: TickModel, x: PredictionState, u: PlanInput) -> PredictionState
         (sx, sy),
         x.yaw + dt * x.yaw_rate + half * u.yaw_acc,
         x.yaw_rate + dt * u.yaw_acc,
-        (q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
-        (qd1 + dt * qdd1, qd2 + dt * qdd2),
+        (q[0] + dt * qd[0] + half * qdd[0], q[1] + dt * qd[1] + half * qdd[1]),
+        (qd[0] + dt * qdd[0], qd[1] + dt * qdd[1]),
     )
 
 

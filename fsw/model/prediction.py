@@ -28,6 +28,7 @@ from scipy.linalg import expm
 from fsw.compiled import compilable
 from fsw.model.airframe import Airframe
 from fsw.signals import PredictionState
+from fsw.tick_record import PlanState
 
 Array = NDArray[np.float64]
 
@@ -105,18 +106,17 @@ def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
 
 
 @compilable
-def to_vector(state: PredictionState) -> Array:
+def to_vector(state: PredictionState | PlanState) -> Array:
     """The prediction state in the layout of this module, (19,)."""
     return np.array(
         (
-            *state.p,
-            *state.v,
-            *state.a,
-            *state.j,
-            *state.s,
-            state.yaw,
-            state.yaw_rate,
-            *state.q_arm,
-            *state.qd_arm,
+            *(state.p[0], state.p[1], state.p[2]),
+            *(state.v[0], state.v[1], state.v[2]),
+            *(state.a[0], state.a[1], state.a[2]),
+            *(state.j[0], state.j[1]),
+            *(state.s[0], state.s[1]),
+            *(state.yaw, state.yaw_rate),
+            *(state.q_arm[0], state.q_arm[1]),
+            *(state.qd_arm[0], state.qd_arm[1]),
         )
     )

@@ -20,7 +20,9 @@ from typing import NamedTuple
 from fsw.compiled import compilable
 from fsw.geometry.vectors import clamp
 from fsw.model.airframe import GRAVITY, Airframe
+from fsw.record import Floats
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
+from fsw.tick_record import Estimate
 
 WEIGHING_TIME = 1.0  # s
 _WEIGHING_THRUST = 5.0  # m/s^2
@@ -37,7 +39,7 @@ class MotionState(NamedTuple):
 
 
 @compilable
-def lag_rotors(thrust: Vec4, command: Vec4, decay: float) -> Vec4:
+def lag_rotors(thrust: Vec4 | Floats, command: Vec4, decay: float) -> Vec4:
     """``thrust`` [N] of each rotor a tick later under ``command`` [N]; ``decay`` [1] per tick."""
     return (
         command[0] + (thrust[0] - command[0]) * decay,
@@ -54,7 +56,7 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
 
 @compilable
 def estimate_mass(
-    airframe: Airframe, mass: float, rotors: Vec4, specific_force: float, seconds: float
+    airframe: Airframe, mass: float, rotors: Vec4 | Floats, specific_force: float, seconds: float
 ) -> float:
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
 
@@ -78,7 +80,7 @@ class HangingArm(NamedTuple):
 
 
 @compilable
-def hanging_arm(airframe: Airframe, q_arm: Vec2) -> HangingArm:
+def hanging_arm(airframe: Airframe, q_arm: Vec2 | Floats) -> HangingArm:
     """The arm as a rigid pendulum across its plane, at the joint angles ``q_arm`` [rad]."""
     upright1, upright2 = math.cos(q_arm[0]), math.cos(q_arm[0] + q_arm[1])
     m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
@@ -91,7 +93,11 @@ def hanging_arm(airframe: Airframe, q_arm: Vec2) -> HangingArm:
 
 @compilable
 def motion_state(
-    airframe: Airframe, mass: float, estimate: StateEstimate, rotors: Vec4, joint1_torque: float
+    airframe: Airframe,
+    mass: float,
+    estimate: StateEstimate | Estimate,
+    rotors: Vec4 | Floats,
+    joint1_torque: float,
 ) -> MotionState:
     """Acceleration, jerk and snap of the body origin from the rotor model.
 
@@ -99,8 +105,8 @@ def motion_state(
     link 1 about +y of the body; the base feels minus it.
     """
     R = estimate.R_WB
-    wx, wy, _ = estimate.w_WB_B
-    f1, f2, f3, f4 = rotors
+    wx, wy = estimate.w_WB_B[0], estimate.w_WB_B[1]
+    f1, f2, f3, f4 = rotors[0], rotors[1], rotors[2], rotors[3]
     thrust = f1 + f2 + f3 + f4
     f = thrust / mass
     wdx = airframe.rotor_arm * (f2 - f4) / hanging_arm(airframe, estimate.q_arm).roll_inertia

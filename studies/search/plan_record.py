@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.control.cascade import CascadeMemory
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.model.prediction import Array
@@ -22,6 +21,7 @@ from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.shapes.zones import NO_ZONES, moving_zones
 from fsw.signals import PlanInput, PredictionState, TickInputs, TickOutputs
+from fsw.tick_record import Tick
 from sitl.disturbances.items import Push
 from sitl.scenario import Scenario
 from sitl.simulation import Simulation
@@ -41,7 +41,7 @@ class Start:
     row: int  # of the plan
     step: int  # of the simulation
     state: Array  # (17 + 2j,) [SI] of the plant
-    memory: CascadeMemory
+    memory: Tick
     margin_m: float = math.inf  # of the calm flight here
 
 
@@ -62,7 +62,7 @@ def record(
     rows: list[tuple[float, ...]] = []
     zones = _ZonesSeen()
     starts: list[Start] = []
-    before: list[tuple[Array, CascadeMemory]] = []
+    before: list[tuple[Array, Tick]] = []
 
     def sense(simulation: Simulation, state: FlightState) -> None:
         if len(rows) % EVERY == 0:

@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, packed
-from fsw.control.cascade import Cascade, CascadeLaw, CascadeMemory, close_loops
-from fsw.estimation.estimator import attitude
+from fsw.control.cascade import Cascade, CascadeLaw, close_loops
 from fsw.flight.autopilot import keep_clear
-from fsw.model.nominal import state_of
+from fsw.flight.quiet_ticks import READINGS, read_into
 from fsw.model.prediction import Array
 from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import ActuatorCommand, PlanInput, StateEstimate
+from fsw.tick_record import FILTER_ACTED, Accelerations, PlanState, Tick
 from sitl.body import Parts
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Inputs, Plant, plant
@@ -83,7 +82,7 @@ class TrackedFlight:
             self._law,
             self._probes,
             start.state.copy(),
-            start.memory,
+            start.memory.copy().array,
             rows,
             self._record.zones,
             self._record.spans[start.row :],
@@ -115,7 +114,7 @@ def _track(
     laws: NDArray[Any],
     probes: Array,
     x: Array,
-    memory: CascadeMemory,
+    ticks: NDArray[Any],
     rows: Array,
     zones: Array,
     spans: NDArray[np.int64],
@@ -139,69 +138,60 @@ def _track(
     states = np.empty((SUBSTEPS, x.shape[0]))
     margins, when_s = np.empty(lowest.shape[0]), np.zeros(lowest.shape[0])
     push = np.zeros(3)
-    felt = (0.0, 0.0, -GRAVITY)
+    reading = np.zeros(READINGS)
+    reading[6], reading[15] = 1.0, -GRAVITY
+    r: Tick = ticks[0]
     top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
+    thrust, torque = np.empty(4), np.empty(2)
     for k in range(kept.shape[0]):
-        r, ahead = rows[k], rows[k + 1]
-        nominal = state_of(r)
-        u = PlanInput((r[19], r[20], r[21]), r[22], (r[23], r[24]))
-        p, v, w = (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[10], x[11], x[12])
-        q_arm, qd_arm = (x[17], x[18]), (x[19], x[20])
-        _, R, yaw = attitude(p, v, (x[6], x[7], x[8], x[9]), w, felt, q_arm, qd_arm)
+        planned, ahead = rows[k], rows[k + 1]
+        _take_plan(planned, r.plan, r.u)
+        reading[:13], reading[16:] = x[:13], x[17:21]
         step = first_step + k
-        estimate = StateEstimate(
-            START_US + STEP_US * step, p, v, R, w, yaw, q_arm, qd_arm, -felt[2]
-        )
-        near = zones[spans[k, 0] : spans[k, 1]]
-        command, memory, guarded = close_loops(law, memory, estimate, nominal, u, 1, near, probes)
-        f, t = command.rotor_thrust, command.joint_torque
-        sent = ActuatorCommand(
-            (
-                min(max(f[0], 0.0), top),
-                min(max(f[1], 0.0), top),
-                min(max(f[2], 0.0), top),
-                min(max(f[3], 0.0), top),
-            ),
-            (min(max(t[0], -drive), drive), min(max(t[1], -drive), drive)),
-        )
-        memory = CascadeMemory(
-            memory.rotors,
-            sent,
-            memory.observed,
-            memory.mass,
-            memory.attitude,
-            memory.height,
-            memory.joints,
-            memory.off_plan,
-            memory.health,
-        )
+        read_into(r.estimate, reading, START_US + STEP_US * step)
+        close_loops(r, law, 1, zones[spans[k, 0] : spans[k, 1]], probes)
+        for i in range(4):
+            thrust[i] = r.sent.rotor_thrust[i] = min(max(r.sent.rotor_thrust[i], 0.0), top)
+        for i in range(2):
+            torque[i] = r.sent.joint_torque[i] = min(max(r.sent.joint_torque[i], -drive), drive)
         if k % every == 0:
             lift = (x[13] + x[14] + x[15] + x[16]) / mass
+            R = r.estimate.R_WB
             a = (-lift * R[2], -lift * R[5], GRAVITY - lift * R[8])
             for axis in range(3):
                 if table.shape[0] > 0:
                     push[axis] = amplitude * table[min(k // every, table.shape[0] - 1), axis]
                 else:
                     chased = (
-                        weights[axis, 0] * (p[axis] - r[axis])
-                        + weights[axis, 1] * (v[axis] - r[3 + axis])
-                        + weights[axis, 2] * (a[axis] - r[6 + axis])
+                        weights[axis, 0] * (x[axis] - planned[axis])
+                        + weights[axis, 1] * (x[3 + axis] - planned[3 + axis])
+                        + weights[axis, 2] * (a[axis] - planned[6 + axis])
                     )
                     idle = not weights[axis].any()
                     push[axis] = 0.0 if idle else amplitude * (1.0 if chased >= 0.0 else -1.0)
-        inputs = Inputs(
-            np.array(sent.rotor_thrust), np.array(sent.joint_torque), mass * push, np.zeros(3)
-        )
+        inputs = Inputs(thrust, torque, mass * push, np.zeros(3))
         felt = integrate(body, x, inputs, STEP_S, places, states, blocks).felt
+        reading[13], reading[14], reading[15] = felt[0], felt[1], felt[2]
         before_s = 1e-6 * STEP_US * step
         _judge(table_of_zones, parts, aim, places, before_s, lowest, when_s, margins, room)
         for axis in range(3):
             kept[k, OFF + axis] = x[axis] - ahead[axis]
             kept[k, PUSH + axis] = push[axis]
-        kept[k, FILTERED] = 1.0 if guarded[0] else 0.0
+        kept[k, FILTERED] = 1.0 if r.flags & FILTER_ACTED else 0.0
         if not (abs(kept[k, OFF]) + abs(kept[k, OFF + 1]) + abs(kept[k, OFF + 2]) < 10.0):
             return k + 1
     return len(kept)
+
+
+@compilable
+def _take_plan(row: Array, x: PlanState, u: Accelerations) -> None:
+    """The plan's state and input of a row (STATE + INPUT,) [SI]."""
+    for i in range(3):
+        x.p[i], x.v[i], x.a[i], u.a[i] = row[i], row[3 + i], row[6 + i], row[19 + i]
+    for i in range(2):
+        x.j[i], x.s[i] = row[9 + i], row[11 + i]
+        x.q_arm[i], x.qd_arm[i], u.qdd_arm[i] = row[15 + i], row[17 + i], row[23 + i]
+    x.yaw, x.yaw_rate, u.yaw_acc = row[13], row[14], row[22]
 
 
 @compilable

@@ -11,6 +11,8 @@ from typing import Any
 
 from command_line.kernel_cache import KernelCache
 
+IN_PYTHON = True
+
 
 def cache() -> KernelCache:
     return KernelCache(None, 0, "")

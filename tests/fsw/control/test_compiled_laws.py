@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fsw.control.cascade import Cascade, CascadeMemory, Inner, close_loops
+from fsw.control.cascade import Cascade, Inner, close_loops, in_hover
 from fsw.control.gains import LoopGains
-from fsw.control.joints import JointMemory
-from fsw.control.tracking import Observed
 from fsw.estimation.estimator import attitude, estimate_state
 from fsw.model.airframe import AIRFRAME, AttitudeLag
 from fsw.model.nominal import NominalModel, advance
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.zones import moving_zones
-from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec2, Vec4
+from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec4
+from fsw.tick_record import FILTER_ACTED, GATE_NEEDED, Tick
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 
 STATES = 300
@@ -41,22 +40,24 @@ def four(random: np.random.Generator, high: float) -> Vec4:
     return (a, b, c, d)
 
 
-def memory(random: np.random.Generator) -> CascadeMemory:
+def memory(random: np.random.Generator) -> Tick:
+    r = in_hover(AIRFRAME, random_estimate(random))
     torque = (float(random.uniform(-2.0, 2.0)), float(random.uniform(-2.0, 2.0)))
-    return CascadeMemory(
-        four(random, AIRFRAME.rotor_thrust_max),
-        ActuatorCommand(four(random, AIRFRAME.rotor_thrust_max), torque),
-        Observed(vec3(random.uniform(-1.0, 1.0, 3)), vec3(random.uniform(-1.0, 1.0, 3))),
-        float(random.uniform(2.5, 4.5)),
-        vec3(random.uniform(-0.2, 0.2, 3)),
-        float(random.uniform(-0.2, 0.2)),
-        JointMemory(*(two(random, most) for most in (1.0, 0.01, 0.1, 0.1, 2.0))),
-    )
-
-
-def two(random: np.random.Generator, most: float) -> Vec2:
-    a, b = (float(value) for value in random.uniform(-most, most, 2))
-    return (a, b)
+    r.commanded = ActuatorCommand(four(random, AIRFRAME.rotor_thrust_max), torque)
+    r.rotors[:4] = random.uniform(0.0, AIRFRAME.rotor_thrust_max, 4)
+    r.mass, r.height = float(random.uniform(2.5, 4.5)), float(random.uniform(-0.2, 0.2))
+    r.observed.v[:], r.observed.d[:] = random.uniform(-1.0, 1.0, (2, 3))
+    r.attitude[:] = random.uniform(-0.2, 0.2, 3)
+    k = r.joints
+    for values, most in (
+        (k.reference, 1.0),
+        (k.momentum, 0.01),
+        (k.disturbance, 0.1),
+        (k.integral, 0.1),
+        (k.reference_rate, 2.0),
+    ):
+        values[:2] = random.uniform(-most, most, 2)
+    return r
 
 
 def plan_input(random: np.random.Generator) -> PlanInput:
@@ -79,17 +80,15 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
         SafeSet((wall((0.6, 0.0, 0.8), 0.0, 0.1), point((0.5, 0.0, 0.0), 0.3))), None
     )
     for _ in range(STATES):
-        case = (
-            memory(random),
-            random_estimate(random),
-            as_state(prediction_vector(random)),
-            plan_input(random),
-            ticks,
-            zones,
-        )
-        plain = list(numbers(close_loops(cascade.law, *case, cascade.probes)))
-        np.testing.assert_allclose(list(numbers(cascade.step(*case))), plain, rtol=0, atol=1e-9)
-        pushed += cascade.step(*case)[2][0]
+        before, estimate = memory(random), random_estimate(random)
+        plan, u = as_state(prediction_vector(random)), plan_input(random)
+        ours = cascade.step(before, estimate, plan, u, ticks, zones)
+        plain = before.copy()
+        plain.give(estimate, plan, u)
+        close_loops(plain, cascade.law, ticks, zones, cascade.probes)
+        np.testing.assert_allclose(ours.numbers, plain.numbers, rtol=0, atol=1e-9)
+        assert ours.flags == plain.flags
+        pushed += ours.flags & FILTER_ACTED
     assert 0 < pushed < STATES, "with and without the safety filter"
 
 
@@ -97,8 +96,9 @@ def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> No
     random = np.random.default_rng(8)
     cascade = Cascade(AIRFRAME, LoopGains(), "tracking", 0.002)
     plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
-    wanted, _, _ = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
-    assert not math.isfinite(sum(wanted.joint_torque))
+    after = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
+    assert not math.isfinite(sum(after.commanded.joint_torque))
+    assert after.flags & GATE_NEEDED
 
 
 @pytest.mark.parametrize("lag", [AttitudeLag(), AttitudeLag(at_once=True)])

@@ -14,18 +14,19 @@ from scipy.spatial.transform import Rotation
 
 from fsw.control.gains import LoopGains
 from fsw.control.joints import (
-    JointMemory,
     arm_dynamics,
     joint_torques,
-    joints_at_rest,
     limited_acceleration,
     observe_disturbance,
+    rest_joints,
     torques_for,
 )
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.prediction import Array
 from fsw.signals import StateEstimate, Vec2
+from fsw.tick_record import Joints, of_joints
 from tests.fsw.random_states import estimate_of
+from tests.fsw.records import changed
 
 GAINS = LoopGains().joint
 WITH_INTEGRAL = replace(GAINS, ki=400.0)
@@ -92,17 +93,16 @@ def test_a_raised_arm_is_held_up() -> None:
 def hold(q: Vec2, q_ref: Vec2, thrust: float = 9.81, pitch: float = 0.0) -> tuple[Vec2, Vec2]:
     """Torques and integrals of an arm at rest that is asked to rest elsewhere."""
     estimate = estimate_of(Rotation.identity(), q_arm=q)
-    torque, kept = joint_torques(
-        AIRFRAME,
-        GAINS,
-        joints_at_rest(AIRFRAME, estimate),
-        estimate,
-        (q_ref, (0.0, 0.0), (0.0, 0.0)),
-        arm_dynamics(AIRFRAME, estimate, (0.0, thrust)),
-        pitch,
-        DT,
-    )
-    return torque, kept.integral
+    k = changed(resting_joints(AIRFRAME, estimate), reference=q_ref)
+    arm = arm_dynamics(AIRFRAME, estimate, (0.0, thrust))
+    torque = joint_torques(k, AIRFRAME, GAINS, estimate, (0.0, 0.0), arm, pitch, DT)
+    return torque, of_joints(k.integral)
+
+
+def resting_joints(airframe: Airframe, estimate: StateEstimate) -> Joints:
+    k = Joints()
+    rest_joints(k, airframe, estimate)
+    return k
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -140,21 +140,18 @@ def followed(
     model = planar_arm()
     data = model.createData()
     q, qd, torque = np.array(start), np.zeros(2), (0.0, 0.0)
-    memory: JointMemory | None = None
+    k = resting_joints(AIRFRAME, estimate_of(Rotation.identity(), q_arm=start))
     angles, rates = [], []
-    for k in range(round(seconds / DT)):
+    for tick in range(round(seconds / DT)):
         estimate = estimate_of(Rotation.identity(), q_arm=pair(q), qd_arm=pair(qd))
         arm = arm_dynamics(AIRFRAME, estimate, FIELD)
-        memory = memory or joints_at_rest(AIRFRAME, estimate)
-        memory = observe_disturbance(memory, arm, torque, DT)
-        q_ref, qd_ref = references(k * DT)
-        torque, memory = joint_torques(
-            AIRFRAME, GAINS, memory, estimate, (q_ref, qd_ref, (0.0, 0.0)), arm, 0.0, DT
-        )
+        observe_disturbance(k, arm, torque, DT)
+        k.reference[:2], k.reference_rate[:2] = references(tick * DT)
+        torque = joint_torques(k, AIRFRAME, GAINS, estimate, (0.0, 0.0), arm, 0.0, DT)
         for _ in range(8):
             dry = friction * np.tanh(qd / 0.05)
             qd = qd + DT / 8.0 * np.array(
-                pin.aba(model, data, q, qd, np.array(torque) - dry + push(k * DT))
+                pin.aba(model, data, q, qd, np.array(torque) - dry + push(tick * DT))
             )
             q = q + DT / 8.0 * qd
         angles.append(q)
@@ -231,20 +228,16 @@ def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() ->
         estimate = estimate_of(
             Rotation.identity(), (0.0, pitch_rate, 0.0), q_arm=pair(q), qd_arm=pair(qd)
         )
-        torque, kept = joint_torques(
-            unlike,
-            far,
-            JointMemory((0.0, 0.0), (0.0, 0.0), integral=pair(integral)),
-            estimate,
-            (pair(q + error), pair(qd + error_rate), pair(qdd)),
-            arm_dynamics(unlike, estimate, FIELD),
-            pitch_acceleration,
-            DT,
+        k = changed(
+            Joints(), integral=integral, reference=q + error, reference_rate=qd + error_rate
         )
+        arm = arm_dynamics(unlike, estimate, FIELD)
+        torque = joint_torques(k, unlike, far, estimate, pair(qdd), arm, pitch_acceleration, DT)
+        kept = k.integral[:2]
         inertial = qd + [pitch_rate, 0.0]
         got = pin.aba(model, data, q, inertial, np.array(torque)) - [pitch_acceleration, 0.0]
-        np.testing.assert_allclose(kept.integral, integral + DT * error, atol=1e-12)
-        pid = far.kp * error + far.ki * np.array(kept.integral) + far.kd * error_rate
+        np.testing.assert_allclose(kept, integral + DT * error, atol=1e-12)
+        pid = far.kp * error + far.ki * kept + far.kd * error_rate
         np.testing.assert_allclose(got, qdd + pid, atol=1e-6)
 
 
@@ -262,11 +255,8 @@ def test_motors_behind_gears_are_moved_along_and_known_to_the_momentum() -> None
         estimate = moving(random, pitch_rate)
         pitch_acceleration, qdd = 5.0, pair(random.uniform(-5.0, 5.0, 2))
         arm = arm_dynamics(motors, estimate, FIELD)
-        reference = (estimate.q_arm, estimate.qd_arm, qdd)
-        memory = JointMemory((0.0, 0.0), (0.0, 0.0))
-        torque, _ = joint_torques(
-            motors, gains, memory, estimate, reference, arm, pitch_acceleration, DT
-        )
+        k = changed(Joints(), reference=estimate.q_arm, reference_rate=estimate.qd_arm)
+        torque = joint_torques(k, motors, gains, estimate, qdd, arm, pitch_acceleration, DT)
         q, qd = np.array(estimate.q_arm), np.array(estimate.qd_arm)
         inertial = qd + [pitch_rate, 0.0]
         links = pin.rnea(model, data, q, inertial, np.array(qdd) + [pitch_acceleration, 0.0])
@@ -286,8 +276,7 @@ def pair(values: Any) -> Vec2:
 def test_a_torque_beyond_the_servos_limit_becomes_the_limit(sign: float) -> None:
     weak = replace(AIRFRAME, joint_torque_max=0.1)
     still = estimate_of(Rotation.identity())
-    memory = joints_at_rest(weak, still)
-    reference = ((3.0 * sign, 3.0 * sign), (0.0, 0.0), (0.0, 0.0))
+    k = changed(resting_joints(weak, still), reference=(3.0 * sign, 3.0 * sign))
     arm = arm_dynamics(weak, still, (0.0, 0.0))
-    limited, _ = joint_torques(weak, GAINS, memory, still, reference, arm, 0.0, DT)
+    limited = joint_torques(k, weak, GAINS, still, (0.0, 0.0), arm, 0.0, DT)
     assert limited == (0.1 * sign, 0.1 * sign)

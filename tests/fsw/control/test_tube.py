@@ -13,9 +13,7 @@ from fsw.control.allocation import allocate
 from fsw.control.gains import TrackingGains, TrackingTuning, tracking_gains
 from fsw.control.tracking import (
     AxisState,
-    Observed,
     TrackingLaw,
-    observe,
     snap_command,
     vertical_acceleration,
 )
@@ -36,6 +34,7 @@ from fsw.model.airframe import AIRFRAME, GRAVITY, Airframe
 from fsw.model.nominal import REST_INPUT, REST_STATE
 from fsw.model.prediction import Array
 from fsw.model.rotors import estimate_mass, hanging_arm
+from tests.fsw.records import observe, observed
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
@@ -62,7 +61,7 @@ def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) ->
     law = TrackingLaw(AIRFRAME.attitude_lag, tuning, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
-    believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    believed = observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     positions = []
     for d in disturbance:
         believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), tuning, DT)
@@ -130,7 +129,7 @@ def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:
     fine = DT / 8.0
     decay = np.exp(-fine / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
-    believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    believed = observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     history = []
     for k in range(round(6.0 / fine)):
         now = 1.0 if k < 8 else 0.0
@@ -240,7 +239,7 @@ def _chased(law: TrackingLaw, tuning: TrackingTuning, amplitude: float) -> float
     for every in (1, 25, 50):
         for lead in (-3.0, 0.0, 3.0):
             p = v = a = j = s = d = 0.0
-            believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            believed = observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             for k in range(5000):
                 if k % every == 0:
                     d = amplitude if v + lead * p >= 0.0 else -amplitude
@@ -310,7 +309,7 @@ def _height_under(disturbance: Array, tuning: TrackingTuning) -> Array:
     true = believed_mass = AIRFRAME.mass
     thrust = true * GRAVITY
     z = v = 0.0
-    seen = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    seen = observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     heights = []
     for d in disturbance:
         each = 0.25 * thrust
@@ -360,7 +359,7 @@ def _position_misled(entry: int, error: np.ndarray) -> np.ndarray:
     dt = DT / fine
     decay = np.exp(-dt / AIRFRAME.rotor_lag)
     x = np.zeros(5)
-    believed = Observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    believed = observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     positions = []
     for wrong in error:
         for _ in range(fine):

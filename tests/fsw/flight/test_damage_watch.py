@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from fsw.control.actuator_watch import Watch, at_start, paused
-from fsw.control.cascade import CascadeMemory, in_hover
+from fsw.control.cascade import in_hover
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.state import Damage
 from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import ActuatorCommand, StateEstimate
+from tests.fsw.records import changed
 
 DT = 0.002
 FAULT_S = 1.5
@@ -55,7 +56,7 @@ class Motion:
         self.damage, self.memory = Damage(), None
         self.told_s = math.inf
         self.history: list[Damage] = []
-        self.loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+        self.loops = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
 
     def run(
         self,
@@ -71,7 +72,7 @@ class Motion:
             t = k * DT
             share = min(t / self.takeoff_s, 1.0) if self.takeoff_s else 1.0
             each = tuple(share * self.asked(t, i) for i in range(4))
-            loops = self.loops.after_sending(ActuatorCommand(each, HANGING))
+            loops = changed(self.loops, commanded=ActuatorCommand(each, HANGING))
             for i in range(4):
                 thrust[i] += DT / self.lag * (self.given(t, i) * each[i] - thrust[i])
             rear, left, front, right = thrust
@@ -278,7 +279,7 @@ def test_after_a_slow_take_off_a_lost_rotor_is_named_as_soon(rise_s: float) -> N
 
 def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
     damage, memory = Damage(), at_start()
-    loops: CascadeMemory = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
+    loops = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
     said = []
     for k, kinds in enumerate([(STUCK, SOUND), (STUCK, LIMP), (LIMP, LIMP)]):
         memory["joint"], memory["joint_for"] = kinds, 0.1

@@ -43,8 +43,8 @@ def moving(random: np.random.Generator) -> tuple[FlightState, StateEstimate]:
     )
     state = replace(flying(), nominal=nominal_at_rest(estimate))
     cascade = in_hover(AIRFRAME, estimate)
-    observed = cascade.observed._replace(v=tuple(random.uniform(-1.0, 1.0, 3).tolist()))
-    return replace(state, cascade=cascade._replace(observed=observed)), estimate
+    cascade.observed.v[:] = random.uniform(-1.0, 1.0, 3)
+    return replace(state, cascade=cascade), estimate
 
 
 def turned_and_moved(

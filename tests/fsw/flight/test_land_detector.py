@@ -21,6 +21,7 @@ from fsw.flight.state import AIDED, Aiding, FlightState
 from fsw.measurements import RangeSample
 from fsw.signals import Mode, Vec3
 from tests.fsw.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
+from tests.fsw.records import changed
 
 CONFIG = limits(landed_height=0.1, airborne_height=0.3, landed_speed=0.05, landed_time_us=500_000)
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -117,7 +118,7 @@ def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
 ) -> None:
     """And with a gyro they carry it down to the ground."""
     state = flying(Mode.DESCEND, range=sample)
-    carries = state.cascade._replace(rotors=(0.25 * WEIGHT,) * 4)
+    carries = changed(state.cascade, rotors=(0.25 * WEIGHT,) * 4)
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
     for lost in (True, False):
         aiding = Aiding(height_sigma=sigma, gyro_lost=lost)
@@ -178,9 +179,7 @@ def landed_after(
     for k in range(1, 2000):
         open_ = state.vehicle.unloaded is not None
         v = v + fall * 1e-6 * TICK_US if open_ else velocity
-        state = replace(
-            state, cascade=state.cascade._replace(rotors=(0.0,) * 4 if open_ else rotors)
-        )
+        state = replace(state, cascade=changed(state.cascade, rotors=() if open_ else rotors))
         here = vehicle_at((0.0, 0.0, GROUND_Z - height), (0.0, 0.0, v), k * TICK_US)
         state, landed = feel_ground(CONFIG, state, here)
         if landed:

@@ -33,6 +33,7 @@ from fsw.signals import (
 )
 from tests.fsw.flight.contexts import READY
 from tests.fsw.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
+from tests.fsw.records import changed
 
 CONFIG = limits(setpoint_timeout_us=500_000, landed_time_us=500_000)
 OFFBOARD = Offboard(CONFIG)
@@ -277,7 +278,7 @@ def test_the_setpoint_begins_anew_only_where_it_is_of_another_point() -> None:
 
 def test_an_attitude_is_an_acceleration_by_the_mass_that_was_weighed() -> None:
     state = hearing(attitude=ATTITUDE, motion_us=NOW_US)
-    light = replace(state, cascade=state.cascade._replace(mass=2.0))
+    light = replace(state, cascade=changed(state.cascade, mass=2.0))
     goal = aimed(light).goal
     assert goal is not None
     thrust = 0.5 * 4.0 * CONFIG.airframe.rotor_thrust_max

@@ -1,0 +1,40 @@
+"""Records for tests: made of tuples, changed by name."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+
+from fsw.control import tracking
+from fsw.control.gains import TrackingTuning
+from fsw.record import Record
+from fsw.signals import Vec3
+from fsw.tick_record import Observed
+
+Kind = TypeVar("Kind", bound=Record)
+
+
+def changed(record: Kind, **fields: Any) -> Kind:
+    """A copy with other fields; an array's entries that are not given are zero."""
+    after = record.copy()
+    for name, value in fields.items():
+        now = getattr(after, name)
+        if isinstance(now, np.ndarray):
+            now[:] = 0.0
+            now[: len(value)] = value
+        else:
+            setattr(after, name, value)
+    return after
+
+
+def observed(v: Vec3, d: Vec3, recent: float = 1.0) -> Observed:
+    """An observer that believes in ``v`` [m/s] and ``d`` [m/s^2]."""
+    return changed(Observed(), v=v, d=d, recent=recent)
+
+
+def observe(before: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) -> Observed:
+    """What it believes a tick of ``dt`` [s] later."""
+    after = before.copy()
+    tracking.observe(after, v, a, tuning, dt)
+    return after
