@@ -243,6 +243,15 @@ class LogFlight:
             return None
         return table.row(place)
 
+    def _nearest(self, name: str, t: float) -> dict[str, Any] | None:
+        """The record of a topic that is nearest in time: margins are logged ten times a second."""
+        table = self._table(name)
+        if not len(table) or t + 1e-9 < table.t[0]:
+            return None
+        after = min(int(np.searchsorted(table.t, t)), len(table) - 1)
+        nearer = after > 0 and t - table.t[after - 1] < table.t[after] - t
+        return table.row(after - 1 if nearer else after)
+
     def _posture(
         self, t: float, p: tuple[str, str | None], q: tuple[str, str], arm: tuple[str, str]
     ) -> Posture | None:
@@ -269,7 +278,7 @@ class LogFlight:
         return self._horizon[1] if fresh else None
 
     def _margins(self, t: float) -> tuple[tuple[Margin, ...], float, float, Safety]:
-        row = self._row("barrier_margin", t)
+        row = self._nearest("barrier_margin", t)
         if row is None:
             return (), math.nan, math.nan, Safety()
         count = int(row["count"])

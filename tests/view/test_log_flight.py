@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +63,20 @@ def test_the_worst_moment_is_that_of_the_result(flight: LogFlight, tmp_path: Pat
     again = LogFlight(alone).worst
     assert again is not None
     assert again.source == "the vehicle's own estimate", "they are of different flights"
+
+
+def test_a_moment_has_the_margin_that_is_nearest_in_time(tmp_path: Path) -> None:
+    """They are logged ten times a second: the worst moment had the one of 0.1 s before."""
+    flight = LogFlight(write_flight(tmp_path / "flown"))
+    table = flight.data.tables["barrier_margin"]
+    margins = np.linspace(1.0, 0.0, len(table))
+    columns = {**table.columns, "minimum": margins}
+    flight.data.tables["barrier_margin"] = replace(table, columns=columns)
+    for k in (1, 2, len(table) - 1):
+        for t in (table.t[k] - 0.004, table.t[k], table.t[k] + 0.004):
+            assert flight.scene(t).minimum == margins[k]
+    assert math.isnan(flight.scene(table.t[0] - 1.0).minimum)
+    assert flight.scene(table.t[-1] + 1.0).minimum == margins[-1]
 
 
 def test_the_safe_set_is_the_announced_one(flight: LogFlight) -> None:
