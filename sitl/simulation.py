@@ -20,10 +20,11 @@ from sitl.faults.keys import Fault
 from sitl.flight_evaluator import FlightEvaluator, Flown, critical
 from sitl.judged_step import watched_step
 from sitl.mission_clock import MissionClock
+from sitl.periods import STEP_US as STEP_US
 from sitl.plant.aerial_manipulator import Plant, plant
 from sitl.plant.battery import open_circuit
 from sitl.plant.integrator import STEP_S, held
-from sitl.plant.kinematics import places as places_into
+from sitl.plant.integrator import places as places_into
 from sitl.plant.lock import seize
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, THRUST, taken_apart
@@ -39,16 +40,16 @@ from sitl.sensors.suite import SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
 
-STEP_US = 2000  # one exchange with the flight software
 START_US = 1_000_000  # so that no stamp is 0
-SETTLED_STEPS = 250  # for which the vehicle's sensors have run when the flight begins
-SETTLED_KEPT = 20  # of these, whose measurements the flight software still gets
+# For which the vehicle's sensors have run when the flight begins.
+SETTLED_STEPS = 500_000 // STEP_US
+SETTLED_KEPT = 40_000 // STEP_US  # of these, whose measurements the flight software still gets
 SETTLED_NEWEST = 2  # of each sensor, however long ago they came
-SUBSTEPS = 2  # plant steps per exchange
-BATTERY_STEPS = 50  # between two readings of the battery
+SUBSTEPS = STEP_US // round(1e6 * STEP_S)  # plant steps per exchange
+BATTERY_STEPS = 100_000 // STEP_US  # between two readings of the battery
 _NONE: V3 = (0.0, 0.0, 0.0)
 _OFF = (0.0, 0.0)  # N, N·m
-SAMPLE_STEPS = 50  # tracking error at 10 Hz, as the paper's TE
+SAMPLE_STEPS = 100_000 // STEP_US  # tracking error at 10 Hz, as the paper's TE
 
 
 class Controls(NamedTuple):
@@ -141,8 +142,8 @@ class Simulation:
         self._turning: V4 = (0.0, 0.0, 0.0, 0.0)  # N, of the rotors at that reading
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
         self._held = held(len(self.vehicle.links))
+        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
         self._step = machine_code(watched_step, *example)
@@ -438,7 +439,7 @@ class Simulation:
 
     def _places_now(self) -> Array:
         out = np.empty((1, *self._places.shape[1:]))
-        places_into(self._plant, self._state, out)
+        places_into(self._plant, self._state, self._held, out)
         now: Array = out[0]
         return now
 

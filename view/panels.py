@@ -8,12 +8,13 @@ from html import escape
 from typing import Final
 
 from fsw.model.airframe import Airframe
+from fsw.periods import PLANNING_US
 from view import colours
 from view.colours import Rgb, css, millimetres
 from view.scene import Event, Margin, Scene, Timing, Worst
 from view.vehicle import tilt
 
-PLANNING_LIMIT: Final = 0.1  # s, a planning cycle must be over by then
+PLANNING_LIMIT: Final = 1e-6 * PLANNING_US  # s, a planning cycle must be over by then
 _SOON: Final = 0.05  # m; a margin below it is shown as close
 _ROTORS: Final = ("rear", "left", "front", "right")
 _INKS: Final = {"fault": colours.RED, "warning": colours.ORANGE, "text": colours.GREY}

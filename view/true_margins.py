@@ -74,11 +74,12 @@ def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:
 def _placed(truth: Table) -> Array:
     """Base, joints, end-effector and the base's axes of each record, (records, 7, 3)."""
     from sitl.plant.aerial_manipulator import plant
-    from sitl.plant.kinematics import places
+    from sitl.plant.integrator import held, places
     from sitl.plant.parameters import Vehicle
 
-    numbers, out = plant(Vehicle()), np.empty((len(truth), 7, 3))
+    vehicle, out = Vehicle(), np.empty((len(truth), 7, 3))
+    numbers, memory = plant(vehicle), held(len(vehicle.links))
     states = np.concatenate([truth[name] for name in _STATE], axis=1)
     for k, state in enumerate(states):
-        places(numbers, state, out[k : k + 1])
+        places(numbers, state, memory, out[k : k + 1])
     return out

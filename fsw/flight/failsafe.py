@@ -20,10 +20,11 @@ from fsw.flight import failsafe_wording as wording
 from fsw.flight.conditions import Action, Condition
 from fsw.flight.failsafe_evidence import FailsafeContext
 from fsw.flight.zone_room import is_deep
+from fsw.periods import PLANNING_US, TICK_US
 from fsw.signals import Charge, Severity
 
-AT_ONCE_US: Final = 2_000  # a tick
-SLOW_US: Final = 100_000  # a planning period, after which the other rows are looked at again
+AT_ONCE_US: Final = TICK_US
+SLOW_US: Final = PLANNING_US  # after which the other rows are looked at again
 SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
 
 Evidence = Callable[[FailsafeContext], bool]
@@ -379,7 +380,8 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         detail=lambda c: f": {c.state.host.missed_ticks} in the last second",
         slow=True,
-        detected="10 of a second's 500 ticks were late, skipped or without readings of their own",
+        detected=f"10 of a second's {1_000_000 // TICK_US} ticks were late, skipped or without "
+        "readings of their own",
         within_us=SECOND_US,
         does="warning; plans and estimate carry over missed ticks",
     ),

@@ -11,13 +11,15 @@ from fsw.flight.state import FlightState, LostSensor
 from fsw.flight.uncertain_clearance import LACKING
 from fsw.frozen import dataclass
 from fsw.parameters.flight_config import FlightConfig, FlightLimits
+from fsw.periods import TICK_US
 from fsw.signals import Mode, StateEstimate
 
 PLAN_STALE_PERIODS: Final = 3
-INVALID_TICKS: Final = 5  # 10 ms without an estimate
-BLIND_TICKS: Final = 125  # 0.25 s: a filter that starts anew has poses that agree long before
-# Of the 500 of a second, that are too many. A gap of 50 ms, in which the rotors hold their last
-# command, is 25, of which at least 12 are in the same second.
+INVALID_TICKS: Final = 10_000 // TICK_US  # without an estimate
+# A filter that starts anew has poses that agree long before.
+BLIND_TICKS: Final = 250_000 // TICK_US
+# Of a second's, that are too many. A gap of 50 ms, in which the rotors hold their last
+# command, is 25 of 2 ms, of which at least 12 are in the same second.
 MISSED_TICKS: Final = 10
 JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing

@@ -29,6 +29,7 @@ from fsw.log.packed import Packed, Records
 from fsw.log.px4_records import Px4Records, validity
 from fsw.measurements import ImuSample
 from fsw.model.kinematics import point_in_flight
+from fsw.periods import TICK_US
 from fsw.ports import GroupTiming
 from fsw.signals import (
     CommandRequest,
@@ -47,7 +48,7 @@ from messages.ulog import logged_text
 
 TYPED: Final = "sensors"  # the inputs that have topics of their own
 SAMPLES: Final = "samples"
-STATUS_TICKS: Final = 500
+STATUS_TICKS: Final = 1_000_000 // TICK_US
 THIN, FULL = 0, 1  # values of LOG_PROFILE
 DETAIL_US: Final = {
     THIN: 20_000,

@@ -9,7 +9,7 @@ from fsw.model.body import BodyName
 from fsw.mpc.costs import CostWeights
 from fsw.mpc.qp_data import InputLimits
 from fsw.mpc.soft_costs import SoftWeights
-from fsw.periods import PLANNING_US
+from fsw.periods import HORIZON_US, PLANNING_US
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class PlannerConfig:
     """Horizon, weights, limits and barriers of the MPC."""
 
     controller: str = "blf"  # a name in variants.py
-    horizon: int = 5  # n
+    horizon: int = HORIZON_US // PLANNING_US  # n
     period_us: int = PLANNING_US  # T
     solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
     qp_solver: str = "dual"  # a name in ocp.py, of what solves each program of clarabel

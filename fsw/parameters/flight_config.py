@@ -146,9 +146,9 @@ class FlightConfig:
     # 20 ms between question and answer: 20 times the planner's median, and a fixed number of
     # ticks, so that a slow machine flies exactly like a fast one. A plan that starts from the
     # nominal state loses nothing by waiting.
-    plan_delay_ticks: int = 10
+    plan_delay_ticks: int = 20_000 // TICK_US
     # Ticks that were missed are made up for, up to this many at once.
-    catch_up_ticks: int = 25
+    catch_up_ticks: int = 50_000 // TICK_US
     log_profile: int = 0  # of flight.ulg: 0 what a replay needs, and the rest at 50 Hz; 1 all
     # Farther from the plan than this, plan from the measurement.
     upset_distance: float = 0.15  # m

@@ -14,12 +14,13 @@ from typing import Final
 
 from fsw.frozen import dataclass
 from fsw.link.sim_link import SimLink
+from fsw.periods import TICK_US
 from fsw.ports import Clock
 from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.release_schedule import ReleaseSchedule
 from fsw.signals import SensorFrame
 
-MAX_STALE_TICKS: Final = 5  # 10 ms, as long as an estimate may be missing
+MAX_STALE_TICKS: Final = 10_000 // TICK_US  # as long as an estimate may be missing
 LEAD_US: Final = 600  # frames arrive so much before their tick, and may be so much late
 _SETTLING_FRAMES: Final = 25  # until the schedule begins
 _PROBE_TICKS: Final = 25  # between two measurements of when a frame arrives

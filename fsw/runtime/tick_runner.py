@@ -7,10 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, Generic
 
+from fsw.periods import TICK_US
 from fsw.runtime.program import Answered, Conclude, Control, State
 from fsw.signals import Answer, Severity, StatusText, TickInputs, TickOutputs
 
-MAX_FAILED_TICKS: Final = 5  # 10 ms, as long as the estimate may be missing
+MAX_FAILED_TICKS: Final = 10_000 // TICK_US  # as long as the estimate may be missing
 
 
 class TickRunner(Generic[State]):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl.air.load import SURFACES, Air, drag_force, rotor_gain, wall_force
-from sitl.compiled import compiled, kernel
+from sitl.compiled import kernel
 from sitl.plant.actuators import joint_torque, rotor_torque, stop_torque, thrust_rate
 from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
 from sitl.plant.contact import Feet, ground_wrench
@@ -126,7 +126,6 @@ def _air(vehicle: Vehicle) -> Air:
     )
 
 
-@compiled
 def empty_workspace(joints: int) -> Workspace:
     """Memory for a vehicle with ``joints`` joints."""
     n = 6 + joints

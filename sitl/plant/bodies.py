@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.compiled import compiled, kernel
+from sitl.compiled import kernel
 from sitl.plant.vector import Array, add, put_row, row, times_one
 
 
@@ -36,7 +36,6 @@ class Posture(NamedTuple):
     moment: Array  # (j+1, 3) N·m, likewise, about the joint between them
 
 
-@compiled
 def empty_posture(joints: int) -> Posture:
     """Room for a posture of an arm with ``joints`` joints."""
     n = joints + 1

@@ -43,6 +43,7 @@ class Memory(NamedTuple):
     work: Workspace
     slopes: Slopes
     moved: Array  # (j,)
+    now: Array  # (17 + 2j,), the state: in here, as all else, one type serves every kernel
 
 
 class Arrival(NamedTuple):
@@ -156,23 +157,27 @@ def run_steps(
     The ``state`` (17 + 2j,) [SI] is advanced in place by as many steps of ``step`` [s] as
     ``places`` (steps, rows, 3) [m, NED] has room for; ``states`` (steps, 17 + 2j) [SI] follow it.
     """
-    n, moved, work = state.shape[0], memory.moved, memory.work
-    fastest = 0.0
-    place_bodies(plant, state, work)
+    moved, work, now = memory.moved, memory.work, memory.now
+    n, fastest = now.shape[0], 0.0
+    for i in range(n):
+        now[i] = state[i]
+    place_bodies(plant, now, work)
     for k in range(places.shape[0]):
         loose = plant.gears.gap > 0.0
         if loose:
-            geared_step(plant, state, inputs, step, work, memory.slopes, moved)
+            geared_step(plant, now, inputs, step, work, memory.slopes, moved)
         else:
-            rk4_step(plant, state, inputs, step, work, memory.slopes)
-        place_bodies(plant, state, work)
-        places_of_bodies(state, work, k, places)
+            rk4_step(plant, now, inputs, step, work, memory.slopes)
+        place_bodies(plant, now, work)
+        places_of_bodies(now, work, k, places)
         for i in range(n):
-            states[k, i] = state[i]
+            states[k, i] = now[i]
         if loose:
             servo_rates_into(plant.gears, states[k, n - len(moved) :])
-        fastest = max(fastest, touch_down_speed(plant, state, work))
-    return Arrival(fastest, specific_force(plant, state, inputs, work))
+        fastest = max(fastest, touch_down_speed(plant, now, work))
+    for i in range(n):
+        state[i] = now[i]
+    return Arrival(fastest, specific_force(plant, now, inputs, work))
 
 
 class Held(NamedTuple):
@@ -187,7 +192,7 @@ def held(joints: int) -> Sequence[Held]:
     n = ARM + 2 * joints
     inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
     slopes = Slopes(np.zeros(n), np.zeros(n), np.zeros(n))
-    memory = Memory(empty_workspace(joints), slopes, np.zeros(joints))
+    memory = Memory(empty_workspace(joints), slopes, np.zeros(joints), np.zeros(n))
     return cast(Sequence[Held], np.array([pack_params(Held(inputs, memory))]))
 
 
@@ -245,3 +250,16 @@ def step(
     put(inputs.torque_B, 0, torque_B)
     arrival = run_steps(plants[0], state, inputs, step_s, places, states, blocks[0].memory)
     return arrival.landing_speed, arrival.felt
+
+
+@compiled
+def places(plant: Plant, state: Array, blocks: Sequence[Held], out: Array) -> None:
+    """``places_of_bodies`` for one state (17 + 2j,) [SI], into out (1, 2 + j, 3) [m, NED].
+
+    ``blocks`` is one, for memory.
+    """
+    memory = blocks[0].memory
+    for i in range(memory.now.shape[0]):
+        memory.now[i] = state[i]
+    place_bodies(plant, memory.now, memory.work)
+    places_of_bodies(memory.now, memory.work, 0, out)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sitl.compiled import compiled, kernel
-from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace, place_bodies
-from sitl.plant.state import ARM, P_WB, V_WB, W_WB_B
+from sitl.compiled import kernel
+from sitl.plant.aerial_manipulator import Plant, Workspace
+from sitl.plant.state import P_WB, V_WB, W_WB_B
 from sitl.plant.vector import V3, Array, add, cross, row, times, triple
 
 
@@ -30,14 +30,6 @@ def places_of_bodies(state: Array, work: Workspace, k: int, out: Array) -> None:
 @kernel
 def _put(out: Array, k: int, i: int, p: V3) -> None:
     out[k, i, 0], out[k, i, 1], out[k, i, 2] = p
-
-
-@compiled
-def places(plant: Plant, state: Array, out: Array) -> None:
-    """``places_of_bodies`` for one state (17 + 2j,) [SI], into out (1, 2 + j, 3) [m, NED]."""
-    work = empty_workspace((state.shape[0] - ARM) // 2)
-    place_bodies(plant, state, work)
-    places_of_bodies(state, work, 0, out)
 
 
 @kernel

@@ -11,7 +11,8 @@ import pytest
 from sitl.flight_evaluator import FlightEvaluator, Flown
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import plant
-from sitl.plant.kinematics import places as places_into
+from sitl.plant.integrator import held
+from sitl.plant.integrator import places as places_into
 from sitl.plant.parameters import Vehicle
 from sitl.plant.state import ARM, P_WB, Q_WB, at_rest
 from sitl.plant.vector import Array
@@ -87,7 +88,7 @@ def swinging(name: str) -> Array:
     """Places of 400 plant steps of a vehicle that sways, pitches and swings its arm."""
     target = MissionClock(load_scenario(name)).target_at(0.0).p
     body, state = plant(Vehicle()), at_rest(2)
-    passed = np.empty((400, 7, 3))
+    passed, blocks = np.empty((400, 7, 3)), held(2)
     for k in range(len(passed)):
         turn = 2.0 * math.pi * k / len(passed)
         sway = (0.1 * math.sin(turn), 0.15 * math.sin(2.0 * turn), 0.05 * math.sin(turn))
@@ -95,7 +96,7 @@ def swinging(name: str) -> Array:
         pitch = 0.2 * math.sin(3.0 * turn)
         state[Q_WB : Q_WB + 4] = (math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0)
         state[ARM : ARM + 2] = (-0.7 + 0.3 * math.sin(turn), 1.4)
-        places_into(body, state, passed[k : k + 1])
+        places_into(body, state, blocks, passed[k : k + 1])
     return passed
 
 
