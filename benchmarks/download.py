@@ -19,6 +19,7 @@ from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.values import number
+from fsw.link.files.flight_logs import MARK
 from pandion.display import Display
 from pandion.supervisor import ProcessFailed, Supervisor
 
@@ -114,6 +115,8 @@ def measure(size: int, display: Display) -> Downloads:
         log = random.Random(0).randbytes(size)  # nothing that could be compressed or left away
         (runs / _EARLIER).mkdir()
         (runs / _EARLIER / "flight.ulg").write_bytes(log)
+        parameters = runs / "vehicle.params"  # makes both flights those of one vehicle
+        (runs / _EARLIER / MARK).write_bytes(bytes(parameters.resolve()))
         out = runs / "now"
         out.mkdir()
         client = stack.enter_context(closing(DownloadClient()))
@@ -129,7 +132,7 @@ def measure(size: int, display: Display) -> Downloads:
             lambda port: [
                 f"--sim=udp:127.0.0.1:{port}",
                 *(f"--gcs={client.address}", "--api=none", f"--keys={out}"),
-                *("--wait=600", f"--out={out}"),
+                *("--wait=600", f"--out={out}", f"--params={parameters}"),
             ],
         )
         helper.join(timeout=30.0)

@@ -207,12 +207,7 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
     delivered_bytes = refused = 0
     at, size = 0, len(datagram)
     while at < size and refused < _FALSE_START_LIMIT:
-        if datagram[at] == _MAGIC_1:
-            length, frame = _frame_1_at(datagram, at)
-        elif datagram[at] == _MAGIC:
-            length, frame = _frame_at(datagram, at)
-        else:
-            length, frame = 0, None
+        length, frame = frame_at(datagram, at)
         if frame is None:
             refused += datagram[at] in (_MAGIC, _MAGIC_1)
             # A message of MAVLink 1 that is not known has a length all the same.
@@ -228,7 +223,16 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
         losses.frames += refused
 
 
-def _frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
+def frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
+    """Decode the frame of either version that starts here: its size [bytes]; None: none does."""
+    if datagram[start] == _MAGIC_1:
+        return _frame_1_at(datagram, start)
+    if datagram[start] == _MAGIC:
+        return _frame_2_at(datagram, start)
+    return 0, None
+
+
+def _frame_2_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     """Decode the frame that starts at a marker: its size in bytes, and None if it is not valid."""
     payload_at = start + _HEADER_SIZE
     if len(datagram) < payload_at + _CHECKSUM_SIZE:

@@ -9,14 +9,14 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from messages.frames import Frame, cut
+from messages.frames import Frame, cut, frame_at
 
 _STAMP: Final = 8  # bytes before each frame: microseconds, big-endian
 _SIGNATURE: Final = 13
 _MAGIC_1, _MAGIC_2 = 0xFE, 0xFD
 _MARKER: Final = re.compile(b"[\xfe\xfd]")
 _MOST_UNKNOWN: Final = 4  # frames of unknown messages in a row
-_MOST_FAILED: Final = 2_000  # markers in a row that begin no frame: what follows is no log
+_MOST_FAILED: Final = 1_000_000  # markers in a row that begin no frame: seconds of looking
 
 
 class TlogFrames:
@@ -29,33 +29,35 @@ class TlogFrames:
     def __init__(self, log: bytes) -> None:
         self._log = log
         self.skipped = 0  # bytes so far
+        self.unread = 0  # bytes at the end that nobody has looked at: too much before was no frame
 
     def __iter__(self) -> Iterator[tuple[float, Frame]]:
         log, at, failed = self._log, 0, 0
         while at + _STAMP + 3 <= len(log) and failed < _MOST_FAILED:
             start = at + _STAMP
+            length, frame = frame_at(log, start)
             end = start + self._size(start)
-            found = next(cut(log[start:end]), None)
-            if found is not None and len(found[1]) == end - start:
-                yield 1e-6 * int.from_bytes(log[at:start], "big"), found[0]
-                at, failed = end, 0
-            elif found is None and end > start and self._follows(end):
+            if frame is not None:
+                yield 1e-6 * int.from_bytes(log[at:start], "big"), frame
+                at, failed = start + length, 0
+            elif end > start and self._follows(end) and next(cut(log[start:end]), None) is None:
                 at, failed = end, 0
             else:
                 marker = _MARKER.search(log, start + 1)
                 further = len(log) if marker is None else marker.start() - _STAMP
                 self.skipped += further - at
                 at, failed = further, failed + 1
-        self.skipped += len(log) - at
+        self.unread = len(log) - at if failed == _MOST_FAILED else 0
+        self.skipped += len(log) - at - self.unread
 
     def _size(self, start: int) -> int:
         """Bytes of the frame that begins at ``start``; 0: none does, or it is cut."""
-        log, size = self._log, 0
-        if log[start] == _MAGIC_2:
-            size = 12 + log[start + 1] + _SIGNATURE * (log[start + 2] & 1)
-        elif log[start] == _MAGIC_1:
-            size = 8 + log[start + 1]
-        return size if start + size <= len(log) else 0
+        head, size = self._log[start : start + 3], 0
+        if len(head) == 3 and head[0] == _MAGIC_2:
+            size = 12 + head[1] + _SIGNATURE * (head[2] & 1)
+        elif len(head) == 3 and head[0] == _MAGIC_1:
+            size = 8 + head[1]
+        return size if start + size <= len(self._log) else 0
 
     def _follows(self, end: int) -> bool:
         """Whether what cannot be checked ends at ``end``, where a frame that can be begins.
@@ -66,12 +68,11 @@ class TlogFrames:
             if end == len(self._log):
                 return True
             start = end + _STAMP
-            end = start + (self._size(start) if start < len(self._log) else 0)
+            end = start + self._size(start)
             if end == start:
                 return False
-            found = next(cut(self._log[start:end]), None)
-            if found is not None:
-                return len(found[1]) == end - start
+            if frame_at(self._log, start)[1] is not None:
+                return True
         return False
 
 

@@ -26,6 +26,7 @@ _MOST_BYTES: Final = 65533  # of a record behind its number
 _TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
 _DEEPEST: Final = 8  # types inside one another
 _APPENDED: Final = 1  # bit of the flags: data was appended behind the end
+_SYSTEM: Final = "Pandion"  # who wrote a log, unless it says so itself
 _DAMAGE = (ValueError, IndexError, KeyError, struct.error)  # what a wrong byte leads to
 
 
@@ -54,11 +55,22 @@ class UlogFile:
     size: int = 0
     at: int = 0  # bytes read so far
     whole: bool = True  # False once the end turned out to be cut
+    unknown: dict[str, int] = field(default_factory=dict)  # kinds passed over, and how often
     _declared: dict[str, tuple[Field, ...]] = field(default_factory=dict)  # as they stand there
     _padded: dict[str, int] = field(default_factory=dict)  # bytes of a record with its padding
     # Bytes of the records by number, without and with padding at their end.
     _lengths: dict[int, tuple[int, int]] = field(default_factory=dict)
     _joints: list[int] = field(default_factory=list)  # where data were appended
+
+    @property
+    def system(self) -> str:
+        """Who wrote the log."""
+        return str(self.information.get("sys_name", _SYSTEM))
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether this project wrote the log; the topics of others may have our names."""
+        return self.system.startswith(_SYSTEM)
 
     def records(self) -> Iterator[Record]:
         """Every message behind the definitions, in file order.
@@ -74,7 +86,11 @@ class UlogFile:
                     number = unpack_from("<H", body, 1)[0]
                     self._subscribe(body[0], number, body[3:].decode("ascii"))
                 elif kind == ulog.REMOVAL:
-                    self.topics.pop(unpack_from("<H", body)[0], None)
+                    number = unpack_from("<H", body)[0]
+                    self.topics.pop(number, None)
+                    self._lengths.pop(number, None)
+                elif self._is_passed_over(kind):
+                    self._pass_over(kind)
                 else:
                     record = _record(kind, body)
                     self._check(record, len(record.body))
@@ -83,6 +99,18 @@ class UlogFile:
             self._check_rest(begin)
         except _DAMAGE as problem:
             raise UlogError(f"{self.path} is damaged at byte {begin}: {problem}") from None
+
+    @staticmethod
+    def _is_new(kind: bytes) -> bool:
+        """Whether a later version of the format may have such messages, which are to be ignored."""
+        return b"A" <= kind <= b"Z" and kind not in ulog.BEFORE_DATA | ulog.AMONG_DATA
+
+    def _is_passed_over(self, kind: bytes) -> bool:
+        """In what says that it is ours such a kind is damage: a replay needs every record."""
+        return self._is_new(kind) and not (self.is_ours and "sys_name" in self.information)
+
+    def _pass_over(self, kind: bytes) -> None:
+        self.unknown[kind.decode()] = self.unknown.get(kind.decode(), 0) + 1
 
     def _subscribe(self, instance: int, number: int, name: str) -> None:
         if number in self.topics or name not in self._declared:
@@ -96,7 +124,7 @@ class UlogFile:
         self.topics[number] = topic
 
     def _check(self, record: Record, length: int) -> None:
-        if record.kind not in ulog.AMONG_DATA:
+        if record.kind not in ulog.AMONG_DATA and not self._is_passed_over(record.kind):
             raise ValueError(f"{record.kind!r} is no kind of message among data")
         if record.kind == ulog.DATA and length not in self._lengths.get(record.number, ()):
             raise ValueError(f"a record of topic {record.number} has {length} bytes")
@@ -132,6 +160,8 @@ class UlogFile:
                 self._read_flags(body)
             elif kind in (ulog.INFO, ulog.PARAMETER):
                 self._note(kind, body)
+            elif self._is_new(kind):
+                self._pass_over(kind)
             elif kind not in ulog.BEFORE_DATA:
                 self.at -= _HEADER.size + len(body)
                 self._complete()
@@ -146,6 +176,8 @@ class UlogFile:
 
     def _complete(self) -> None:
         """Make topics of the formats; those without a time are parts of others."""
+        if any(not self._is_passed_over(kind.encode()) for kind in self.unknown):
+            raise ValueError(f"{', '.join(self.unknown)} is no kind of message among definitions")
         for name, declared in self._declared.items():
             fields = list(self._flat(declared, 0))
             whole = struct.calcsize("<" + "".join(one.code for one in fields))
@@ -216,6 +248,23 @@ class UlogFile:
             self.whole = self.at == self.size
 
 
+def is_ulog(path: Path) -> bool:
+    """Whether a file can be read and begins as a ULog."""
+    try:
+        return _begins_a_log(_head(path))
+    except OSError:
+        return False
+
+
+def _head(path: Path) -> bytes:
+    with open_regular(path) as file:
+        return file.read(16)
+
+
+def _begins_a_log(head: bytes) -> bool:
+    return len(head) == 16 and head[:7] == ulog.MAGIC[:7]
+
+
 def open_log(path: Path) -> UlogFile:
     """Open a log and read what stands before its data.
 
@@ -223,12 +272,12 @@ def open_log(path: Path) -> UlogFile:
         UlogError: The file cannot be read or is no ULog.
     """
     try:
-        with open_regular(path) as file:
-            head = file.read(16)
+        head = _head(path)
     except OSError as error:
         raise UlogError(f"cannot read {path}: {error.strerror}") from None
-    if len(head) < 16 or head[:7] != ulog.MAGIC[:7]:
-        raise UlogError(f"{path} is not a ULog file")
+    if not _begins_a_log(head):
+        of_link = "; `pandion view` shows telemetry logs" if path.suffix.lower() == ".tlog" else ""
+        raise UlogError(f"{path} is not a ULog file{of_link}")
     log = UlogFile(path, unpack_from("<Q", head, 8)[0], at=16)
     try:
         log.read_definitions()

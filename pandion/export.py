@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
             display = Display(sys.stdout, lines=0)
             stack.enter_context(display.progress())
             count = _export(log, sink, display)
-            if options.mcap is not None and _is_ours(log):
+            if options.mcap is not None and log.is_ours:
                 _draw(path, sink)
         if count == 0:
             raise UlogError(f"{path} holds no record")
@@ -70,8 +70,16 @@ def main(argv: list[str]) -> int:
     except ModuleNotFoundError as error:
         complain("pandion export", f"--mcap: {without(error, 'mcap')}")
         return COULD_NOT_START
-    say(f"{count} records of {path} in {options.csv or options.mcap}")
+    say(f"{count} records of {path} in {options.csv or options.mcap}{_left_out(log)}")
     return DONE
+
+
+def _left_out(log: UlogFile) -> str:
+    """What of a log is not among its records."""
+    told = "" if log.whole else f"; the log is cut, and its last {log.size - log.at} bytes left out"
+    for kind, count in sorted(log.unknown.items()):
+        told += f"; {count} messages of the unknown kind {kind} are left out"
+    return told
 
 
 def _write_layouts(folder: Path) -> int:
@@ -91,12 +99,6 @@ def _write_layouts(folder: Path) -> int:
         return COULD_NOT_START
     say(f"{', '.join(made)} in {folder}")
     return DONE
-
-
-def _is_ours(log: UlogFile) -> bool:
-    from view.flight_data import is_ours
-
-    return is_ours(log)
 
 
 def _draw(path: Path, sink: Any) -> None:

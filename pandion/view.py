@@ -114,10 +114,13 @@ def _wait() -> None:
 
 
 def _opened(path: Path) -> Flight:
-    if path.suffix == ".tlog":
-        from view.tlog_flight import TlogFlight
+    """By what it begins with: ground stations name their logs .tlog, .TLOG, .raw and otherwise."""
+    from messages.ulog_reader import is_ulog
 
-        return TlogFlight(path)
-    from view.log_flight import LogFlight
+    if path.suffix == ".ulg" or path.is_dir() or is_ulog(path):
+        from view.log_flight import LogFlight
 
-    return LogFlight(path)
+        return LogFlight(path)
+    from view.tlog_flight import TlogFlight
+
+    return TlogFlight(path)

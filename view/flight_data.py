@@ -20,7 +20,7 @@ from messages.ulog import Field, Topic
 from messages.ulog_reader import UlogError, UlogFile, open_log
 from view.results_beside import results_beside
 
-__all__ = ["FlightData", "InputChange", "Table", "Text", "UlogError", "is_ours", "read_flight"]
+__all__ = ["FlightData", "InputChange", "Table", "Text", "UlogError", "read_flight"]
 
 Array = NDArray[Any]
 
@@ -29,7 +29,6 @@ _NUMPY: Final = {
     "int32_t": "<i4", "uint64_t": "<u8", "int64_t": "<i8", "float": "<f4", "double": "<f8",
     "bool": "?",
 }  # fmt: skip
-_SYSTEM: Final = "Pandion"
 _INPUTS: Final = "tick_input"
 _OURS: Final = {
     topic.name: {one.name: one for one in topic.fields} for topic in (*TOPICS, *TRUTH_TOPICS)
@@ -132,11 +131,6 @@ class FlightData:
             raise UlogError(f"{self.path}: {problem}") from None
 
 
-def is_ours(log: UlogFile) -> bool:
-    """Whether this project wrote a log; the topics of others may have our names."""
-    return str(log.information.get("sys_name", _SYSTEM)).startswith(_SYSTEM)
-
-
 def read_flight(path: Path) -> FlightData:
     """Read a flight log, by its file or its directory; topics of any build.
 
@@ -144,9 +138,9 @@ def read_flight(path: Path) -> FlightData:
         UlogError: It is no log, one of another system, is damaged, or holds no record.
     """
     log = open_log(path / "flight.ulg" if path.is_dir() else path)
-    if not is_ours(log):
+    if not log.is_ours:
         raise UlogError(
-            f"{log.path} is a log of {str(log.information['sys_name'])[:32]!r}, whose vehicle has "
+            f"{log.path} is a log of {log.system[:32]!r}, whose vehicle has "
             "no arm to show; `pandion export` writes it as CSV or MCAP"
         )
     bodies: dict[str, list[bytes]] = {}  # by topic: one may have had several numbers

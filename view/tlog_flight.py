@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
-from fsw.link.wire.message_ids import SYSTEM_ID
+from fsw.link.wire.message_ids import ATTITUDE, LOCAL_POSITION_NED, SYSTEM_ID
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import Vec3
 from messages.frames import Frame
@@ -30,6 +30,7 @@ _SCENE_S: Final = 0.04  # between two scenes that are kept
 _MOST_BYTES: Final = 128 * 1024 * 1024  # an hour of a vehicle's telemetry has 40 MB
 _MOST_SCENES: Final = 360_000
 _MOST_EVENTS: Final = 5_000
+_OF_VEHICLES: Final = frozenset({ATTITUDE, LOCAL_POSITION_NED})  # messages of no other component
 _BETWEEN_S: Final = 1.0  # from one flight to the next, as it is shown
 
 
@@ -78,6 +79,12 @@ class _Recording:
             told.append(f"{len(self._begins) + 1} flights, one after another: new ones at {times}")
         if self._frames.skipped:
             told.append(f"{self._frames.skipped} bytes are no frames, and are skipped")
+        if self._frames.unread:
+            told.append(f"the last {self._frames.unread} bytes follow too much that is no frame")
+        others = {system for system, _, message in self.telemetry.heard if message in _OF_VEHICLES}
+        if others - {SYSTEM_ID}:
+            listed = ", ".join(map(str, sorted(others - {SYSTEM_ID})))
+            told.append(f"of several vehicles system {SYSTEM_ID} is shown, not {listed}")
         return tuple(told)
 
     def missing(self) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,12 +18,14 @@ from fsw.estimation import redundancy
 from fsw.estimation.error_state import (
     BA,
     BG,
+    IMU_CAPACITY,
+    LOST,
+    MODELLED,
     NO_FORCE,
     NO_RATE,
     NOTHING,
     ON_TRIAL,
     TH,
-    Array,
     V,
 )
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
@@ -40,11 +42,11 @@ from fsw.measurements import GnssSample, MagneticSample, PoseSample
 from fsw.signals import StateEstimate
 
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
-# Of a suspect, standard deviations of its bias, and of what it may have led to by then.
-_SUSPECTED_FORCE: Final = 3.0  # m/s^2
-_SUSPECTED_SPEED: Final = 0.3  # m/s
-_SUSPECTED_RATE: Final = 0.5  # rad/s
-_SUSPECTED_TURN: Final = 0.03  # rad
+# Of a suspect: the most that its bias may be off, for how long it has been so [s], and the share of
+# it that residuals show. Places show a force late: half of it where windows are half full.
+_MOST: Final = (3.0, 0.5)  # m/s^2 and rad/s
+_FOR: Final = (0.1, 0.06)
+_SEEN: Final = (0.5, 1.0)
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
@@ -70,11 +72,18 @@ class Arbitration:
         self._again = again
 
     def step(
-        self, memory: FusionMemory, now: float, found: StateEstimate, *, aloft: bool
+        self,
+        memory: FusionMemory,
+        now: float,
+        found: StateEstimate,
+        *,
+        aloft: bool,
+        damaged: bool,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory, and the state ``found`` at ``now`` [s], after what is due.
 
-        Nothing is, unless the vehicle is ``aloft``: else the ground may hold it.
+        Nothing is, unless the vehicle is ``aloft``: else the ground may hold it. Of a ``damaged``
+        one a rotor or a joint is known to have failed.
         """
         evidence = memory.verdict.evidence
         if evidence is None:
@@ -85,10 +94,10 @@ class Arbitration:
             return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
         if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
             return memory, found
-        return self._look(memory, now, found)
+        return self._look(memory, now, found, damaged)
 
     def _look(
-        self, memory: FusionMemory, now: float, found: StateEstimate
+        self, memory: FusionMemory, now: float, found: StateEstimate, damaged: bool
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory after a look at whether all sensors agree, and the state with it."""
         before = memory.verdict
@@ -106,7 +115,15 @@ class Arbitration:
         verdict = verdict._replace(evidence=evidence, seen=tuple(seen))
         if before.is_on or before.wrong or max(ratios) > 1.0:
             held = Source.POSE in self._aided(memory, now)
-            verdict = redundancy.judged(verdict, ratios, now, holds_attitude=held, lost=lost)
+            verdict = redundancy.judged(
+                verdict,
+                ratios,
+                now,
+                holds_attitude=held,
+                lost=lost,
+                damaged=damaged,
+                sizes=tuple(evidence[0]["size"].tolist()),
+            )
         memory = memory._replace(verdict=verdict)
         state: StateEstimate | None = found
         if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
@@ -153,8 +170,11 @@ class Arbitration:
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
             if self._aided(memory, now):  # else nothing would find the bias, and all would be lost
-                _widen(x[0]["covariance"], verdict.accused & ~before.accused)
-        if not (new or believes):
+                verdict = _widened(x[0], verdict)
+                memory = memory._replace(verdict=verdict)
+        # What the rotors explain, nobody else was wrong about.
+        acquits = verdict.explained and not before.explained and any(before.unknown)
+        if not (new or believes or acquits):
             return memory, found
         x["believed"] = NOTHING if believes else 0
         if new & _UNIT:
@@ -261,19 +281,44 @@ def _stuck(memory: FusionMemory) -> Source:
     return found
 
 
-def _widen(M: Array, suspects: Source) -> None:
-    """Know little of the biases of new ``suspects``, and of what they have led to; M (17, 17) [SI].
+def _widened(x: Any, verdict: Verdict) -> Verdict:
+    """The ``verdict`` with a filter ``x`` that takes the biases of suspects for unknown.
 
-    A bias that may walk alone takes too long to be found.
+    By as much as residuals with them show, and so what that has led to. A bias that may walk alone
+    takes too long to be found.
     """
-    k = np.arange(3)
-    for source, bias, most, state, led in (
-        (Source.ACCELEROMETER, BA, _SUSPECTED_FORCE, V, _SUSPECTED_SPEED),
-        (Source.GYRO, BG, _SUSPECTED_RATE, TH, _SUSPECTED_TURN),
-    ):
-        if source & suspects:
-            M[bias + k, bias + k] += most**2
-            M[state + k, state + k] += led**2
+    assert verdict.evidence is not None
+    M, unknown, k = x["covariance"], list(verdict.unknown), np.arange(3)
+    for half, ((source, _), bias, state) in enumerate(zip(_HALVES, (BA, BG), (V, TH), strict=True)):
+        if not source & verdict.suspects:
+            continue
+        seen = redundancy.size_of(verdict.evidence, source)
+        size = min(seen / _SEEN[half], _MOST[half])
+        x["model_walk"][half] = min(x["model_walk"][half], size)
+        grown = size**2 - unknown[half] ** 2
+        if grown > 0.0:
+            if not unknown[half]:
+                _doubt(x, half)
+            unknown[half] = size
+            M[bias + k, bias + k] += grown
+            M[state + k, state + k] += _FOR[half] ** 2 * grown
+    return verdict._replace(unknown=(unknown[0], unknown[1]))
+
+
+def _doubt(x: Any, half: int) -> None:
+    """Keep what the filter ``x`` knows of the bias of a ``half``: its readings are in doubt now.
+
+    Those too that have come, but wait until measurements of their time have.
+    """
+    waiting = np.arange(x["first"], x["end"]) % IMU_CAPACITY
+    lost = x["imu"][waiting, LOST].astype(int) | MODELLED | 1 << half
+    x["imu"][waiting, LOST] = lost
+    if x["lost"] & 1 << half:
+        return
+    x["lost"] |= 1 << half
+    of = slice(3 * half, 3 * half + 3)
+    x["kept_bias"][of] = x["gyro_bias" if half else "accel_bias"]
+    x["kept_variance"][of] = np.diag(x["covariance"])[BA:][of]
 
 
 def _halves(sources: Source) -> int:

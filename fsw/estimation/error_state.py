@@ -71,13 +71,14 @@ FILTER: Final = np.dtype(
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
         # Of the law for who is wrong (redundancy.py): which halves are not used, and of which the
         # bias may be anything; what both and the rotors have made of the vehicle since it flies;
-        # and how quickly the rotors' model has been off by a rate [rad/s^2/sqrt(Hz)].
+        # and how quickly a force [m/s^3/sqrt(Hz)] and a rate [rad/s^2/sqrt(Hz)] may be off that
+        # the rotors' model gives, or is compared with.
         ("out", np.int64),
         ("suspect", np.int64),  # and ON_TRIAL where sensors contradict each other
         ("believed", np.int64),  # halves whose jumps are the truth
         ("witness", float, (WITNESS,)),
         ("baseline", float, (9,)),  # SI: biases, and what is felt beside the model
-        ("model_walk", float),
+        ("model_walk", float, (2,)),
         # By how much more than it states a pose's and a receiver's variance is, and their last
         # innovations (fusion.py).
         ("noise_scale", float, (4,)),
@@ -234,17 +235,17 @@ def propagate(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
 
 
 @compilable
-def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: float) -> None:
+def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: Array) -> None:
     """Add to the covariance ``M`` (17, 17) [SI] what ``dt`` [s] of noise add. Solà, eq 261-265.
 
-    Of what is ``lost`` [NO_FORCE, NO_RATE] the bias may be anything soon; of a rate that is the
-    rotors' model's, what that has been off by lately, ``model_walk`` [rad/s^2/sqrt(Hz)].
+    Of what is ``lost`` [NO_FORCE, NO_RATE] the bias may be anything soon; where the rotors' model
+    stands in, ``model_walk`` (2,) [m/s^3/sqrt(Hz), rad/s^2/sqrt(Hz)].
     """
     force = law.accel_noise * law.accel_noise * dt
     turn = law.gyro_noise * law.gyro_noise * dt
     lost_accel_walk, lost_gyro_walk = law.lost_accel_walk, law.lost_gyro_walk
     if lost & MODELLED:
-        lost_accel_walk, lost_gyro_walk = law.modelled_accel_walk, model_walk
+        lost_accel_walk, lost_gyro_walk = model_walk[0], model_walk[1]
     accel_walk = lost_accel_walk if lost & NO_FORCE else law.accel_bias_walk
     gyro_walk = lost_gyro_walk if lost & NO_RATE else law.gyro_bias_walk
     for i in range(3):

@@ -12,7 +12,7 @@ from fsw.estimation.confirmation import Run
 from fsw.estimation.drift import FrameDrift
 from fsw.estimation.error_state import FILTER, Filter
 from fsw.estimation.pace import Pace
-from fsw.estimation.redundancy import Verdict
+from fsw.estimation.redundancy import LEAST_WALKS, Verdict
 from fsw.estimation.sensor_checks import Aiding, Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.measurements import GnssSample, MagneticSample, PoseSample, Sample
@@ -181,4 +181,6 @@ class FusionMemory(NamedTuple):
 
 def at_start() -> FusionMemory:
     """Memory before the first sample."""
-    return FusionMemory(np.zeros(1, dtype=FILTER))
+    x = np.zeros(1, dtype=FILTER)
+    x["model_walk"] = LEAST_WALKS
+    return FusionMemory(x)

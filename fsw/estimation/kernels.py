@@ -208,8 +208,8 @@ def _copy_halves(a: Any, b: Any) -> None:
     for i in range(2):
         b.same[i], b.steady[i] = a.same[i], a.steady[i]
         b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
+        b.model_walk[i] = a.model_walk[i]
     b.out, b.suspect, b.believed = a.out, a.suspect, a.believed
-    b.model_walk = a.model_walk
     for i in range(WITNESS):
         b.witness[i] = a.witness[i]
     for i in range(9):

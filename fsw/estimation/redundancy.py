@@ -34,7 +34,7 @@ from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.geometry.vectors import add_scaled, norm, subtract
 from fsw.model.airframe import GRAVITY
-from fsw.signals import Mat3, Vec3, Vec4
+from fsw.signals import Mat3, Vec2, Vec3, Vec4
 
 Array = NDArray[np.float64]
 
@@ -69,8 +69,9 @@ NOBODY: Final = Source(0)
 G, A, M, P, N, B = Source
 # Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
 # into the world is the gyro's and the magnetometer's as well: see ``_sources``.
-GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB = range(11)
-OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N, M | B)
+# The last two are of one alone: a bias that is larger than a sensor of its kind has.
+GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB, AA, GG = range(13)
+OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N, M | B, A, G)
 COUNT: Final = len(OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
@@ -88,7 +89,8 @@ _AT: Final = 8  # column of the integrals at its time
 _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
-_LEAST_WALK: Final = 0.15  # rad/s^2/sqrt(Hz), of the rotors' model
+# Of forces [m/s^3/sqrt(Hz)] and rates [rad/s^2/sqrt(Hz)] of the rotors' model: gusts and errors.
+LEAST_WALKS: Final = (3.0, 0.15)
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
 _MODEL_SIGMAS: Final = 5.0  # of them, that are nominal
 _NOISE_SIGMAS: Final = 4.0  # of the noise of measurements
@@ -104,6 +106,9 @@ _FIELD_OFF_LONG: Final = 0.012  # rad/s: hard and soft iron of a vehicle that ti
 _IRON: Final = 0.1  # rad: by how much they turn a field, for each radian that the vehicle turns
 _ACCEL_OFF: Final = 0.4  # m/s^2: scale, axes, bias and tilt
 _SPEED_OFF: Final = 0.08  # m/s
+# Biases, of which units of this kind are sold with a third or less (EstimatorTuning).
+_ACCEL_BIAS: Final = 0.8  # m/s^2
+_GYRO_BIAS: Final = 0.1  # rad/s
 # How a vehicle moves between two measurements, of which one may be an outlier: beside the velocity
 # that the last two of them show, or with any where there are none.
 _GAINS: Final = 15.0  # m/s^2, half of it
@@ -114,6 +119,9 @@ _NOISE: Final = 20.0  # deviations of a place that is extrapolated
 _LEAD: Final = 1.0
 _DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
 _MOST: Final = 25.0  # of one residual
+# What is off shows at once in the first, while the trial is this young [s], and in others later.
+_SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
+_SHOWS: Final = 1.5
 _SURE: Final = 3.0  # sum of leads
 _QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
 _AGREES: Final = 5.0  # s of agreement, until what was named is believed again
@@ -134,11 +142,13 @@ EVIDENCE: Final = np.dtype(
         ("waits", np.int64, (3,)),
         ("squares", float, (COUNT, 4)),  # mean squares of residuals with the model, by window
         # Residual over threshold, by window, the long one last: at the last look, what both of the
-        # last two looks have had, when it was computed last [s], and the largest of all windows.
+        # last two looks have had, and the threshold [SI].
         ("raw", float, (COUNT, 5)),
         ("both", float, (COUNT, 5)),
-        ("came", float, (COUNT,)),
-        ("ratio", float, (COUNT,)),
+        ("threshold", float, (COUNT, 5)),
+        ("came", float, (COUNT,)),  # s, when it was computed last
+        ("ratio", float, (COUNT,)),  # the largest of all windows
+        ("size", float, (COUNT,)),  # SI, of that
     ],
     align=True,
 )
@@ -223,18 +233,37 @@ def _look(
         _over_long(s, now, 0, pose[5], bias)
     if field[0]:
         _over_long(s, now, 2, field[4], bias)
+    _note_bias(s, x, now, 0, AA, _ACCEL_BIAS)
+    _note_bias(s, x, now, 1, GG, _GYRO_BIAS)
     for k in range(COUNT):
-        s.ratio[k] = _largest(s.both[k]) if now - s.came[k] < _LATEST else 0.0
-    # How quickly the model has been off by a rate, which is what a filter without a gyro needs.
-    x.model_walk = max(_LEAST_WALK, 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
+        _note_largest(s, now, k)
+    # How quickly the model has been off, which is what a filter without a half of the unit needs.
+    x.model_walk[0] = LEAST_WALKS[0]
+    x.model_walk[1] = max(LEAST_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
 
 
 @compilable
-def _largest(row: Array) -> float:
-    found = 0.0
-    for i in range(row.shape[0]):
-        found = max(found, row[i])
-    return found
+def _note_largest(s: Any, now: float, k: int) -> None:
+    """Keep what is largest of a residual in all windows."""
+    s.ratio[k], s.size[k] = 0.0, 0.0
+    if not now - s.came[k] < _LATEST:
+        return
+    for i in range(5):
+        if s.both[k, i] > s.ratio[k]:
+            s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
+
+
+@compilable
+def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> None:
+    """Keep how far the bias of a half is beyond the ``most`` [SI] that its kind has.
+
+    By the square, because it is no noise. Of one that is in doubt, it is the one from before.
+    """
+    bias = vec3(x.gyro_bias if half else x.accel_bias, 0)
+    if x.lost & (1 << half):
+        bias = vec3(x.kept_bias, 3 * half)
+    share = norm(bias) / most
+    _note(s, now, k, 0, (share * share * most, 0.0, 0.0), most)
 
 
 @compilable
@@ -359,6 +388,7 @@ def _before(s: Any, kind: int, at: int, window: float, room: float) -> int:
 def _note(s: Any, now: float, k: int, window: int, r: Vec3, threshold: float) -> None:
     """Keep a residual ``r`` [SI] over its ``threshold`` [SI]; a single one may be off."""
     ratio = norm(r) / threshold
+    s.threshold[k, window] = threshold
     s.both[k, window] = min(ratio, s.raw[k, window])
     s.raw[k, window] = ratio
     s.came[k] = now
@@ -603,7 +633,8 @@ class Verdict(NamedTuple):
     since: float = -1.0  # of the trial that is on; -1: none
     fired: float = -math.inf  # when a residual did last
     suspects: Source = NOBODY
-    accused: Source = NOBODY  # all that have been suspects in this trial
+    # By how much the biases of accelerometer [m/s^2] and gyro [rad/s] were unknown in this trial.
+    unknown: Vec2 = (0.0, 0.0)
     explained: bool = False  # in this trial the rotors' model was named
     leader: Source = NOBODY  # the one that is named once that is sure
     sum: float = 0.0  # of its leads
@@ -624,7 +655,7 @@ class Verdict(NamedTuple):
         return self._replace(
             since=-1.0,
             suspects=NOBODY,
-            accused=NOBODY,
+            unknown=(0.0, 0.0),
             explained=False,
             leader=NOBODY,
             sum=0.0,
@@ -672,11 +703,14 @@ def judged(
     *,
     holds_attitude: bool,
     lost: Source = NOBODY,
+    damaged: bool = False,
+    sizes: tuple[float, ...] = (0.0,) * COUNT,
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
-    Where nothing that is used ``holds_attitude``, gyro and magnetometer do. What is ``lost`` says
-    nothing, and is known to be of no use without this law.
+    Their ``sizes`` are in SI. Where nothing that is used ``holds_attitude``, gyro and magnetometer
+    do. What is ``lost`` says nothing, and is known to be of no use without this law. Of a
+    ``damaged`` vehicle it is known that the rotors' model is off.
     """
     of = _sources(holds_attitude, verdict.wrong)
     used = [k for k in range(COUNT) if not of[k] & (verdict.wrong | lost)]
@@ -692,11 +726,14 @@ def judged(
             continue
         cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in used if not of[k] & one)
         cost[one] -= _DISTURBED if one is B else 0.0
+        if not verdict.is_on or now - verdict.since < _SHOWS:
+            cost[one] += _not_shown(one, ratios, sizes, used)
     first, *others = sorted(cost, key=cost.__getitem__)
     lead = cost[others[0]] - cost[first] if others else math.inf
     suspects = NOBODY
     for one in cost:
-        if cost[one] - cost[first] < _LEAD:
+        # Of a bias that is too large the filter knows already.
+        if cost[one] - cost[first] < _LEAD and fires[0] < AA:
             suspects |= one
     leader = first if lead > _LEAD else NOBODY
     total = lead if leader else 0.0
@@ -704,12 +741,11 @@ def judged(
         total += verdict.sum
     named = leader if total > _SURE else NOBODY
     # What the rotors have been named for shows in some windows for longer than in others.
-    explained = verdict.explained or named is M
+    explained = verdict.explained or named is M or damaged
     verdict = verdict._replace(
         since=verdict.since if verdict.is_on else now,
         fired=now,
         suspects=M if explained else suspects,
-        accused=verdict.accused | suspects,
         explained=explained,
         leader=leader,
         sum=total,
@@ -721,6 +757,26 @@ def judged(
     agreed[list(Source).index(named)] = math.inf
     convicted = verdict._replace(wrong=verdict.wrong | named, agreed=tuple(agreed))
     return convicted.acquitted()._replace(named=named)
+
+
+def _not_shown(
+    one: Source, ratios: tuple[float, ...], sizes: tuple[float, ...], used: list[int]
+) -> float:
+    """What it costs that a half of the unit is off by more than it differs from the rotors."""
+    at_once, others = _SHOWN.get(one, (GM, ()))
+    fired = [sizes[k] for k in others if k in used and ratios[k] > 1.0]
+    if not fired or at_once not in used or not sizes[at_once] > 0.0:
+        return 0.0
+    threshold = sizes[at_once] / ratios[at_once]
+    unseen = max(max(fired) - sizes[at_once], 0.0)
+    return min((unseen / threshold) ** 2, _MOST)
+
+
+def size_of(evidence: Evidence, source: Source) -> float:
+    """The largest residual [SI] of a ``source`` that fires; 0: none does."""
+    s = evidence[0]
+    fired = np.where(s["ratio"] > 1.0, s["size"], 0.0)
+    return float(max(fired[k] for k in range(COUNT) if OF[k] & source))
 
 
 def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:

@@ -223,19 +223,21 @@ class SensorFusion:
         estimate: StateEstimate | None,
         *,
         aloft: bool = True,
+        damaged: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
 
         The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
         there is nothing to fuse the state is the ``estimate`` of ``take_in``. Every 20 ms it is
         asked whether all sensors agree, unless the vehicle is so low that the ground may hold it.
+        Of a ``damaged`` one a rotor or a joint is known to have failed.
         """
         memory, found = self._caught_up(memory, samples, now, estimate)
         if not memory.started:
             return memory, found
         if found is None:
             return begun(memory), None
-        return self._arbitration.step(memory, now, found, aloft=aloft)
+        return self._arbitration.step(memory, now, found, aloft=aloft, damaged=damaged)
 
     def _again(
         self, memory: FusionMemory, tick: TickInputs
@@ -446,9 +448,13 @@ class SensorFusion:
         others = memory.without(health.sensor)
         if not fault:
             memory = memory.hearing(sample)
-            if memory.verdict.wrong & _SOURCES.get(type(sample), NOBODY):
+            source = _SOURCES.get(type(sample), NOBODY)
+            if memory.verdict.wrong & source:
                 fault = SensorFault.DISAGREES
                 health = health.with_fault(fault, now)
+            # A heading that may be wrong is not needed, and turns what else is measured.
+            elif memory.verdict.suspects & source & Source.COMPASS:
+                return memory._replace(health=(*others, health), delay=delay)
         if fault:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
                 memory = memory._replace(without_fix=sample)

@@ -32,9 +32,7 @@ class EstimatorTuning:
     # as quickly as the vehicle does: the pose then gives acceleration and rate.
     lost_accel_walk: float = 10.0  # m/s^3/sqrt(Hz)
     lost_gyro_walk: float = 6.0  # rad/s^2/sqrt(Hz)
-    # The same where it goes on as the rotors' commands make it: gusts and errors of the model only.
-    # By how much the model has been off by a rate is learnt in flight (redundancy.py).
-    modelled_accel_walk: float = 3.0  # m/s^3/sqrt(Hz)
+    # Where it goes on as the rotors' commands make it: redundancy.py.
 
     # What is not known when the filter starts.
     accel_bias: float = 0.3  # m/s^2

@@ -129,7 +129,9 @@ class SensedState:
             memory = _memory(state, now)
             memory, estimate = self._fusion.take_in(memory, one.samples, now)
             aloft = is_aloft(state, now, self._legs, self._stale)
-            memory, found = self._fusion.catch_up(memory, one.samples, now, estimate, aloft=aloft)
+            memory, found = self._fusion.catch_up(
+                memory, one.samples, now, estimate, aloft=aloft, damaged=_is_damaged(state)
+            )
             state = replace(state, fusion=memory, estimate=found or estimate or state.estimate)
         return state, inputs
 
@@ -150,7 +152,9 @@ class SensedState:
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
         aloft = is_aloft(state, now, self._legs, self._stale)
-        memory, found = self._fusion.catch_up(memory, inputs.samples, now, known, aloft=aloft)
+        memory, found = self._fusion.catch_up(
+            memory, inputs.samples, now, known, aloft=aloft, damaged=_is_damaged(state)
+        )
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
@@ -344,6 +348,10 @@ def _recently(aid: Health) -> float:
     A fault that its last reading had, that is: a sensor that has fallen silent is silent.
     """
     return max(_LATELY, 1.5 * aid.apart) if aid.fault_at >= aid.came else _LATELY
+
+
+def _is_damaged(state: FlightState) -> bool:
+    return bool(state.damage.rotor or state.damage.joint)
 
 
 def _memory(state: FlightState, now: float) -> FusionMemory:

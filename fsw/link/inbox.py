@@ -12,6 +12,7 @@ from fsw.link.bounded_memory import renew
 from fsw.link.wire import decode, decode_commands, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_setpoints import (
+    actuator_setpoint,
     attitude_setpoint,
     body_setpoint,
     end_effector_setpoint,
@@ -113,6 +114,7 @@ class Inbox:
             ),
             message_ids.SET_ATTITUDE_TARGET: partial(self._setpoint, attitude_setpoint),
             message_ids.ARM_JOINT_SETPOINT: partial(self._setpoint, joint_setpoint),
+            message_ids.SET_ACTUATOR_CONTROL_TARGET: partial(self._setpoint, actuator_setpoint),
             message_ids.HEARTBEAT: self._heartbeat,
             message_ids.OBSTACLE_WALL: partial(self._obstacle, decode.obstacle_wall),
             message_ids.OBSTACLE_POINT: partial(self._obstacle, decode.obstacle_point),

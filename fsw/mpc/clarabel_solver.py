@@ -7,7 +7,8 @@ from functools import cache
 import clarabel
 import numpy as np
 
-from fsw.mpc.qp_data import QuadraticProgram
+from fsw.model.prediction import Array
+from fsw.mpc.qp_data import QpData, QuadraticProgram
 from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
@@ -72,3 +73,14 @@ class ClarabelSolver:
         if not np.isfinite(x).all():
             status = SolverStatus.NUMERICAL_ERROR
         return Solution(status, x, int(answer.iterations))
+
+
+class WholeSolver:
+    """``QpSolver`` that hands all unknowns and rows over: what ``DualSolver`` is compared with."""
+
+    def __init__(self, program: QpData) -> None:
+        self._program = program
+
+    def solve(self, guess: Array) -> Solution:
+        """See ``QpSolver``; an interior-point method cannot use ``guess`` (6 n,) [SI inputs]."""
+        return ClarabelSolver(self._program.whole()).solve()

@@ -1,7 +1,7 @@
-r"""Solves the planner's program for the multipliers of the few rows that can bind, exactly.
+r"""Gives Clarabel the dual of the planner's program, restricted to the rows that may be active.
 
 An interior-point method pays for every unknown and every row in each iteration. A horizon has
-30 to 120 inputs and a hundred rows or more, of which a few matter. So the inputs are
+30 to 120 inputs and a hundred rows or more, of which a few are active. So the inputs are
 eliminated by one Cholesky factor of the Hessian, :math:`H = L L^T`, and only the rows of a
 working set are kept. With :math:`U_0 = -H^{-1} c`, the optimum without any row, what is left is
 
@@ -20,8 +20,8 @@ Source: docs/equations.md E17 and docs/decisions/0009; Boyd and Vandenberghe, Co
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from fsw.compiled import compiled
 from fsw.model.prediction import Array
 from fsw.mpc.clarabel_solver import ClarabelSolver
-from fsw.mpc.qp_data import CONE, QpData, QuadraticProgram
+from fsw.mpc.qp_data import CONE, HARD, QpData, QuadraticProgram
 from fsw.mpc.solution import Solution
 from fsw.signals import SolverStatus
 
@@ -46,72 +46,91 @@ _PATTERNS = 64  # programs kept ready; others are built when they occur
 _MULTIPLIER, _COST = 20.0, 0.25
 _SPREAD = _MULTIPLIER / math.sqrt(_COST)
 
-WorkingSet = NDArray[np.bool_]
-
 
 class DualSolver:
-    """Solves one program again and again with new numbers."""
+    """See ``QpSolver``; the optimum does not depend on the guess, which says where rows bind."""
 
     def __init__(self, program: QpData) -> None:
         self._program = program
         self._multipliers = lru_cache(maxsize=_PATTERNS)(_Multipliers)
 
     def solve(self, guess: Array) -> Solution:
-        """Inputs and slacks that solve the program as filled now.
-
-        The inputs ``guess`` (6 n,) [SI] say where rows may be active; the optimum does not depend
-        on them. Where the multipliers have no optimum (rows that contradict each other, a Hessian
-        that is not positive) Clarabel solves the whole program and has the last word.
-        """
+        """See ``QpSolver``; ``guess`` (6 n,) [SI inputs]."""
         program, rows = self._program, self._program.rows
+        softened = np.zeros(len(program.penalty) + 1)  # by its slack, and 0 of rows without one
         factor, failed = dpotrf(program.hessian.T, lower=1, clean=0)
         if failed:
-            return ClarabelSolver(program.whole()).solve()
-        free = -dpotrs(factor, program.linear, lower=1)[0]
-        residual_free = rows.b - rows.g @ free
-        working_set = np.zeros(len(rows.b), dtype=np.bool_)
-        _add_near(residual_free, rows.b - rows.g @ guess, rows.first_cone, working_set)
-        inputs, residual = free, residual_free
-        slacks = np.zeros(len(program.penalty))
-        status, iterations = SolverStatus.SOLVED, 0
-        for solves in range(len(rows.b)):
+            return Solution(SolverStatus.NUMERICAL_ERROR, np.full(program.unknowns, np.nan), 0)
+        inputs = free = -dpotrs(factor, program.linear, lower=1)[0]
+        free_residual = rows.b - rows.g @ free
+        distance = _distances(free_residual, rows.first_cone)
+        at_guess = _distances(rows.b - rows.g @ guess, rows.first_cone)
+        if distance.min() >= 0.0 and at_guess.min() >= _BINDS:
+            return Solution(SolverStatus.SOLVED, np.concatenate((inputs, softened[:-1])), 0)
+        # Comparisons are negated so that what is not a number counts as violated.
+        working_set = ~((at_guess >= _NEAR) | (at_guess >= _BINDS) & (distance >= 0.0))
+        status, iterations, solves = SolverStatus.SOLVED, 0, 0
+        while True:
             chosen = np.flatnonzero(working_set)
             if len(chosen):
                 # L^-1 G', scaled so that its square is the quadratic term.
                 spread = dtrsm(_SPREAD, factor, rows.g[chosen].T, lower=1, overwrite_b=1)
-                solution = self._by_multipliers(chosen, spread, residual_free[chosen])
-                status = solution.status
-                iterations += solution.iterations
-                if not solution.usable:
+                found = self._by_multipliers(chosen, spread, free_residual[chosen])
+                status = found.status
+                iterations += found.iterations
+                if not found.usable:
                     break
-                moved = spread @ (_MULTIPLIER / _SPREAD * solution.x)
+                moved = spread @ (_MULTIPLIER / _SPREAD * found.x)
                 inputs = free - dtrsv(factor, moved, lower=1, trans=1)
                 residual = rows.b - rows.g @ inputs
-            if not _add_violated(residual, rows.slack, rows.first_cone, working_set, slacks):
-                return Solution(status, np.concatenate((inputs, slacks)), iterations)
-            if solves >= _SOLVES:
-                working_set[:] = True
-        return ClarabelSolver(program.whole()).solve()
+                softened[:] = 0.0
+                np.maximum.at(softened, rows.slack[chosen], -residual[chosen])
+                softened[-1] = 0.0
+                distance = _distances(residual, rows.first_cone) + softened[rows.slack]
+            distance[chosen] = 0.0
+            if distance.min() >= -_TOLERANCE:
+                break
+            solves += 1
+            working_set |= ~(distance >= -_TOLERANCE) | (solves > _SOLVES)
+        return Solution(status, np.concatenate((inputs, softened[:-1])), iterations)
 
     def _by_multipliers(self, chosen: NDArray[np.intp], spread: Array, residual: Array) -> Solution:
         """Multipliers of the chosen rows, counted in ``_MULTIPLIER``."""
-        program = self._program
-        simple = int(chosen.searchsorted(program.rows.first_cone))
-        softening, held = _numbered(program.rows.slack[chosen[:simple]], len(program.penalty))
-        same = self._multipliers(tuple(held.tolist()), (len(chosen) - simple) // CONE)
-        return same.solve(spread.T @ spread, residual, program.penalty[softening])
+        rows = self._program.rows
+        slack = rows.slack[chosen[: chosen.searchsorted(rows.first_cone)]].tolist()
+        softening = sorted(set(slack) - {HARD})
+        number = {its: k for k, its in enumerate(softening)} | {HARD: HARD}
+        same = self._multipliers(tuple([number[its] for its in slack]), len(chosen))
+        return same.solve(spread.T @ spread, residual, self._program.penalty[softening])
+
+
+@compiled
+def _distances(residual: Array, first_cone: int) -> Array:
+    """``residual`` (rows,) [SI], where the three rows of a tilt cone have its distance."""
+    distances = residual.copy()
+    for row in range(first_cone, len(residual), CONE):
+        distances[row : row + CONE] = residual[row] - np.hypot(residual[row + 1], residual[row + 2])
+    return distances
 
 
 class _Multipliers:
     """The dual program of rows that share slacks in one way, in Clarabel's form."""
 
-    def __init__(self, held: tuple[int, ...], cones: int) -> None:
-        """Lay it out for simple rows, each with the number of its slack or -1, and for cones."""
-        simple, slacks, size = len(held), max(held, default=-1) + 1, len(held) + CONE * cones
-        p, self._upper = _upper_triangle(size)
-        a = _signs_and_sums(held, slacks, size)
+    def __init__(self, slack: tuple[int, ...], size: int) -> None:
+        """Lay it out for simple rows, each with the number of its slack or ``HARD``, and cones."""
+        simple, slacks = len(slack), max(slack, default=HARD) + 1
+        sums = np.zeros((slacks, size))
+        sums[:, :simple] = np.arange(slacks)[:, None] == slack
+        signs = -np.eye(size)
+        upper = np.triu(np.ones((size, size)))
+        self._upper = np.flatnonzero(upper.T)  # of the transpose, which is the same, row by row
         self._program = QuadraticProgram(
-            p, np.zeros(size), a, np.zeros(size + slacks), simple + slacks, cones
+            p=_columns(upper),
+            q=np.zeros(size),
+            a=_columns(np.concatenate((signs[:simple], sums, signs[simple:]))),
+            b=np.zeros(size + slacks),
+            nonnegative_rows=simple + slacks,
+            cones=(size - simple) // CONE,
         )
         self._penalty = self._program.b[simple : simple + slacks]
         self._solver = ClarabelSolver(self._program)
@@ -128,115 +147,21 @@ class _Multipliers:
         return self._solver.solve()
 
 
-@dataclass(frozen=True, slots=True)
-class _Columns:
+class _Columns(NamedTuple):
     """A sparse matrix, column by column: what Clarabel reads of SciPy's class.
 
-    That class checks all it is given, which took longer than all else in a new pattern, in flight
-    twice as long as a solve.
+    That class checks all it is given, which made a step with a new pattern take twice as long.
     """
 
     data: Array  # (entries,)
     indices: NDArray[np.intp]  # (entries,) rows
     indptr: NDArray[np.intp]  # (columns + 1,) where each column begins
-    shape: tuple[int, int]
+    shape: tuple[int, ...]
     has_canonical_format: bool = True  # rows in order, none twice
 
 
-@lru_cache(maxsize=_PATTERNS)
-def _triangle(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Rows, beginnings of columns, and places in the flat square of a full upper triangle."""
-    column, row = np.tril_indices(size)
-    ends = np.arange(size + 1)
-    found = (row, ends * (ends + 1) // 2, row * size + column)
-    for one in found:
-        one.flags.writeable = False
-    return found
-
-
-def _upper_triangle(size: int) -> tuple[_Columns, NDArray[np.intp]]:
-    """A full upper triangle, and where its entries are in the flat square, column by column."""
-    row, begins, flat = _triangle(size)
-    return _Columns(np.ones(len(row)), row, begins, (size, size)), flat
-
-
-def _signs_and_sums(held: tuple[int, ...], slacks: int, size: int) -> _Columns:
-    """Rows for the signs of simple multipliers, for their sums by slack, and for the cones'.
-
-    A column has -1 for its own sign and, in a row that shares a slack, 1 in the sum for it.
-    """
-    simple = len(held)
-    data, rows, begins = list[float](), list[int](), [0]
-    for k in range(size):
-        data.append(-1.0)
-        rows.append(k if k < simple else slacks + k)
-        if k < simple and held[k] >= 0:
-            data.append(1.0)
-            rows.append(simple + held[k])
-        begins.append(len(data))
-    return _Columns(np.array(data), np.array(rows), np.array(begins), (size + slacks, size))
-
-
-@compiled
-def _residual(residual: Array, row: int, first_cone: int) -> float:
-    """Distance of a row, or of the cone that begins there, to its boundary."""
-    if row < first_cone:
-        return float(residual[row])
-    return float(residual[row] - np.hypot(residual[row + 1], residual[row + 2]))
-
-
-@compiled
-def _add_near(at_free: Array, at_guess: Array, first_cone: int, working_set: WorkingSet) -> None:
-    """Mark the rows that probably bind; what is not a number counts as violated."""
-    row = 0
-    while row < len(working_set):
-        rows = 1 if row < first_cone else CONE
-        near = _residual(at_guess, row, first_cone)
-        if not (near >= _BINDS) or (
-            near < _NEAR and not (_residual(at_free, row, first_cone) >= 0.0)
-        ):
-            working_set[row : row + rows] = True
-        row += rows
-
-
-@compiled
-def _add_violated(
-    residual: Array,
-    slack: NDArray[np.intp],
-    first_cone: int,
-    working_set: WorkingSet,
-    slacks: Array,
-) -> bool:
-    """Fill the slacks of the working set, add violated rows to it; whether there are any."""
-    slacks[:] = 0.0
-    for row in range(first_cone):
-        if working_set[row] and slack[row] >= 0 and -residual[row] > slacks[slack[row]]:
-            slacks[slack[row]] = -residual[row]
-    more = False
-    row = 0
-    while row < len(working_set):
-        rows = 1 if row < first_cone else CONE
-        softened = slacks[slack[row]] if slack[row] >= 0 else 0.0
-        if not working_set[row] and not (
-            _residual(residual, row, first_cone) + softened >= -_TOLERANCE
-        ):
-            working_set[row : row + rows] = True
-            more = True
-        row += rows
-    return more
-
-
-@compiled
-def _numbered(slack: NDArray[np.intp], slacks: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The slacks of these rows in the order they come, and which of them each row has, or -1."""
-    number = np.full(slacks, -1)
-    softening, held = np.empty(len(slack), dtype=np.intp), np.full(len(slack), -1)
-    count = 0
-    for row, its in enumerate(slack):
-        if its >= 0:
-            if number[its] < 0:
-                number[its] = count
-                softening[count] = its
-                count += 1
-            held[row] = number[its]
-    return softening[:count], held
+def _columns(matrix: Array) -> _Columns:
+    """The entries of a ``matrix`` (rows, columns) that are not zero."""
+    column, row = np.nonzero(matrix.T)
+    begins = column.searchsorted(np.arange(matrix.shape[1] + 1))
+    return _Columns(matrix[row, column], row, begins, matrix.shape)

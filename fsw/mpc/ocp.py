@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fsw.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Array, CondensedModel
+from fsw.mpc.clarabel_solver import WholeSolver
 from fsw.mpc.costs import Quadratic
 from fsw.mpc.dual_solver import DualSolver
 from fsw.mpc.joint_limits import JointLimits
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.qp_data import QpData
-from fsw.mpc.solution import Solution
+from fsw.mpc.solution import QpSolver, Solution
 from fsw.mpc.variants import parts_of
 from fsw.signals import SafeSet
+
+QP_SOLVERS: dict[str, Callable[[QpData], QpSolver]] = {"dual": DualSolver, "whole": WholeSolver}
 
 
 class Ocp:
@@ -31,7 +36,7 @@ class Ocp:
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self.qp = QpData(config.horizon, config.limits, tuple(blocks))
         self._first_barrier_slack = self.qp.inputs + self._limits.rows.slacks
-        self._solver = DualSolver(self.qp)
+        self._solver = QP_SOLVERS[config.qp_solver](self.qp)
 
     def update(self, safe_set: SafeSet) -> None:
         """Take other numbers of a safe set of the same layout, whose zones moved."""

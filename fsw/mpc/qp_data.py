@@ -28,6 +28,7 @@ from fsw.model.airframe import GRAVITY
 from fsw.model.prediction import INPUTS, Array
 from fsw.signals import Vec4
 
+HARD = -1  # in the place of a slack's index: no slack softens the row
 CONE = 3  # rows of a tilt cone: what there is, then the two that it must cover
 
 
@@ -60,7 +61,7 @@ class Rows:
 
     g: Array  # (rows, 6 n)
     b: Array  # (rows,)
-    slack: NDArray[np.intp]  # (rows,) index of the slack that softens the row; -1: hard
+    slack: NDArray[np.intp]  # (rows,) index of the slack that softens the row, or ``HARD``
     first_cone: int  # rows from here on are tilt cones
 
 
@@ -102,7 +103,7 @@ class QpData:
         self.penalty: Array = np.zeros(0)  # (slacks,)
         for rows, penalty in blocks:
             if penalty is None:
-                slack.append(np.full(len(rows.node), -1))
+                slack.append(np.full(len(rows.node), HARD))
             else:
                 slack.append(len(self.penalty) + rows.slack)
                 self.penalty = np.append(self.penalty, np.full(rows.slacks, penalty))
@@ -112,7 +113,7 @@ class QpData:
         self.rows = Rows(
             np.vstack((np.zeros((soft, self.inputs)), bound_rows, tilt_rows)),
             np.concatenate((np.zeros(soft), bounds, tilts)),
-            np.concatenate((*slack, np.full(len(bounds) + len(tilts), -1))),
+            np.concatenate((*slack, np.full(len(bounds) + len(tilts), HARD))),
             soft + len(bounds),
         )
 

@@ -1,8 +1,9 @@
-"""What a solver answers."""
+"""What a solver of the planner's program is asked, and what it answers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from fsw.model.prediction import Array
 from fsw.signals import SolverStatus
@@ -20,3 +21,11 @@ class Solution:
     def usable(self) -> bool:
         """Whether ``x`` may be flown: a truncated iterate is finite but wrong."""
         return self.status in (SolverStatus.SOLVED, SolverStatus.ALMOST_SOLVED)
+
+
+class QpSolver(Protocol):
+    """Solves one ``QpData``, which it is built with, again and again as filled anew."""
+
+    def solve(self, guess: Array) -> Solution:
+        """Inputs and slacks at the optimum; the inputs ``guess`` (6 n,) [SI] may save time."""
+        ...

@@ -53,6 +53,7 @@ def flight_software(
             least_margin=flight.least_margin,
             clearance=lambda: flight.config.limits.fence_clearance,
             owner=lambda: int(flight.config.limits.safe_set_owner),
+            ceiling=lambda: flight.config.steering.highest,
         )
     )
     return FlightProgram(

@@ -300,7 +300,8 @@ def test_a_fresh_clone_is_set_up_flies_and_tests_on_a_real_machine(
     shell = {**shell_of_ros, **HOSTILE, "LOCPATH": str(locales)}
     # Without this checkout: the clone is to find its own code.
     shell["PYTHONPATH"] = shell["PYTHONPATH"].partition(os.pathsep)[0]
-    shell.pop("HOME", None)
+    for name in ("HOME", "MAKEFLAGS", "MAKELEVEL"):  # the last two of a make that runs this test
+        shell.pop(name, None)
     clone, moved, copy = (tmp_path / name for name in ("clone", "moved", "copy"))
     subprocess.run(["git", "clone", "--quiet", str(ROOT), str(clone)], check=True)
 

@@ -7,8 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from fsw.link.wire import message_ids as ids
+from messages import ulog
+from messages.frames import FrameWriter
+from messages.ulog_reader import UlogError
 from pandion import view
 from view.page import PageError, open_server
+from view.tlog_flight import TlogFlight
 
 
 @pytest.mark.parametrize("name", ["flight.ulg", "flight.tlog"])
@@ -21,6 +26,22 @@ def test_a_log_that_is_none_is_refused_in_a_sentence(
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 2
     assert all(line.startswith("pandion view: ") and name in line for line in said)
+
+
+@pytest.mark.parametrize("name", ["FLIGHT.TLOG", "flight", "flight.tlog.raw"])
+def test_a_telemetry_log_is_known_by_its_content(name: str, tmp_path: Path) -> None:
+    writer = FrameWriter(1, 1)
+    frames = (writer.frame(ids.ATTITUDE, *[0] * 7), writer.frame(ids.LOCAL_POSITION_NED, *[0] * 7))
+    stamps = (10**15 + 40_000 * k for k in range(4))
+    log = b"".join(at.to_bytes(8, "big") + one for at in stamps for one in frames)
+    (tmp_path / name).write_bytes(log)
+    assert isinstance(view._opened(tmp_path / name), TlogFlight)
+
+
+def test_a_ulog_is_known_by_its_content(tmp_path: Path) -> None:
+    (tmp_path / "flight.tlog").write_bytes(ulog.MAGIC + bytes(8))
+    with pytest.raises(UlogError, match="ends before its data begin"):
+        view._opened(tmp_path / "flight.tlog")
 
 
 def test_an_address_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -121,7 +121,7 @@ def test_each_rotor_is_named_in_time(
 @pytest.mark.parametrize("joint", [1, 2])
 def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> None:
     fault = Fault("joint", kind, instance=float(joint))  # type: ignore[arg-type]
-    seen = fly("trajectory", fault, suite)
+    seen = fly("trajectory", (fault,), suite)
     assert seen.warning is not None
     assert f"joint {joint}" in seen.warning.text
     assert not seen.contact
@@ -135,7 +135,7 @@ def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> 
 @pytest.mark.parametrize("kind", ["garbage", "stuck", "delayed"])
 def test_a_rotor_that_does_not_obey_is_flown_with_beside_walls(kind: str) -> None:
     fault = Fault("motor", kind, instance=2.0)  # type: ignore[arg-type]
-    seen = fly("trajectory", fault, "mocap")
+    seen = fly("trajectory", (fault,), "mocap")
     assert seen.warning is not None
     assert "rotor 2" in seen.warning.text
     assert not seen.contact
@@ -156,7 +156,7 @@ def test_nothing_is_named_in_healthy_flights() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("suite", ["perfect", "mocap", "vio", "rtk"])
 def test_nothing_is_named_from_the_ground_and_back(suite: str) -> None:
-    seen = fly("takeoff", None, suite), fly("land", None, suite)
+    seen = fly("takeoff", (), suite), fly("land", (), suite)
     assert not [said for one in seen for said in one.texts if "failed" in said.text]
 
 

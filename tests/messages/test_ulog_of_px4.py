@@ -40,6 +40,7 @@ def log_of(body: bytes, flags: bytes = bytes(40)) -> bytes:
 
 PLAIN = declare("foo:uint64_t timestamp;float x;") + subscribe("foo")
 ROW = data(0, "Qf", 5, 1.5)
+LATER = message(b"Z", b"of a version to come")
 CASES = {
     "plain": PLAIN + ROW,
     "a type inside another": declare("esc_report:uint64_t timestamp;int32_t rpm;")
@@ -74,6 +75,17 @@ CASES = {
     + data(1, "Qf", 6, 9.5)
     + data(7, "Qf", 7, 2.5),
 }
+
+
+def test_messages_of_a_later_version_are_ignored_and_counted(tmp_path: Path) -> None:
+    path = tmp_path / "later.ulg"
+    foreign = LATER + key(b"I", "char[3] sys_name", b"PX4") + PLAIN + ROW + LATER + ROW
+    path.write_bytes(log_of(foreign + LATER[:-2]))
+    assert len(read(path)["foo"]) == 2
+    log = open_log(path)
+    assert sum(record.kind == ulog.DATA for record in log.records()) == 2
+    assert log.unknown == {"Z": 2}
+    assert not log.whole
 
 
 def read(path: Path) -> dict[str, list[dict[str, Any]]]:
@@ -141,6 +153,10 @@ def test_a_subscription_may_end_and_its_number_be_given_again(tmp_path: Path) ->
             b"".join(declare(f"t{k}:uint64_t timestamp;t{k + 1}[99] x;") for k in range(7))
             + declare("t7:float x;") + subscribe("t0"), 0, "too many fields",
         ),
+        (PLAIN + ROW + message(b"R", struct.pack("<H", 0)) + ROW, 0, "topic 0 has 12 bytes"),
+        (PLAIN + ROW + bytes(40), 0, "no kind of message"),
+        (key(b"I", "char[7] sys_name", b"Pandion") + PLAIN + LATER, 0, "no kind of message"),
+        (LATER + key(b"I", "char[7] sys_name", b"Pandion") + PLAIN, 0, "among definitions"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_said_in_a_sentence(

@@ -332,7 +332,32 @@ def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(tmp_path: Path
     assert "2 flights" in flight.unusable[0]
     assert flight.unusable[1].startswith("5000000 bytes")
     flooded, _ = places(tmp_path / "flood.tlog", whole + b"\xfd" * 2_000_000)
-    assert flooded.unusable == ("2000000 bytes are no frames, and are skipped",)
+    assert flooded.unusable == (
+        "1000000 bytes are no frames, and are skipped",
+        "the last 1000000 bytes follow too much that is no frame",
+    )
+
+
+def test_half_a_megabyte_of_junk_between_two_flights_hides_neither(tmp_path: Path) -> None:
+    junk = np.random.default_rng(3).bytes(500_000)
+    log = a_flight(1000, 6, 1.0) + junk + a_flight(2000, 6, 2.0)
+    flight, north = places(tmp_path / "junk.tlog", log)
+    assert {round(x) for x in north} == {1, 2}
+    assert flight.unusable[1] == "500000 bytes are no frames, and are skipped"
+
+
+def test_an_unknown_frame_at_the_very_end_is_no_reason_to_fail(tmp_path: Path) -> None:
+    whole = a_flight(1000, 6, 1.0)
+    unknown = b"\xfd\x00\x00\x00\x00\x07\x01\xff\xff\x7f" + bytes(2)
+    flight, _ = places(tmp_path / "end.tlog", whole + bytes(8) + unknown + bytes(8) + b"\xfd\x01")
+    assert flight.end == pytest.approx(5.9, abs=0.05)
+
+
+def test_another_vehicle_in_the_log_is_named(tmp_path: Path) -> None:
+    other = FrameWriter(9, 1).frame(ids.ATTITUDE, *[0] * 7)
+    log = a_flight(1000, 6, 1.0) + (1_007_000_000).to_bytes(8, "big") + other
+    flight, _ = places(tmp_path / "two.tlog", log)
+    assert flight.unusable == ("of several vehicles system 1 is shown, not 9",)
 
 
 def test_another_component_of_the_vehicle_s_system_is_not_the_vehicle(tmp_path: Path) -> None:

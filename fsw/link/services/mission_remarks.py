@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from fsw.flight import mission_sequencer
-from fsw.link.wire.mission_items import SKIPPED, MissionItem
+from fsw.link.wire.mission_items import SKIPPED, MissionItem, command_name
 from fsw.shapes.half_space import KIND as HALF_SPACE
 from fsw.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
 from fsw.signals import FlightSnapshot, MissionAction, MissionStep, SafeSet, Vec2, Zone
@@ -20,21 +20,38 @@ _PLACES: Final = (MissionAction.GO, MissionAction.CIRCLE, MissionAction.LAND)
 
 
 def mission_remarks(
-    items: tuple[MissionItem, ...], steps: tuple[MissionStep, ...], seen: FlightSnapshot | None
+    items: tuple[MissionItem, ...],
+    steps: tuple[MissionStep, ...],
+    seen: FlightSnapshot | None,
+    ceiling: float,
 ) -> tuple[str, ...]:
-    """What of a mission is skipped, and whether it can start, for the vehicle last ``seen``."""
-    remarks = []
-    skipped = [
-        f"{number} {SKIPPED[item.command]}"
-        for number, (item, step) in enumerate(zip(items, steps, strict=True))
-        if step.action is MissionAction.SKIP
+    """What of a mission is not flown as it says, for the vehicle last ``seen``.
+
+    Which items are skipped, whether it can start, and what is above the ``ceiling`` [m] over the
+    origin.
+    """
+    skipped: dict[str, list[str]] = {}  # by the reason
+    for number, (item, step) in enumerate(zip(items, steps, strict=True)):
+        if step.action is MissionAction.SKIP:
+            name = f"{number} {command_name(item.command)}"
+            skipped.setdefault(SKIPPED[item.command], []).append(name)
+    remarks = [
+        f"mission items skipped, {reason}: {_listed(names)}" for reason, names in skipped.items()
     ]
-    if skipped:
-        remarks.append(f"mission items skipped, this vehicle has no camera: {_listed(skipped)}")
     landed = seen is None or seen.landed
     against = mission_sequencer.refusal(mission_sequencer.loaded(steps), landed=landed)
     if steps and against is not None:
         remarks.append(f"mission accepted, but it cannot start: {against}")
+    home = 0.0 if seen is None or seen.home is None else -seen.home.p[2]
+    above = {
+        number: (home if step.above_home else 0.0) - step.position[2] - ceiling
+        for number, step in enumerate(steps)
+        if step.position is not None
+    }
+    high = [f"{number} by {by:.2f} m" for number, by in above.items() if by > 0.0]
+    if high:
+        kept = f"above STR_ALT_MAX ({ceiling:g} m) at item {_listed(high)}: it is kept below"
+        remarks.append(f"mission is {kept}")
     return tuple(remarks)
 
 

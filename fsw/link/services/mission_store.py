@@ -6,6 +6,7 @@ means. It lives as long as the process (docs/decisions/0013-missions-stop-and-fe
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Callable
@@ -85,6 +86,7 @@ class Site:
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
     least_margin: MarginCheck
     owner: Callable[[], int] = lambda: 0  # system that may grow a fence in flight; 0: its uploader
+    ceiling: Callable[[], float] = lambda: math.inf  # m above the origin
 
 
 class MissionStore:
@@ -133,7 +135,7 @@ class MissionStore:
             wrong = mission_problem(steps)
             if wrong is not None:
                 raise BadItem(INVALID, f"item {wrong[0]}: {wrong[1]}")
-            remarks = mission_remarks(items, steps, self._snapshot)
+            remarks = mission_remarks(items, steps, self._snapshot, self._site.ceiling())
             self._steps = steps
             self._change(MissionUpdate(steps=steps, current=0 if steps else None))
         elif kind is Kind.RALLY:

@@ -109,6 +109,15 @@ def attitude_setpoint(values: Numbers) -> AttitudeSetpoint:
     return setpoint
 
 
+def actuator_setpoint(_: Numbers) -> JointSetpoint:
+    """Refuse a SET_ACTUATOR_CONTROL_TARGET: rotors and joints are the loops'.
+
+    Raises:
+        RefusedError: Always.
+    """
+    raise RefusedError("SET_ACTUATOR_CONTROL_TARGET is not supported: loops drive actuators")
+
+
 def joint_setpoint(values: Numbers) -> JointSetpoint:
     """Read an ARM_JOINT_SETPOINT.
 

@@ -31,6 +31,7 @@ from fsw.link.wire.mission_items import (
     BadItem,
     Locate,
     MissionItem,
+    command_name,
     horizontal_place,
 )
 from fsw.shapes.half_space import KIND as HALF_SPACE
@@ -91,7 +92,7 @@ def check_fence_item(item: MissionItem, locate: Locate) -> None:
         _sphere(item)
         return
     if item.command not in (*_POLYGONS, *_CIRCLES, RETURN_POINT):
-        raise BadItem(UNSUPPORTED, f"command {item.command} is no fence of this vehicle")
+        raise BadItem(UNSUPPORTED, f"{command_name(item.command)} is no fence of this vehicle")
     horizontal_place(item, locate)
     number = item.params[0]
     if item.command in _CIRCLES and not 0.0 < number < math.inf:

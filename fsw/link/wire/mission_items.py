@@ -14,6 +14,7 @@ from typing import Final
 
 from fsw.flight.bounds import MAX_REPEATS, MAX_SPEED, MAX_STAY, MAX_YAW, circle_problem
 from fsw.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
+from messages import dialect
 
 # MAV_CMD
 NAV_WAYPOINT: Final = 16
@@ -32,37 +33,23 @@ DO_SET_ROI_NONE: Final = 197
 DO_SET_ROI: Final = 201
 NAV_RALLY_POINT: Final = 5100
 
-# What is for a payload that this vehicle does not have, and leaves its way as it is.
+# What leaves the way as it is, and why it is skipped.
+_NO_CAMERA: Final = "this vehicle has no camera"
 SKIPPED: Final[dict[int, str]] = {
-    189: "DO_LAND_START",
-    200: "DO_CONTROL_VIDEO",
-    202: "DO_DIGICAM_CONFIGURE",
-    203: "DO_DIGICAM_CONTROL",
-    204: "DO_MOUNT_CONFIGURE",
-    205: "DO_MOUNT_CONTROL",
-    206: "DO_SET_CAM_TRIGG_DIST",
-    214: "DO_SET_CAM_TRIGG_INTERVAL",
-    260: "OBLIQUE_SURVEY",
-    530: "SET_CAMERA_MODE",
-    531: "SET_CAMERA_ZOOM",
-    532: "SET_CAMERA_FOCUS",
-    1000: "DO_GIMBAL_MANAGER_PITCHYAW",
-    1001: "DO_GIMBAL_MANAGER_CONFIGURE",
-    2000: "IMAGE_START_CAPTURE",
-    2001: "IMAGE_STOP_CAPTURE",
-    2003: "DO_TRIGGER_CONTROL",
-    2500: "VIDEO_START_CAPTURE",
-    2501: "VIDEO_STOP_CAPTURE",
+    189: "a return leads to home or a rally point",  # DO_LAND_START
+    **dict.fromkeys((80, 196, 198, 200, 202, 203, 204, 205, 206, 214, 220, 260), _NO_CAMERA),
+    **dict.fromkeys((530, 531, 532, 533, 534, 1000, 1001, 2000, 2001, 2003), _NO_CAMERA),
+    **dict.fromkeys((2004, 2005, 2010, 2020, 2021, 2500, 2501, 2502, 2503), _NO_CAMERA),
 }
 # What a mission relies on: without it, it would be another one.
 _MISSING: Final[dict[int, str]] = {
-    181: "DO_SET_RELAY: this vehicle has no relay",
-    183: "DO_SET_SERVO: this vehicle has no servo outputs",
-    187: "DO_SET_ACTUATOR: the joints follow from where the end-effector is to be",
-    207: "DO_FENCE_ENABLE: the fence is always in force",
-    208: "DO_PARACHUTE: this vehicle has no parachute",
-    211: "DO_GRIPPER: this vehicle has no gripper",
-    42600: "DO_WINCH: this vehicle has no winch",
+    181: "this vehicle has no relay",
+    183: "this vehicle has no servo outputs",
+    187: "the joints follow from where the end-effector is to be",
+    207: "the fence is always in force",
+    208: "this vehicle has no parachute",
+    211: "this vehicle has no gripper",
+    42600: "this vehicle has no winch",
 }
 
 # MAV_FRAME
@@ -111,21 +98,29 @@ class BadItem(Exception):
         self.reason = reason
 
 
+def command_name(command: int) -> str:
+    """As MAVLink names a MAV_CMD, without what all begin with; the number of one it has not."""
+    known = dialect.enums["MAV_CMD"]
+    if command not in known:
+        return f"command {command}"
+    return str(known[command].name).removeprefix("MAV_CMD_")
+
+
 def read_step(item: MissionItem, locate: Locate) -> MissionStep:
     """What an item means to this vehicle, or ``BadItem``."""
     reader = _READERS.get(item.command)
     if reader is None and item.command in SKIPPED:
         return MissionStep(MissionAction.SKIP, stop_after=not item.autocontinue)
     if reader is None:
-        unknown = f"command {item.command} is not one of this vehicle's missions"
-        raise BadItem(UNSUPPORTED, _MISSING.get(item.command, unknown))
+        reason = _MISSING.get(item.command, "it is not one of this vehicle's missions")
+        raise BadItem(UNSUPPORTED, f"{command_name(item.command)}: {reason}")
     return reader(item, locate)
 
 
 def read_rally(item: MissionItem, locate: Locate) -> Vec2:
     """North and east of a rally point [m]; its altitude is not used, a return has its own."""
     if item.command != NAV_RALLY_POINT:
-        raise BadItem(UNSUPPORTED, f"command {item.command} is no rally point")
+        raise BadItem(UNSUPPORTED, f"{command_name(item.command)} is no rally point")
     north, east, _ = _place(item, locate, "a rally point needs a place")
     return north, east
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from fsw.estimation.error_state import BG, NO_RATE
+from fsw.estimation.error_state import BG, IMU_CAPACITY, LOST, NO_RATE
 from fsw.estimation.fusion_memory import FusionMemory, at_start
 from fsw.estimation.redundancy import NOBODY, Source
 from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.estimation.tuning import EstimatorTuning
+from fsw.geometry.quaternion import turned
 from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.signals import Vec3, Vec4
 
@@ -23,21 +25,27 @@ LEVEL: Vec4 = (1.0, 0.0, 0.0, 0.0)
 FINE: Vec3 = (1e-6, 1e-6, 1e-6)
 
 
-def hovered(
-    *, turns: float = 0.0, angle: float = 0.0, poses: bool = True, garbage: bool = False
-) -> tuple[FusionMemory, Source]:
-    """The memory after 5 s, and all who were suspects.
+def hovering(
+    *,
+    turns: float = 0.0,
+    angle: float = 0.0,
+    poses: bool = True,
+    garbage: bool = False,
+    damaged: bool = False,
+) -> Iterator[FusionMemory]:
+    """The memories of 5 s.
 
     In the last second the gyro says that the vehicle ``turns`` [rad/s] about its vertical, and
     encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second, or
-    ``garbage`` in their place.
+    ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``.
     """
-    memory, accused, random = at_start(), NOBODY, np.random.default_rng(3)
+    memory, random = at_start(), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
         t, now = TICK * tick, 1.0 + TICK * tick
         wrong = t > WRONG_FROM
         a, b, c, d, e, f = random.standard_normal(6).tolist()
-        rate = 1e-3 * a, 1e-3 * b, 1e-3 * c + (turns if wrong else 0.0)
+        shakes = 1e-3 * a, 1e-3 * b, 1e-3 * c
+        rate = *shakes[:2], shakes[2] + (turns if wrong else 0.0)
         reading = (angle if wrong else 1e-5) * (tick % 2)
         samples: list[Sample] = [
             JointSample(now, (reading, 0.0)),
@@ -47,9 +55,19 @@ def hovered(
         if tick % 5 == 0 and (good or garbage):
             scatter = 1e-3 if good else 20.0
             place = scatter * d, scatter * e, -1.5 + scatter * f
-            samples.insert(0, PoseSample(now, place, LEVEL, FINE, FINE))
-        memory, _ = FUSION.step(memory, samples, now, model=HOVERS)
-        accused |= memory.verdict.accused
+            samples.insert(0, PoseSample(now, place, turned(LEVEL, *shakes), FINE, FINE))
+        memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged)
+        yield memory
+
+
+def hovered(
+    *, turns: float = 0.0, angle: float = 0.0, poses: bool = True, garbage: bool = False
+) -> tuple[FusionMemory, Source]:
+    """The last memory of ``hovering``, and all who were suspects."""
+    accused = NOBODY
+    for memory in hovering(turns=turns, angle=angle, poses=poses, garbage=garbage):
+        accused |= memory.verdict.suspects
     return memory, accused
 
 
@@ -61,6 +79,35 @@ def test_a_gyro_is_not_doubted_where_nothing_measured_could_find_its_bias(garbag
     assert accused & Source.GYRO
     M = memory.numbers[0]["covariance"]
     assert max(math.sqrt(M[BG + k, BG + k]) for k in range(3)) < 0.25
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("turns", [0.25, 0.4])
+def test_a_bias_is_as_unknown_as_residuals_are_large(turns: float) -> None:
+    """Taken for 0.5 rad/s whatever was seen, sound gyros of vehicles with satellites tilted them.
+
+    What is known of it from before is kept, and taken up when the trial is over.
+    """
+    before, all_memories = at_start(), hovering(turns=turns)
+    for memory in all_memories:
+        if memory.verdict.suspects & Source.GYRO:
+            break
+        before = memory
+    assert 0.3 * turns < memory.verdict.unknown[1] < 1.3 * turns
+    x = memory.numbers[0]
+    assert x["lost"] & NO_RATE
+    assert x["kept_bias"][3:] == pytest.approx(before.numbers[0]["gyro_bias"], abs=1e-4)
+    waiting = np.arange(x["first"], x["end"]) % IMU_CAPACITY
+    assert all(int(lost) & NO_RATE for lost in x["imu"][waiting, LOST])
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("damaged", [False, True])
+def test_of_a_rotor_that_is_known_to_have_failed_no_gyro_is_a_suspect(damaged: bool) -> None:
+    suspects = NOBODY
+    for memory in hovering(turns=0.3, damaged=damaged):
+        suspects |= memory.verdict.suspects
+    assert bool(suspects & Source.GYRO) is not damaged
 
 
 @pytest.mark.requirement("REQ-EST-13")

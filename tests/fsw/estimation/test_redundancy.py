@@ -108,7 +108,8 @@ def flown(
             field = (True, now, tuple(body.tolist()), (1.0, 0.0, 0.0, 0.0), 0.01, 0.0)  # type: ignore[assignment]
         look(evidence, x, now, pose, fix, field, not verdict.is_on)
         ratios = tuple(evidence[0]["ratio"].tolist())
-        verdict = judged(verdict, ratios, now, holds_attitude=suite == "pose")
+        sizes = tuple(evidence[0]["size"].tolist())
+        verdict = judged(verdict, ratios, now, holds_attitude=suite == "pose", sizes=sizes)
         found.append(verdict)
     return found
 
@@ -236,6 +237,44 @@ def test_a_field_that_turns_as_the_rotors_turn_nothing_is_named(turning: Vec3) -
     """Gyro and field contradict each other, and the rotors know who is right."""
     verdicts = flown(Wrong(magnetic=turning), "satellites", 0.6)
     assert named(verdicts) == Source.COMPASS
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=2, phases=[Phase.generate])
+@given(direction=directions, size=st.floats(0.04, 0.3), seed=st.integers(0, 99))
+def test_a_field_that_leaps_is_no_fault_of_a_gyro_that_agrees_with_the_rotors(
+    direction: Vec3, size: float, seed: int
+) -> None:
+    """A gyro that is off by so much would show beside the rotors at once."""
+    verdicts = flown(Wrong(iron=along(direction, size)), "satellites", 1.0, seed)
+    assert not suspected(verdicts) & Source.GYRO
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("residual", "source"),
+    [(redundancy.AA, Source.ACCELEROMETER), (redundancy.GG, Source.GYRO)],
+)
+def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
+    residual: int, source: Source
+) -> None:
+    """Satellites do not hold the tilt: an accelerometer that drifts turned it by 20 deg."""
+    ratios = [0.7] * redundancy.COUNT
+    ratios[residual] = 2.0
+    verdict = Verdict()
+    for look_ in range(3):
+        now = EVERY * look_
+        verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
+        assert not verdict.suspects
+    assert verdict.wrong == source
+    x: Any = np.zeros(1, FILTER)
+    evidence = np.zeros(1, EVIDENCE)
+    x["witness"][0, 0] = 1.0
+    x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
+    for look_ in range(60):
+        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
+    assert evidence[0]["ratio"][redundancy.AA] > 1.0
+    assert evidence[0]["ratio"][redundancy.GG] > 1.0
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:

@@ -12,9 +12,9 @@ from scipy import sparse
 from fsw.barriers.constraint_block import TargetPoints
 from fsw.model.airframe import AIRFRAME
 from fsw.model.prediction import INPUTS, Array, condense
-from fsw.mpc.clarabel_solver import ClarabelSolver
+from fsw.mpc.clarabel_solver import WholeSolver
 from fsw.mpc.dual_solver import DualSolver
-from fsw.mpc.ocp import Ocp
+from fsw.mpc.ocp import QP_SOLVERS, Ocp
 from fsw.mpc.planner_config import PlannerConfig
 from fsw.mpc.qp_data import QpData
 from fsw.shapes.half_space import wall
@@ -145,13 +145,31 @@ def test_an_arm_outside_its_limits_is_softened_at_every_node_as_little_as_can_be
     start[15] = joint
     still = TargetPoints(np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1))
     ocp.linearise(start, np.zeros(INPUTS * n), still)
-    found, whole = ocp.solve(), ClarabelSolver(ocp.qp.whole()).solve()
+    found, whole = ocp.solve(), WholeSolver(ocp.qp).solve(np.zeros(ocp.qp.inputs))
     assert found.usable
     assert whole.usable
     slacks = found.x[ocp.qp.inputs :]
     assert slacks[0] > 0.1
     np.testing.assert_allclose(slacks, whole.x[ocp.qp.inputs :], atol=1e-3)
     np.testing.assert_allclose(slacks, ocp.qp.least_slacks(found.x[: ocp.qp.inputs]), atol=1e-4)
+
+
+@pytest.mark.parametrize("solver", QP_SOLVERS)
+@pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
+def test_every_solver_finds_the_optimum_of_the_program_as_filled_last(
+    safe_set: SafeSet, solver: str
+) -> None:
+    random = np.random.default_rng(12)
+    config = replace(CONFIG, qp_solver=solver)
+    for _ in range(3):
+        ocp = filled(random, safe_set, config=config)
+        found = ocp.solve()
+        assert found.usable
+        best = exactly(ocp.qp)
+        assert difference(found.x, best, ocp.qp.inputs) < 0.01
+        np.testing.assert_allclose(
+            found.x[ocp.qp.inputs :], best[ocp.qp.inputs :], rtol=0.0, atol=1e-3
+        )
 
 
 @pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
@@ -194,5 +212,13 @@ def test_hard_rows_that_contradict_each_other_are_infeasible() -> None:
 def test_a_hessian_that_is_not_positive_is_never_flown() -> None:
     ocp = filled(np.random.default_rng(11), WALLS)
     ocp.qp.hessian[0, 0] = -1.0
-    solution = ocp.solve()
-    assert not solution.usable
+    assert ocp.solve().status is SolverStatus.NUMERICAL_ERROR
+
+
+@pytest.mark.parametrize("where", ["hessian", "linear", "g", "b"])
+def test_what_is_not_a_number_is_never_flown(where: str) -> None:
+    ocp = filled(np.random.default_rng(13), WALLS)
+    numbers = getattr(ocp.qp, where, None)
+    array = getattr(ocp.qp.rows, where) if numbers is None else numbers
+    array[(0,) * array.ndim] = np.nan
+    assert not ocp.solve().usable

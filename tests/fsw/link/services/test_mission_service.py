@@ -12,14 +12,16 @@ from typing import Any
 import pytest
 
 from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.link.services.mission_remarks import fence_remarks
+from fsw.link.services.mission_remarks import fence_remarks, mission_remarks
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import Kind, MissionStore, Site
+from fsw.link.wire.mission_items import MissionItem
 from fsw.parameters.flight_config import flight_config
 from fsw.shapes.half_space import wall
 from fsw.shapes.vertical_cylinder import column
 from fsw.signals import (
     TARGET_SPHERE,
+    Home,
     MissionAction,
     MissionProgress,
     MissionState,
@@ -218,7 +220,7 @@ def test_a_lost_acknowledgement_is_given_again(vehicle: Vehicle) -> None:
 @pytest.mark.parametrize(
     ("bad", "result", "word"),
     [
-        ({"command": 82}, UNSUPPORTED, "command 82"),
+        ({"command": 82}, UNSUPPORTED, "NAV_SPLINE_WAYPOINT"),
         ({"command": 16, "frame": 8}, UNSUPPORTED_FRAME, "frame 8"),
         ({"command": 16, "params": (NAN, 0.0, 0.0, 0.0)}, 6, "stay"),
         ({"command": 16, "x": 2_000_000_000}, 10, "too far"),
@@ -284,6 +286,24 @@ def test_a_mission_that_cannot_start_or_leaves_the_fence_is_told_at_upload(
     assert client.upload(BOX, FENCE) == ACCEPTED
     client.pump(0.1)
     assert "mission leaves the fence on the way to item 1 by 4.10 m" in client.texts()
+
+
+def test_each_skipped_item_has_its_own_reason(vehicle: Vehicle) -> None:
+    client = vehicle.client()
+    marked = [WAYPOINTS[0], {"command": 189, "frame": 2}, {"command": 2004, "frame": 2}]
+    assert client.upload(marked) == ACCEPTED
+    texts = client.texts()
+    assert "skipped, a return leads to home or a rally point: 1 DO_LAND_START" in texts
+    assert "skipped, this vehicle has no camera: 2 CAMERA_TRACK_POINT" in texts
+
+
+def test_a_place_above_the_highest_height_is_told_at_upload() -> None:
+    low = MissionStep(MissionAction.GO, (0.0, 0.0, -119.0))
+    high = MissionStep(MissionAction.GO, (0.0, 0.0, -119.0), above_home=True)
+    items = (MissionItem(16, 1, (0.0, 0.0, 0.0, NAN), 0, 0, 119.0),) * 2
+    seen = replace(outputs_at(1).snapshot, home=Home((0.0, 0.0, -4.0), 0.0), landed=False)
+    (remark,) = mission_remarks(items, (low, high), seen, 120.0)
+    assert remark == "mission is above STR_ALT_MAX (120 m) at item 1 by 3.00 m: it is kept below"
 
 
 def test_a_leg_through_a_column_and_a_circle_over_a_wall_leave_the_fence() -> None:

@@ -176,6 +176,14 @@ def test_a_velocity_may_be_along_the_heading() -> None:
     assert setpoint == MotionSetpoint(False, v=V, yaw=YAW, along_heading=True)
 
 
+def test_actuators_are_not_commanded_past_the_loops() -> None:
+    """MAVSDK's offboard.set_actuator_control and MAVROS' actuator_control."""
+    why = "SET_ACTUATOR_CONTROL_TARGET is not supported"
+    received = taken(frame(ids.SET_ACTUATOR_CONTROL_TARGET, group_mlx=0))
+    assert received.refused_setpoints == 1
+    assert received.setpoint_problem.startswith(why)
+
+
 def attitude(mask: int, **changes: float) -> Frame:
     fields = {"q[0]": 1.0, "thrust": 0.5, "body_roll_rate": 0.25, "type_mask": mask}
     return frame(ids.SET_ATTITUDE_TARGET, **{**fields, **changes})

@@ -156,7 +156,7 @@ def test_two_polygons_are_kept_both() -> None:
         (polygon(CASE_1)[:3] + polygon(CASE_1, POLYGON_EXCLUSION)[:1], 5, "number"),
         ((excluded(math.inf),), 6, "radius"),
         ((excluded(1.0),) * 17, 5, "cylinders"),
-        (polygon(CASE_1[:1], 16), 3, "16"),
+        (polygon(CASE_1[:1], 16), 3, "NAV_WAYPOINT"),
         ((circle(0.0),), 6, "radius"),
         ((circle(math.nan),), 6, "radius"),
         ((circle(1.0, frame=8),), 2, "frame"),
