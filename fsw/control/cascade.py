@@ -190,8 +190,12 @@ class Cascade:
         if health is not HEALTHY or before.flags & IMPAIRED:
             note_health(after.health, health)
             after.flags = 0 if health is HEALTHY else IMPAIRED
-        self._close_loops(self.packed, after.array, ticks, zones, self.probes)
+        self.close(after, zones, ticks)
         return after
+
+    def close(self, r: Tick, zones: NDArray[np.float64], ticks: int = 1) -> None:
+        """The machine code of ``close_loops``, for ``zones`` (zones, k) [SI]."""
+        self._close_loops(self.packed, r.array, ticks, zones, self.probes)
 
 
 @compilable

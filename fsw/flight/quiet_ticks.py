@@ -1,4 +1,4 @@
-"""Ticks of a flight in which nothing happens, each as one compiled call.
+"""Ticks of a flight in which nothing happens, each as three compiled calls on its record.
 
 Between two planning periods most ticks believe the sensors, move the plan's state on and close the
 loops; no command comes, no limit is met, no failsafe acts. Such ticks need no other part of the
@@ -13,17 +13,16 @@ Source: docs/decisions/0037-quiet-ticks.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, compiled, machine_code
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.control.actuator_watch import Watch, at_start, blank, watch
-from fsw.control.cascade import Cascade, close_loops
+from fsw.control.cascade import Cascade
 from fsw.estimation.estimator import attitude
-from fsw.flight.active_failsafes import all_is_well
+from fsw.flight.active_failsafes import surely_none
 from fsw.flight.failsafe import SLOW_US
 from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
 from fsw.flight.plan_exchange import planned_input
@@ -50,48 +49,45 @@ class Bounds(NamedTuple):
     decay: float  # of a rotor's error in a tick
 
 
-@compiled
-def _tick(
-    law: NDArray[Any],
-    model: NDArray[Any],
-    airframe: NDArray[Any],
-    zones: Array,
-    probes: Array,
-    bounds: Bounds,
-    now_us: int,
-    reading: Array,
-    before: NDArray[Any],
-    after: NDArray[Any],
-    watched: Watch,
-    watching: Watch,
+@kernel
+def _sense(
+    model: NDArray[Any], ticks: NDArray[Any], reading: Array, now_us: int, bounds: Bounds
 ) -> bool:
-    """One tick from ``before`` to ``after``, and from ``watched`` to ``watching``.
+    """Read a frame and move the plan's state on. False: there is something to be looked at.
 
-    False, and nothing to rely on in either, if something happens. ``reading`` (READINGS,) [SI];
-    ``law``, ``model`` and ``airframe`` as cascade, plan's model and watch have them packed,
-    ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as ``close_loops`` takes them. Zones
-    are where they are at ``now_us``.
+    ``reading`` (READINGS,) [SI]. Reads plan, u; writes estimate, plan.
     """
-    after[0] = before[0]
-    r, last = after[0], before[0].sent
+    r = ticks[0]
     x = r.estimate
     if read_into(x, reading, now_us) or not x.R_WB[8] > bounds.upright:
         return False
     put_plan(r.plan, next_state(model[0], r.plan, r.u))
+    within = True
     for i in range(3):
-        if not -bounds.off_plan <= x.p_WB[i] - r.plan.p[i] <= bounds.off_plan:
-            return False
-    close_loops(r, law[0], 1, zones, probes)
-    if r.flags or not r.margin >= 0.0:
-        return False
-    failed = watch(
+        within = within and -bounds.off_plan <= x.p_WB[i] - r.plan.p[i] <= bounds.off_plan
+    return within
+
+
+@kernel
+def _watch(
+    before: NDArray[Any],
+    after: NDArray[Any],
+    watched: Watch,
+    watching: Watch,
+    airframe: NDArray[Any],
+    bounds: Bounds,
+) -> bool:
+    """Watch the actuators over a tick, from ``watched`` to ``watching``; whether one has failed."""
+    sent, r = before[0].sent, after[0]
+    f, x = sent.rotor_thrust, r.estimate
+    return watch(
         watched,
         watching,
         airframe,
         bounds.decay,
         bounds.tick,
-        (last.rotor_thrust[0], last.rotor_thrust[1], last.rotor_thrust[2], last.rotor_thrust[3]),
-        (last.joint_torque[0], last.joint_torque[1]),
+        (f[0], f[1], f[2], f[3]),
+        (sent.joint_torque[0], sent.joint_torque[1]),
         (r.joints.reference[0], r.joints.reference[1]),
         (x.w_WB_B[0], x.w_WB_B[1], x.w_WB_B[2]),
         (x.q_arm[0], x.q_arm[1]),
@@ -99,7 +95,6 @@ def _tick(
         x.specific_force,
         True,
     )
-    return not failed
 
 
 @compilable
@@ -142,17 +137,17 @@ class QuietTicks:
         self._config, self._tick_us = config, config.tick_period_us
         self._per_plan = config.mpc_period_us // config.tick_period_us
         self._radius = radius
-        self._laws = (cascade.packed, model.packed, airframe)
-        self._probes = cascade.probes
+        self._cascade, self._model, self._airframe = cascade, model.packed, airframe
         self._bounds = Bounds(radius, upright, 1e-6 * self._tick_us, decay)
-        self._before, self._after = Tick(), Tick()
+        self._before = Tick()
         self._watched, self._watching = at_start(), blank()
         self._zones = NO_ZONES
         self._flown, self._since_us = 0, 0
-        example = (self._bounds, 0, np.zeros(READINGS), self._before.array, self._after.array)
-        self._code: Callable[..., bool] = machine_code(
-            _tick, *self._laws, NO_ZONES, self._probes, *example, self._watched, self._watching
-        )
+        ticks = self._before.array, self._before.array
+        reading = np.zeros(READINGS)
+        self._sense = machine_code(_sense, self._model, ticks[0], reading, 0, self._bounds)
+        memory = self._watched, self._watching
+        self._watch = machine_code(_watch, *ticks, *memory, airframe, self._bounds)
 
     def begin(self, state: FlightState, zones: Array) -> int:
         """How many ticks after this state may be quiet; none: 0.
@@ -174,7 +169,7 @@ class QuietTicks:
         self._bounds = self._bounds._replace(
             off_plan=off_plan_bound(self._radius, state.accuracy.reach)
         )
-        self._before, self._after = state.cascade.copy(), Tick()
+        self._before = state.cascade.copy()
         self._before.give(x, nominal, u)
         self._watched = at_start() if state.watch is None else state.watch
         self._watching = blank()
@@ -185,22 +180,19 @@ class QuietTicks:
 
         Rotors [N] and joints [N m]. If it was not, the tick is still to be flown.
         """
-        after = self._after
-        quiet = self._code(
-            *self._laws,
-            self._zones,
-            self._probes,
-            self._bounds,
-            self._since_us + (self._flown + 1) * self._tick_us,
-            reading,
-            self._before.array,
-            after.array,
-            self._watched,
-            self._watching,
-        )
+        before, after = self._before, self._before.copy()
+        now_us = self._since_us + (self._flown + 1) * self._tick_us
+        quiet = self._sense(self._model, after.array, reading, now_us, self._bounds)
+        if quiet:
+            self._cascade.close(after, self._zones)
+            quiet = not after.flags and after.margin >= 0.0
+        if quiet:
+            memory = self._watched, self._watching
+            ticks = before.array, after.array
+            quiet = not self._watch(*ticks, *memory, self._airframe, self._bounds)
         if quiet:
             self._flown += 1
-            self._before, self._after = after, self._before
+            self._before = after
             # The first one is the state's own.
             given = self._watched if self._flown > 1 else blank()
             self._watched, self._watching = self._watching, given
@@ -251,7 +243,6 @@ def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
         vehicle.mode is Mode.TRAJECTORY
         and vehicle.flies
         and vehicle.home is not None
-        and not vehicle.conditions
         and state.fusion is None
         and state.nominal is not None
         and estimate is not None
@@ -267,5 +258,5 @@ def _is_quiet(state: FlightState, config: FlightConfig) -> bool:
         and bool(state.mission.stream)
         and plan.running is not None
         and state.t_us >= plan.since_us
-        and all_is_well(state, estimate, config)
+        and surely_none(state, estimate, config)
     )
