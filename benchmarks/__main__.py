@@ -21,12 +21,13 @@ BENCHMARKS: Final = {
     "scheduler": "what a campaign's scheduler costs a task, and what more cores would do",
     "plant": "one step of the simulator's plant",
     "estimator": "a tick with real sensors beside one with exact states",
+    "first_start": "what the first flight compiles, by kernel",
 }
 
 
 def help_text() -> str:
     """The list of the benchmarks."""
-    rows = (f"  {name:10}{what}" for name, what in BENCHMARKS.items())
+    rows = (f"  {name:12}{what}" for name, what in BENCHMARKS.items())
     return "\n".join(
         ("usage: python -m benchmarks NAME [options]", "", "benchmarks:", *rows, "")
         + ("`python -m benchmarks NAME --help` prints the options of one.",)

@@ -15,6 +15,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
+from command_line.kernel_types import compile_for_types
 
 # The shapes' kernels are called by a table of functions (fsw/shapes/zones.py), which numba has had
 # for years and still calls new.
@@ -60,10 +61,17 @@ def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_CACHE.folder)
     kept = _CACHE.folder is not None
     try:
-        compile_it = numba.njit(cache=kept, fastmath=False, error_model="numpy", **more)
+        compile_it = numba.njit(
+            cache=kept,
+            fastmath=False,
+            error_model="numpy",
+            no_cfunc_wrapper=True,  # nothing in C calls a kernel
+            **more,
+        )
         dispatcher = compile_it(kernel)
     finally:
         numba.config.CACHE_DIR = before
+    compile_for_types(dispatcher, numba.types.unliteral)
     _DISPATCHERS.append(dispatcher)
     return cast(Callable[P, R], dispatcher)
 

@@ -12,6 +12,7 @@ from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
+from command_line.kernel_types import compile_for_types
 
 # The shapes' kernels are called by a table of functions (sitl/distance.py), which numba has had for
 # years and still calls new.
@@ -73,13 +74,15 @@ def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_CACHE.folder)
     try:
-        machine_code: Callable[P, R] = numba.njit(
+        dispatcher = numba.njit(
             cache=_CACHE.folder is not None,
             fastmath=False,
             nogil=True,
             error_model="numpy",
+            no_cfunc_wrapper=True,  # nothing in C calls a kernel
             _nrt=counts_references,  # numba's own switch for its runtime, undocumented
         )(function)
     finally:
         numba.config.CACHE_DIR = before
-    return machine_code
+    compile_for_types(dispatcher, numba.types.unliteral)
+    return cast(Callable[P, R], dispatcher)

@@ -179,13 +179,19 @@ def _add_tracking(
     weight[7] = weights.yaw
     for i in range(1, n + 1):
         w = weights.node[1 if i == n else 0]
-        weight[0:3], weight[3:6], weight[6] = w[0], w[1], w[2]
-        rows[0:3], rows[3:6] = tracked.d_position[i], tracked.d_velocity[i]
-        rows[6] = tracked.d_arm_com[i]
-        rows[7] = tracked.d_yaw[i, 0] + weights.yaw_lead * tracked.d_yaw[i, 1]
-        values[0:3] = tracked.position[i] - target.position[i]
-        values[3:6] = tracked.velocity[i] - weights.target_velocity * target.velocity[i]
-        values[6] = tracked.arm_com[i]
+        # Entry by entry: for a slice numba compiles a text that says which shapes do not fit.
+        for axis in range(3):
+            weight[axis], weight[3 + axis] = w[0], w[1]
+            values[axis] = tracked.position[i, axis] - target.position[i, axis]
+            v_target = weights.target_velocity * target.velocity[i, axis]
+            values[3 + axis] = tracked.velocity[i, axis] - v_target
+            for k in range(INPUTS * i):
+                rows[axis, k] = tracked.d_position[i, axis, k]
+                rows[3 + axis, k] = tracked.d_velocity[i, axis, k]
+        for k in range(INPUTS * i):
+            rows[6, k] = tracked.d_arm_com[i, k]
+            rows[7, k] = tracked.d_yaw[i, 0, k] + weights.yaw_lead * tracked.d_yaw[i, 1, k]
+        weight[6], values[6] = w[2], tracked.arm_com[i]
         # The short way round: a target half a turn away must not unwind whole turns.
         turn = (tracked.yaw[i, 0] - target.yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
         values[7] = turn + weights.yaw_lead * tracked.yaw[i, 1]
@@ -201,8 +207,9 @@ def _add_squares(
 ) -> None:
     """``add_square`` for all residuals of a node at once: the Hessian is walked through once."""
     guess, hessian, gradient = quadratic
-    at_zero = value.copy().reshape(_RESIDUALS, 1)
+    at_zero = np.empty((_RESIDUALS, 1))
     for residual in range(_RESIDUALS):
+        at_zero[residual, 0] = value[residual]
         for k in range(columns):
             at_zero[residual, 0] -= rows[residual, k] * guess[k]
     for k in range(columns):
