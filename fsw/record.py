@@ -17,6 +17,7 @@ rest at zero, and all share one layout and one machine code.
 
 from __future__ import annotations
 
+import struct
 from typing import Annotated, Any, ClassVar, Final, Self, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -35,7 +36,7 @@ PerJoint = Annotated[Floats, JOINTS]
 PerRotor = Annotated[Floats, ROTORS]
 
 _NUMBER: Final = 8  # bytes, of whole numbers and of others
-_NUMBERS, _ARRAY, _WHOLES = -1, -2, -3  # views of a whole record
+_NUMBERS, _ARRAY = -1, -2  # views of a whole record
 
 
 class Record:
@@ -112,33 +113,25 @@ class _Number:
 
     dtype: Any = np.float64
     count = 1
+    code = struct.Struct("<d")
 
     def __init__(self, at: int) -> None:
         self._at = at
 
     def __get__(self, record: Record | None, kind: Any = None) -> Any:
-        return self if record is None else record.numbers.item(self._at)
+        if record is None:
+            return self
+        return self.code.unpack_from(record.memory, self._at * _NUMBER)[0]
 
     def __set__(self, record: Record, value: float) -> None:
-        record.numbers[self._at] = value
+        self.code.pack_into(record.memory, self._at * _NUMBER, value)
 
 
 class _Whole(_Number):
     """A field of one whole number."""
 
     dtype = np.int64
-
-    def __get__(self, record: Record | None, kind: Any = None) -> Any:
-        return self if record is None else self._wholes(record).item(self._at)
-
-    def __set__(self, record: Record, value: float) -> None:
-        self._wholes(record)[self._at] = value
-
-    def _wholes(self, record: Record) -> Any:
-        views = record._views
-        if _WHOLES not in views:
-            views[_WHOLES] = record.numbers.view(np.int64)
-        return views[_WHOLES]
+    code = struct.Struct("<q")
 
 
 class _Several(_Number):

@@ -14,7 +14,6 @@ from typing import Final
 from fsw.record import (
     JOINTS,
     ROTORS,
-    Floats,
     Nine,
     PerJoint,
     PerRotor,
@@ -132,6 +131,18 @@ class Tick(Record):
     def commanded(self, command: ActuatorCommand) -> None:
         _COMMAND.pack_into(self.memory, _SENT_AT, *command.rotor_thrust, *command.joint_torque)
 
+    @property
+    def wind(self) -> Vec2:
+        """What lasts of the disturbance [m/s^2, NED]."""
+        north, east = _TWO.unpack_from(self.memory, _WIND_AT)
+        return north, east
+
+    @property
+    def joint_reference(self) -> Vec2:
+        """What the joints were asked for [rad]."""
+        first, second = _TWO.unpack_from(self.memory, _REFERENCE_AT)
+        return first, second
+
     def give(self, x: StateEstimate, plan: PredictionState, u: PlanInput) -> None:
         """Write down what a tick is given."""
         _GIVEN.pack_into(
@@ -189,7 +200,22 @@ _GIVEN: Final = struct.Struct(
     f"<q19d{2 * _OF_JOINTS}d" + f"15d{2 * _OF_JOINTS}" + f"4d{_OF_JOINTS}"
 )
 _COMMAND: Final = struct.Struct(f"<4d{8 * (ROTORS - FLOWN_ROTORS)}x{_OF_JOINTS}")
-_SENT_AT: Final = Tick.dtype.fields["sent"][1]  # type: ignore[index]
+_TWO: Final = struct.Struct("<2d")
+
+
+def _place(*names: str) -> int:
+    """Where a field is in a record, by its name and those of the records around it [byte]."""
+    at, layout = 0, Tick.dtype
+    for name in names:
+        assert layout.fields is not None
+        layout, offset = layout.fields[name][:2]
+        at += offset
+    return at
+
+
+_SENT_AT: Final = _place("sent")
+_WIND_AT: Final = _place("observed", "disturbance_bias")
+_REFERENCE_AT: Final = _place("joints", "reference")
 assert _GIVEN.size == _SENT_AT
 
 
@@ -203,9 +229,3 @@ def new_tick(mass: float) -> Tick:
 
 
 _NOT_KNOWN: Final = 1.0  # m/s^2; nothing was observed yet, and what is to come may be large
-
-
-def of_joints(values: Floats) -> Vec2:
-    """The entries (JOINTS,) of the vehicle's own joints."""
-    first, second = values[:_FLOWN].tolist()
-    return first, second

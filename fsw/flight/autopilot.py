@@ -536,8 +536,7 @@ class Autopilot:
         """What the memory of wind in force can add to the tube [m, NED]."""
         if self.config.inner != "tracking":
             return 0.0, 0.0
-        north, east = memory.observed.disturbance_bias.tolist()
-        return beyond_covered(self._safe_sets.loop_tube, (north, east))
+        return beyond_covered(self._safe_sets.loop_tube, memory.wind)
 
     def _pose_error(
         self,

@@ -17,7 +17,7 @@ from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealt
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.rotors import rotor_decay
 from fsw.signals import ActuatorReport, StateEstimate, Vec2, Vec4
-from fsw.tick_record import Tick, of_joints
+from fsw.tick_record import Tick
 
 ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
@@ -73,7 +73,7 @@ class DamageWatch:
             dt,
             thrust,
             torque,
-            of_joints(now.joints.reference),
+            now.joint_reference,
             estimate.w_WB_B,
             estimate.q_arm,
             estimate.qd_arm,

@@ -28,7 +28,6 @@ from fsw.flight.state import Aiding, FlightState, LostSensor
 from fsw.frozen import made, replace
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
-from fsw.tick_record import of_joints
 
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
@@ -292,7 +291,7 @@ def _watched(
     joint as well, but not one that is asked to move on. Of one encoder alone nothing tells whether
     it or its joint is stuck: that is left to the watch over the joints.
     """
-    asked = of_joints(state.cascade.joints.reference)
+    asked = state.cascade.joint_reference
     if angles != watch.angles or not state.vehicle.flies:
         return made(EncoderWatch, (angles, asked, 0, False))
     stuck = watch.stuck

@@ -24,7 +24,7 @@ from fsw.control.joints import (
 from fsw.model.airframe import AIRFRAME, Airframe
 from fsw.model.prediction import Array
 from fsw.signals import StateEstimate, Vec2
-from fsw.tick_record import Joints, of_joints
+from fsw.tick_record import Joints
 from tests.fsw.random_states import estimate_of
 from tests.fsw.records import changed
 
@@ -96,7 +96,7 @@ def hold(q: Vec2, q_ref: Vec2, thrust: float = 9.81, pitch: float = 0.0) -> tupl
     k = changed(resting_joints(AIRFRAME, estimate), reference=q_ref)
     arm = arm_dynamics(AIRFRAME, estimate, (0.0, thrust))
     torque = joint_torques(k, AIRFRAME, GAINS, estimate, (0.0, 0.0), arm, pitch, DT)
-    return torque, of_joints(k.integral)
+    return torque, pair(k.integral)
 
 
 def resting_joints(airframe: Airframe, estimate: StateEstimate) -> Joints:
