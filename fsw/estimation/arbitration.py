@@ -29,7 +29,7 @@ from fsw.estimation.error_state import (
     V,
 )
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
-from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS
+from fsw.estimation.imu import IMU_TOO_OLD, is_stuck
 from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.estimation.measurement_update import MeasurementUpdate
 from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
@@ -44,7 +44,7 @@ from fsw.signals import StateEstimate
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
 # Of a suspect: the most that its bias may be off, for how long it has been so [s], and the share of
 # it that residuals show. Places show a force late: half of it where windows are half full.
-_MOST: Final = (3.0, 0.5)  # m/s^2 and rad/s
+_MOST: Final = (10.0, 0.5)  # m/s^2 and rad/s
 _FOR: Final = (0.1, 0.06)
 _SEEN: Final = (0.5, 1.0)
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
@@ -212,6 +212,7 @@ class Arbitration:
             numbers=numbers,
             health=health,
             waiting=back.waiting,
+            arrivals=back.arrivals,
             runs=back.runs,
             pose=back.pose,
             reset_counter=back.reset_counter,
@@ -276,7 +277,7 @@ def _stuck(memory: FusionMemory) -> Source:
     """Halves of the inertial unit that repeat themselves."""
     found, same = NOBODY, memory.numbers[0]["same"]
     for place, (source, _) in enumerate(_HALVES):
-        if same[place] >= STUCK_READINGS:
+        if is_stuck(same, place):
             found |= source
     return found
 

@@ -65,7 +65,7 @@ FILTER: Final = np.dtype(
         ("end", np.int64),  # behind the newest reading
         # Of accelerometer and gyro, in this order (imu.py).
         ("newest", float, (6,)),  # m/s^2 and rad/s, as they came, believed or not
-        ("same", np.int64, (2,)),  # how often the newest reading came in a row
+        ("same", np.int64, (6,)),  # how often each number of the newest came in a row
         ("steady", np.int64, (2,)),  # how many in a row were near the one before
         ("calm", np.int64, (2,)),  # how many in a row were believed
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is

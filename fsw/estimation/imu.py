@@ -29,7 +29,9 @@ from fsw.signals import Vec3, Vec4
 
 TIME_TOLERANCE: Final = 0.002  # s, by which a reading may be ahead of the tick
 IMU_TOO_OLD: Final = 0.03  # s; what the vehicle did so long ago says nothing about its rates now
-STUCK_READINGS: Final = 5  # equal to the last bit, in a row: noise never is
+# Equal to the last bit, in a row: noise of three axes never is, that of one by chance for a while.
+STUCK_READINGS: Final = 5
+_STUCK_AXIS: Final = 50
 # Steady readings in a row until what has jumped is the truth: of one that was calm, and of others.
 STAYS: Final = 3
 STAYS_LONG: Final = 25
@@ -116,7 +118,9 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bo
     size, change, stray = 0.0, 0.0, 0.0
     for i in range(3):
         size = max(size, abs(reading[i]))
-        change = max(change, abs(reading[i] - x.newest[at + i]))
+        moved = abs(reading[i] - x.newest[at + i])
+        x.same[at + i] = x.same[at + i] + 1 if moved == 0.0 else 0
+        change = max(change, moved)
         stray = max(stray, abs(reading[i] - last[FORCE + at + i]))
         x.newest[at + i] = reading[i]
     if size > most:
@@ -124,7 +128,6 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bo
         return _IMPLAUSIBLE
     if x.end == 0:
         return _NONE
-    x.same[half] = x.same[half] + 1 if change == 0.0 else 0
     x.steady[half] = x.steady[half] + 1 if change <= jump else 0
     if x.believed & (1 << half):
         x.doubted[half] = 0
@@ -137,7 +140,15 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bo
         )
     if x.doubted[half] > 0:
         return _JUMP
-    return _STUCK if x.same[half] >= STUCK_READINGS else _NONE
+    return _STUCK if is_stuck(x.same, half) else _NONE
+
+
+@compilable
+def is_stuck(same: Any, half: int) -> bool:
+    """Whether a half of the unit repeats itself, or one axis of it for longer."""
+    a, b, c = same[3 * half], same[3 * half + 1], same[3 * half + 2]
+    stuck: bool = min(a, b, c) >= STUCK_READINGS or max(a, b, c) >= _STUCK_AXIS
+    return stuck
 
 
 @compilable

@@ -198,7 +198,7 @@ def _copy(a: Any, b: Any) -> None:
         for i in range(COLUMNS):
             b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
     for i in range(6):
-        b.newest[i] = a.newest[i]
+        b.newest[i], b.same[i] = a.newest[i], a.same[i]
     _copy_halves(a, b)
     _copy_joints(a, b)
 
@@ -206,7 +206,7 @@ def _copy(a: Any, b: Any) -> None:
 @compilable
 def _copy_halves(a: Any, b: Any) -> None:
     for i in range(2):
-        b.same[i], b.steady[i] = a.same[i], a.steady[i]
+        b.steady[i] = a.steady[i]
         b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
         b.model_walk[i] = a.model_walk[i]
     b.out, b.suspect, b.believed = a.out, a.suspect, a.believed

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, of_fixed_types
-from fsw.estimation.error_state import WITNESS, vec3
+from fsw.estimation.error_state import BA, WITNESS, vec3
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.geometry.vectors import add_scaled, norm, subtract
@@ -109,6 +109,7 @@ _SPEED_OFF: Final = 0.08  # m/s
 # Biases, of which units of this kind are sold with a third or less (EstimatorTuning).
 _ACCEL_BIAS: Final = 0.8  # m/s^2
 _GYRO_BIAS: Final = 0.1  # rad/s
+_KNOWN: Final = 0.4  # of that
 # How a vehicle moves between two measurements, of which one may be an outlier: beside the velocity
 # that the last two of them show, or with any where there are none.
 _GAINS: Final = 15.0  # m/s^2, half of it
@@ -257,11 +258,16 @@ def _note_largest(s: Any, now: float, k: int) -> None:
 def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> None:
     """Keep how far the bias of a half is beyond the ``most`` [SI] that its kind has.
 
-    By the square, because it is no noise. Of one that is in doubt, it is the one from before.
+    By the square, because it is no noise. Of one that is in doubt, it is the one from before. What
+    is known of it no better than when the filter began is no evidence.
     """
     bias = vec3(x.gyro_bias if half else x.accel_bias, 0)
     if x.lost & (1 << half):
         bias = vec3(x.kept_bias, 3 * half)
+    else:
+        for i in range(BA + 3 * half, BA + 3 * half + 3):
+            if x.covariance[i, i] > (_KNOWN * most) ** 2:
+                return
     share = norm(bias) / most
     _note(s, now, k, 0, (share * share * most, 0.0, 0.0), most)
 
@@ -713,7 +719,9 @@ def judged(
     ``damaged`` vehicle it is known that the rotors' model is off.
     """
     of = _sources(holds_attitude, verdict.wrong)
-    used = [k for k in range(COUNT) if not of[k] & (verdict.wrong | lost)]
+    # Where a pose holds the attitude, a bias that is found with it is as much the pose's.
+    known = range(AA if holds_attitude else COUNT)
+    used = [k for k in known if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:

@@ -434,7 +434,11 @@ class SensorFusion:
         """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
         x, before = memory.numbers, memory.of(SENSOR_OF[type(sample)])
         health, fault = arrived(
-            before, sample, now, self.tuning, lambda: bool(x["same"][0].min() >= STUCK_READINGS)
+            before,
+            sample,
+            now,
+            self.tuning,
+            lambda: bool(x["same"][0].min() >= STUCK_READINGS),
         )
         time = self._update.measured_at(memory, sample)
         if not fault and memory.started and time < x["time"][0] - LATE:

@@ -70,6 +70,23 @@ def test_half_a_unit_that_repeats_itself_is_lost_alone() -> None:
         assert unit.last[LOST] == 0
 
 
+def test_one_axis_that_repeats_itself_is_told_and_rest_on_a_grid_is_not() -> None:
+    """With an axis of the accelerometer stuck a vehicle with satellites flew into a wall."""
+    for half, axis in ((NO_RATE, 1), (NO_FORCE, 0)):
+        unit = Unit()
+        for _ in range(51):
+            noisy = 0.05 * unit.random.standard_normal(3)
+            noisy[axis] = 0.2
+            said = {("rate" if half == NO_RATE else "force"): tuple(noisy.tolist())}
+            fault = unit.read(**said)
+        assert fault is SensorFault.STUCK
+        assert unit.last[LOST] == half
+    unit = Unit()
+    for _ in range(3000):
+        on_grid = tuple((1e-3 * np.rint(unit.random.standard_normal(3))).tolist())
+        assert unit.read(rate=on_grid) is SensorFault.NONE
+
+
 def test_garbage_is_never_believed_again_and_the_other_half_is() -> None:
     for size, at, half in ((50.0, FORCE, NO_FORCE), (10.0, RATE, NO_RATE)):
         unit = Unit()

@@ -275,6 +275,10 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
         look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
     assert evidence[0]["ratio"][redundancy.AA] > 1.0
     assert evidence[0]["ratio"][redundancy.GG] > 1.0
+    x["covariance"][0] = 0.5**2 * np.eye(17)
+    for look_ in range(60, 90):
+        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
+    assert not evidence[0]["ratio"].any(), "nothing is known of them"
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
