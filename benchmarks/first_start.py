@@ -11,6 +11,7 @@ import time
 from collections import defaultdict
 from typing import Any
 
+from command_line.output import json_text
 from command_line.parser import Parser
 
 PROCESSES = ("fsw", "sitl")
@@ -95,4 +96,4 @@ def _watched(process: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(_watched(sys.argv[1])))
+    print(json_text(_watched(sys.argv[1])))

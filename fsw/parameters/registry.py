@@ -540,7 +540,6 @@ NO_PARAMETERS: Final[dict[str, str]] = {
     "estimator.gyro_jump": "what the airframe can do from one reading to the next",
     "estimator.imu_gap": "counted in ticks",
     "estimator.lost_": "what the airframe does while the inertial unit is lost",
-    "estimator.modelled_": "the same where the rotors' commands stand in for it",
     "estimator.velocity": "of use in the first second alone",
     "estimator.pose_noise_at_start": "of use in the first second alone",
     "estimator.start_heading": "of use in the first second alone",
