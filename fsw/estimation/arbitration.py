@@ -89,6 +89,10 @@ class Arbitration:
         if evidence is None:
             return begun(memory), found
         if not aloft:
+            # What is in doubt is so all the way down: else its bias would be the one of before.
+            turned = memory.numbers[0]["witness"][redundancy.SAID : redundancy.FELT]
+            if memory.verdict.is_on and turned.any():  # the rotors turn: ``redundancy.witness``
+                return memory, found
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)
             return (_on_ground(memory, now) if memory.verdict.wrong else memory), found

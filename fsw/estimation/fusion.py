@@ -261,7 +261,9 @@ def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3, believe
 def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) -> bool:
     """The row of a ``measured`` [m] distance to level ground, ``dt`` [s] after the state.
 
-    ``variance`` [m^2]. False where the vehicle is tilted by more than 45 degrees.
+    ``variance`` [m^2]. False where the vehicle is tilted by more than 45 degrees. It measures the
+    height alone: what is not known of the tilt is noise. Over a tilt, a distance that is off would
+    tilt the estimate, and the more, the more that is tilted already.
     """
     _cleared(x, 1)
     R = matrix_from_quaternion(vec4(x.q))
@@ -272,9 +274,10 @@ def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) ->
     x.H[0, P + 2] = -1.0 / R[8]
     x.H[0, V + 2] = -dt / R[8]
     # R33 changes by R31 dtheta_y - R32 dtheta_x.
-    x.H[0, TH] = expected * R[7] / R[8]
-    x.H[0, TH + 1] = -expected * R[6] / R[8]
-    x.variance[0] = variance
+    by_roll, by_pitch = expected * R[7] / R[8], expected * R[6] / R[8]
+    M = x.covariance
+    tilt = by_roll * by_roll * M[TH, TH] + by_pitch * by_pitch * M[TH + 1, TH + 1]
+    x.variance[0] = variance + tilt
     return True
 
 

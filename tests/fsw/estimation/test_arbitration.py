@@ -19,6 +19,7 @@ from fsw.signals import Vec3, Vec4
 
 FUSION = SensorFusion(EstimatorTuning())
 HOVERS: Vec4 = (0.0, 0.0, 0.0, 9.81)  # what rotors make of it
+STANDS: Vec4 = (0.0, 0.0, 0.0, 0.0)  # it does not fly
 TICK = 0.002
 POSES_UNTIL, WRONG_FROM = 3.0, 4.0  # s
 LEVEL: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -108,6 +109,26 @@ def test_of_a_rotor_that_is_known_to_have_failed_no_gyro_is_a_suspect(damaged: b
     for memory in hovering(turns=0.3, damaged=damaged):
         suspects |= memory.verdict.suspects
     assert bool(suspects & Source.GYRO) is not damaged
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_doubts_do_not_end_with_a_descent_but_where_the_rotors_stand() -> None:
+    """Near the ground a gyro that had drifted was taken for the one from before: 40 deg of tilt."""
+    for memory in hovering(turns=0.3):
+        if memory.verdict.suspects & Source.GYRO:
+            break
+    began, now, suspect = memory.verdict.since, memory.now, int(memory.numbers["suspect"][0])
+    for model in (HOVERS, HOVERS, STANDS, STANDS):
+        now += TICK
+        samples: list[Sample] = [
+            JointSample(now, (1e-3 * (now % 0.1), 0.0)),
+            ImuSample(now, (0.0, 0.0, -9.81 + 1e-3 * (now % 0.1)), (1e-4 * (now % 0.3), 0.0, 0.3)),
+        ]
+        memory, found = FUSION.take_in(memory, samples, now, model=model)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, aloft=False)
+        flies = model is HOVERS
+        assert memory.verdict.since == (began if flies else -1.0)
+        assert int(memory.numbers["suspect"][0]) == (suspect if flies else 0)
 
 
 @pytest.mark.requirement("REQ-EST-13")
