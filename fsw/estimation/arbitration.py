@@ -27,6 +27,7 @@ from fsw.estimation.error_state import (
     ON_TRIAL,
     TH,
     V,
+    watch_biases,
 )
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
 from fsw.estimation.imu import IMU_TOO_OLD, is_stuck
@@ -174,7 +175,7 @@ class Arbitration:
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
             if self._aided(memory, now):  # else nothing would find the bias, and all would be lost
-                verdict = _widened(x[0], verdict)
+                verdict = _widened(x.view(np.recarray)[0], verdict)
                 memory = memory._replace(verdict=verdict)
         # What the rotors explain, nobody else was wrong about.
         acquits = verdict.explained and not before.explained and any(before.unknown)
@@ -318,12 +319,7 @@ def _doubt(x: Any, half: int) -> None:
     waiting = np.arange(x["first"], x["end"]) % IMU_CAPACITY
     lost = x["imu"][waiting, LOST].astype(int) | MODELLED | 1 << half
     x["imu"][waiting, LOST] = lost
-    if x["lost"] & 1 << half:
-        return
-    x["lost"] |= 1 << half
-    of = slice(3 * half, 3 * half + 3)
-    x["kept_bias"][of] = x["gyro_bias" if half else "accel_bias"]
-    x["kept_variance"][of] = np.diag(x["covariance"])[BA:][of]
+    watch_biases(x, x["covariance"], int(x["lost"]) | 1 << half)
 
 
 def _halves(sources: Source) -> int:

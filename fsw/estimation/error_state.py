@@ -266,7 +266,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     """
     gap = max(row[TIME] - x.time, 0.0)
     lost = NOTHING if gap > law.imu_gap else int(row[LOST])
-    _watch_biases(x, M, lost)
+    watch_biases(x, M, lost)
     f = (
         0.5 * (row[1] + before[1]) - x.accel_bias[0],
         0.5 * (row[2] + before[2]) - x.accel_bias[1],
@@ -300,8 +300,11 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
 
 
 @compilable
-def _watch_biases(x: Any, M: Array, lost: int) -> None:
-    """Keep the biases when readings are lost, and take them up again when they are back."""
+def watch_biases(x: Any, M: Array, lost: int) -> None:
+    """Keep the biases when readings are ``lost`` [NO_FORCE, NO_RATE], and take them up again.
+
+    ``M`` (17, 17) [SI] is the covariance. They are taken up when the readings are back.
+    """
     changed = lost ^ x.lost
     if not changed:
         return
