@@ -55,6 +55,7 @@ _PARTS: Final = {
     Sensor.POSE: (Source.POSE, Source.ATTITUDE),
     Sensor.GNSS: (Source.GNSS, Source.GNSS),
 }
+_FOLLOWED: Final = (SensorFault.SELDOM, SensorFault.NOISY)  # encoders that are used all the same
 _ROUNDING: Final = 1e-9  # s
 
 Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
@@ -276,7 +277,7 @@ def _silent(memory: FusionMemory, now: float) -> Source:
     """
     unit = now - memory.imu_came > IMU_TOO_OLD
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
-    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault is not SensorFault.SELDOM
+    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault not in _FOLLOWED
     arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
     return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
 

@@ -171,3 +171,20 @@ def test_a_joint_that_falls_as_no_torque_makes_it_is_followed_and_is_no_jump(fal
         (first, _), _ = present_joints(x, now)
         worst = max(worst, abs(first - q))
     assert worst < 0.12
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("sigma", [0.01, 0.03])
+def test_noise_of_an_encoder_is_no_motion_and_it_is_known_how_large_it_is(sigma: float) -> None:
+    """The rates that noise made threw an arm into a wall."""
+    noise = np.random.default_rng(7)
+
+    def noisy(t: float, said: Vec2) -> Vec2:
+        return (said[0] + float(noise.normal(0.0, sigma)), said[1]) if t > 0.5 else said
+
+    arm = Arm(spoil=noisy)
+    assert SensorFault.JUMP not in arm.faults
+    assert arm.off < 3.0
+    scale = float(arm.x.encoder_scale)
+    assert 0.2 * sigma < math.sqrt(scale) * TUNING.encoder_noise < 3.0 * sigma
+    assert Arm().x.encoder_scale == 1.0
