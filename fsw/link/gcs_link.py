@@ -44,6 +44,7 @@ RecordFrame = Callable[[int, bytes], None]
 _LEAST_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
+_MEASURED_S: Final = 3  # calls of ``news``, one a second
 _HOUSEKEEPING_US: Final = 1_000_000
 _MESSAGE_ID: Final = slice(7, 10)  # in a frame
 # Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
@@ -113,7 +114,8 @@ class GcsLink:
             context.facts.tick_period_us,
             most_bytes_s=None if carried is None else TELEMETRY * carried,
         )
-        self._told_share = 1.0  # of the telemetry's rates
+        self._looks = 0  # for news
+        self._told_slow = False
         self.talks = setup.unheard  # whether more than a heartbeat is sent
         self._unheard = setup.unheard
         self._peers = Peers(peer)
@@ -218,7 +220,7 @@ class GcsLink:
         if changed:
             for stream in AT_ONCE:
                 self._encode(stream, snapshot)
-        has_room = self._line is None or self._line.has_room()
+        has_room = self._line is None or self._line.takes_telemetry()
         for stream in self.rates.due(snapshot.t_us):
             if has_room or stream.vital:
                 self._encode(stream, snapshot)
@@ -229,20 +231,20 @@ class GcsLink:
             self.outbox.add_overdue_texts(snapshot.t_us)
             self._peers.expire(self._clock())
             self.talks = self._unheard or self._peers.any_heard
+            if self._line is not None:
+                self.rates.fit()
 
     def news(self) -> list[StatusText]:
         """What the operator should know about the line itself; call it once a second."""
         found = self._endpoint.news()
         texts = [] if found is None else [StatusText(Severity.NOTICE, f"link {self.name}: {found}")]
-        if self.rates.share < self._told_share:
-            self._told_share = self.rates.share
-            texts.append(
-                StatusText(
-                    Severity.NOTICE,
-                    f"link {self.name}: slow line, telemetry at {100.0 * self.rates.share:.0f} % "
-                    "of its rates, heartbeat and states in full",
-                )
-            )
+        self._looks += 1
+        # By then frames of every kind have been measured.
+        if self._looks > _MEASURED_S and self.rates.share < 1.0 and not self._told_slow:
+            self._told_slow = True
+            share = f"{100.0 * self.rates.share:.0f} %"
+            sentence = f"slow line, telemetry at {share} of its rates, heartbeat and state in full"
+            texts.append(StatusText(Severity.NOTICE, f"link {self.name}: {sentence}"))
         return texts
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
@@ -340,7 +342,9 @@ class GcsLink:
             self.outbox.encode_failures += 1
             return
         if values is not None:
-            self.outbox.add(stream.component, stream.message_id, values)
+            size = self.outbox.add(stream.component, stream.message_id, values)
+            if self._line is not None and size:
+                self.rates.note_size(stream, size)
 
     def _send(self, t_us: int) -> None:
         frames, asked_for = self.outbox.take()

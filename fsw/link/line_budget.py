@@ -13,6 +13,7 @@ from fsw.ports import Clock
 FULL: Final = 0.8  # of what the line carries
 TELEMETRY: Final = 0.6  # of it
 _BURST_S: Final = 0.1  # of that share may leave at once
+_LONGEST: Final = 1400  # bytes of what can wait, which are sent as one
 
 
 class LineBudget:
@@ -31,9 +32,17 @@ class LineBudget:
         self._level -= size
 
     def has_room(self) -> bool:
-        """Whether something that can wait may be sent now."""
+        """Whether what can wait may be sent now: parameters, files."""
         self._count()
         return self._level > 0.0
+
+    def takes_telemetry(self) -> bool:
+        """Whether telemetry may be sent now; what was sent before it of what can wait is no reason.
+
+        In real time it always may. Where the vehicle's time goes faster, some of it is left out.
+        """
+        self._count()
+        return self._level > -self._most - _LONGEST
 
     def _count(self) -> None:
         now_us = self._clock()

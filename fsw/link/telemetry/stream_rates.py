@@ -16,6 +16,8 @@ from messages.frames import whole_size
 SLOT_US: Final = 10_000  # what is due within one slot leaves together, in one datagram
 OFF: Final = -1  # MESSAGE_INTERVAL: not sent
 UNKNOWN: Final = 0  # MESSAGE_INTERVAL: not available
+_RENEWED: Final = 0.2  # of a size by each frame
+_NOTICED: Final = 0.02  # change of the share
 _LEAST_SHARE: Final = 0.1  # of a line
 _MOST_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
 
@@ -28,6 +30,7 @@ class _Timetable:
     default_us: int
     wanted_us: int
     due_us: int
+    size: float  # bytes of a frame: all of its fields, and then as measured
     interval_us: int = OFF  # in force
 
 
@@ -54,8 +57,13 @@ class StreamRates:
             interval = round(1e6 / rate_hz) if rate_hz > 0.0 else OFF
             # Spread over the slots, so that slow messages do not all leave at once.
             phase = place * SLOT_US % interval if interval != OFF else 0
-            self._rows.append(_Timetable(stream, interval, interval, phase))
+            size = whole_size(stream.message_id)
+            self._rows.append(_Timetable(stream, interval, interval, phase, size))
+        self._by_stream = {row.stream: row for row in self._rows}
         self._lay_out()
+        for row in self._rows:
+            # The first ones do not all leave in the first second either.
+            row.due_us = row.due_us if row.stream.vital else round(row.due_us / self.share)
 
     def due(self, t_us: int) -> Iterator[Stream]:
         """Streams to be sent now; a pause is not caught up on."""
@@ -69,6 +77,16 @@ class StreamRates:
                 if row.due_us <= t_us:
                     row.due_us = t_us + row.interval_us
                 yield row.stream
+
+    def note_size(self, stream: Stream, size: int) -> None:
+        """How large [bytes] a frame of a stream is: the zeros at its end are not sent."""
+        row = self._by_stream[stream]
+        row.size += _RENEWED * (size - row.size)
+
+    def fit(self) -> None:
+        """Take the sizes of late frames for the next ones; call it once a second."""
+        if abs(self._share() - self.share) > _NOTICED:
+            self._lay_out()
 
     def interval_us(self, message_id: int) -> int:
         """The interval in force, OFF, or UNKNOWN for a message that does not exist."""
@@ -112,8 +130,7 @@ class StreamRates:
         wanted = {True: 0.0, False: 0.0}  # bytes/s, of what is vital and of the rest
         for row in self._rows:
             if row.wanted_us != OFF:
-                size = whole_size(row.stream.message_id)
-                wanted[row.stream.vital] += 1e6 * size / row.wanted_us
+                wanted[row.stream.vital] += 1e6 * row.size / row.wanted_us
         # What is vital is little; a line that has no room even for that has some for the rest.
         left = max(self._most_bytes_s - wanted[True], _LEAST_SHARE * self._most_bytes_s)
         return min(left / wanted[False], 1.0) if wanted[False] > 0.0 else 1.0
