@@ -92,6 +92,19 @@ def parse_link_address(text: str) -> LinkAddress:
     return (host, port) if kind == "udp" else TcpEnd(host, port, listens=kind == "tcpin")
 
 
+def parse_listener(text: str) -> TcpEnd:
+    """Read ``tcp:HOST:PORT`` of this machine, to listen there; port 0 lets the system choose.
+
+    Raises:
+        LinkError: As of :func:`parse_address`.
+    """
+    form = "tcp:HOST:PORT"
+    kind, host, number = _parts(text, form)
+    if kind not in ("tcp", "tcpin"):
+        raise LinkError(f"address {text!r} is not of the form {form}")
+    return TcpEnd(_host(text, host, form), _port(text, number, 0), listens=True)
+
+
 def address_text(address: LinkAddress) -> str:
     """The opposite of :func:`parse_link_address`."""
     if isinstance(address, tuple):

@@ -58,7 +58,7 @@ class ByteStream:
         self._unsent = b""
         # Never ready: what to wait for while there is no connection.
         self._nothing = os.eventfd(0, os.EFD_CLOEXEC)
-        self._look()
+        self.look()
 
     @property
     def connected(self) -> bool:
@@ -75,7 +75,7 @@ class ByteStream:
     def read(self, most: int) -> bytes:
         """Up to ``most`` bytes that are there; also looks for a peer when it is time."""
         if self._port is None or self._listener is not None:
-            self._look()
+            self.look()
         self._flush()
         port = self._port
         ready = self._poll.poll(0)
@@ -106,6 +106,17 @@ class ByteStream:
         self._unsent += datagram
         self._flush()
 
+    @property
+    def listening_port(self) -> int | None:
+        """Where it listens, if it does."""
+        return None if self._listener is None else int(self._listener.getsockname()[1])
+
+    def stop_listening(self) -> None:
+        """Keep to the client that there is: nobody takes its place."""
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+
     def close(self) -> None:
         """Give everything back; safe to call twice."""
         self._lose("")
@@ -129,8 +140,8 @@ class ByteStream:
             return
         self._unsent = self._unsent[sent:]
 
-    def _look(self) -> None:
-        """Open what can be opened now."""
+    def look(self) -> None:
+        """Open what can be opened now; :meth:`read` does so too."""
         now_us = self._clock()
         if now_us < self._looks_us or self._nothing < 0:
             return
@@ -140,7 +151,7 @@ class ByteStream:
                 self._take(_serial(self.address))
             elif self._listener is not None:
                 self._accept(self._listener)
-            else:
+            elif not self.address.listens:
                 self._dial(self.address)
         except OSError as error:
             self.problem = _reason(error)
