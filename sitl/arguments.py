@@ -28,7 +28,7 @@ def speed(text: str) -> float | None:
         ) from None
 
 
-def _rate(text: str) -> int:
+def rate(text: str) -> int:
     """A rate of the exchange with PX4 [Hz]."""
     if text not in ("250", "500"):
         raise ArgumentTypeError(f"{text!r} is neither 250 nor 500")
@@ -75,7 +75,7 @@ class SitlOptions(RunOptions):
         "where the autopilot finds it: udp:HOST:PORT (default udp:127.0.0.1:4560), "
         "for px4 tcp:HOST:PORT (default tcp:127.0.0.1:4560)",
     )
-    rate_hz: int = option("--rate HZ", "for px4: steps a second, 250 or 500", _rate, default=250)
+    rate_hz: int = option("--rate HZ", "for px4: steps a second, 250 or 500", rate, default=250)
     wait_s: float = option(
         "--wait S", "how long to wait for the flight software, in seconds", seconds, default=60.0
     )
