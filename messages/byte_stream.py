@@ -15,8 +15,6 @@ import termios
 from collections.abc import Callable
 from typing import Final, Protocol
 
-import serial
-
 from messages.addresses import LinkError, SerialLine, StreamAddress, TcpEnd, address_text
 
 RETRY_US: Final = 1_000_000
@@ -238,6 +236,8 @@ def _tcp(one: socket.socket) -> socket.socket:
 
 
 def _serial(line: SerialLine) -> _Port:
+    import serial  # by those alone who have such a line
+
     port: _Port = serial.Serial(line.device, line.baud, timeout=0, write_timeout=0, exclusive=True)
     return port
 

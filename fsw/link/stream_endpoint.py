@@ -35,6 +35,7 @@ class StreamEndpoint:
         self._last_read_us = 0
         self._connections = 0  # that were seen
         self._told: tuple[bool, int] | None = None  # whether, and how often, it was connected
+        self._connected = False  # once the stream is closed
         self._losses = Losses()  # of earlier connections, not counted yet
 
     def fileno(self) -> int:
@@ -77,15 +78,16 @@ class StreamEndpoint:
         return f"{self._name} {'lost' if stream.connections else 'not there'}: {stream.problem}"
 
     def as_json(self) -> dict[str, object]:
-        """Counts since start."""
+        """Counts since start, and whether there was a connection at the end."""
         stream = self._stream
         return {
             "address": self._name,
-            "connected": stream.connected,
+            "connected": stream.connected or self._connected,
             "connections": stream.connections,
             "datagrams_unsent": stream.dropped,
         }
 
     def close(self) -> None:
-        """Give everything back."""
+        """Give everything back; safe to call twice."""
+        self._connected = self._connected or self._stream.connected
         self._stream.close()

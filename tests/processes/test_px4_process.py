@@ -63,7 +63,7 @@ def test_a_scenario_in_the_air_is_flown_from_the_ground(tmp_path: Path) -> None:
         connected.start()
         flown = until(process, "ended")
         assert process.wait(10.0) == 0
-    assert any(event["message"] == "sitl: PX4 answers from step 10 on" for event in flown)
+    assert any(event["message"].startswith("sitl: PX4 answers from step ") for event in flown)
     result = json.loads((tmp_path / "sitl.json").read_text())
     assert result["end_reason"] == "flew 4.0 s"
     assert result["sensors"] == "mocap"
