@@ -48,5 +48,7 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     # Dashes, which all options have in common, make any two of them alike.
     names = {one.lstrip("-"): one for one in known}
     nearest = difflib.get_close_matches(name.lstrip("-"), names, n=1, cutoff=0.51)
-    hint = f"did you mean {names[nearest[0]]}?" if nearest else f"known: {', '.join(names.values())}"
+    hint = (
+        f"did you mean {names[nearest[0]]}?" if nearest else f"known: {', '.join(names.values())}"
+    )
     return f"unknown {what} {name}; {hint}"
