@@ -12,7 +12,6 @@ import os
 import tempfile
 import threading
 import time
-from collections import defaultdict
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -187,12 +186,13 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
     answers = [wait for one in flights for wait in one.heard["answered_s"]]
     unanswered = sum(len(one.heard["unanswered"]) for one in flights)
     lost = sum(one.read - one.written for one in flights)
-    growth: defaultdict[str, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
+    growth: dict[str, tuple[float, float]] = {}  # and what it may be; of the worst process
     for one in flights:
         for name, glances in one.glances.items():
             for what, found in grown(glances, _LEAST_LIFE * one.flown_s).items():
                 kind = f"{name.split()[0]}: {what}"
-                growth[kind] = max(growth[kind], found, key=lambda it: it[0] - it[1])
+                worst = growth.setdefault(kind, found)
+                growth[kind] = max(worst, found, key=lambda it: it[0] - it[1])
     flown_s = max(sum(one.flown_s for one in flights), 1.0)
     aloft_s = sum(one.heard["airborne_s"] for one in flights)
     hours = flown_s / 3600.0

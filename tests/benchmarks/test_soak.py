@@ -63,6 +63,9 @@ def test_a_leak_is_seen_in_minutes_and_what_is_taken_once_is_none(minutes: int) 
     seconds = 60.0 * minutes
     assert "planner: memory, steady, growth" in failed(at(seconds, mb_h=12.0), seconds)
     assert not failed(at(seconds, mb_h=8.0), seconds)
+    flown = replace(FINE, glances={"fsw 1": at(seconds, mb_h=8.0), "fsw 2": STEADY})
+    shown = {row.name: row.measured for row in judge([flown])}
+    assert shown["fsw: memory, steady, growth"] == pytest.approx(8.0)
     for when in (0.3, 0.5, 0.7, 0.9):
         assert not failed(at(seconds, taken=3.5, when=when), seconds)
     leaps = [one._replace(private_mb=100.0 + 20.0 * round(one.at_s / 900.0)) for one in at(seconds)]
