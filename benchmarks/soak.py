@@ -78,20 +78,30 @@ class Used:
     """What the processes of one flight have used, by process and time."""
 
     glances: dict[str, list[Glance]] = field(default_factory=dict)
+    begin_s: float = 0.0
     _done: threading.Event = field(default_factory=threading.Event)
 
     def watch(self, root: int) -> None:
         """Look at all processes below ``root`` until :meth:`stop`."""
-        begin_s = time.monotonic()
+        self.begin_s = time.monotonic()
         while not self._done.wait(_GLANCE_S):
             for process in descendants(root):
                 with contextlib.suppress(OSError, ValueError, IndexError):
-                    name, glance = _glance(process, time.monotonic() - begin_s)
+                    name, glance = _glance(process, time.monotonic() - self.begin_s)
                     self.glances.setdefault(f"{name} {process}", []).append(glance)
 
     def stop(self) -> None:
         """End :meth:`watch`."""
         self._done.set()
+
+    def since(self, moment_s: float) -> dict[str, list[Glance]]:
+        """What was used from a moment [s, monotonic] on."""
+        begin_s = moment_s - self.begin_s
+        later = {
+            name: [one for one in glances if one.at_s >= begin_s]
+            for name, glances in self.glances.items()
+        }
+        return {name: glances for name, glances in later.items() if glances}
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +185,8 @@ def fly(options: SoakOptions, flight: int, left_s: float, display: Display) -> S
         dropped=dropped or 0,
         read=asked,
         written=answered,
-        glances=used.glances,
+        # Compiling kernels, which the first flight may begin with, is no part of a flight.
+        glances=used.since(client.first_heard_s),
         ended=_ended(flown),
         flown_s=float(flown.sitl["duration_s"]),
     )

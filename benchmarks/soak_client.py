@@ -74,6 +74,7 @@ class Client(threading.Thread):
         self._waiting: tuple[int, float] | None = None
         self._parameter: tuple[str, float] | None = None
         self._flies = self._aloft = self._armed = False
+        self.first_heard_s = 0.0  # monotonic
         self._refused_s = 0.0  # since when it was not armed though it was to be; 0: it was
         self._seen_s = 0.0  # when it said last whether it flies
         self._beat_s = self._next_s = self._fault_s = self._takes_off_s = self._heard_s = 0.0
@@ -120,6 +121,7 @@ class Client(threading.Thread):
             time.sleep(0.002)
             return False
         datagram, self._vehicle = got
+        self.first_heard_s = self.first_heard_s or now_s
         self._note(self.heard.gaps, self._heard_s or now_s, now_s)
         self._heard_s = now_s
         for message in self._link.parse_buffer(datagram) or []:

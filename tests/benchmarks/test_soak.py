@@ -12,6 +12,7 @@ import pytest
 from benchmarks.soak import (
     Glance,
     Soaked,
+    Used,
     grown,
     judge,
     main,
@@ -91,6 +92,14 @@ def test_handles_count_at_any_age_and_memory_at_a_quarter_of_the_flight() -> Non
     leaks = at(300.0, mb_h=36.0)
     assert not failed(leaks, 3600.0)
     assert failed(leaks, 900.0)
+
+
+def test_what_was_used_before_the_vehicle_spoke_is_no_part_of_the_flight() -> None:
+    """Kernels were compiled for two minutes, and what a flight takes at its start was judged."""
+    used = Used({"fsw 1": at(400.0), "fsw 2": at(60.0)}, begin_s=1000.0)
+    later = used.since(1120.0)
+    assert list(later) == ["fsw 1"]
+    assert later["fsw 1"][0].at_s == 120.0
 
 
 def test_a_vehicle_that_waited_for_a_processor_is_said_to_be_starved() -> None:
