@@ -73,7 +73,8 @@ class Client(threading.Thread):
         self._vehicle: tuple[str, int] | None = None
         self._waiting: tuple[int, float] | None = None
         self._parameter: tuple[str, float] | None = None
-        self._flies = self._armed = False
+        self._flies = self._aloft = self._armed = False
+        self.first_heard_s = 0.0  # monotonic
         self._refused_s = 0.0  # since when it was not armed though it was to be; 0: it was
         self._seen_s = 0.0  # when it said last whether it flies
         self._beat_s = self._next_s = self._fault_s = self._takes_off_s = self._heard_s = 0.0
@@ -120,6 +121,7 @@ class Client(threading.Thread):
             time.sleep(0.002)
             return False
         datagram, self._vehicle = got
+        self.first_heard_s = self.first_heard_s or now_s
         self._note(self.heard.gaps, self._heard_s or now_s, now_s)
         self._heard_s = now_s
         for message in self._link.parse_buffer(datagram) or []:
@@ -200,9 +202,11 @@ class Client(threading.Thread):
             if self._armed:
                 self._refused_s = 0.0
         elif name == "EXTENDED_SYS_STATE":
-            if self._flies:
+            if self._aloft:
                 heard.airborne_s += now_s - self._seen_s
             self._flies = message.landed_state == dialect.MAV_LANDED_STATE_IN_AIR
+            # A take-off and a landing are in the air as well.
+            self._aloft = message.landed_state > dialect.MAV_LANDED_STATE_ON_GROUND
             self._seen_s = now_s
         elif name == "STATUSTEXT":
             heard.texts += 1

@@ -45,7 +45,10 @@ class Parser(argparse.ArgumentParser):
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     """A sentence about a name that does not exist."""
-    names = list(known)
-    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    hint = f"did you mean {nearest[0]}?" if nearest else f"known: {', '.join(names)}"
+    # Dashes, which all options have in common, make any two of them alike.
+    names = {one.lstrip("-"): one for one in known}
+    nearest = difflib.get_close_matches(name.lstrip("-"), names, n=1, cutoff=0.51)
+    hint = (
+        f"did you mean {names[nearest[0]]}?" if nearest else f"known: {', '.join(names.values())}"
+    )
     return f"unknown {what} {name}; {hint}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 V3: TypeAlias = tuple[float, float, float]
 V2: TypeAlias = tuple[float, float]
@@ -31,3 +31,7 @@ class Range(NamedTuple):
     def __str__(self) -> str:
         grid = f" in steps of {self.step:g}" if self.step is not None else ""
         return f"{self.low:g} to {self.high:g}{grid}{' or inf' if self.or_inf else ''}"
+
+
+ROUNDED: Final = 0.05  # [1] by which the length of a normal may be off 1 by rounding; it is scaled
+NORMAL: Final = Range(-1.0 - ROUNDED, 1.0 + ROUNDED)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
 from sitl.faults.keys import Fault
+from sitl.ranges import NORMAL as NORMAL
 from sitl.ranges import V2 as V2
 from sitl.ranges import V3 as V3
 from sitl.ranges import WORLD_M as WORLD_M
@@ -68,7 +69,7 @@ class ScenarioWall:
     """A plane; free space is where n·p > offset."""
 
     name: str
-    normal: Annotated[V3, Range(-1.0, 1.0)]  # unit, NED, into free space
+    normal: Annotated[V3, NORMAL]  # unit, NED, into free space
     offset_m: Annotated[float, Range(-WORLD_M, WORLD_M)]
     clearance_m: Annotated[float, Range(0.0, 10.0)]  # s_min
 

@@ -15,13 +15,14 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
+from sitl.ranges import ROUNDED
 from sitl.scenario import V3, Range, Scenario, ScenarioWall, ScenarioZone, Sensors
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
 _MOST_BYTES = 256 * 1024  # of a file: 64 zones with their way points are a tenth of it
 _SHOWN = 80  # characters of a value in a sentence
-_UNIT, _ROUNDED = 1e-6, 0.05  # [1] by which a normal's length is off 1: not at all; by rounding
+_UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
@@ -138,7 +139,7 @@ def _with_unit_normal(zone: Plane) -> Plane:
         return zone
     length = math.hypot(*normal)
     # Nearer to 1 it is a unit vector as it is written; further off it is some other vector.
-    if abs(length - 1.0) <= _UNIT or abs(length - 1.0) > _ROUNDED:
+    if abs(length - 1.0) <= _UNIT or abs(length - 1.0) > ROUNDED:
         return zone
     changed: Any = zone  # whichever of the two it is
     unit = tuple(part / length for part in normal)

@@ -12,11 +12,10 @@ from fsw.periods import PLANNING_US
 from view import colours
 from view.colours import Rgb, css, millimetres
 from view.scene import Event, Margin, Scene, Timing, Worst
-from view.vehicle import tilt
+from view.vehicle import ROTORS, tilt
 
 PLANNING_LIMIT: Final = 1e-6 * PLANNING_US  # s, a planning cycle must be over by then
 _SOON: Final = 0.05  # m; a margin below it is shown as close
-_ROTORS: Final = ("rear", "left", "front", "right")
 _INKS: Final = {"fault": colours.RED, "warning": colours.ORANGE, "text": colours.GREY}
 _BOX: Final = "font:12px/1.45 ui-sans-serif,system-ui,sans-serif;padding:0 0.9em 0.3em"
 _NUMBER: Final = "font-variant-numeric:tabular-nums;white-space:nowrap;text-align:right"
@@ -171,7 +170,7 @@ def _margin_row(one: Margin, least: float) -> str:
 
 def _inputs(now: Scene, airframe: Airframe) -> str:
     rows = []
-    for name, thrust in zip(_ROTORS, now.thrust or (), strict=False):
+    for name, thrust in zip(ROTORS, now.thrust or (), strict=False):
         rows.append(_limited(f"rotor {name}", thrust, airframe.rotor_thrust_max, "N"))
     for k, torque in enumerate(now.torque or (), start=1):
         rows.append(_limited(f"joint {k} torque", torque, airframe.joint_torque_max, "N m"))

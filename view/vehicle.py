@@ -19,6 +19,7 @@ from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
 from view.scene import Horizon, Posture
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
+ROTORS = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")  # as the vehicle's texts name them
 
 
 class Places(NamedTuple):

@@ -20,7 +20,6 @@ Source: docs/equations.md E17 and docs/decisions/0009; Boyd and Vandenberghe, Co
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +39,10 @@ from fsw.signals import SolverStatus
 _BINDS, _NEAR = 1e-3, 0.05
 _TOLERANCE = 1e-6  # a left-out row may be missed by no more than the solver's own error
 _SOLVES = 4  # after so many every row is in the working set
-_PATTERNS = 64  # programs kept ready; others are built when they occur
+# Programs kept ready: so many, with so many entries of matrices, some 3 MB; a flight that is well
+# needs half of both. Others are built when they occur: of a vehicle that is lost between walls each
+# has a hundred rows, and 64 of them took 40 MB.
+_PATTERNS, _ENTRIES = 64, 40_000
 # Unknowns and costs of the order of one save the interior-point method a third of its iterations:
 # multipliers are counted in a slack's penalty, and the cost so that its tolerance is fine enough.
 _MULTIPLIER, _COST = 20.0, 0.25
@@ -52,7 +54,8 @@ class DualSolver:
 
     def __init__(self, program: QpData) -> None:
         self._program = program
-        self._multipliers = lru_cache(maxsize=_PATTERNS)(_Multipliers)
+        self._kept: dict[tuple[tuple[int, ...], int], _Multipliers] = {}  # used last comes last
+        self._entries = 0  # of all that are kept
 
     def solve(self, guess: Array) -> Solution:
         """See ``QpSolver``; ``guess`` (6 n,) [SI inputs]."""
@@ -102,6 +105,19 @@ class DualSolver:
         number = {its: k for k, its in enumerate(softening)} | {HARD: HARD}
         same = self._multipliers(tuple([number[its] for its in slack]), len(chosen))
         return same.solve(spread.T @ spread, residual, self._program.penalty[softening])
+
+    def _multipliers(self, slack: tuple[int, ...], size: int) -> _Multipliers:
+        """The program of rows that share slacks in this way, kept or new."""
+        found = self._kept.pop((slack, size), None)
+        if found is None:
+            found = _Multipliers(slack, size)
+            self._entries += size * size
+        self._kept[slack, size] = found
+        while len(self._kept) > 1 and (self._entries > _ENTRIES or len(self._kept) > _PATTERNS):
+            oldest = next(iter(self._kept))
+            del self._kept[oldest]
+            self._entries -= oldest[1] ** 2
+        return found
 
 
 @compiled

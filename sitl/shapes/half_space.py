@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from sitl.compiled import kernel
 from sitl.plant.vector import Array
-from sitl.scenario import V3, WORLD_M, Range, ScenarioZone
+from sitl.scenario import NORMAL, V3, WORLD_M, Range, ScenarioZone
 from sitl.shapes.kind import Nearest, ShapeKind
 
 
@@ -16,7 +16,7 @@ from sitl.shapes.kind import Nearest, ShapeKind
 class HalfSpace(ScenarioZone):
     """Points p with n·p <= offset; the free side is in front."""
 
-    normal: Annotated[V3, Range(-1.0, 1.0)]
+    normal: Annotated[V3, NORMAL]
     offset_m: Annotated[float, Range(-WORLD_M, WORLD_M)]
     shape: Literal["half-space"] = "half-space"
 

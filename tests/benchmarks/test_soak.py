@@ -9,7 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.soak import Glance, Soaked, grown, judge, main, recorded, stood_still
+from benchmarks.soak import (
+    Glance,
+    Soaked,
+    Used,
+    grown,
+    judge,
+    main,
+    recorded,
+    starved,
+    stood_still,
+)
 from benchmarks.soak_client import Client
 from fsw.log.tlog import TlogWriter
 from messages import dialect
@@ -27,45 +37,84 @@ FINE = Soaked(
 )
 
 
+def failed(glances: list[Glance], flown_s: float = 500.0, name: str = "planner 4") -> list[str]:
+    """What a process does not pass that goes on like this, among others that are steady."""
+    flown = replace(FINE, glances=FINE.glances | {name: glances}, flown_s=flown_s)
+    return [row.name for row in judge([flown]) if not row.passed and "growth" in row.name]
+
+
+def at(seconds: float, mb_h: float = 0.0, taken: float = 0.0, when: float = 0.5) -> list[Glance]:
+    """A process of so many seconds that grows, and takes something at once at a share of them."""
+    times = [5.0 * k for k in range(round(seconds / 5.0))]
+    return [
+        Glance(t, 100.0 + mb_h * t / 3600.0 + taken * (t > when * seconds), 8, 4) for t in times
+    ]
+
+
 def test_a_steady_process_has_not_grown_and_a_short_one_says_nothing() -> None:
-    assert grown(STEADY) == pytest.approx({"memory": 0.0, "handles": 0.0, "threads": 0.0})
+    found = {what: value for what, (value, _) in grown(STEADY).items()}
+    assert found == pytest.approx(
+        {"memory": 0.0, "memory, steady": 0.0, "handles": 0.0, "threads": 0.0}
+    )
     assert grown(STEADY[:30]) == {}
 
 
-def test_a_leak_of_memory_and_of_handles_is_seen() -> None:
-    leaks = [
-        one._replace(resident_mb=100.0 + 0.01 * one.at_s, handles=8 + int(one.at_s / 100.0))
-        for one in STEADY
+@pytest.mark.parametrize("minutes", [5, 8, 14, 60])
+def test_a_leak_is_seen_in_minutes_and_what_is_taken_once_is_none(minutes: int) -> None:
+    seconds = 60.0 * minutes
+    assert "planner: memory, steady, growth" in failed(at(seconds, mb_h=12.0), seconds)
+    assert not failed(at(seconds, mb_h=8.0), seconds)
+    flown = replace(FINE, glances={"fsw 1": at(seconds, mb_h=8.0), "fsw 2": STEADY})
+    shown = {row.name: row.measured for row in judge([flown])}
+    assert shown["fsw: memory, steady, growth"] == pytest.approx(8.0)
+    for when in (0.3, 0.5, 0.7, 0.9):
+        assert not failed(at(seconds, taken=3.5, when=when), seconds)
+    leaps = [one._replace(private_mb=100.0 + 20.0 * round(one.at_s / 900.0)) for one in at(seconds)]
+    # One that comes in lumps is seen from the first lump on that is more than a process takes once.
+    assert ("planner: memory, growth" in failed(leaps, seconds)) == (minutes >= 8)
+
+
+def test_a_planner_that_fills_what_it_keeps_and_one_that_leaks() -> None:
+    """As in 14 minutes with three landings: programs are kept, 4 MB in steps, and no more."""
+    fills = [
+        one._replace(private_mb=100.0 + min(4.0, 1.3 * round(one.at_s / 100.0)))
+        for one in at(840.0)
     ]
-    assert grown(leaks)["memory"] == pytest.approx(36.0)
-    assert grown(leaks)["handles"] >= 2
+    assert not failed(fills, 840.0)
+    grows = [one._replace(private_mb=100.0 + 1.3 * round(one.at_s / 100.0)) for one in at(840.0)]
+    assert "planner: memory, growth" in failed(grows, 840.0)
 
 
-def test_what_a_short_life_takes_once_is_no_growth_of_an_hour_and_handles_count_at_any_age() -> (
-    None
-):
-    once = [one._replace(resident_mb=100.0 + (one.at_s > 200.0), handles=8) for one in STEADY]
-    opens = [one._replace(handles=8 + (one.at_s > 300.0)) for one in once]
-    assert grown(once)["memory"] > 5.0
-    assert grown(opens, 600.0) == {"handles": 1, "threads": 0}
-    leaks = [one._replace(resident_mb=100.0 + 0.01 * one.at_s) for one in STEADY]
-    flown = replace(FINE, glances=FINE.glances | {"planner 4": leaks[:60]})
-    assert all(
-        row.passed for row in judge([replace(flown, flown_s=3600.0)]) if "growth" in row.name
+def test_handles_count_at_any_age_and_memory_at_a_quarter_of_the_flight() -> None:
+    opens = [one._replace(handles=8 + (one.at_s > 300.0)) for one in STEADY]
+    assert grown(opens, 600.0) == {"handles": (1, 0.0), "threads": (0, 0.0)}
+    assert failed(opens) == ["planner: handles, growth"]
+    leaks = at(300.0, mb_h=36.0)
+    assert not failed(leaks, 3600.0)
+    assert failed(leaks, 900.0)
+
+
+def test_what_was_used_before_the_vehicle_spoke_is_no_part_of_the_flight() -> None:
+    """Kernels were compiled for two minutes, and what a flight takes at its start was judged."""
+    used = Used({"fsw 1": at(400.0), "fsw 2": at(60.0)}, begin_s=1000.0)
+    later = used.since(1120.0)
+    assert list(later) == ["fsw 1"]
+    assert later["fsw 1"][0].at_s == 120.0
+
+
+def test_a_vehicle_that_waited_for_a_processor_is_said_to_be_starved() -> None:
+    def shares(share: float) -> list[Glance]:
+        return [one._replace(waited_s=share * one.at_s) for one in STEADY]
+
+    alone = replace(FINE, glances={"fsw 1": shares(0.01), "sitl 2": shares(0.02)})
+    said = starved([alone])
+    assert (
+        said == "Flight 1 waited for a processor: fsw 1 %, sitl 2 %, at most 2 % of half a minute."
     )
-    flown = replace(FINE, glances=FINE.glances | {"planner 4": leaks})
-    assert "planner: memory, growth" in [row.name for row in judge([flown]) if not row.passed]
-
-
-@pytest.mark.parametrize(("seconds", "passes"), [(500.0, True), (3600.0, False)])
-def test_what_is_taken_once_fails_an_hour_and_no_soak_of_minutes(
-    seconds: float, passes: bool
-) -> None:
-    each = [one._replace(at_s=one.at_s * seconds / STEADY[-1].at_s) for one in STEADY]
-    grows = [one._replace(resident_mb=100.0 + 18.0 * one.at_s / 3600.0) for one in each]
-    flown = replace(FINE, glances=FINE.glances | {"fsw 1": grows}, flown_s=seconds)
-    failed = [row.name for row in judge([flown]) if not row.passed and "memory" in row.name]
-    assert failed == ([] if passes else ["fsw: memory, growth"])
+    shared = starved([alone, replace(FINE, glances={"fsw 1": shares(0.3)})])
+    assert shared.startswith(said)
+    assert "Flight 2 waited for a processor: fsw 30 %" in shared
+    assert shared.endswith("it was starved, and shows little.")
 
 
 @pytest.mark.parametrize(

@@ -147,6 +147,7 @@ def test_every_program_refuses_an_unknown_option(
         (["a", "--count"], "--count"),
         (["a", "--kind", "c"], "known: a, b"),
         (["a", "--cuont", "1"], "did you mean --count?"),
+        (["a", "--rate", "1"], "known: -h, --help, --count"),
         (["a", "b"], "b"),
         (["a", "--loud", "--silent"], "not allowed with"),
     ],

@@ -291,7 +291,10 @@ def test_every_shape_says_what_is_wrong_with_its_numbers(shape: str) -> None:
     assert all(part in str(refusal.value) for part in ["zones[0].", *reported])
 
 
-@pytest.mark.parametrize("normal", [(-0.98, 0.28, 0.0), (-0.9487, 0.3162, 0.0), (0.0, 0.6, -0.77)])
+@pytest.mark.parametrize(
+    "normal",
+    [(-0.98, 0.28, 0.0), (-0.9487, 0.3162, 0.0), (0.0, 0.6, -0.77), (-1.02, 0.0, 0.0)],
+)
 def test_a_normal_that_was_rounded_is_a_unit_vector(normal: tuple[float, ...]) -> None:
     wall = WALL.replace("[-1.0, 0.0, 0.0]", str(list(normal)))
     zone = (

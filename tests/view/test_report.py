@@ -125,7 +125,7 @@ def test_the_tracking_error_is_the_distance_to_the_reference(drawn: dict[str, An
 
 
 def test_a_spike_of_one_tick_is_in_the_thinned_line(drawn: dict[str, Any]) -> None:
-    rear = trace(drawn["inputs"], "rotor rear")
+    rear = trace(drawn["inputs"], "rotor 1 (rear)")
     at = rear["y"].index(SPIKE_N)
     assert rear["x"][at] == SPIKE_S
     assert [shape["y0"] for shape in drawn["inputs"]["layout"]["shapes"] if "x0" in shape][:2] == [
@@ -137,10 +137,10 @@ def test_thrusts_are_a_band_of_all_and_a_mean_of_each(drawn: dict[str, Any]) -> 
     top = trace(drawn["inputs"], "rotors, least to most")
     assert top["fill"] == "tonexty"
     assert max(top["y"]) == SPIKE_N, "no extreme is lost in the band"
-    mean = trace(drawn["inputs"], "rotor rear, mean")
+    mean = trace(drawn["inputs"], "rotor 1 (rear), mean")
     assert "visible" not in mean
     assert max(mean["y"]) < SPIKE_N
-    assert trace(drawn["inputs"], "rotor rear")["visible"] == "legendonly"
+    assert trace(drawn["inputs"], "rotor 1 (rear)")["visible"] == "legendonly"
 
 
 def test_each_row_has_its_legend_and_the_events_stand_between_it_and_the_axis(
@@ -240,7 +240,7 @@ def test_the_events_are_in_a_table_in_order(page: str) -> None:
 def test_the_worst_second_is_what_is_about_it(drawn: dict[str, Any]) -> None:
     figure = drawn["worst_second"]
     assert figure["layout"]["xaxis"]["range"] == [WORST_S - 0.5, WORST_S + 0.5]
-    rotor = trace(figure, "rotor 1")
+    rotor = trace(figure, "rotor 1 (rear)")
     assert len(rotor["x"]) == 500
     assert min(rotor["x"]) >= WORST_S - 0.5
 

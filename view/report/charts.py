@@ -27,6 +27,7 @@ from view.report.chart import (
     spread,
 )
 from view.report.reported import Reported
+from view.vehicle import ROTORS
 
 Array = NDArray[Any]
 
@@ -202,8 +203,7 @@ def inputs(flights: Sequence[Reported]) -> Chart | None:
     most, torque = (
         flight.number(f"airframe.{name}_max") for name in ("rotor_thrust", "joint_torque")
     )
-    names = ("rear", "left", "front", "right")
-    rotors = [(f"rotor {name}", COLOURS[k]) for k, name in enumerate(names)]
+    rotors = [(f"rotor {name}", COLOURS[k]) for k, name in enumerate(ROTORS)]
     thrusts = spread("rotors", t, sent["rotor_thrust"], rotors)
     torques = [
         line(f"joint {k + 1}", t, sent["joint_torque"][:, k], COLOURS[k + 4], width=0.8)
@@ -547,7 +547,7 @@ def worst_second(flights: Sequence[Reported]) -> Chart | None:
             if y.ndim == 1:
                 y = y[:, None]
             for j in range(y.shape[1]):
-                shown = f"{name} {j + 1}" if y.shape[1] > 1 else name
+                shown = f"{name} {ROTORS[j]}" if y.shape[1] > 1 else name
                 shade = COLOURS[j] if alone else colour
                 row.append(line(_named(flight, flights, shown), t[inside] - zero, y[inside, j],
                                 shade, width=1.0, showlegend=alone or j == 0))  # fmt: skip
