@@ -120,7 +120,8 @@ class _Session:
             lambda: self._services(program, logs),
         )
         # For a view beside it: the usual port may have been taken.
-        self._events.report("links", "", ports={link.name: link.port for link in ground.links})
+        ports = {link.name: link.port for link in ground.links if link.port is not None}
+        self._events.report("links", "", ports=ports)
         console = Console(self._events, START_US)
         loop = SimLoop(
             *(program, sim, ground, inbox, record, clock.now_us, self._stop, files),

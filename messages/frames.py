@@ -28,7 +28,7 @@ _MAGIC_1: Final = 0xFE  # of MAVLink 1
 _HEADER_SIZE: Final = 10
 _HEADER_SIZE_1: Final = 6
 _CHECKSUM_SIZE: Final = 2
-_SIGNATURE_SIZE: Final = 13
+SIGNATURE_SIZE: Final = 13
 _SIGNED: Final = 0x01
 # Noise of 1400 bytes holds 5 start markers on average. A datagram made of nothing else must not
 # hold the flight loop up: 1400 of them would cost a quarter of a tick.
@@ -232,6 +232,39 @@ def frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     return 0, None
 
 
+def whole_size(message_id: int) -> int:
+    """Bytes of an unsigned frame of MAVLink 2 in which no field is left out, but extensions are.
+
+    Raises:
+        KeyError: The dialect has no such message.
+    """
+    return _HEADER_SIZE + LAYOUTS[message_id].base_size + _CHECKSUM_SIZE
+
+
+def announced_size(data: bytes, start: int) -> int | None:
+    """How many bytes the frame that begins here says it has; 0: none can begin here.
+
+    None while too little of it has come to tell.
+    """
+    marker, come = data[start], len(data) - start
+    if marker == _MAGIC_1:
+        if come < _HEADER_SIZE_1:
+            return None
+        layout, length = LAYOUTS.get(data[start + 5]), data[start + 1]
+        known = layout is not None and layout.base_size <= length <= layout.payload.size
+        return _HEADER_SIZE_1 + length + _CHECKSUM_SIZE if known else 0
+    if marker != _MAGIC:
+        return 0
+    if come >= 3 and data[start + 2] not in (0, _SIGNED):
+        return 0
+    if come < _HEADER_SIZE:
+        return None
+    if int.from_bytes(data[start + 7 : start + _HEADER_SIZE], "little") not in LAYOUTS:
+        return 0
+    signature = SIGNATURE_SIZE if data[start + 2] else 0
+    return _HEADER_SIZE + data[start + 1] + _CHECKSUM_SIZE + signature
+
+
 def _frame_2_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     """Decode the frame that starts at a marker: its size in bytes, and None if it is not valid."""
     payload_at = start + _HEADER_SIZE
@@ -248,7 +281,7 @@ def _frame_2_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
         # Any flag but the signature's announces a format that this code does not know.
         if incompatible != _SIGNED:
             return 0, None
-        end += _SIGNATURE_SIZE
+        end += SIGNATURE_SIZE
     if layout is None or len(datagram) < end:
         return 0, None
     values = _payload_values(datagram, start, payload_at, payload_end, layout)

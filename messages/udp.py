@@ -1,4 +1,4 @@
-"""The UDP socket between simulator and flight software, and the addresses of all links.
+"""The UDP socket between simulator and flight software.
 
 Timeouts are set in the kernel (SO_RCVTIMEO): Python's own timeout costs one more system call for
 each datagram.
@@ -6,42 +6,19 @@ each datagram.
 
 from __future__ import annotations
 
-import re
 import select
 import socket
 import struct
 from typing import Final
 
+from messages.addresses import Address, LinkError, parse_address
 from messages.busy_poll import BusyPollReceiver
 
-Address = tuple[str, int]
+__all__ = ["MAX_DATAGRAM", "Address", "LinkError", "PeerSocket", "parse_address"]
 
 MAX_DATAGRAM: Final = 2048  # bytes; a larger datagram is cut and its last frame then refused
 
-_ADDRESS = re.compile(r"udp:(?P<host>[^:\s]+):(?P<port>\d{1,5})")
 _RECEIVE_BUFFER: Final = 1 << 20  # bytes: rides out a pause of the receiver
-
-
-class LinkError(Exception):
-    """A link that cannot be opened, in one sentence for the operator."""
-
-
-def parse_address(text: str, *, any_port: bool = False) -> Address:
-    """Read ``udp:HOST:PORT``; port 0, which lets the system choose, only with ``any_port``.
-
-    Raises:
-        LinkError: The text has another form, the port is out of range, or the host is unknown.
-    """
-    match = _ADDRESS.fullmatch(text)
-    if match is None:
-        raise LinkError(f"address {text!r} is not of the form udp:HOST:PORT")
-    port, lowest = int(match["port"]), 0 if any_port else 1
-    if not lowest <= port <= 65535:
-        raise LinkError(f"address {text!r}: port {port} is outside {lowest}..65535")
-    try:
-        return socket.gethostbyname(match["host"]), port
-    except OSError:
-        raise LinkError(f"address {text!r}: host {match['host']!r} is not known") from None
 
 
 class PeerSocket:

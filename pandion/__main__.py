@@ -29,6 +29,7 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
             "pandion.param",
             "list, set, import and export parameters of a vehicle or a file",
         ),
+        "px4": ("pandion.px4", "print what PX4 needs to fly the simulated vehicle"),
     },
     "look": {
         "view": ("pandion.view", "show a flight in the browser, from its log or live"),

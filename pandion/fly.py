@@ -14,9 +14,9 @@ from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
 from fsw.link.link_choice import NO_LINK, LinkChoice, addresses
-from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.log.run_directory import run_directory
 from fsw.parameters.control_choice import ControlChoice
+from messages.addresses import LinkError, parse_link_address
 from pandion.display import Display
 from pandion.join_truth import join_truth
 from pandion.processor import ANYWHERE, lockstep_places
@@ -137,8 +137,9 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
             f"note: --body {options.control.body} keeps clear, the scenario is for {flight.body}; "
             "it may start outside its safe set"
         )
-    port = parse_address(options.links.gcs)[1]
-    display.say(f"telemetry to {options.links.gcs}: QGroundControl connects on UDP {port}")
+    gcs = parse_link_address(options.links.gcs)
+    hint = f": QGroundControl connects on UDP {gcs[1]}" if isinstance(gcs, tuple) else ""
+    display.say(f"telemetry to {options.links.gcs}{hint}")
     if options.links.api != NO_LINK:
         display.say(f"programs (MAVSDK) find the vehicle at {options.links.api}")
     display.say(f"logs in {flight.out}")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from command_line.options import OneOf, option, read, switch
 from command_line.output import complain, json_text, say
 from command_line.parser import COULD_NOT_START, unknown_name
-from fsw.link.udp_endpoint import LinkError, parse_address
+from messages.addresses import LinkError, parse_link_address
 
 if TYPE_CHECKING:
     from fsw.parameters.storage import Loaded
@@ -27,8 +27,8 @@ class _Where:
     """Whose parameters."""
 
     vehicle: str = option(
-        "--vehicle udp:HOST:PORT",
-        "address on which the vehicle listens",
+        "--vehicle ADDRESS",
+        "of the vehicle: udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD",
         default="udp:127.0.0.1:14580",
         one_of=_WHERE,
     )
@@ -137,7 +137,7 @@ def main(argv: list[str]) -> int:
     try:
         if options.file is not None:
             return act(options, FileValues(options.file))
-        with ParameterClient(parse_address(options.vehicle)) as vehicle:
+        with ParameterClient(parse_link_address(options.vehicle)) as vehicle:
             return act(options, vehicle)
     except (LinkError, NoAnswer, OSError) as error:
         complain("pandion param", error)
@@ -278,7 +278,7 @@ ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]
 def _help() -> str:
     rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
     return "\n".join(
-        ("usage: pandion param ACTION [options] [--vehicle udp:HOST:PORT | --file FILE]", "")
+        ("usage: pandion param ACTION [options] [--vehicle ADDRESS | --file FILE]", "")
         + ("Parameters of a running vehicle or in a file.", "", "actions:", *rows, "")
         + ("`pandion param ACTION --help` prints the options of an action.",)
     )

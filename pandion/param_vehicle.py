@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
-import socket
+import select
 import time
-from collections.abc import Iterator
 from typing import Final, cast
 
-from fsw.link.udp_endpoint import MAX_DATAGRAM, Address
+from fsw.link.endpoints import open_endpoint
 from fsw.link.wire import message_ids as ids
 from fsw.parameters.float32 import nearest_decimal
 from fsw.parameters.param_type import field_of, value_of
 from messages import status_text
-from messages.frames import Frame, FrameWriter, split
+from messages.addresses import LinkAddress, address_text
+from messages.frames import Frame, FrameWriter, Losses
+from sitl.earth import Place
 
 _SYSTEM, _COMPONENT = 254, 190  # of no ground station in use
 _VEHICLE: Final = (1, 1)
@@ -23,6 +23,7 @@ _NO_INDEX: Final = 0xFFFF
 _BY_NAME: Final = -1  # in place of an index
 _GCS, _NO_AUTOPILOT, _ACTIVE, _VERSION = 6, 8, 4, 3
 _TRIES: Final = 3
+_LOOK_S: Final = 0.05
 _NAME: Final = re.compile(r"[A-Za-z0-9_]{1,16}")
 _MOST: Final = 4096  # parameters; PX4 has some 1,500
 _QUIET_S: Final = 0.3  # a list that pauses this long has lost something
@@ -40,20 +41,21 @@ class ParameterRefused(Exception):
 class ParameterClient:
     """Asks one vehicle; a context manager."""
 
-    def __init__(self, vehicle: Address, patience_s: float = 1.0) -> None:
-        """Open a socket; each answer is waited for ``patience_s``, three times."""
-        self._vehicle = vehicle
+    def __init__(self, vehicle: LinkAddress, patience_s: float = 1.0) -> None:
+        """Open a link; each answer is waited for ``patience_s``, three times."""
+        self._where = address_text(vehicle)
         self._known: dict[str, float] = {}  # values that have come, for their types
         self._patience_s = patience_s
         self._writer = FrameWriter(_SYSTEM, _COMPONENT)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.connect(vehicle)
+        self._endpoint, self._peer = open_endpoint(vehicle, lambda: time.monotonic_ns() // 1000)
+        self._losses = Losses()
+        self._waiting: list[Frame] = []  # frames that were not looked at yet
 
     def __enter__(self) -> ParameterClient:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._socket.close()
+        self._endpoint.close()
 
     def read_all(self) -> dict[str, float]:
         """Every parameter, by name.
@@ -145,31 +147,34 @@ class ParameterClient:
                 "must be 1 to 16 letters, digits or _"
             )
 
-    @property
-    def _where(self) -> str:
-        return f"udp:{self._vehicle[0]}:{self._vehicle[1]}"
+    def set_origin(self, origin: Place) -> None:
+        """Say where on Earth the local frame begins, as SET_GPS_GLOBAL_ORIGIN."""
+        at = (round(1e7 * origin.latitude), round(1e7 * origin.longitude))
+        self._send(ids.SET_GPS_GLOBAL_ORIGIN, *at, round(1e3 * origin.altitude), 1, 0)
 
     def _send(self, message_id: int, *values: float | bytes) -> None:
         beat = self._writer.frame(ids.HEARTBEAT, 0, _GCS, _NO_AUTOPILOT, 0, _ACTIVE, _VERSION)
-        # Nothing listens yet: the vehicle may start.
-        with contextlib.suppress(ConnectionRefusedError):
-            self._socket.send(beat + self._writer.frame(message_id, *values))
+        self._endpoint.send(beat + self._writer.frame(message_id, *values), self._peer)
 
     def _hear(self, wanted: tuple[int, ...], patience_s: float) -> Frame | None:
         """The next frame of the vehicle with one of these ids; None after the patience."""
         until = time.monotonic() + patience_s
         while True:
-            for frame in self._waiting:
+            while self._waiting:
+                frame = self._waiting.pop(0)
                 if frame.message_id in wanted and (frame.system_id, frame.component_id) == _VEHICLE:
                     return frame
+            received = self._endpoint.receive_waiting()
+            if received is not None:
+                data, sender = received
+                if sender == self._peer:
+                    self._waiting = [one for one, _ in self._endpoint.cut(data, self._losses)]
+                continue
             left_s = until - time.monotonic()
             if left_s <= 0.0:
                 return None
-            self._socket.settimeout(left_s)
-            with contextlib.suppress(TimeoutError, ConnectionRefusedError):
-                self._waiting = split(self._socket.recv(MAX_DATAGRAM))
-
-    _waiting: Iterator[Frame] = iter(())
+            # A stream is looked after meanwhile.
+            select.select((self._endpoint,), (), (), min(left_s, _LOOK_S))
 
 
 def _value(field: float, type_: int) -> float:

@@ -171,7 +171,11 @@ class Supervisor:
         elif kind == "fault":
             self._faults.begin(event, self._children)
         elif kind == "links" and self._found is not None:
-            self._found(event["ports"]["gcs"])
+            ports = event["ports"]
+            if ports:  # the ground station's, or the programs' where that one has no UDP
+                self._found(ports.get("gcs") or ports["api"])
+            else:
+                self._display.say("note: no page, which needs a link with UDP")
         if kind in (
             "listening",
             "preparing",

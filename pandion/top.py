@@ -9,7 +9,7 @@ from typing import Final
 from command_line.options import option, read
 from command_line.output import complain, without
 from command_line.parser import COULD_NOT_START
-from fsw.link.udp_endpoint import LinkError, parse_address
+from messages.addresses import LinkError, parse_link_address
 
 LEFT: Final = 0  # exit code
 
@@ -19,8 +19,8 @@ class TopOptions:
     """One inspector."""
 
     vehicle: str = option(
-        "--vehicle udp:HOST:PORT",
-        "address on which the vehicle listens",
+        "--vehicle ADDRESS",
+        "of the vehicle: udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD",
         default="udp:127.0.0.1:18570",
     )
 
@@ -30,7 +30,7 @@ def main(argv: list[str]) -> int:
     what = "Inspect a running vehicle: rates and fields of its messages, margins, texts."
     options = read(TopOptions, "pandion top", what, argv)
     try:
-        vehicle = parse_address(options.vehicle)
+        vehicle = parse_link_address(options.vehicle)
         from view.top.app import TopApp
         from view.top.peer import TelemetryPeer
     except LinkError as error:
@@ -42,6 +42,11 @@ def main(argv: list[str]) -> int:
     if not sys.stdout.isatty():
         complain("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
         return COULD_NOT_START
-    app = TopApp(TelemetryPeer(vehicle))
+    try:
+        peer = TelemetryPeer(vehicle)
+    except LinkError as error:
+        complain("pandion top", error)
+        return COULD_NOT_START
+    app = TopApp(peer)
     app.run()
     return app.return_code or LEFT  # 1 after an exception, which it has printed and does not raise

@@ -29,7 +29,9 @@ class ViewOptions:
         "LOG", "flight.ulg, flight.tlog or the flight's directory; none: a running vehicle", Path
     )
     vehicle: str = option(
-        "--vehicle udp:HOST:PORT", "a running vehicle's link to the ground", default=VEHICLE
+        "--vehicle ADDRESS",
+        "of a running vehicle: udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD",
+        default=VEHICLE,
     )
     port: int = option(
         "--port N", "of the page; 0: any that is free", whole(0, 65535), default=PORT
@@ -82,14 +84,14 @@ def _show_log(options: ViewOptions, log: Path) -> int:
 
 
 def _show_live(options: ViewOptions) -> int:
-    from fsw.link.udp_endpoint import LinkError, parse_address
+    from messages.addresses import LinkError, parse_link_address
     from view.live_link import VehicleLink
     from view.live_page import LivePage
     from view.page import LOCAL, PageError, address, open_server
 
     try:
         commands = options.host in LOCAL or options.allow_commands
-        link = VehicleLink(parse_address(options.vehicle), commands=commands)
+        link = VehicleLink(parse_link_address(options.vehicle), commands=commands)
         server = open_server(options.host, options.port, f"vehicle at {options.vehicle}")
     except (LinkError, PageError) as error:
         complain("pandion view", error)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import math
+import time
+from typing import Final
 
 from command_line.process import (
     NOT_COMPLETED,
@@ -13,8 +17,14 @@ from command_line.process import (
     run_reported,
 )
 from sitl.arguments import SitlOptions
+from sitl.faults.keys import LINKS
+from sitl.link.stream_endpoint import ByteStream, parse_listener
 from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
-from sitl.scenario_file import ScenarioError, check_pacing, load_scenario
+from sitl.scenario_file import PERFECT, ScenarioError, check_pacing, load_scenario, suite_of
+
+_UDP: Final = "udp:127.0.0.1:4560"
+_TCP: Final = "tcp:127.0.0.1:4560"
+_NOISY: Final = "mocap"  # the suite in place of the perfect one
 
 
 def run(options: SitlOptions) -> int:
@@ -27,12 +37,15 @@ def run(options: SitlOptions) -> int:
 def _run(options: SitlOptions, events: Events) -> int:
     if options.realtime and options.speed not in (None, 1.0):
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
+    if options.for_px4:
+        return _run_for_px4(options, events)
     scenario = load_scenario(options.scenario, options.sensors)
     check_pacing(scenario, realtime=options.realtime)
     if options.duration_s is not None:
         scenario = dataclasses.replace(scenario, duration_s=options.duration_s)
     _check_outputs(options)
-    endpoint = PeerSocket.bound(parse_address(options.listen, any_port=True), RESEND_S)
+    local = parse_address(options.listen or _UDP, any_port=True)
+    endpoint = PeerSocket.bound(local, RESEND_S)
     try:
         host, port = endpoint.address
         sentence = f"sitl: {scenario.name}, seed {options.seed}, on udp:{host}:{port}"
@@ -40,13 +53,15 @@ def _run(options: SitlOptions, events: Events) -> int:
         # NumPy and numba take a second to load; the flight software can start meanwhile.
         from sitl.flight import Flight
         from sitl.link.server import wait_for_vehicle
+        from sitl.vehicle_session import VehicleSession
 
-        flight = Flight(options, scenario, endpoint, events)
+        flight = Flight(options, scenario, events)
+        session = VehicleSession(options, endpoint)
         stop = StopRequest()
         stop.listen()
         events.report("ready", "sitl: ready, waiting for the flight software")
         if wait_for_vehicle(endpoint, options.wait_s, stop):
-            return flight.run(stop)
+            return flight.run(session, stop)
         if not stop.requested:
             raise CouldNotStart(
                 f"no flight software spoke to udp:{host}:{port} within {options.wait_s:g} s"
@@ -55,6 +70,54 @@ def _run(options: SitlOptions, events: Events) -> int:
         return NOT_COMPLETED
     finally:
         endpoint.close()
+
+
+def _run_for_px4(options: SitlOptions, events: Events) -> int:
+    listener = parse_listener(options.listen or _TCP)
+    suite = options.sensors
+    scenario = load_scenario(options.scenario, suite)
+    if suite_of(scenario) == PERFECT:
+        suite = _NOISY
+        scenario = load_scenario(options.scenario, suite)
+        events.report("remark", f"sitl: sensors {suite}: PX4 takes sensors without noise for stuck")
+    check_pacing(scenario, realtime=False)
+    for i, fault in enumerate(scenario.faults):
+        if fault.unit in LINKS:
+            raise ScenarioError(f"faults[{i}]: {fault} is of a link that loses datagrams, not TCP")
+    # PX4 takes off and lands when its own operator says.
+    duration_s = math.inf if options.duration_s is None else options.duration_s
+    scenario = dataclasses.replace(scenario, duration_s=duration_s)
+    _check_outputs(options)
+    with contextlib.closing(ByteStream(listener, _wall_us)) as stream:
+        host, port = listener.host, stream.listening_port
+        sentence = f"sitl: {scenario.name}, seed {options.seed}, for PX4 on tcp:{host}:{port}"
+        events.report("listening", sentence, host=host, port=port, duration_s=duration_s)
+        from sitl.flight import Flight
+        from sitl.link.px4_server import wait_for_px4
+        from sitl.px4_session import Px4Session
+        from sitl.start import on_the_ground
+
+        if scenario.start.kind == "airborne":
+            events.report(
+                "remark", f"sitl: {scenario.name} begins on the ground: PX4 takes off itself"
+            )
+        flight = Flight(options, on_the_ground(scenario), events)
+        session = Px4Session(options, stream, events)
+        stop = StopRequest()
+        stop.listen()
+        events.report("ready", "sitl: ready, waiting for PX4")
+        if wait_for_px4(stream, options.wait_s, stop):
+            return flight.run(session, stop)
+        if not stop.requested:
+            raise CouldNotStart(
+                f"no PX4 connected to tcp:{host}:{port} within {options.wait_s:g} s"
+            )
+        events.report("error", "sitl: interrupted before the flight began")
+        return NOT_COMPLETED
+
+
+def _wall_us() -> int:
+    return time.monotonic_ns() // 1000
 
 
 def _check_outputs(options: SitlOptions) -> None:

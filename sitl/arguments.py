@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from command_line.options import events, json_file, option, switch
+from command_line.options import ContradictionError, events, json_file, option, switch
 from command_line.values import number, one_of, place, seconds, whole
 from sitl.earth import DEFAULT_ORIGIN, Place
-from sitl.scenario_file import SUITE_NAMES
+from sitl.scenario_file import PERFECT, SUITE_NAMES
 
 SLOWEST: Final = 0.05  # below it a step in lockstep would take longer than the stall time allows
 _FASTEST: Final = 1e6
@@ -26,6 +26,13 @@ def speed(text: str) -> float | None:
         raise ArgumentTypeError(
             f"{text!r} is neither max nor a number from {SLOWEST:g} to {_FASTEST:g}"
         ) from None
+
+
+def rate(text: str) -> int:
+    """A rate of the exchange with PX4 [Hz]."""
+    if text not in ("250", "500"):
+        raise ArgumentTypeError(f"{text!r} is neither 250 nor 500")
+    return int(text)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,11 +64,18 @@ class RunOptions:
 class SitlOptions(RunOptions):
     """What the simulator is started with."""
 
-    listen: str = option(
-        "--listen udp:HOST:PORT",
-        "address on which the flight software finds it",
-        default="udp:127.0.0.1:4560",
+    autopilot: str = option(
+        "--for AUTOPILOT",
+        "who flies: pandion, or px4, whose simulator it is then",
+        one_of("autopilot", "pandion", "px4"),
+        default="pandion",
     )
+    listen: str | None = option(
+        "--listen ADDRESS",
+        "where the autopilot finds it: udp:HOST:PORT (default udp:127.0.0.1:4560), "
+        "for px4 tcp:HOST:PORT (default tcp:127.0.0.1:4560)",
+    )
+    rate_hz: int = option("--rate HZ", "for px4: steps a second, 250 or 500", rate, default=250)
     wait_s: float = option(
         "--wait S", "how long to wait for the flight software, in seconds", seconds, default=60.0
     )
@@ -76,3 +90,23 @@ class SitlOptions(RunOptions):
     json: str | None = json_file("the result")
     out: Path | None = option("--out DIR", "directory for sitl.json", Path)
     events: str = events()
+
+    @property
+    def for_px4(self) -> bool:
+        """Whether PX4 flies."""
+        return self.autopilot == "px4"
+
+    def __post_init__(self) -> None:
+        """Refuse a contradictory choice; raises ContradictionError."""
+        if not self.for_px4:
+            if self.rate_hz != 250:
+                raise ContradictionError("--rate is of the exchange with PX4; add --for px4")
+        elif self.realtime:
+            raise ContradictionError(
+                "--for px4 is in lockstep with PX4; --speed 1 is real time, without --realtime"
+            )
+        elif self.sensors == PERFECT:
+            raise ContradictionError(
+                "--sensors perfect: PX4 takes sensors without noise for stuck; "
+                f"choose {', '.join(name for name in SUITE_NAMES if name != PERFECT)}"
+            )

@@ -7,26 +7,21 @@ import dataclasses
 import gc
 import os
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple, Protocol
 
 from command_line.output import json_text, unwritten
 from command_line.parser import COULD_NOT_START
 from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
 from sitl.compiled import cache
-from sitl.faults.keys import LINKS, Fault
-from sitl.link.encode import StepEncoder
-from sitl.link.exchange import Exchange, ExchangeCounts, Lockstep, RealTime
-from sitl.link.faulty_endpoint import Endpoint, FaultyEndpoint
-from sitl.link.pilot import flight_plan
-from sitl.link.server import RunTiming, serve, shut_down
-from sitl.link.udp_endpoint import PeerSocket
+from sitl.faults.keys import Fault
+from sitl.link.exchange import ExchangeCounts
+from sitl.link.server import Progress, RunTiming
 from sitl.rehearsal import rehearse
 from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
 from sitl.scenario_file import suite_of
-from sitl.simulation import START_US, STEP_US, Simulation
-from sitl.trajectory import TrajectoryPoint
+from sitl.simulation import Simulation
 from sitl.truth_log import TruthLog
 
 COMPLETED: Final = 0  # exit code
@@ -35,19 +30,40 @@ _FIFO_PRIORITY: Final = 50
 _KERNELS: Final = "flight"  # of which all but a few are the same for every scenario
 
 
+class Watch(NamedTuple):
+    """Who looks on while a flight goes on."""
+
+    progress: Progress
+    truth: Callable[[Simulation], None]  # takes the true state of every step
+    begun: Callable[[Fault], None]  # takes each fault when it begins
+
+
+class FlownSession(NamedTuple):
+    """How it went with whoever flew."""
+
+    timing: RunTiming
+    counts: ExchangeCounts
+    silent: bool  # it did not answer any more when the flight was over
+
+
+class Session(Protocol):
+    """The autopilot at the other end of a link."""
+
+    def fly(self, simulation: Simulation, watch: Watch, stop: StopRequest) -> FlownSession:
+        """Step until the run is over; the reason is in ``simulation.ended``."""
+        ...
+
+
 class Flight:
     """Everything of one run, ready to meet the vehicle."""
 
-    def __init__(
-        self, options: SitlOptions, scenario: Scenario, endpoint: PeerSocket, events: Events
-    ) -> None:
+    def __init__(self, options: SitlOptions, scenario: Scenario, events: Events) -> None:
         """Build the plant and compile it.
 
         Raises:
             ScenarioError: The scenario contradicts itself or starts outside its safe set.
         """
         self._options = options
-        self._endpoint = endpoint
         self._events = events
         if cache().folder is None or cache().is_due(_KERNELS):
             cache().announce("sitl", events)
@@ -55,49 +71,28 @@ class Flight:
         rehearse(Simulation(scenario, options.seed))
         cache().note(_KERNELS)
 
-    def run(self, stop: StopRequest) -> int:
+    def run(self, session: Session, stop: StopRequest) -> int:
         """Fly to the end and report; returns the exit code."""
-        options, simulation, endpoint = self._options, self._simulation, self._endpoint
+        options, simulation = self._options, self._simulation
         self._events.report("flying", "sitl: flying")
-        encoder = StepEncoder(
-            lockstep=not options.realtime,
-            measured=simulation.measurements() is not None,
-            origin=options.origin,
-        )
-        plan = flight_plan(simulation.scenario, self._target_at, self._yaw_at)
         self._settle()
-        exchange = self._exchange(stop)
         with contextlib.ExitStack() as files:
-            truth = self._truth(files)
-            timing = serve(
-                simulation, plan, exchange, encoder, stop, self._progress, truth, self._begun
-            )
-        silent_since = exchange.silent_since
-        if silent_since is not None:
-            simulation.note_silence(silent_since)
-        heard = shut_down(endpoint, encoder, self._tries(silent_since is not None))
-        self._report_pauses(exchange.counts)
+            watch = Watch(self._progress, self._truth(files), self._begun)
+            flown = session.fly(simulation, watch, stop)
+        counts, timing = flown.counts, flown.timing
+        self._report_pauses(counts)
         result = simulation.result()
-        described = self._as_json(result, timing, exchange.counts)
+        described = self._as_json(result, timing, counts)
         text = json_text(described, 2) + "\n"
         in_directory = None if options.out is None else options.out / "sitl.json"
         lost = [*unwritten(options.json, text), *unwritten(in_directory, text)]
         sentence = f"sitl: {_summary(result, timing)}"
-        self._events.report("ended", sentence, result=described, vehicle_silent=not heard)
+        self._events.report("ended", sentence, result=described, vehicle_silent=flown.silent)
         for what in lost:
             self._events.report("unwritten", f"sitl: cannot write {what}", what=what)
         if simulation.ended is not None and simulation.ended.kind is EndKind.REFUSED:
             return COULD_NOT_START
         return COMPLETED if result.completed and not lost else NOT_COMPLETED
-
-    def _tries(self, silent: bool) -> int:
-        """How often to send the shutdown command; a silent vehicle may not receive it."""
-        end = self._simulation.ended
-        if end is not None and end.kind is EndKind.STOPPED:
-            return 0
-        if silent:
-            return 1
-        return 2 if end is not None and end.kind is EndKind.INTERRUPTED else 4
 
     def _report_pauses(self, counts: ExchangeCounts) -> None:
         if counts.pauses:
@@ -121,12 +116,6 @@ class Flight:
     def _warn(self, sentence: str) -> None:
         self._events.report("warning", f"sitl: {sentence}")
 
-    def _target_at(self, t_us: int) -> TrajectoryPoint:
-        return self._simulation.clock.target_at(1e-6 * (t_us - START_US))
-
-    def _yaw_at(self, t_us: int) -> float:
-        return self._simulation.clock.yaw_at(1e-6 * (t_us - START_US))
-
     def _progress(self, time_s: float, margin_m: float | None, real_time_factor: float) -> None:
         values = {"t_s": time_s, "min_margin_m": margin_m, "real_time_factor": real_time_factor}
         self._events.report("progress", "", **values)
@@ -135,24 +124,6 @@ class Flight:
         simulation = self._simulation
         sentence = f"sitl: fault at {simulation.time_s:.1f} s: {fault}"
         self._events.report("fault", sentence, **dataclasses.asdict(fault))
-
-    def _exchange(self, stop: StopRequest) -> Exchange:
-        endpoint = self._link()
-        joints = len(self._simulation.vehicle.links)
-        period_s = 1e-6 * STEP_US
-        if self._options.realtime:
-            return RealTime(endpoint, joints, period_s, stop)
-        speed = self._options.speed
-        paced_s = None if speed is None else period_s / speed
-        return Lockstep(endpoint, joints, paced_s, stop)
-
-    def _link(self) -> Endpoint:
-        """The way to the vehicle, with a network in between that fails if the scenario has one."""
-        simulation = self._simulation
-        if not any(fault.unit in LINKS for fault in simulation.scenario.faults):
-            return self._endpoint
-        faults = simulation.faults
-        return FaultyEndpoint(self._endpoint, lambda: faults.active, self._options.seed)
 
     def _settle(self) -> None:
         """Stop the garbage collector: sweeping numba's objects takes tens of milliseconds."""

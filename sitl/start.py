@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 from sitl.air.load import SURFACES
+from sitl.mission_clock import MissionClock
 from sitl.plant.parameters import AirModel, Motors, Vehicle, level_reach
 from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B, at_rest
 from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
 from sitl.plant.vector import Array
-from sitl.scenario import V3, Scenario
+from sitl.scenario import V3, Scenario, Start
 from sitl.scenario_file import ScenarioError
 
 
@@ -61,6 +62,21 @@ def air_model(scenario: Scenario) -> AirModel:
         suction=keys.wall_suction,
         surfaces=tuple(planes) if near else (),
     )
+
+
+def on_the_ground(scenario: Scenario) -> Scenario:
+    """The same scenario with the vehicle standing under the place where it would begin to fly.
+
+    For an autopilot that takes off itself: no pilot asks it for anything.
+    """
+    pilot, start = replace(scenario.pilot, plan="none"), scenario.start
+    if start.kind == "airborne":
+        place, _ = hovering(
+            flown_vehicle(scenario), scenario, MissionClock(scenario).target_at(0.0).p
+        )
+        x, y = (float(one) for one in place[P_WB : P_WB + 2])
+        start = Start(kind="ground", yaw_deg=start.yaw_deg, position_m=(x, y))
+    return replace(scenario, pilot=pilot, start=start)
 
 
 def first_state(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array, Trim]:

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import select
-import socket
 import threading
 import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
-from fsw.link.udp_endpoint import LinkError
+from fsw.link.endpoints import open_endpoint
 from fsw.link.wire import message_ids as ids
 from fsw.signals import SafeSet, Vec3
-from messages.frames import FrameWriter, split
+from messages.addresses import LinkAddress, address_text
+from messages.frames import FrameWriter, Losses
 from view.scene import Scene
 from view.telemetry import Telemetry, command_name, result_name
 
 Answer = TypeVar("Answer")
-Address = tuple[str, int]
 
 SYSTEM, COMPONENT = 253, 190  # of no other station in use; MAV_COMP_ID_MISSIONPLANNER
 _LOOKS, _COMMANDS = 18, 6  # MAV_TYPE: an onboard controller, a ground station
@@ -30,8 +28,6 @@ _ANSWER_S: Final = 0.7
 _REASON_S: Final = 0.15  # the text with the reason follows the answer
 _TRIES: Final = 3
 _ACCEPTED, _IN_PROGRESS = 0, 5
-_MAX_DATAGRAM: Final = 2048
-_RECEIVE_BUFFER: Final = 1 << 20  # bytes
 _POSITION_ONLY: Final = 0x0DF8  # type mask: position, no heading
 _LOCAL_NED: Final = 1
 _SHAPE_NUMBERS: Final = 16
@@ -49,38 +45,29 @@ OFFBOARD: Final = (1.0, 6.0, 0.0)
 class VehicleLink(threading.Thread):
     """Speaks to one vehicle until it is closed. A vehicle that is not there yet may come."""
 
-    def __init__(self, vehicle: Address, *, commands: bool) -> None:
-        """Open a socket of its own towards ``vehicle``; without ``commands`` it only looks.
+    def __init__(self, vehicle: LinkAddress, *, commands: bool) -> None:
+        """Open a link of its own towards ``vehicle``; without ``commands`` it only looks.
 
         One that only looks is no ground station to the vehicle: it must not hide that the link to
         the one that commands is lost.
-
-        Raises:
-            LinkError: There is no way to that address.
         """
         super().__init__(daemon=True)
         self.commands = commands
         self.watched = False  # whether a person sees the page
-        self._vehicle = vehicle
+        self.where = address_text(vehicle)
         self._telemetry = Telemetry()
         self._writer = FrameWriter(SYSTEM, COMPONENT)
         self._heard = threading.Condition()
         self._setpoint: Vec3 | None = None
         self._ended = False
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
-        try:
-            self._socket.connect(vehicle)
-        except OSError as error:
-            self._socket.close()
-            raise LinkError(f"cannot reach {self.where}: {error.strerror or error}") from None
-        self._socket.setblocking(False)
+        self._endpoint, self._peer = open_endpoint(vehicle, lambda: time.monotonic_ns() // 1000)
+        self._losses = Losses()
 
     def close(self) -> None:
         """Hang up."""
         self._ended = True
         self.join()
-        self._socket.close()
+        self._endpoint.close()
 
     def scene(self) -> Scene:
         """What is known now."""
@@ -95,7 +82,7 @@ class VehicleLink(threading.Thread):
         """See :class:`VehicleLink`."""
         beat_s = setpoint_s = asked_s = -1e9
         while not self._ended:
-            select.select((self._socket,), (), (), 0.02)
+            select.select((self._endpoint,), (), (), 0.02)
             self._hear()
             now_s = time.monotonic()
             if now_s - beat_s >= _BEAT_S:
@@ -175,24 +162,18 @@ class VehicleLink(threading.Thread):
         """Ask for all of them."""
         self._send(ids.PARAM_REQUEST_LIST, 1, 1)
 
-    @property
-    def where(self) -> str:
-        """The vehicle's address."""
-        return f"udp:{self._vehicle[0]}:{self._vehicle[1]}"
-
     def _answer(self, command: int) -> int | None:
         answers = [result for asked, result in self._telemetry.answers if asked == command]
         return answers[-1] if answers else None
 
     def _hear(self) -> None:
-        while True:
-            try:
-                datagram = self._socket.recv(_MAX_DATAGRAM)
-            except OSError:  # nothing there; or nothing listens yet: the vehicle may start
-                return
+        while (received := self._endpoint.receive_waiting()) is not None:
+            data, sender = received
+            if sender != self._peer:
+                continue
             with self._heard:
                 now_s = time.monotonic()
-                for frame in split(datagram):
+                for frame, _ in self._endpoint.cut(data, self._losses):
                     self._telemetry.take(frame, now_s)
                 self._heard.notify_all()
 
@@ -226,5 +207,4 @@ class VehicleLink(threading.Thread):
         self._send(ids.OBSTACLE_SHAPE, t_us, clearance, *velocity, *filled, *place)
 
     def _send(self, message_id: int, *values: Any) -> None:
-        with contextlib.suppress(OSError):
-            self._socket.send(self._writer.frame(message_id, *values))
+        self._endpoint.send(self._writer.frame(message_id, *values), self._peer)

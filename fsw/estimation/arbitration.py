@@ -55,6 +55,7 @@ _PARTS: Final = {
     Sensor.POSE: (Source.POSE, Source.ATTITUDE),
     Sensor.GNSS: (Source.GNSS, Source.GNSS),
 }
+_FOLLOWED: Final = (SensorFault.SELDOM, SensorFault.NOISY)  # encoders that are used all the same
 _ROUNDING: Final = 1e-9  # s
 
 Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
@@ -116,8 +117,8 @@ class Arbitration:
         for sample, last in zip(newest, before.seen, strict=True):
             aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
             seen.append(sample)
-        verdict = before.hearing_nothing_of(_silent(memory, now), now)
-        lost = verdict.lost(now) | _stuck(memory)
+        verdict = before.hearing_nothing_of(_silent(memory, now) | _stuck(memory), now)
+        lost = verdict.lost(now)
         learns = not (before.is_on or before.wrong or lost)
         redundancy.look(evidence, memory.numbers, now, *aids, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
@@ -276,7 +277,7 @@ def _silent(memory: FusionMemory, now: float) -> Source:
     """
     unit = now - memory.imu_came > IMU_TOO_OLD
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
-    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault is not SensorFault.SELDOM
+    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault not in _FOLLOWED
     arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
     return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
 

@@ -100,6 +100,8 @@ FILTER: Final = np.dtype(
         # Of what is doubted: how far readings have leapt [rad], and in which time [s].
         ("encoder_leap", float, (2,)),
         ("encoder_leapt", float),
+        ("encoder_scale", float),  # by how much their variance is larger than stated
+        ("encoder_surprise", float, (2,)),  # rad, of the last one that was believed
         # What is known of the biases while the readings are of no use.
         ("kept_bias", float, (6,)),
         ("kept_variance", float, (6,)),

@@ -29,9 +29,9 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
+from fsw.estimation.stated_variance import followed
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
-from fsw.geometry.vectors import clamp
 from fsw.signals import Vec3, Vec4
 
 _LEAST_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
@@ -40,10 +40,7 @@ _KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
 _DOUBTED_SPEED = 0.5  # m/s
 _DOUBTED_FORCE = 3.0  # m/s^2
 _DOUBTED_RATE = 0.5  # rad/s
-# Of how a variance follows the noise that there is: with each measurement, by at most so much, and
-# from what differences of innovations are beyond which are expected.
-_SCALE_RATE = 0.06
-_SCALE_MOST = 6.0
+# By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
@@ -88,9 +85,8 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
             total -= L[k, j] * y[j]
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
-    more = min(0.5 * squared / rows, _SCALE_MOST) - _SCALE_FROM
-    scale = max(x.noise_scale[scaled], 1.0) * math.exp(_SCALE_RATE * more)
-    x.noise_scale[scaled] = clamp(scale, 1.0, _SCALE_LIMIT)
+    scale = followed(x.noise_scale[scaled], squared / rows, _SCALE_FROM)
+    x.noise_scale[scaled] = min(scale, _SCALE_LIMIT)
 
 
 @compilable

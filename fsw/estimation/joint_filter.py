@@ -23,6 +23,7 @@ from fsw.compiled import compilable
 from fsw.estimation.error_state import PUSHES
 from fsw.estimation.imu import doubt
 from fsw.estimation.sensor_fault import SensorFault
+from fsw.estimation.stated_variance import followed
 from fsw.geometry.vectors import clamp
 from fsw.signals import Vec2
 
@@ -34,6 +35,10 @@ _DISTURBANCE_AT_START: Final = 30.0  # rad/s^2
 _FAR: Final = 0.1  # rad
 _SIGMAS: Final = 6.0
 _MOST_SIGMA: Final = 0.03  # rad; of a wider one garbage would pass
+# By what differences of surprises are beyond which are expected, the variance of readings grows;
+# one step of an encoder does not make it.
+_SCALE_FROM: Final = 4.0
+_SCALE_LIMIT: Final = 1e4  # of the variance
 # By how much a joint moves from one reading to the next, with the noise of both.
 _FASTEST: Final = 10.0  # rad/s
 _NEAR: Final = 0.02  # rad
@@ -93,6 +98,12 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
     _advance(x, law, time)
     said = _less_zero(x, angles)
     far, before_it = _is_far(x, said), x.encoder_doubted
+    if far and not x.encoder_leapt > 0.0:
+        # No reading has leapt since one was believed: the joint moves as torques do not make it.
+        rates = x.joints[0, 1], x.joints[1, 1]
+        begin(x, law, time, said)
+        x.joints[0, 1], x.joints[1, 1] = rates
+        far = False
     x.encoder_doubted, x.encoder_calm = doubt(
         x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
     )
@@ -209,14 +220,19 @@ def _move(x: Any, law: Any, u1: float, u2: float, dt: float) -> None:
 @compilable
 def _correct(x: Any, law: Any, angles: Vec2) -> None:
     C = x.joint_variance
-    total = C[0, 0] + law.encoder_noise * law.encoder_noise
+    total = C[0, 0] + max(x.encoder_scale, 1.0) * law.encoder_noise * law.encoder_noise
     most = _SIGMAS * math.sqrt(total)  # of a reading that is just believed, and may be garbage
     g0, g1, g2 = C[0, 0] / total, C[1, 0] / total, C[2, 0] / total
+    squared = 0.0
     for i in range(2):
-        surprise = clamp(angles[i] - x.joints[i, 0], -most, most)
+        surprise = angles[i] - x.joints[i, 0]
+        more = surprise - x.encoder_surprise[i]
+        squared, x.encoder_surprise[i] = max(squared, more * more / total), surprise
+        surprise = clamp(surprise, -most, most)
         x.joints[i, 0] += g0 * surprise
         x.joints[i, 1] += g1 * surprise
         x.joints[i, 2] += g2 * surprise
+    x.encoder_scale = min(followed(x.encoder_scale, squared, _SCALE_FROM), _SCALE_LIMIT)
     c0, c1, c2 = C[0, 0], C[0, 1], C[0, 2]
     C[0, 0] -= g0 * c0
     C[0, 1] -= g0 * c1

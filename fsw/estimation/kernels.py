@@ -225,12 +225,14 @@ def _copy_joints(a: Any, b: Any) -> None:
     b.joint_time, b.pushed, b.pushes_end = a.joint_time, a.pushed, a.pushes_end
     b.encoder_steady, b.encoder_calm = a.encoder_steady, a.encoder_calm
     b.encoder_doubted, b.encoder_leapt = a.encoder_doubted, a.encoder_leapt
+    b.encoder_scale = a.encoder_scale
     for i in range(3):
         b.encoders[i] = a.encoders[i]
         for j in range(3):
             b.joint_variance[i, j] = a.joint_variance[i, j]
     for i in range(2):
         b.encoder_zero[i], b.encoder_leap[i] = a.encoder_zero[i], a.encoder_leap[i]
+        b.encoder_surprise[i] = a.encoder_surprise[i]
         for j in range(3):
             b.joints[i, j] = a.joints[i, j]
     for k in range(max(a.pushed - 1, 0), a.pushes_end):

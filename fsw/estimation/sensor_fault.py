@@ -32,6 +32,7 @@ class SensorFault(IntEnum):
     SELDOM = 9
     DISAGREES = 10
     NO_FIX = 11
+    NOISY = 12
 
 
 _SENTENCES = {
@@ -47,6 +48,7 @@ _SENTENCES = {
     SensorFault.SELDOM: "comes less often than it did",
     SensorFault.DISAGREES: "does not agree with the other sensors",
     SensorFault.NO_FIX: "has no fix",
+    SensorFault.NOISY: "is noisier than stated",
 }
 
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
 from fsw.compiled import compilable
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.measurements import GnssSample, PoseSample, PressureSample, RangeSample
 from fsw.signals import Vec3
+
+# Of how a variance follows the noise that there is with each measurement, and by at most so much.
+_RATE: Final = 0.06
+_MOST: Final = 6.0
 
 
 @compilable
@@ -14,6 +21,17 @@ def believable(variance: Vec3, least: float) -> Vec3:
     x, y, z = variance
     # NaN and zero mean that the sensor does not know; both fail the comparison.
     return (x if x > least else least, y if y > least else least, z if z > least else least)
+
+
+@compilable
+def followed(scale: float, squared: float, start: float) -> float:
+    """By how much variances are larger than stated, after a measurement; ``scale`` [1] before it.
+
+    ``squared`` [1] is the square of by how much its innovation differs from the last one, over the
+    variance of an innovation. Beyond twice ``start`` [1] they grow.
+    """
+    grown: float = max(scale, 1.0) * math.exp(_RATE * (min(0.5 * squared, _MOST) - start))
+    return max(grown, 1.0)
 
 
 class StatedVariance:

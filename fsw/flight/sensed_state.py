@@ -38,7 +38,10 @@ _IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
-_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
+_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES, SensorFault.NOISY)
+_NOISY = 4.0  # times the stated variance
+_BEGUN = 1.0  # s, until scales have settled
+_SHOWN = 1.0  # s, for which another fault says more
 _SET_BACK = 0.1  # s; a clock that goes back by more has been set to another time
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
 _LATELY = 0.02  # s, in which a fault is one of now
@@ -210,7 +213,7 @@ class SensedState:
         if not due:
             return memory
         self._report_silence(memory, now, texts)
-        return _report_seldom(memory, now, texts)
+        return _report_noise(_report_seldom(memory, now, texts), now, texts)
 
     def _report_silence(self, memory: FusionMemory, now: float, texts: list[StatusText]) -> None:
         """Report sensors that have been silent for too long since the last check."""
@@ -250,6 +253,24 @@ def _report_seldom(memory: FusionMemory, now: float, texts: list[StatusText]) ->
     for sensor in seldom:
         memory = memory.noting(memory.of(sensor).with_fault(SensorFault.SELDOM, now))
         texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.SELDOM)))
+    return memory
+
+
+def _report_noise(memory: FusionMemory, now: float, texts: list[StatusText]) -> FusionMemory:
+    """Report sensors whose readings scatter more than they state, or are known to."""
+    if memory.joints_came < 0.0 or now - memory.began < _BEGUN:
+        return memory
+    x = memory.numbers[0]
+    pose, fix = x["noise_scale"][:2].max(), x["noise_scale"][2:].max()
+    scales = (Sensor.POSE, pose), (Sensor.GNSS, fix), (Sensor.ENCODERS, x["encoder_scale"])
+    for sensor, scale in scales:
+        health, heard = memory.of(sensor), now - memory.came(sensor) < _SHOWN
+        said_more = health.fault is not SensorFault.NOISY and now - health.fault_at < _SHOWN
+        if scale > _NOISY and heard and not said_more:
+            health = health.with_fault(SensorFault.NOISY, now)
+            memory = memory.noting(health)
+            if health.is_news():
+                texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.NOISY)))
     return memory
 
 

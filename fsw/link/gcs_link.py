@@ -10,7 +10,9 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from fsw.link.bounded_memory import renew
+from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
+from fsw.link.line_budget import TELEMETRY, LineBudget
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
 from fsw.link.sent_frames import SentFrames
@@ -19,15 +21,22 @@ from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
-from fsw.link.udp_endpoint import Address, OpenEndpoint
 from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.ports import Clock, LinkLosses
-from fsw.signals import CommandAck, FlightSnapshot, MessageSource, TickOutputs
+from fsw.signals import (
+    CommandAck,
+    FlightSnapshot,
+    MessageSource,
+    Severity,
+    StatusText,
+    TickOutputs,
+)
 from messages import dialect
-from messages.frames import Frame, Losses, as_version_1, cut, is_version_1
+from messages.addresses import Address, LinkAddress
+from messages.frames import Frame, Losses, as_version_1, is_version_1
 
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
@@ -35,6 +44,7 @@ RecordFrame = Callable[[int, bytes], None]
 _LEAST_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
+_MEASURED_S: Final = 3  # calls of ``news``, one a second
 _HOUSEKEEPING_US: Final = 1_000_000
 _MESSAGE_ID: Final = slice(7, 10)  # in a frame
 # Not recorded: a log that is downloaded while it is written would grow by what is sent of it.
@@ -55,8 +65,8 @@ class LinkSetup:
     """Configuration of one link."""
 
     name: str  # in fsw.json
-    target: Address  # peer that is spoken to first
-    local_port: int  # if it is free
+    target: LinkAddress  # peer that is spoken to first
+    local_port: int  # of UDP, if it is free
     rates_hz: tuple[float, ...]  # of each stream
     unheard: bool  # whether everything is sent before anybody has been heard
     remote: bool = False  # whether other machines are heard though the target is this one
@@ -93,11 +103,22 @@ class GcsLink:
         handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
         self._handled = frozenset[int]().union(*handled)
         self._read = 0  # datagrams
-        self.rates = StreamRates(STREAMS, setup.rates_hz, context.facts.tick_period_us)
+        self._endpoint, peer = open_endpoint(
+            setup.target, clock, setup.local_port, remote=setup.remote
+        )
+        carried = self._endpoint.bytes_per_s
+        self._line = None if carried is None else LineBudget(carried, clock)
+        self.rates = StreamRates(
+            STREAMS,
+            setup.rates_hz,
+            context.facts.tick_period_us,
+            most_bytes_s=None if carried is None else TELEMETRY * carried,
+        )
+        self._looks = 0  # for news
+        self._told_slow = False
         self.talks = setup.unheard  # whether more than a heartbeat is sent
         self._unheard = setup.unheard
-        self._endpoint = OpenEndpoint(setup.target, setup.local_port, remote=setup.remote)
-        self._peers = Peers(setup.target)
+        self._peers = Peers(peer)
         self._inbox = inbox
         self._context = context
         self._clock = clock
@@ -108,8 +129,8 @@ class GcsLink:
         self._housekeeping_us = 0
 
     @property
-    def port(self) -> int:
-        """The local port, where ground stations answer to."""
+    def port(self) -> int | None:
+        """The local UDP port, where ground stations answer to; None of a stream."""
         return self._endpoint.port
 
     @property
@@ -153,7 +174,7 @@ class GcsLink:
             datagram, sender = received
             self._read += 1
             budget -= max(len(datagram), _LEAST_COST)
-            for frame, raw in cut(datagram, self.losses):
+            for frame, raw in self._endpoint.cut(datagram, self.losses):
                 if frame.system_id == SYSTEM_ID and raw in self._sent:
                     self.echoes += 1
                 else:
@@ -179,12 +200,15 @@ class GcsLink:
 
     def serve(self, t_us: int) -> None:
         """Let services go on with what they are sending, if it talks; see :meth:`is_busy`."""
-        self.dispatch.poll(t_us)
+        if self._line is None or self._line.has_room():
+            self.dispatch.poll(t_us)
         if self.outbox.waiting:
             self._send(t_us)
 
     def serve_bulk(self, t_us: int) -> bool:
-        """Send a datagram of what clients wait for; whether there was anything."""
+        """Send a datagram of what clients wait for; whether there was anything, and room."""
+        if self._line is not None and not self._line.has_room():
+            return False
         if not self.dispatch.bulk(t_us):
             return False
         self._send(t_us)
@@ -196,8 +220,10 @@ class GcsLink:
         if changed:
             for stream in AT_ONCE:
                 self._encode(stream, snapshot)
+        has_room = self._line is None or self._line.takes_telemetry()
         for stream in self.rates.due(snapshot.t_us):
-            self._encode(stream, snapshot)
+            if has_room or stream.vital:
+                self._encode(stream, snapshot)
         for text in outputs.texts:
             self.outbox.add_text(text, snapshot.t_us)
         if snapshot.t_us >= self._housekeeping_us:
@@ -205,6 +231,21 @@ class GcsLink:
             self.outbox.add_overdue_texts(snapshot.t_us)
             self._peers.expire(self._clock())
             self.talks = self._unheard or self._peers.any_heard
+            if self._line is not None:
+                self.rates.fit()
+
+    def news(self) -> list[StatusText]:
+        """What the operator should know about the line itself; call it once a second."""
+        found = self._endpoint.news()
+        texts = [] if found is None else [StatusText(Severity.NOTICE, f"link {self.name}: {found}")]
+        self._looks += 1
+        # By then frames of every kind have been measured.
+        if self._looks > _MEASURED_S and self.rates.share < 1.0 and not self._told_slow:
+            self._told_slow = True
+            share = f"{100.0 * self.rates.share:.0f} %"
+            sentence = f"slow line, telemetry at {share} of its rates, heartbeat and state in full"
+            texts.append(StatusText(Severity.NOTICE, f"link {self.name}: {sentence}"))
+        return texts
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command that came over this link."""
@@ -226,6 +267,7 @@ class GcsLink:
             "peers": len(self.peers),
             "encode_failures": self.outbox.encode_failures,
             "service_failures": self.dispatch.failures,
+            **self._endpoint.as_json(),
         }
 
     @property
@@ -300,7 +342,9 @@ class GcsLink:
             self.outbox.encode_failures += 1
             return
         if values is not None:
-            self.outbox.add(stream.component, stream.message_id, values)
+            size = self.outbox.add(stream.component, stream.message_id, values)
+            if self._line is not None and size:
+                self.rates.note_size(stream, size)
 
     def _send(self, t_us: int) -> None:
         frames, asked_for = self.outbox.take()
@@ -321,6 +365,8 @@ class GcsLink:
         for datagram in packed(frames):
             for peer in peers:
                 self._endpoint.send(datagram, peer)
+            if self._line is not None:
+                self._line.spend(len(datagram))
 
 
 def _message_name(message_id: int) -> str:

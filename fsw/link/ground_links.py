@@ -13,7 +13,7 @@ from fsw.link.gcs_link import GcsLink
 from fsw.link.telemetry.stream_rates import SLOT_US
 from fsw.link.wire.px4_mode import shown_mode
 from fsw.ports import Clock, LinkLosses
-from fsw.signals import CommandAck, FlightSnapshot, TickOutputs
+from fsw.signals import CommandAck, FlightSnapshot, StatusText, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
 _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
@@ -112,6 +112,10 @@ class GroundLinks:
             if encodes and self._attends:
                 # Ticks without a pause between them must not make the vehicle deaf.
                 link.read(t_us, _ONE)
+
+    def news(self) -> list[StatusText]:
+        """What the operator should know about lines that come and go; call it once a second."""
+        return [text for link in self.links for text in link.news()]
 
     def _changes(self, now: FlightSnapshot) -> tuple[bool, bool]:
         """Whether a heartbeat says something new at once, and whether a mission has gone on.

@@ -9,9 +9,9 @@ from typing import Final
 from command_line.options import option, switch
 from command_line.values import one_of, place
 from fsw.geometry.geodesy import DEFAULT_ORIGIN
-from fsw.link.udp_endpoint import Address, LinkError, parse_address
 from fsw.link.wire.telemetry_context import GENERIC, PX4
 from fsw.signals import Origin
+from messages.addresses import LinkAddress, LinkError, SerialLine, parse_link_address
 
 NO_LINK: Final = "none"
 AUTOPILOTS: Final = {"px4": PX4, "generic": GENERIC}
@@ -36,11 +36,14 @@ class LinkChoice:
     """Where telemetry goes and who is heard; the fields are the options of a command line."""
 
     gcs: str = option(
-        "--gcs udp:HOST:PORT", "GCS address for telemetry", default="udp:127.0.0.1:14550"
+        "--gcs ADDRESS",
+        "of the ground station: udp:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT (listens) or "
+        "serial:DEVICE:BAUD",
+        default="udp:127.0.0.1:14550",
     )
     api: str = option(
-        "--api udp:HOST:PORT",
-        "address of a program, such as one with MAVSDK, or none",
+        "--api ADDRESS",
+        "the same of a program, such as one with MAVSDK, or none",
         default="udp:127.0.0.1:14540",
     )
     allow_remote: bool = switch(
@@ -65,14 +68,22 @@ class LinkChoice:
     )
 
 
-def addresses(choice: LinkChoice) -> tuple[Address, Address | None]:
+def addresses(choice: LinkChoice) -> tuple[LinkAddress, LinkAddress | None]:
     """Where ground stations and programs are: ``--gcs`` and ``--api`` of a choice.
 
     Raises:
         LinkError: One of them is none.
     """
-    api = None if choice.api == NO_LINK else parse_address(choice.api)
-    gcs = parse_address(choice.gcs)
-    if api == gcs:
-        raise LinkError(f"--gcs and --api are both {choice.gcs}; give them different ports")
+    api = None if choice.api == NO_LINK else parse_link_address(choice.api)
+    gcs = parse_link_address(choice.gcs)
+    if api == gcs or (api is not None and _line(api) is not None and _line(api) == _line(gcs)):
+        raise LinkError(
+            f"--gcs {choice.gcs} and --api {choice.api} are the same; "
+            "give them different ports or lines"
+        )
     return gcs, api
+
+
+def _line(address: LinkAddress) -> str | None:
+    """The device of a serial line, of which two links cannot both speak."""
+    return address.device if isinstance(address, SerialLine) else None

@@ -34,17 +34,18 @@ class Outbox:
         """Whether there is anything to send."""
         return bool(self._frames)
 
-    def add(self, component: int, message_id: int, values: WireValues) -> None:
-        """Take one message; one with a number that does not fit its field is dropped and counted.
+    def add(self, component: int, message_id: int, values: WireValues) -> int:
+        """Take one message; returns the bytes of its frame.
 
-        Such a number must not end the flight it describes.
+        One with a number that does not fit its field is dropped and counted, and has 0: such a
+        number must not end the flight it describes.
         """
         try:
             frame = self._writers[component].frame(message_id, *values)
         except (struct.error, OverflowError, ValueError, KeyError, TypeError):
             self.encode_failures += 1
-            return
-        self._add_frame(frame)
+            return 0
+        return self._add_frame(frame)
 
     def add_output(self, outgoing: ServiceOutput, t_us: int) -> None:
         """Take an output of a service."""
@@ -77,8 +78,10 @@ class Outbox:
         for text in self._limiter.overdue(t_us):
             self._add_text(text)
 
-    def _add_frame(self, frame: bytes) -> None:
-        self._frames.append(self._signing.signed(frame) if self._signing.active else frame)
+    def _add_frame(self, frame: bytes) -> int:
+        sent = self._signing.signed(frame) if self._signing.active else frame
+        self._frames.append(sent)
+        return len(sent)
 
     def _add_text(self, text: StatusText) -> None:
         """In as many STATUSTEXT as it needs."""

@@ -8,6 +8,7 @@ import struct
 import sys
 from typing import Final
 
+from messages.frames import cut
 from messages.udp import MAX_DATAGRAM, Address, LinkError, parse_address
 
 __all__ = ["MAX_DATAGRAM", "Address", "LinkError", "OpenEndpoint", "is_loopback", "parse_address"]
@@ -24,7 +25,10 @@ def is_loopback(address: Address) -> bool:
 
 
 class OpenEndpoint:
-    """A socket that talks to anyone and never waits."""
+    """A socket that talks to anyone and never waits; ``stream_endpoint`` has what it has."""
+
+    bytes_per_s: Final = None  # not known of a network
+    cut = staticmethod(cut)  # no state between datagrams
 
     def __init__(self, target: Address, local_port: int = 0, *, remote: bool = False) -> None:
         """Open the socket towards the peer that is spoken to first.
@@ -84,6 +88,14 @@ class OpenEndpoint:
             self._socket.sendto(datagram, peer)
         except OSError:
             return
+
+    def news(self) -> str | None:
+        """Nothing: a socket does not know whether anybody is there."""
+        return None
+
+    def as_json(self) -> dict[str, object]:
+        """Nothing of its own."""
+        return {}
 
     def close(self) -> None:
         """Give the port back; safe to call twice."""

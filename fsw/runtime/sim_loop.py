@@ -346,6 +346,7 @@ class SimLoop(Generic[State]):
         record.health.vibration = self._vibration.metrics
         record.health.clipped = self._vibration.clipped
         record.health.losses = self._ground.losses
+        self._notices += self._ground.news()
         self._vibration.accel_range = self._parameters.values[ACCEL_RANGE]
         for group in RATE_GROUPS:
             # The planner's cycles are of interest, not the time that a request takes to send.

@@ -32,7 +32,7 @@ BAROMETRIC: Final = 0x1A00
 _AT_ANOTHER_TIME: Final = 1  # id of HIL_SENSOR
 
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
-_VIO, _MOTION_CAPTURE = 3, 6  # MAV_ESTIMATOR_TYPE
+VIO, _MOTION_CAPTURE = 3, 6  # MAV_ESTIMATOR_TYPE
 _ALL_WELL: Final = 100  # quality
 _UNKNOWN: Final = (math.nan, *(0.0,) * 20)  # a covariance
 _NO_RATES: Final = (math.nan,) * 6
@@ -84,13 +84,13 @@ class SensorEncoder:
             case PoseMeasurement():
                 return self._odometry(t_us, one)
             case GnssMeasurement():
-                return self._writer.frame(message_ids.HIL_GPS, t_us, *self._gps(one))
+                gps = gps_values(self._origin, one)
+                return self._writer.frame(message_ids.HIL_GPS, t_us, *gps)
             case RangeMeasurement():
-                return self._writer.frame(message_ids.DISTANCE_SENSOR, *_distance(one))
+                return self._writer.frame(message_ids.DISTANCE_SENSOR, *distance_values(one))
             case PressureMeasurement():
-                altitude = standard_altitude(max(one.pressure_pa, 1.0))
-                values = (0.01 * one.pressure_pa, 0.0, altitude, _WARM_C)
-                return self._hil_sensor(t_us, (*(0.0,) * 9, *values), BAROMETRIC, _AT_ANOTHER_TIME)
+                fields = (*(0.0,) * 9, *pressure_values(one))
+                return self._hil_sensor(t_us, fields, BAROMETRIC, _AT_ANOTHER_TIME)
             case MagneticMeasurement():
                 fields = (*(0.0,) * 6, *one.field_B, *(0.0,) * 4)
                 return self._hil_sensor(t_us, fields, MAGNETIC, _AT_ANOTHER_TIME)
@@ -114,28 +114,9 @@ class SensorEncoder:
         values = (t_us, *one.p_WB, *one.q_WB, *_about(one))
         return self._writer.frame(message_ids.ODOMETRY, *values)
 
-    def _gps(self, one: GnssMeasurement) -> tuple[float, ...]:
-        place = place_of(self._origin, one.p_WB)
-        north, east, down = one.v_WB
-        course = math.degrees(math.atan2(east, north)) % 360.0
-        return (
-            round(1e7 * place.latitude),
-            round(1e7 * place.longitude),
-            round(1e3 * place.altitude),
-            _counted(100.0 * one.horizontal_deviation, _U16),
-            _counted(100.0 * one.vertical_deviation, _U16),
-            min(round(100.0 * math.hypot(north, east)), _U16),
-            *(min(max(round(100.0 * v), -_I16), _I16) for v in (north, east, down)),
-            round(100.0 * course) % 36_000,
-            one.fix_type,
-            one.satellites,
-            0,
-            0,  # no yaw
-        )
 
-
-def _about(one: PoseMeasurement) -> tuple[float, ...]:
-    """All of ODOMETRY behind its pose."""
+def about_pose(one: PoseMeasurement, estimator: int) -> tuple[float, ...]:
+    """All of ODOMETRY behind its pose; ``estimator`` is a MAV_ESTIMATOR_TYPE."""
     x, y, z = one.position_variance
     roll, pitch, yaw = one.attitude_variance
     # The upper triangle, row by row.
@@ -147,12 +128,44 @@ def _about(one: PoseMeasurement) -> tuple[float, ...]:
         *(pitch, 0.0),
         yaw,
     )
-    kind = _VIO if one.from_cameras_on_board else _MOTION_CAPTURE
-    tail = (_LOCAL_NED, _BODY_FRD, one.resets, kind, _ALL_WELL)
+    tail = (_LOCAL_NED, _BODY_FRD, one.resets, estimator, _ALL_WELL)
     return (*_NO_RATES, *covariance, *_UNKNOWN, *tail)
 
 
-def _distance(one: RangeMeasurement) -> tuple[float | bytes, ...]:
+def _about(one: PoseMeasurement) -> tuple[float, ...]:
+    """The same of the sensor's own kind."""
+    return about_pose(one, VIO if one.from_cameras_on_board else _MOTION_CAPTURE)
+
+
+def pressure_values(one: PressureMeasurement) -> tuple[float, float, float, float]:
+    """The last numbers of HIL_SENSOR: hPa, hPa, m, °C."""
+    altitude = standard_altitude(max(one.pressure_pa, 1.0))
+    return (0.01 * one.pressure_pa, 0.0, altitude, _WARM_C)
+
+
+def gps_values(origin: Place, one: GnssMeasurement) -> tuple[float, ...]:
+    """All of HIL_GPS behind its time; the local frame begins at ``origin``."""
+    place = place_of(origin, one.p_WB)
+    north, east, down = one.v_WB
+    course = math.degrees(math.atan2(east, north)) % 360.0
+    return (
+        round(1e7 * place.latitude),
+        round(1e7 * place.longitude),
+        round(1e3 * place.altitude),
+        _counted(100.0 * one.horizontal_deviation, _U16),
+        _counted(100.0 * one.vertical_deviation, _U16),
+        min(round(100.0 * math.hypot(north, east)), _U16),
+        *(min(max(round(100.0 * v), -_I16), _I16) for v in (north, east, down)),
+        round(100.0 * course) % 36_000,
+        one.fix_type,
+        one.satellites,
+        0,
+        0,  # no yaw
+    )
+
+
+def distance_values(one: RangeMeasurement) -> tuple[float | bytes, ...]:
+    """All of DISTANCE_SENSOR."""
     lengths = (100.0 * one.least, 100.0 * one.most, 100.0 * one.distance)
     variance = _counted(1e4 * one.variance, _U8 - 1)
     begin = (max(one.t_us, 0) // 1000, *(min(max(round(cm), 0), _U16) for cm in lengths))

@@ -26,8 +26,8 @@ from sitl.simulation import STEP_US, Controls, Simulation
 from sitl.stand_in import StandIn
 
 _HEARTBEAT_STEPS: Final = 500  # 1 Hz
-_PROGRESS_S: Final = 0.1  # wall time between two reports
-_PROGRESS_STEPS: Final = 25  # how often the wall clock is looked at
+PROGRESS_S: Final = 0.1  # wall time between two reports
+PROGRESS_STEPS: Final = 25  # how often the wall clock is looked at
 _SILENT: Final = math.nan
 _SHUTDOWN: Final = SendCommand(
     CMD_REBOOT_SHUTDOWN, (0.0, 2.0, _SILENT, _SILENT, _SILENT, _SILENT, _SILENT)
@@ -108,9 +108,9 @@ def serve(
             if heard is not state:  # what was to be said is not any more
                 state, spoken = heard, pilot.speak(plan, heard, simulation.t_us)
         _end_if_over(simulation, state, stop, t_us)
-        if simulation.step % _PROGRESS_STEPS == 0:
+        if simulation.step % PROGRESS_STEPS == 0:
             now_s = time.perf_counter()
-            if now_s - reported_s >= _PROGRESS_S:
+            if now_s - reported_s >= PROGRESS_S:
                 reported_s = now_s
                 speed = simulation.time_s / (now_s - begin_s)
                 progress(simulation.time_s, simulation.min_margin_m, speed)
@@ -125,7 +125,13 @@ def _end_if_over(simulation: Simulation, state: PilotState, stop: StopRequest, t
         simulation.end(EndKind.REFUSED, state.refusal)
     elif state.done:
         simulation.end(EndKind.MISSION, f"landed and disarmed after {simulation.time_s:.1f} s")
-    elif stop.requested:
+    else:
+        end_if_over(simulation, stop)
+
+
+def end_if_over(simulation: Simulation, stop: StopRequest) -> None:
+    """End the run if it was interrupted."""
+    if stop.requested:
         endless = math.isinf(simulation.scenario.duration_s)  # and has no other end than this
         by = ": ended by you" if endless else ""
         simulation.end(EndKind.INTERRUPTED, f"interrupted at step {simulation.step}{by}")

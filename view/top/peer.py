@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+import time
 from functools import cache
 from typing import Any, Final
 
-from fsw.link.udp_endpoint import Address, OpenEndpoint
+from fsw.link.endpoints import open_endpoint
 from messages import dialect
-from messages.frames import Frame, FrameWriter, split, wire_fields
+from messages.addresses import LinkAddress
+from messages.frames import Frame, FrameWriter, Losses, wire_fields
 
 _SYSTEM, _COMPONENT = 253, 191  # of no ground station in use
 _HEARTBEAT: Final = 0
@@ -24,10 +26,10 @@ Value = float | int | str | tuple[float, ...]
 class TelemetryPeer:
     """Asks a vehicle to be told, once a second, and takes what comes."""
 
-    def __init__(self, vehicle: Address) -> None:
-        """Open a socket with a port of its own."""
-        self._vehicle = vehicle
-        self._endpoint = OpenEndpoint(vehicle)
+    def __init__(self, vehicle: LinkAddress) -> None:
+        """Open a link of its own."""
+        self._endpoint, self._vehicle = open_endpoint(vehicle, lambda: time.monotonic_ns() // 1000)
+        self._losses = Losses()
         self._writer = FrameWriter(_SYSTEM, _COMPONENT)
         self._last_beat: float | None = None
 
@@ -44,7 +46,7 @@ class TelemetryPeer:
                 break
             datagram, sender = came
             if sender == self._vehicle:
-                found += split(datagram)
+                found += [frame for frame, _ in self._endpoint.cut(datagram, self._losses)]
         return found
 
     def close(self) -> None:

@@ -1,4 +1,8 @@
-"""Message schedule of one link, and its changes by SET_MESSAGE_INTERVAL."""
+"""Message schedule of one link, and its changes by SET_MESSAGE_INTERVAL.
+
+On a line that is too slow for what is wanted all intervals are stretched alike, but those of what
+is vital.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from fsw.link.telemetry.streams import Stream
+from messages.frames import whole_size
 
 SLOT_US: Final = 10_000  # what is due within one slot leaves together, in one datagram
 OFF: Final = -1  # MESSAGE_INTERVAL: not sent
 UNKNOWN: Final = 0  # MESSAGE_INTERVAL: not available
+_RENEWED: Final = 0.2  # of a size by each frame
+_NOTICED: Final = 0.02  # change of the share
+_LEAST_SHARE: Final = 0.1  # of a line
 _MOST_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
 
 
@@ -20,24 +28,42 @@ class _Timetable:
 
     stream: Stream
     default_us: int
-    interval_us: int
+    wanted_us: int
     due_us: int
+    size: float  # bytes of a frame: all of its fields, and then as measured
+    interval_us: int = OFF  # in force
 
 
 class StreamRates:
     """The timetable of one link, in sensor time: the same in real time and in lockstep."""
 
-    def __init__(self, streams: Sequence[Stream], rates_hz: Sequence[float], tick_us: int) -> None:
-        """Lay out the defaults, at most one message a tick; a rate of 0 is sent on request only."""
+    def __init__(
+        self,
+        streams: Sequence[Stream],
+        rates_hz: Sequence[float],
+        tick_us: int,
+        *,
+        most_bytes_s: float | None = None,
+    ) -> None:
+        """Lay out the defaults, at most one message a tick; a rate of 0 is sent on request only.
+
+        All of them together send no more than ``most_bytes_s`` [bytes/s] on average.
+        """
         self._tick_us = tick_us
+        self._most_bytes_s = most_bytes_s
         self._begun = False
         self._rows = []
         for place, (stream, rate_hz) in enumerate(zip(streams, rates_hz, strict=True)):
             interval = round(1e6 / rate_hz) if rate_hz > 0.0 else OFF
             # Spread over the slots, so that slow messages do not all leave at once.
             phase = place * SLOT_US % interval if interval != OFF else 0
-            self._rows.append(_Timetable(stream, interval, interval, phase))
+            size = whole_size(stream.message_id)
+            self._rows.append(_Timetable(stream, interval, interval, phase, size))
+        self._by_stream = {row.stream: row for row in self._rows}
         self._lay_out()
+        for row in self._rows:
+            # The first ones do not all leave in the first second either.
+            row.due_us = row.due_us if row.stream.vital else round(row.due_us / self.share)
 
     def due(self, t_us: int) -> Iterator[Stream]:
         """Streams to be sent now; a pause is not caught up on."""
@@ -51,6 +77,16 @@ class StreamRates:
                 if row.due_us <= t_us:
                     row.due_us = t_us + row.interval_us
                 yield row.stream
+
+    def note_size(self, stream: Stream, size: int) -> None:
+        """How large [bytes] a frame of a stream is: the zeros at its end are not sent."""
+        row = self._by_stream[stream]
+        row.size += _RENEWED * (size - row.size)
+
+    def fit(self) -> None:
+        """Take the sizes of late frames for the next ones; call it once a second."""
+        if abs(self._share() - self.share) > _NOTICED:
+            self._lay_out()
 
     def interval_us(self, message_id: int) -> int:
         """The interval in force, OFF, or UNKNOWN for a message that does not exist."""
@@ -66,20 +102,35 @@ class StreamRates:
             return f"message {message_id} is not one that this vehicle sends"
         if interval_us < OFF or 0 < interval_us < self._tick_us:
             return f"interval {interval_us} us is shorter than a tick, {self._tick_us} us"
-        before = [row.interval_us for row in rows]
+        before = [row.wanted_us for row in rows]
         for row in rows:
-            row.interval_us = interval_us or row.default_us
-            row.due_us = t_us + max(row.interval_us, 0)
-        per_second = sum(1e6 / row.interval_us for row in self._rows if row.interval_us != OFF)
+            row.wanted_us = interval_us or row.default_us
+            row.due_us = t_us + max(row.wanted_us, 0)
+        per_second = sum(1e6 / row.wanted_us for row in self._rows if row.wanted_us != OFF)
         if per_second > _MOST_PER_SECOND:
-            for row, interval in zip(rows, before, strict=True):
-                row.interval_us = interval
+            for row, wanted in zip(rows, before, strict=True):
+                row.wanted_us = wanted
             return f"more than {_MOST_PER_SECOND} messages a second on one link"
         self._begun = True
         self._lay_out()
         return ""
 
     def _lay_out(self) -> None:
+        self.share = self._share()  # of the wanted rates, of all that is not vital
+        for row in self._rows:
+            stretched = row.wanted_us != OFF and not row.stream.vital
+            row.interval_us = round(row.wanted_us / self.share) if stretched else row.wanted_us
         self._sent = [row for row in self._rows if row.interval_us != OFF]
         fast = any(row.interval_us < SLOT_US for row in self._sent)
         self.slot_us = self._tick_us if fast else SLOT_US  # how often to ask for what is due
+
+    def _share(self) -> float:
+        if self._most_bytes_s is None:
+            return 1.0
+        wanted = {True: 0.0, False: 0.0}  # bytes/s, of what is vital and of the rest
+        for row in self._rows:
+            if row.wanted_us != OFF:
+                wanted[row.stream.vital] += 1e6 * row.size / row.wanted_us
+        # What is vital is little; a line that has no room even for that has some for the rest.
+        left = max(self._most_bytes_s - wanted[True], _LEAST_SHARE * self._most_bytes_s)
+        return min(left / wanted[False], 1.0) if wanted[False] > 0.0 else 1.0

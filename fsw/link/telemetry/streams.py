@@ -38,6 +38,23 @@ class Stream:
     component: int
     encode: Encoder
 
+    @property
+    def vital(self) -> bool:
+        """Whether it says what the vehicle is and does: it is sent even where a line is full."""
+        return self.message_id in _VITAL
+
+
+# First on a line that is too slow for all.
+_VITAL: Final = frozenset(
+    (
+        message_ids.HEARTBEAT,
+        message_ids.SYS_STATUS,
+        message_ids.EXTENDED_SYS_STATE,
+        message_ids.CURRENT_MODE,
+        message_ids.BATTERY_STATUS,
+        message_ids.MISSION_CURRENT,
+    )
+)
 
 HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, 1, AUTOPILOT, encode_standard.heartbeat)
 _CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, AUTOPILOT, encode_identity.current_mode)

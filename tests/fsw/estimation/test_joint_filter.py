@@ -152,3 +152,39 @@ def test_a_reading_again_and_one_older_than_the_state_are_named() -> None:
     now = TICK * 1000
     assert SensorFault(read(arm.x, LAW, now, (0.0, 0.0), TICK)) is SensorFault.REPEATED
     assert all(np.isfinite(np.ravel(arm.x.joints)))
+
+
+@pytest.mark.requirement("REQ-ACT-4")
+@pytest.mark.parametrize("falls", [150.0, 400.0])
+def test_a_joint_that_falls_as_no_torque_makes_it_is_followed_and_is_no_jump(falls: float) -> None:
+    """Encoders were blamed for a limp joint, and joints are not judged without encoders."""
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    begin(x, LAW, 0.0, (0.0, 0.0))
+    q, w, worst = 0.0, 0.0, 0.0
+    for k in range(1, 650):
+        now = TICK * k
+        a = falls if now > 1.0 and w < 8.0 else 0.0
+        q, w = q + TICK * (w + 0.5 * TICK * a), w + TICK * a
+        push(x, LAW, now, TICK, (0.0, 0.0))
+        seen = round(q / STEP) * STEP
+        assert read(x, LAW, now, (seen, -0.5 * seen), 0.0) == SensorFault.NONE
+        (first, _), _ = present_joints(x, now)
+        worst = max(worst, abs(first - q))
+    assert worst < 0.12
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("sigma", [0.01, 0.03])
+def test_noise_of_an_encoder_is_no_motion_and_it_is_known_how_large_it_is(sigma: float) -> None:
+    """The rates that noise made threw an arm into a wall."""
+    noise = np.random.default_rng(7)
+
+    def noisy(t: float, said: Vec2) -> Vec2:
+        return (said[0] + float(noise.normal(0.0, sigma)), said[1]) if t > 0.5 else said
+
+    arm = Arm(spoil=noisy)
+    assert SensorFault.JUMP not in arm.faults
+    assert arm.off < 3.0
+    scale = float(arm.x.encoder_scale)
+    assert 0.2 * sigma < math.sqrt(scale) * TUNING.encoder_noise < 3.0 * sigma
+    assert Arm().x.encoder_scale == 1.0

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fsw.estimation.sensor_fault import Sensor, SensorFault
@@ -121,3 +122,21 @@ def test_what_lasts_of_a_sensors_error_is_reported_and_no_reason_to_come_down() 
     assert report.level_accuracy > math.sqrt(stated[0] + stated[1])
     assert report.vertical_accuracy > math.sqrt(stated[2])
     assert 0.0 < state.aiding.position_sigma < 0.8
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("noise", [0.0, 0.006])
+def test_poses_that_scatter_more_than_they_state_are_told(noise: float) -> None:
+    state, random, told = FlightState(), np.random.default_rng(2), []
+    for now, samples in run(MOCAP, 1, 2.5):
+        spoilt = []
+        for one in samples:
+            if isinstance(one, PoseSample) and now > 6.5:
+                x, y, z = one.position
+                off = noise * random.standard_normal(3)
+                one = replace(one, position=(x + off[0], y + off[1], z + off[2]))
+            spoilt.append(one)
+        state, outputs = tick(state, round(1e6 * now), samples=tuple(spoilt))
+        told += [one.text for one in outputs.texts]
+    assert ("pose is noisier than stated" in told) is (noise > 0.0)
+    assert told.count("pose is noisier than stated") <= 1

@@ -1,0 +1,151 @@
+"""``pandion px4``: what PX4 needs to fly the simulated vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from command_line.options import option, read
+from command_line.output import complain, unwritten
+from command_line.parser import COULD_NOT_START, unknown_name
+from command_line.values import one_of, place
+from messages.addresses import LinkError, parse_link_address
+from sitl.arguments import rate
+from sitl.earth import DEFAULT_ORIGIN, Place
+from sitl.scenario_file import PERFECT, SUITE_NAMES, ScenarioError, load_scenario, suite_of
+
+DONE: Final = 0  # exit codes
+FAILED: Final = 1
+NOISY: Final = "mocap"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Plant:
+    """The plant that PX4 is to fly."""
+
+    scenario: str = option("SCENARIO", "name or path of a .toml file", default="ground")
+    sensors: str | None = option(
+        "--sensors SUITE",
+        "sensors of the vehicle (default the scenario's, mocap where they have no noise)",
+        one_of("suite", *(name for name in SUITE_NAMES if name != PERFECT)),
+    )
+    rate_hz: int = option("--rate HZ", "steps a second, 250 or 500", rate, default=250)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Params(_Plant):
+    out: Path | None = option("--out FILE", "write a .params file as well", Path)
+    vehicle: str | None = option(
+        "--vehicle ADDRESS",
+        "set them in the PX4 at udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD, and the origin",
+    )
+    origin: Place = option(
+        "--origin LAT,LON,ALT",
+        "origin of the local frame, in degrees and metres above sea level",
+        lambda text: Place(*place(text)),
+        default=DEFAULT_ORIGIN,
+        text=lambda origin: ",".join(map(repr, origin)),
+    )
+
+
+def main(argv: list[str]) -> int:
+    """Do one thing; returns the exit code."""
+    if not argv or argv[0] in ("-h", "--help"):
+        print(_help())
+        return DONE
+    action = ACTIONS.get(argv[0])
+    if action is None:
+        complain("pandion px4", f"{unknown_name('action', argv[0], ACTIONS)}")
+        return COULD_NOT_START
+    kind, act, what = action
+    options = read(kind, f"pandion px4 {argv[0]}", what, argv[1:])
+    try:
+        return act(options)
+    except (ScenarioError, LinkError) as error:
+        complain("pandion px4", error)
+        return COULD_NOT_START
+
+
+def parameters(options: _Plant) -> dict[str, int | float]:
+    """What PX4 needs for this plant, by name.
+
+    Raises:
+        ScenarioError: There is no such scenario, or it cannot be flown.
+    """
+    from sitl.px4_parameters import px4_parameters
+    from sitl.sensors.keys import MeasuredSensors
+    from sitl.start import flown_vehicle
+
+    scenario = load_scenario(options.scenario, options.sensors)
+    if suite_of(scenario) == PERFECT:
+        scenario = load_scenario(options.scenario, NOISY)
+    assert isinstance(scenario.sensors, MeasuredSensors)
+    return px4_parameters(flown_vehicle(scenario), scenario.sensors, options.rate_hz)
+
+
+def _print_parameters(options: _Params) -> int:
+    from fsw.parameters.float32 import as_text
+
+    values = parameters(options)
+    for name, value in values.items():
+        print(f"param set {name} {as_text(value)}")
+    if options.out is not None:
+        from fsw.parameters.storage import as_params
+
+        text = as_params(values).replace("Stack: Pandion", "Stack: PX4 Pro")
+        for problem in unwritten(options.out, text):
+            complain("pandion px4", f"cannot write {problem}")
+            return FAILED
+    return DONE if options.vehicle is None else _set_all(options, values)
+
+
+def _set_all(options: _Params, values: dict[str, int | float]) -> int:
+    from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
+
+    assert options.vehicle is not None
+    refused = 0
+    with ParameterClient(parse_link_address(options.vehicle)) as vehicle:
+        try:
+            for name, value in values.items():
+                try:
+                    vehicle.write(name, value)
+                except ParameterRefused as error:
+                    refused += 1
+                    complain("pandion px4", f"{name}: {error}")
+            vehicle.set_origin(options.origin)
+        except NoAnswer as error:
+            complain("pandion px4", error)
+            return FAILED
+    print(f"{len(values) - refused} of {len(values)} set; restart PX4: some count from then on")
+    return FAILED if refused else DONE
+
+
+def _print_environment(options: _Plant) -> int:
+    from fsw.parameters.float32 import as_text
+    from sitl.px4_parameters import AIRFRAME, MODEL
+
+    print(f"PX4_SYS_AUTOSTART={AIRFRAME}\nPX4_SIM_MODEL={MODEL}")
+    for name, value in parameters(options).items():
+        print(f"PX4_PARAM_{name}={as_text(value)}")
+    return DONE
+
+
+ACTIONS: Final[dict[str, tuple[type[Any], Callable[[Any], int], str]]] = {
+    "params": (
+        _Params,
+        _print_parameters,
+        "print the parameters PX4 needs; write or set them",
+    ),
+    "env": (_Plant, _print_environment, "print the environment of PX4's own start command"),
+}
+
+
+def _help() -> str:
+    rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
+    return "\n".join(
+        ("usage: pandion px4 ACTION [SCENARIO] [options]", "")
+        + ("What PX4 needs to fly the simulated vehicle.", "", "actions:", *rows, "")
+        + ("`pandion px4 ACTION --help` prints the options of an action.",)
+    )

@@ -1,0 +1,127 @@
+"""What PX4 must be told about the simulated vehicle and its sensors; names and units are PX4's.
+
+The only place that turns constants of the vehicle into PX4's parameters. The values that are not
+read off the vehicle were measured with PX4 v1.17 (a70a558393) in SITL, flying the paper's vehicle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from sitl.plant.parameters import Vehicle
+from sitl.sensors.keys import MeasuredSensors
+
+_MOTOR, _ACTUATOR_SET = 101, 301  # output functions: Motor 1, Offboard Actuator Set 1
+_RATE_BANDWIDTH: Final = 17.0  # rad/s, of roll and pitch rates: MC_ROLLRATE_P of 0.7
+_NO_MAGNETOMETER: Final = 5  # EKF2_MAG_TYPE
+_VISION: Final = 3  # EKF2_HGT_REF
+_POSE: Final = 11  # EKF2_EV_CTRL: horizontal and vertical position, yaw; no velocity is measured
+_ACC_NOISE: Final = (0.35, 1.0)  # m/s², PX4's default and most
+AIRFRAME: Final = 10016  # SYS_AUTOSTART: a quadrotor at an external simulator
+MODEL: Final = "none_iris"
+
+
+def px4_parameters(
+    vehicle: Vehicle, sensors: MeasuredSensors, rate_hz: int
+) -> dict[str, int | float]:
+    """Every parameter that PX4 needs, whole numbers where PX4 has them.
+
+    The exchange with the plant has ``rate_hz`` [Hz].
+    """
+    return {
+        **_geometry(vehicle),
+        **_outputs(vehicle),
+        **_control(vehicle),
+        **_estimation(sensors),
+        **_inertial_unit(sensors, rate_hz),
+    }
+
+
+def _geometry(vehicle: Vehicle) -> dict[str, int | float]:
+    """Rotors 1 rear, 2 left, 3 front, 4 right; a positive KM turns the body to the right."""
+    rotors = vehicle.rotors
+    places = ((-rotors.arm, 0.0), (0.0, -rotors.arm), (rotors.arm, 0.0), (0.0, rotors.arm))
+    found: dict[str, int | float] = {"CA_AIRFRAME": 0, "CA_ROTOR_COUNT": len(places)}
+    for k, (x, y) in enumerate(places):
+        turns = rotors.yaw_ratio if k % 2 == 0 else -rotors.yaw_ratio
+        found |= {
+            f"CA_ROTOR{k}_PX": x,
+            f"CA_ROTOR{k}_PY": y,
+            f"CA_ROTOR{k}_PZ": 0.0,
+            f"CA_ROTOR{k}_KM": turns,
+        }
+    return found
+
+
+def _outputs(vehicle: Vehicle) -> dict[str, int | float]:
+    """Motors first, then the joints' servos, which MAV_CMD_DO_SET_ACTUATOR moves."""
+    functions = [_MOTOR + k for k in range(4)]
+    functions += [_ACTUATOR_SET + k for k in range(len(vehicle.links))]
+    return {f"PWM_MAIN_FUNC{k}": function for k, function in enumerate(functions, start=1)}
+
+
+def _control(vehicle: Vehicle) -> dict[str, int | float]:
+    """Hover thrust, and gains that carry over to other sizes.
+
+    A roll of 1 changes the thrust of two rotors by 0.707 of the full one, so the rate loop has the
+    bandwidth 0.707 · 2 · arm · thrust / inertia times its gain; its derivative cancels the rotors'
+    lag. With PX4's own gains the same vehicle follows as well, with larger errors.
+    """
+    rotors = vehicle.rotors
+    lever = math.sqrt(2.0) * rotors.arm * rotors.thrust_max
+    found: dict[str, int | float] = {
+        "MPC_THR_HOVER": round(vehicle.mass * vehicle.gravity / (4.0 * rotors.thrust_max), 3),
+        "MPC_XY_P": 1.8,
+        "MPC_XY_VEL_P_ACC": 4.0,
+        "MPC_XY_VEL_I_ACC": 1.0,
+        "MPC_Z_P": 1.5,
+    }
+    for axis, inertia in zip(("ROLL", "PITCH"), vehicle.base_inertia[:2], strict=True):
+        gain = round(_RATE_BANDWIDTH * inertia / lever, 3)
+        found |= {
+            f"MC_{axis}_P": 7.0,
+            f"MC_{axis}RATE_P": gain,
+            f"MC_{axis}RATE_D": round(gain * rotors.lag, 4),
+        }
+    return found
+
+
+def _estimation(sensors: MeasuredSensors) -> dict[str, int | float]:
+    """What there is to fuse, and how late poses are, which their stamps do not say to PX4."""
+    pose = sensors.motion_capture or sensors.visual_odometry
+    found: dict[str, int | float] = {
+        "SYS_HAS_MAG": int(sensors.magnetometer is not None),
+        "SYS_HAS_BARO": int(sensors.barometer is not None),
+        "SYS_HAS_GPS": int(sensors.gnss is not None),
+    }
+    if sensors.magnetometer is None:
+        found["EKF2_MAG_TYPE"] = _NO_MAGNETOMETER
+    if sensors.gnss is None:
+        found["EKF2_GPS_CTRL"] = 0
+    else:
+        found["EKF2_GPS_DELAY"] = sensors.gnss.latency_ms
+    if pose is not None:
+        found |= {
+            "EKF2_EV_CTRL": _POSE,
+            "EKF2_EV_DELAY": pose.latency_ms,
+            # The least that PX4 takes: poses count with the variances that they state. With its
+            # default of 0.1 m the same hover is twice as unsteady.
+            "EKF2_EVP_NOISE": 0.01,
+            "EKF2_HGT_REF": _VISION,
+        }
+    return found
+
+
+def _inertial_unit(sensors: MeasuredSensors, rate_hz: int) -> dict[str, int | float]:
+    """The noise of a sample is the vibration that is left of it where several are averaged.
+
+    Without the two rates PX4 answers every second step at 500 Hz.
+    """
+    imu = sensors.imu
+    noise = imu.vibration_m_s2 * math.sqrt(min(rate_hz / imu.rate_hz, 1.0))
+    least, most = _ACC_NOISE
+    found: dict[str, int | float] = {"EKF2_ACC_NOISE": round(min(max(noise, least), most), 2)}
+    if rate_hz > 250:
+        found |= {"IMU_GYRO_RATEMAX": 2000, "IMU_INTEG_RATE": rate_hz}
+    return found
