@@ -68,7 +68,7 @@ class SensedState:
     def warm_up(self) -> None:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
-        self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate), estimate)
+        self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate))
 
     def covariance(self, memory: FusionMemory | None) -> Array | None:
         """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""
@@ -91,8 +91,8 @@ class SensedState:
         now = 1e-6 * inputs.sensors.t_us
         before = _memory(state, now)
         pushed, model = (0.0, 0.0), UNKNOWN
-        if state.estimate is not None:
-            pushed, model = self._cascade.expected(state.cascade, state.estimate)
+        if state.cascade.has_estimate:
+            pushed, model = self._cascade.expected(state.cascade)
             # On the ground thrust does not explain how the vehicle moves.
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
@@ -107,7 +107,7 @@ class SensedState:
         if came:
             memory = memory._replace(imu_came=came)
         caught = None
-        if estimate is None and state.estimate is None:
+        if estimate is None and not state.cascade.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
             estimate = caught.estimate
         if estimate is None:
@@ -131,7 +131,11 @@ class SensedState:
             memory, found = self._fusion.catch_up(
                 memory, one.samples, now, estimate, aloft=aloft, damaged=_is_damaged(state)
             )
-            state = replace(state, fusion=memory, estimate=found or estimate or state.estimate)
+            state, known = replace(state, fusion=memory), found or estimate
+            if known is not None:
+                r = state.cascade.copy()
+                r.known = known
+                state = replace(state, cascade=r)
         return state, inputs
 
     def catch_up(
