@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Final
+from typing import Any, Final
 
 from fsw.record import (
     JOINTS,
@@ -216,47 +216,24 @@ class Tick(Record):
     @known.setter
     def known(self, x: StateEstimate) -> None:
         self.has_estimate = 1
-        _ESTIMATE.pack_into(
-            self.memory,
-            0,
-            x.t_us,
-            *x.p_WB,
-            *x.v_WB,
-            *x.R_WB,
-            *x.w_WB_B,
-            x.yaw,
-            *x.q_arm,
-            *x.qd_arm,
-            x.specific_force,
-        )
+        t_us, p, v, R, w, yaw, q, qd, force = x
+        _ESTIMATE.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *q, *qd, force)
 
     @property
     def nominal(self) -> PredictionState | None:
         """The plan's state; None: there is none."""
         if not self.has_plan:
             return None
-        n = _PLAN.unpack_from(self.memory, _PLAN_AT)
-        p, v, a = (n[0], n[1], n[2]), (n[3], n[4], n[5]), (n[6], n[7], n[8])
-        j, s, q, qd = (n[9], n[10]), (n[11], n[12]), (n[15], n[16]), (n[17], n[18])
+        n: Any = _PLAN.unpack_from(self.memory, _PLAN_AT)
+        p, v, a, j, s, q, qd = n[:3], n[3:6], n[6:9], n[9:11], n[11:13], n[15:17], n[17:]
         return PredictionState(p, v, a, j, s, n[13], n[14], q, qd)
 
     @nominal.setter
     def nominal(self, x: PredictionState | None) -> None:
         self.has_plan = int(x is not None)
         if x is not None:
-            _PLAN.pack_into(
-                self.memory,
-                _PLAN_AT,
-                *x.p,
-                *x.v,
-                *x.a,
-                *x.j,
-                *x.s,
-                x.yaw,
-                x.yaw_rate,
-                *x.q_arm,
-                *x.qd_arm,
-            )
+            p, v, a, j, s, yaw, rate, q, qd = x
+            _PLAN.pack_into(self.memory, _PLAN_AT, *p, *v, *a, *j, *s, yaw, rate, *q, *qd)
 
     @property
     def input(self) -> PlanInput:
@@ -275,10 +252,9 @@ class Tick(Record):
 
 def estimate_in(record: Record, at: int) -> StateEstimate:
     """The ``Estimate`` ``at`` [byte] of a record."""
-    t_us, *x = _ESTIMATE.unpack_from(record.memory, at)
-    R = (x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14])
-    p, v, w = (x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[15], x[16], x[17])
-    return StateEstimate(t_us, p, v, R, w, x[18], (x[19], x[20]), (x[21], x[22]), x[23])
+    x: Any = _ESTIMATE.unpack_from(record.memory, at)
+    p, v, R, w = x[1:4], x[4:7], x[7:16], x[16:19]
+    return StateEstimate(x[0], p, v, R, w, x[19], x[20:22], x[22:24], x[24])
 
 
 NO_ROTOR: Final = -1

@@ -47,17 +47,9 @@ def read_frame(sensors: SensorFrame, r: Tick) -> int:
 
 def reading_of(sensors: SensorFrame) -> Floats:
     """The numbers of a frame (READINGS,) [SI]."""
-    return np.frombuffer(
-        _FRAME.pack(
-            *sensors.p_WB,
-            *sensors.v_WB,
-            *sensors.q_WB,
-            *sensors.gyro_B,
-            *sensors.accel_B,
-            *sensors.q_arm,
-            *sensors.qd_arm,
-        )
-    )
+    s = sensors
+    parts = *s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *s.q_arm, *s.qd_arm
+    return np.frombuffer(_FRAME.pack(*parts))
 
 
 @kernel
