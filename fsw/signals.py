@@ -974,13 +974,7 @@ class TickOutputs:
         None  # whether the requested one is in use; None: none was requested
     )
 
-    _made: list[FlightSnapshot] = field(default_factory=list, init=False, compare=False)
-
     @property
     def snapshot(self) -> FlightSnapshot:
         """The vehicle as telemetry shows it."""
-        if isinstance(self.shown, FlightSnapshot):
-            return self.shown
-        if not self._made:
-            self._made.append(self.shown())
-        return self._made[0]
+        return self.shown if isinstance(self.shown, FlightSnapshot) else self.shown()

@@ -222,6 +222,22 @@ class Simulation:
             self._reading = self._exact_sensors.measure(exact)
         return self._reading
 
+    @property
+    def tells_its_state(self) -> bool:
+        """Whether sensors say the exact state of every step, and nothing fails."""
+        return self._suite is None and self._exact_sensors.exact and self.faults.none
+
+    def exact_state(self, out: Array) -> None:
+        """Write the numbers of :meth:`sense` where sensors tell the exact state.
+
+        ``out`` (16 + 2j,) [SI]: position, velocity, attitude, rate, specific force, joints and
+        their rates.
+        """
+        state, felt = self._state, self._felt
+        out[:THRUST] = state[:THRUST]
+        out[THRUST], out[THRUST + 1], out[THRUST + 2] = felt
+        out[THRUST + 3 :] = state[ARM:]
+
     def measurements(self) -> tuple[Measurement, ...] | None:
         """What arrives from the sensors in this step; None with the suite ``perfect``.
 

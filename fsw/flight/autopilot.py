@@ -133,7 +133,7 @@ class Autopilot:
         reallocates = bool(config.limits.failed_rotor_mode)
         self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
         self._watches = bool(config.limits.watches_actuators)
-        self._calm = CalmTick(
+        self.calm = CalmTick(
             config, self._cascade, self._plans.model, self._damage, self._watch, self.zones_now
         )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
@@ -180,7 +180,7 @@ class Autopilot:
 
     def control(self, state: FlightState, inputs: TickInputs) -> Controlled:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
-        calm = self._calm.fly(state, inputs)
+        calm = self.calm.fly(state, inputs)
         if calm is not None:
             answer = Answer(calm.commanded, True, state.vehicle.mode)
             return Controlled(answer, inputs, state, calm, calm=True)
@@ -245,7 +245,7 @@ class Autopilot:
         c = controlled
         answer, inputs, state, r, estimate, fusion, flown = c[:7]
         if c.calm:
-            state = self._calm.after(state, r, inputs.sensors.t_us)
+            state = self.calm.after(state, r)
             return state, TickOutputs(answer.actuators, answer.mode, Shown(state, inputs.sensors))
         plan, texts, safety = c.plan, answer.texts, state.safety
         flags = r.flags if flown else 0

@@ -80,22 +80,32 @@ class CalmTick:
         """The record after a calm tick; None: the tick is to be flown whole."""
         frame = inputs.sensors
         now_us = frame.t_us
-        if state.fusion is not None or now_us != state.t_us + self._tick_us:
+        next_one = state.fusion is None and now_us == state.t_us + self._tick_us
+        if not (next_one and self.ticks(state) and inputs.has_only_sensors):
             return None
+        return self.step(state.cascade, reading_of(frame), now_us)
+
+    def ticks(self, state: FlightState) -> int:
+        """How many ticks after a state may be calm, if nothing but sensors comes."""
         if state is not self._state:
             self._look_at(state)
-        if now_us > self._until_us or not inputs.has_only_sensors:
-            return None
-        before = state.cascade
+        return max((self._until_us - state.t_us) // self._tick_us, 0)
+
+    def step(self, before: Tick, reading: Floats, now_us: int) -> Tick | None:
+        """The record after a tick that may be calm, with a ``reading`` (READINGS,) [SI].
+
+        None: it is not. Of the state that was looked at last, or a calm tick after it.
+        """
         r = before.copy()
-        if not self._sense(self._model, r.array, reading_of(frame), now_us, self._watch.upright):
+        if not self._sense(self._model, r.array, reading, now_us, self._watch.upright):
             return None
         self._cascade.step(r, 1, self._zones, HEALTHY, self._tube)
         return None if r.flags or self._damage.finds(before, r) else r
 
-    def after(self, state: FlightState, r: Tick, now_us: int) -> FlightState:
-        """The state after a calm tick, with the record that it has left: as calm as before."""
-        self._state = replace(state, index=state.index + 1, t_us=now_us, cascade=r)
+    def after(self, state: FlightState, r: Tick, ticks: int = 1) -> FlightState:
+        """The state after calm ``ticks``, with the record that they have left: calm as before."""
+        t_us = state.t_us + ticks * self._tick_us
+        self._state = replace(state, index=state.index + ticks, t_us=t_us, cascade=r)
         return self._state
 
     def _look_at(self, state: FlightState) -> None:
@@ -133,7 +143,8 @@ def _is_calm(state: FlightState, config: FlightConfig) -> bool:
     vehicle, plan, r = state.vehicle, state.plan, state.cascade
     estimate = r.known
     return (
-        vehicle.mode is Mode.TRAJECTORY
+        state.fusion is None
+        and vehicle.mode is Mode.TRAJECTORY
         and vehicle.flies
         and not vehicle.restarts
         and vehicle.unloaded is None

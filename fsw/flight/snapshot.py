@@ -5,20 +5,26 @@ from __future__ import annotations
 from fsw.flight.failsafe import FAULTS
 from fsw.flight.modes.offboard import report
 from fsw.flight.state import FlightState
-from fsw.frozen import dataclass
 from fsw.signals import FlightSnapshot, Mode, SensorFrame
 
 
-@dataclass(frozen=True, slots=True)
 class Shown:
-    """What ``snapshot_of`` makes a snapshot of, when it is asked for."""
+    """The snapshot of a state and the frame of the tick that left it, made when it is asked for."""
 
-    state: FlightState
-    sensors: SensorFrame
+    def __init__(self, state: FlightState, sensors: SensorFrame) -> None:
+        self._of = state, sensors
+        self._snapshot: FlightSnapshot | None = None
 
     def __call__(self) -> FlightSnapshot:
-        """The snapshot."""
-        return snapshot_of(self.state, self.sensors)
+        """The snapshot; the same one each time."""
+        if self._snapshot is None:
+            self._snapshot = snapshot_of(*self._of)
+        return self._snapshot
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Shown) and self._of == other._of
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:

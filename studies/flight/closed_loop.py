@@ -12,7 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+import numpy as np
+
+from fsw.estimation.estimator import READINGS
 from fsw.flight.autopilot import Autopilot
+from fsw.flight.calm_tick import CalmTick
 from fsw.flight.state import FlightState
 from fsw.measurements import Sample, Vec2, Vec4
 from fsw.model.airframe import Airframe
@@ -146,6 +150,38 @@ class ClosedLoop(Generic[State]):
         return Controls(thrust, (t1 / torque, t2 / torque), armed)
 
 
+class CalmStretch:
+    """Flies the calm ticks of a loop without the inputs and outputs of each, which nobody reads.
+
+    For studies of exact states: see ``fsw.flight.calm_tick``.
+    """
+
+    def __init__(self, loop: ClosedLoop[FlightState], calm: CalmTick, *, allowed: bool) -> None:
+        """Fly none unless it is ``allowed``."""
+        self._loop, self._calm = loop, calm
+        self._allowed = allowed and loop.simulation.tells_its_state
+        self._reading = np.empty(READINGS)
+
+    def fly(self) -> bool:
+        """Go on as far as nothing happens, often not at all; whether the run is not over then."""
+        loop, calm, reading = self._loop, self._calm, self._reading
+        simulation, before = loop.simulation, loop.state
+        r, flown = before.cascade, 0
+        allowed = self._allowed and simulation.t_us == before.t_us + STEP_US
+        for _ in range(calm.ticks(before) if allowed else 0):
+            simulation.exact_state(reading)
+            after = calm.step(r, reading, simulation.t_us)
+            if after is None:
+                break
+            r, flown = after, flown + 1
+            simulation.advance(loop.controls(r.commanded, armed=True))
+            if simulation.ended is not None:
+                break
+        if flown:
+            loop.state = calm.after(before, r, flown)
+        return simulation.ended is None
+
+
 class RefusedError(RuntimeError):
     """The flight software denied a command of the study's pilot."""
 
@@ -194,9 +230,11 @@ def simulate(
     planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
     autopilot = Autopilot(config)
     loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
+    # A trace is of every so many ticks, and a fault of a sensor may be in each.
+    stretch = CalmStretch(loop, autopilot.calm, allowed=fault is None and not traced)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     faulty, mode = FaultySensors(fault, seed), Mode.TRAJECTORY
-    while simulation.ended is None:
+    while stretch.fly():
         step = simulation.step
         sensors, samples = loop.observe()
         if fault is not None:

@@ -19,9 +19,10 @@ from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import Mode, SensorFrame, TickInputs, TickOutputs
 from sitl.disturbances.items import Uniform
+from sitl.faults.keys import Fault
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
-from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
+from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner, simulate
 
 in_long = partial(pytest.param, marks=pytest.mark.long)
 
@@ -35,7 +36,7 @@ class Flight:
             scenario = with_fields(scenario, disturbances=(Uniform(push, 0.1),))
         config = flight_config(body=scenario.body)
         self.autopilot, self.plain = Autopilot(config), Autopilot(config)
-        self.plain._calm.fly = lambda *_: None  # type: ignore[method-assign]
+        self.plain.calm.fly = lambda *_: None  # type: ignore[method-assign]
         self.planner = InlinePlanner(Planner(config.planner, config.airframe, lambda: 0.0))
         self.loop = ClosedLoop(
             Simulation(scenario, 7), self.tick, FlightState(), self.planner, config.airframe
@@ -91,6 +92,28 @@ def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
     assert flight.calm >= least_calm * flight.loop.simulation.step
 
 
+@pytest.mark.parametrize(("name", "push"), [("walls", 0.0), in_long("workspace", 3.0)])
+def test_a_study_flies_the_same_flight_without_inputs_and_outputs(name: str, push: float) -> None:
+    scenario = with_fields(load_scenario(name), duration_s=3.0)
+    if push > 0.0:
+        scenario = with_fields(scenario, disturbances=(Uniform(push, 0.1),))
+    config = flight_config(body=scenario.body)
+    # Traced flights have inputs and outputs in every tick.
+    plain, ours = (simulate(scenario, 7, config, traced=traced) for traced in (True, False))
+    assert ours.truth == plain.truth
+    assert ours.planner.texts == plain.planner.texts
+    assert ours.planner.metrics.as_json() == plain.planner.metrics.as_json()
+
+
+def test_where_sensors_fail_a_study_has_inputs_in_every_tick() -> None:
+    scenario, fault = load_scenario("walls-calm"), Fault("motor", "weak", start_s=1.0)
+    assert Simulation(scenario, 0).tells_its_state
+    assert not Simulation(with_fields(scenario, faults=(fault,)), 0).tells_its_state
+    injected = Simulation(scenario, 0)
+    injected.inject(fault)
+    assert not injected.tells_its_state
+
+
 @pytest.fixture(scope="module")
 def calm() -> tuple[Flight, FlightState, SensorFrame]:
     """A flight, a state of it that is calm, and the next frame; nothing changes them."""
@@ -131,7 +154,7 @@ def test_no_tick_is_calm_while_something_goes_on(
 ) -> None:
     flight, state, frame = calm
     assert flight.autopilot.control(state, TickInputs(frame)).calm
-    assert flight.autopilot._calm.fly(CHANGES[what](state), TickInputs(frame)) is None
+    assert flight.autopilot.calm.fly(CHANGES[what](state), TickInputs(frame)) is None
 
 
 FRAMES: dict[str, Callable[[SensorFrame], SensorFrame]] = {
