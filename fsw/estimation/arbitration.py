@@ -51,6 +51,10 @@ _SEEN: Final = (0.5, 1.0)
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
+_PARTS: Final = {
+    Sensor.POSE: (Source.POSE, Source.ATTITUDE),
+    Sensor.GNSS: (Source.GNSS, Source.GNSS),
+}
 _ROUNDING: Final = 1e-9  # s
 
 Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
@@ -119,7 +123,7 @@ class Arbitration:
         ratios = tuple(evidence[0]["ratio"].tolist())
         verdict = verdict._replace(evidence=evidence, seen=tuple(seen))
         if before.is_on or before.wrong or max(ratios) > 1.0:
-            held = Source.POSE in self._aided(memory, now)
+            held = Source.ATTITUDE in self._aided(memory, now)
             verdict = redundancy.judged(
                 verdict,
                 ratios,
@@ -151,14 +155,15 @@ class Arbitration:
         return True, time, sample.field, NO_TURN, self._tuning.mag_noise, 0.0
 
     def _aided(self, memory: FusionMemory, now: float) -> Source:
-        """Who measures places that are used at ``now`` [s], and is not named."""
-        found = NOBODY
-        for sensor, source in ((Sensor.POSE, Source.POSE), (Sensor.GNSS, Source.GNSS)):
+        """Who measures places, and attitudes, that are used at ``now`` [s], and is not named."""
+        found, wrong = NOBODY, memory.verdict.wrong
+        for sensor, parts in _PARTS.items():
             health = memory.of(sensor)
-            used = now - min(health.fused, default=-math.inf) <= _USED
-            if used and now - health.came <= self._tuning.stale_time:
-                found |= source
-        return found & ~memory.verdict.wrong
+            fused = zip(parts, health.fused, strict=False)
+            used = min([at for part, at in fused if not part & wrong], default=-math.inf)
+            if now - used <= _USED and now - health.came <= self._tuning.stale_time:
+                found |= parts[0] | parts[1]
+        return found & ~wrong
 
     def _convicted(
         self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
@@ -174,9 +179,8 @@ class Arbitration:
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
-            if self._aided(memory, now):  # else nothing would find the bias, and all would be lost
-                verdict = _widened(x.view(np.recarray)[0], verdict)
-                memory = memory._replace(verdict=verdict)
+            verdict = _widened(x.view(np.recarray)[0], verdict, bool(self._aided(memory, now)))
+            memory = memory._replace(verdict=verdict)
         # What the rotors explain, nobody else was wrong about.
         acquits = verdict.explained and not before.explained and any(before.unknown)
         if not (new or believes or acquits):
@@ -201,8 +205,7 @@ class Arbitration:
         for name in ("out", "suspect"):
             numbers[name] = x[name]
         numbers["believed"] = believed
-        verdict = memory.verdict._replace(evidence=None)
-        back = back._replace(numbers=numbers, verdict=verdict)
+        back = back._replace(numbers=numbers, verdict=memory.verdict)
         for trail in trails:
             for tick in trail.inputs():
                 back, state = self._again(back, tick)
@@ -287,11 +290,11 @@ def _stuck(memory: FusionMemory) -> Source:
     return found
 
 
-def _widened(x: Any, verdict: Verdict) -> Verdict:
+def _widened(x: Any, verdict: Verdict, aided: bool) -> Verdict:
     """The ``verdict`` with a filter ``x`` that takes the biases of suspects for unknown.
 
     By as much as residuals with them show, and so what that has led to. A bias that may walk alone
-    takes too long to be found.
+    takes too long to be found; where the filter is not ``aided``, nothing would find it.
     """
     assert verdict.evidence is not None
     M, unknown, k = x["covariance"], list(verdict.unknown), np.arange(3)
@@ -302,7 +305,7 @@ def _widened(x: Any, verdict: Verdict) -> Verdict:
         size = min(seen / _SEEN[half], _MOST[half])
         x["model_walk"][half] = min(x["model_walk"][half], size)
         grown = size**2 - unknown[half] ** 2
-        if grown > 0.0:
+        if aided and grown > 0.0:
             if not unknown[half]:
                 _doubt(x, half)
             unknown[half] = size

@@ -145,7 +145,7 @@ def fuse_pose(
     """Fuse a pose stamped ``time`` [s]: chi-square over gate of its two halves.
 
     ``position`` [m, NED], ``attitude`` [1], ``position_variance`` [m^2, NED] and
-    ``attitude_variance`` [rad^2, FRD].
+    ``attitude_variance`` [rad^2, FRD]. An attitude of infinite variance says nothing: infinite.
     """
     delayed = 1.0 if law.pose_delay_sigma > 0.0 else 0.0
     for i in range(V, V + 3):
@@ -156,6 +156,10 @@ def fuse_pose(
     dt = time - x.pose_delay - x.time
     position_rows(x, position, position_variance, dt, delayed)
     first = _judged(x, 3, gates.pose, 0, POSE)
+    if not attitude_variance[0] < math.inf:
+        for i in range(3):
+            x.innovation[1, i] = 0.0
+        return first, math.inf
     dt = time - x.pose_delay - x.time
     attitude_rows(x, attitude, attitude_variance, dt, delayed)
     return first, _judged(x, 3, gates.pose, 1, POSE + 1)

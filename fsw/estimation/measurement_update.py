@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -22,6 +23,7 @@ from fsw.signals import Vec3, Vec4
 
 _STEADY: Final = 0.5  # s without a refused reading, until a magnetometer is believed again
 _REST: Vec3 = (0.0, 0.0, 0.0)
+_UNKNOWN: Vec3 = (math.inf, math.inf, math.inf)
 
 
 class MeasurementUpdate:
@@ -48,13 +50,15 @@ class MeasurementUpdate:
 
     def fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
         """The same of a pose: position, attitude."""
+        place, about = self.noise(memory, sample)
         return kernels.fuse_pose(
             memory.numbers,
             self._law,
             sample.time,
             sample.position,
             normalised(sample.attitude),
-            *self.noise(memory, sample),
+            place,
+            about if sample.turns else _UNKNOWN,
         )
 
     def measured_at(self, memory: FusionMemory, sample: Aiding) -> float:
@@ -78,7 +82,7 @@ class MeasurementUpdate:
             about_place, about = self.noise(memory, sample)
             if ratio[0] > 1.0:
                 place = kernels.set_place(x, law, one.time, sample.position, about_place)
-            if ratio[1] > 1.0:
+            if 1.0 < ratio[1] < math.inf:
                 before = attitude(x[0])
                 after = normalised(sample.attitude)
                 kernels.set_attitude(x, law, after, about)

@@ -2,9 +2,10 @@ r"""Who is wrong: each sensor is predicted from the others and from the rotors' 
 
 How the vehicle turns is said by the gyro (G), by what measures attitudes (the pose P, or the
 magnetometer B) and by the rotors' model (M). How it accelerates is said by the accelerometer (A),
-by what measures places (P, or satellites N), and by the model. Of each two of them there is a
-residual: what they differ by, over windows of 0.1 to 3 s. Of a culprit X all residuals with X are
-large and all others are not, so
+by what measures places (P, or satellites N), and by the model. The attitude of a pose (Q) may be
+wrong where its place is not; not the other way round. Of each two of them there is a residual: what
+they differ by, over windows of 0.1 to 3 s. Of a culprit X all residuals with X are large and all
+others are not, so
 
 .. math:: J(X) = \sum_{k \not\ni X} \min(r_k / t_k, 5)^2, \quad
           t_k = \text{the largest that is nominal},
@@ -48,6 +49,7 @@ class Source(IntFlag):
     POSE = 8
     GNSS = 16
     COMPASS = 32
+    ATTITUDE = 64  # of a pose; of a ``POSE`` that is wrong it is too
 
 
 _NAMES: Final = {
@@ -57,6 +59,7 @@ _NAMES: Final = {
     Source.POSE: "pose",
     Source.GNSS: "GNSS",
     Source.COMPASS: "magnetometer",
+    Source.ATTITUDE: "attitude of the pose",
 }
 
 
@@ -66,12 +69,13 @@ def names(sources: Source) -> str:
 
 
 NOBODY: Final = Source(0)
-G, A, M, P, N, B = Source
+G, A, M, P, N, B, Q = Source
 # Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
 # into the world is the gyro's and the magnetometer's as well: see ``_sources``.
 # The last two are of one alone: a bias that is larger than a sensor of its kind has.
 GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB, AA, GG = range(13)
-OF: Final = (G | M, G | P, G | B, A | M, A | P, M | P, M | P, A | N, M | N, N, M | B, A, G)
+_PQ: Final = P | Q
+OF: Final = (G | M, G | _PQ, G | B, A | M, A | P, M | _PQ, M | P, A | N, M | N, N, M | B, A, G)
 COUNT: Final = len(OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
@@ -120,6 +124,8 @@ _NOISE: Final = 20.0  # deviations of a place that is extrapolated
 _LEAD: Final = 1.0
 _DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
 _MOST: Final = 25.0  # of one residual
+_OF_PLACES: Final = (AP, MP_FORCE)
+_TILTED: Final = 1.5  # m/s^2, that a pose shows whose attitude is off by 0.15 rad
 # What is off shows at once in the first, while the trial is this young [s], and in others later.
 _SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
 _SHOWS: Final = 1.5
@@ -719,8 +725,8 @@ def judged(
     ``damaged`` vehicle it is known that the rotors' model is off.
     """
     of = _sources(holds_attitude, verdict.wrong)
-    # Where a pose holds the attitude, a bias that is found with it is as much the pose's.
-    known = range(AA if holds_attitude else COUNT)
+    # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's.
+    known = range(AA if holds_attitude or verdict.wrong & Q else COUNT)
     used = [k for k in known if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)
@@ -728,14 +734,8 @@ def judged(
         if verdict.is_on and now - verdict.fired > _QUIET:
             return verdict.acquitted()
         return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
-    cost = {}
-    for one in Source:
-        if one & (verdict.wrong | lost) or not any(of[k] & one and ratios[k] > 0.0 for k in used):
-            continue
-        cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in used if not of[k] & one)
-        cost[one] -= _DISTURBED if one is B else 0.0
-        if not verdict.is_on or now - verdict.since < _SHOWS:
-            cost[one] += _not_shown(one, ratios, sizes, used)
+    young = not verdict.is_on or now - verdict.since < _SHOWS
+    cost = _costs(ratios, sizes, of, used, verdict.wrong | lost, young)
     first, *others = sorted(cost, key=cost.__getitem__)
     lead = cost[others[0]] - cost[first] if others else math.inf
     suspects = NOBODY
@@ -759,12 +759,41 @@ def judged(
         sum=total,
         named=named,
     )
-    if not named or named is M:
-        return verdict
+    return verdict if not named or named is M else _convicted(verdict, named)
+
+
+def _convicted(verdict: Verdict, named: Source) -> Verdict:
     agreed = list(verdict.agreed)
     agreed[list(Source).index(named)] = math.inf
     convicted = verdict._replace(wrong=verdict.wrong | named, agreed=tuple(agreed))
     return convicted.acquitted()._replace(named=named)
+
+
+def _costs(
+    ratios: tuple[float, ...],
+    sizes: tuple[float, ...],
+    of: tuple[Source, ...],
+    used: list[int],
+    gone: Source,
+    young: bool,
+) -> dict[Source, float]:
+    """What each hypothesis costs, of a trial that is ``young`` or not."""
+    cost = {}
+    for one in Source:
+        if one & gone or not any(of[k] & one and ratios[k] > 0.0 for k in used):
+            continue
+        left = [k for k in used if not of[k] & one]
+        if one is Q:
+            # The filter has turned what is felt by it for as long as it agreed.
+            left = [k for k in left if k not in _OF_PLACES or sizes[k] > _TILTED]
+        cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in left)
+        cost[one] -= _DISTURBED if one is B else 0.0
+        cost[one] += _not_shown(one, ratios, sizes, used) if young else 0.0
+    if not any(ratios[k] > 1.0 for k in used if of[k] & Q):
+        cost.pop(Q, None)
+    if P in cost and cost.get(Q, math.inf) - cost[P] < _LEAD:
+        del cost[P]  # nothing contradicts its place
+    return cost
 
 
 def _not_shown(

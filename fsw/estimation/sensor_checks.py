@@ -172,6 +172,11 @@ def _is_stuck(sample: Aiding, numbers: tuple[float, ...], repeats: tuple[int, ..
     return needed is not None and len(of_axis) >= needed
 
 
+def is_attitude_stuck(health: Health) -> bool:
+    """Whether of the last pose the attitude repeats itself, and the place does not."""
+    return health.sensor is Sensor.POSE and not any(health.repeats[:3])
+
+
 def numbers_of(sample: Aiding) -> tuple[float, ...]:
     """All that a sample measures, without its variance."""
     match sample:

@@ -25,6 +25,7 @@ from fsw.estimation.error_state import (
     ERRORS,
     FILTER,
     FRAME,
+    TH,
     Array,
     Filter,
 )
@@ -56,14 +57,17 @@ from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
 from fsw.estimation.sensor_checks import (
     SENSOR_OF,
     Aiding,
+    Health,
     arrived,
+    is_attitude_stuck,
 )
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
-from fsw.frozen import made
+from fsw.frozen import made, replace
 from fsw.geometry.quaternion import conjugate, multiply
-from fsw.geometry.vectors import norm
+from fsw.geometry.rotation import matrix_from_quaternion, rotate_back
+from fsw.geometry.vectors import add_scaled, norm
 from fsw.measurements import (
     GnssSample,
     ImuSample,
@@ -85,9 +89,12 @@ _LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
 # wrong by as much before it is found out.
 _SMALL_STEP: Final = 0.05  # m
 _SMALL_TURN: Final = 0.1  # rad
+# A frame that has been moved is level to so much, and the filter to so many deviations.
+_LEVEL: Final = 0.05  # rad
+_SIGMAS: Final = 3.0
 _JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
 _SOURCES: Final = {
-    PoseSample: Source.POSE,
+    PoseSample: Source.POSE | Source.ATTITUDE,
     GnssSample: Source.GNSS,
     MagneticSample: Source.COMPASS,
 }
@@ -323,6 +330,9 @@ class SensorFusion:
             self.tuning,
             lambda: bool(x["same"][0].min() >= STUCK_READINGS),
         )
+        half = fault is SensorFault.STUCK and is_attitude_stuck(health)
+        if half:
+            fault = SensorFault.NONE
         time = self._update.measured_at(memory, sample)
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
@@ -332,21 +342,15 @@ class SensorFusion:
         delay = memory.delay
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
             delay = self._delay(delay, now - time, now - before.came)
-        others = memory.without(health.sensor)
+        others, used = memory.without(health.sensor), None
         if not fault:
             memory = memory.hearing(sample)
-            source = _SOURCES.get(type(sample), NOBODY)
-            if memory.verdict.wrong & source:
-                fault = SensorFault.DISAGREES
-                health = health.with_fault(fault, now)
-            # A heading that may be wrong is not needed, and turns what else is measured.
-            elif memory.verdict.suspects & source & Source.COMPASS:
-                return memory._replace(health=(*others, health), delay=delay)
-        if fault:
+            health, used = _as_judged(memory.verdict, sample, health, now, half)
+        if used is None:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
                 memory = memory._replace(without_fix=sample)
             return memory._replace(health=(*others, health), delay=delay)
-        waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample))
+        waiting = (*memory.waiting, Waiting(time, memory.arrivals, used))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
         known = (waiting, (*others, health), memory.arrivals + 1, delay)
@@ -429,13 +433,15 @@ class SensorFusion:
         """
         sample = one.sample
         health = memory.of(SENSOR_OF[type(sample)])
-        refused = 1.0 < max(ratio) < math.inf  # infinite: it says nothing here
+        # What is infinite says nothing here.
+        refused = any(1.0 < r < math.inf for r in ratio)
         if refused and isinstance(sample, PressureSample) and not health.fused:
             # The weather is not known until the first reading.
             refused, ratio = False, (1.0,)
             self._update.take_pressure(memory, one.time, sample)
         runs, run = memory.runs, None
-        long_refused = bool(health.fused) and now - min(health.fused) > self.tuning.reset_time
+        used = [at for at, r in zip(health.fused, ratio, strict=False) if r < math.inf]
+        long_refused = bool(used) and now - min(used) > self.tuning.reset_time
         if refused:
             run = self._run(memory, sample, innovation)
             runs = (*[other for other in runs if other.kind is not run.kind], run)
@@ -450,17 +456,21 @@ class SensorFusion:
         shown = innovation if len(ratio) > 1 else innovation[:1]
         health = health.with_fused(fused, ratio, shown)
         counter, memory = memory.reset_counter, memory.after(one, health, runs)
-        believed = run is not None and run.is_believable(
-            self.tuning.reset_time, announced=announced
+        believed = (
+            run is not None
+            and run.is_believable(self.tuning.reset_time, announced=announced)
+            and not _tilts(memory, sample, innovation, now)
         )
         if announced and run is not None and not believed:
             memory = memory._replace(reset_counter=counter)
-        if believed and max(ratio) > 1.0:
+        if believed and any(1.0 < r < math.inf for r in ratio):
             memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
                 kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
-            memory = memory.noting(health._replace(fused=(now,) * len(ratio)))
+            taken = zip(fused, ratio, strict=True)
+            fused = tuple([now if r < math.inf else before for before, r in taken])
+            memory = memory.noting(health._replace(fused=fused))
         elif previous is not None and not refused:
             memory = memory.jumped(*_jump(previous, memory.numbers[0]))
         return memory
@@ -529,6 +539,44 @@ def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
         return False
     x, y, z, a, b, c = innovation
     return norm((x, y, z)) < _SMALL_STEP and norm((a, b, c)) < _SMALL_TURN
+
+
+def _as_judged(
+    verdict: Verdict, sample: Aiding, health: Health, now: float, half: bool
+) -> tuple[Health, Aiding | None]:
+    """A sensor's health at ``now`` [s], and what is used of its ``sample`` (None: nothing).
+
+    Of a pose that is wrong by ``half``, or whose attitude is named, the place is.
+    """
+    source = _SOURCES.get(type(sample), NOBODY)
+    wrong = verdict.wrong & source
+    if wrong:
+        health = health.with_fault(SensorFault.DISAGREES, now)
+    # A heading that may be wrong is not needed, and turns what else is measured.
+    if wrong & ~Source.ATTITUDE or verdict.suspects & source & Source.COMPASS:
+        return health, None
+    if isinstance(sample, PoseSample) and (wrong or half):
+        sample = replace(sample, turns=False)
+    return health, sample
+
+
+def _tilts(memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...], now: float) -> bool:
+    """Whether a pose has jumped in a way that no frame does: down stays where it is.
+
+    In flight the filter knows where, but for what a gyro may have turned it by that others
+    contradict at ``now`` [s].
+    """
+    x, evidence = memory.numbers[0], memory.verdict.evidence
+    if not isinstance(sample, PoseSample) or evidence is None or evidence[0]["began"] < 0.0:
+        return False
+    used = max(memory.of(Sensor.POSE).fused[1], evidence[0]["began"])
+    room = (now - used) * redundancy.size_of(evidence, Source.GYRO)
+    rx, ry, rz = innovation[3:]
+    down = rotate_back(matrix_from_quaternion(attitude(x)), (0.0, 0.0, 1.0))
+    along = rx * down[0] + ry * down[1] + rz * down[2]
+    known = math.sqrt(max(x["covariance"].diagonal()[TH : TH + 3].tolist()))
+    tilt = norm(add_scaled((rx, ry, rz), down, -along))
+    return bool(tilt > _LEVEL + _SIGMAS * known + room)
 
 
 def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:

@@ -14,7 +14,7 @@ from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
-from fsw.estimation.redundancy import Source, names
+from fsw.estimation.redundancy import NOBODY, Source, names
 from fsw.estimation.sensor_checks import Health
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.estimation.sensor_fusion import UNKNOWN, SensorFusion
@@ -42,6 +42,7 @@ _IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES)
 _SET_BACK = 0.1  # s; a clock that goes back by more has been set to another time
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
 _LATELY = 0.02  # s, in which a fault is one of now
+_HALF = 0.5  # s for which of poses that are used no attitude is
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
 
@@ -326,8 +327,14 @@ def _aiding(
     before, now, verdict = state.aiding, memory.now, memory.verdict
     lost = _lost(memory, before.lost, report.t_us)
     aid = memory.of(Sensor.POSE)
+    half_pose = bool(aid.fused) and aid.fused[0] - aid.fused[1] > _HALF
     if aid.came < 0.0:
         aid = memory.of(Sensor.GNSS)
+    disputed, suspects = 0.0, NOBODY
+    if verdict.contradicts:
+        disputed, suspects = now - verdict.since, verdict.suspects
+    elif half_pose:  # who is wrong about its attitude may soon be so about its place
+        disputed, suspects = now - aid.fused[1], Source.POSE
     pose, V = report.pose_covariance, report.velocity_covariance
     return Aiding(
         unaided_us=max(round(1e6 * _overdue(memory, now)), 0) if report.unaided_us > 0 else 0,
@@ -340,8 +347,9 @@ def _aiding(
         lost=lost,
         gyro_lost=bool(verdict.wrong & Source.GYRO)
         or any(one.sensor is _IMU and one.fault is SensorFault.STALE for one in lost),
-        disputed_us=max(round(1e6 * (now - verdict.since)), 1) if verdict.contradicts else 0,
-        suspects=names(verdict.suspects),
+        half_pose=half_pose,
+        disputed_us=max(round(1e6 * disputed), 1) if suspects else 0,
+        suspects=names(suspects),
     )
 
 

@@ -233,6 +233,7 @@ class Aiding(NamedTuple):
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use
     gyro_lost: bool = False  # rotors' torques stand in
+    half_pose: bool = False  # poses are used without their attitudes
     disputed_us: int = 0  # since sensors began to contradict each other; 0: they do not
     suspects: str = ""  # of which one is wrong then
 
@@ -242,7 +243,7 @@ class Aiding(NamedTuple):
         Else the rotors' model stands in, and the attitude gets worse with time.
         """
         by_pose = self.pose is Sensor.POSE and self.unaided_us < unaided_us
-        return by_pose or not self.has_lost(Sensor.IMU)
+        return (by_pose and not self.half_pose) or not self.has_lost(Sensor.IMU)
 
     def has_lost(self, sensor: Sensor) -> bool:
         """Whether a sensor that every tick needs is of no use."""

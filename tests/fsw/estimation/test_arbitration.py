@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ import pytest
 from fsw.estimation.error_state import BG, IMU_CAPACITY, LOST, NO_RATE
 from fsw.estimation.fusion_memory import FusionMemory, at_start
 from fsw.estimation.redundancy import NOBODY, Source
+from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.sensor_fusion import SensorFusion
 from fsw.estimation.tuning import EstimatorTuning
 from fsw.geometry.quaternion import turned
@@ -33,12 +34,16 @@ def hovering(
     poses: bool = True,
     garbage: bool = False,
     damaged: bool = False,
+    turned_by: Callable[[float], Vec3] | None = None,
+    moved_by: float = 0.0,
 ) -> Iterator[FusionMemory]:
     """The memories of 5 s.
 
     In the last second the gyro says that the vehicle ``turns`` [rad/s] about its vertical, and
     encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second, or
-    ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``.
+    ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``. Poses may
+    be ``turned_by`` an angle [rad, FRD] at each time [s] of that second, and ``moved_by`` so much
+    [m].
     """
     memory, random = at_start(), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -56,7 +61,11 @@ def hovering(
         if tick % 5 == 0 and (good or garbage):
             scatter = 1e-3 if good else 20.0
             place = scatter * d, scatter * e, -1.5 + scatter * f
-            samples.insert(0, PoseSample(now, place, turned(LEVEL, *shakes), FINE, FINE))
+            attitude = turned(LEVEL, *shakes)
+            if wrong and turned_by is not None:
+                attitude = turned(attitude, *turned_by(t - WRONG_FROM))
+                place = place[0] + moved_by, *place[1:]
+            samples.insert(0, PoseSample(now, place, attitude, FINE, FINE))
         memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
         memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged)
         yield memory
@@ -161,3 +170,64 @@ def test_what_was_named_in_flight_is_believed_again_after_five_seconds_on_the_gr
         assert now - began < 5.1
     assert now - began > 4.9
     assert memory.numbers[0]["out"] == 0
+
+
+def last(memories: Iterator[FusionMemory]) -> FusionMemory:
+    *_, memory = memories
+    return memory
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("rate", [(0.8, 0.0, 0.0), (0.0, -2.0, 0.0), (0.0, 0.0, 1.5)])
+def test_of_a_pose_whose_attitude_is_wrong_the_place_is_used(rate: Vec3) -> None:
+    """A frame that tilted was left for dead reckoning, at a tilt of 3 deg, and hit the ground."""
+    memory = last(hovering(turned_by=lambda t: (t * rate[0], t * rate[1], t * rate[2])))
+    assert memory.verdict.wrong == Source.ATTITUDE
+    health = memory.of(Sensor.POSE)
+    assert memory.now - health.fused[0] < 0.1
+    assert memory.now - health.fused[1] > 0.5
+    assert health.fault is SensorFault.DISAGREES
+    x, y = memory.numbers[0]["q"][1:3].tolist()
+    assert 2.0 * math.hypot(x, y) < 0.02
+    assert math.dist(memory.numbers[0]["p"], (0.0, 0.0, -1.5)) < 0.02
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_of_a_pose_whose_attitude_repeats_itself_the_place_is_used() -> None:
+    memory, random, said = at_start(), np.random.default_rng(5), LEVEL
+    for tick in range(round(2.0 / TICK)):
+        now = 1.0 + TICK * tick
+        a, b, c = (1e-3 * random.standard_normal(3)).tolist()
+        samples: list[Sample] = [
+            JointSample(now, (1e-5 * (tick % 2), 0.0)),
+            ImuSample(now, (0.0, 0.0, -9.81 + a), (a, b, c)),
+        ]
+        if tick % 5 == 0:
+            said = turned(LEVEL, a, b, c) if now < 2.0 else said
+            samples.insert(0, PoseSample(now, (a, b, c - 1.5), said, FINE, FINE))
+        memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
+        memory, _ = FUSION.catch_up(memory, samples, now, found)
+    health = memory.of(Sensor.POSE)
+    assert memory.now - health.fused[0] < 0.1
+    assert memory.now - health.fused[1] > 0.5
+    assert health.fault is SensorFault.STUCK
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("turn", "is_believed"),
+    [((0.15, 0.0, 0.0), False), ((0.0, -0.2, 0.0), False), ((0.0, 0.0, 0.2), True)],
+)
+def test_a_frame_may_jump_by_a_heading_and_never_by_a_tilt(turn: Vec3, is_believed: bool) -> None:
+    """Down stays where it is: a jump of 22 deg was believed, and flown into the ground."""
+    memory = last(hovering(turned_by=lambda _: turn, moved_by=0.5))
+    assert bool(memory.reset.number) is is_believed
+    assert (memory.now - memory.of(Sensor.POSE).fused[0] < 0.1) is is_believed
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_suspect_is_no_better_witness_of_a_tilt_than_its_residuals_say() -> None:
+    """Nothing finds the bias of a gyro without poses: by what it may be off, down is unknown."""
+    memory = last(hovering(turned_by=lambda t: (0.15, 0.0, 0.05 * t), moved_by=0.5))
+    assert memory.verdict.is_on or memory.verdict.wrong
+    assert not memory.reset.number

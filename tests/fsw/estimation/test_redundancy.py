@@ -191,8 +191,8 @@ def test_a_frame_that_turns_is_suspected_and_the_accelerometer_is_not(
     """Degrees a second: nothing but the gyro says otherwise, so both stay suspects."""
     turning = along(direction, math.radians(size))
     verdicts = flown(Wrong(turning=turning), "pose", 5.0, seed)
-    assert suspected(verdicts) & Source.POSE
-    assert not named(verdicts) & ~(Source.POSE | Source.GYRO)
+    assert suspected(verdicts) & Source.ATTITUDE
+    assert not named(verdicts) & ~(Source.ATTITUDE | Source.GYRO)
 
 
 @pytest.mark.requirement("REQ-EST-13")
@@ -206,7 +206,7 @@ def test_a_slow_turn_stays_undecided_for_long_and_is_over_when_it_ends() -> None
     verdicts = flown(Wrong(turning=(0.0, 0.0, math.radians(1.0))), "pose", 6.0)
     last = verdicts[-1]
     assert last.contradicts
-    assert last.suspects == Source.POSE | Source.GYRO
+    assert last.suspects == Source.ATTITUDE | Source.GYRO
     now = EVERY * len(verdicts)
     assert now - last.since > UNDECIDED
 
@@ -267,6 +267,9 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
         verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
         assert not verdict.suspects
     assert verdict.wrong == source
+    found_with = Verdict(wrong=Source.ATTITUDE)
+    found_with = judged(found_with, tuple(ratios), 1.0, holds_attitude=False)
+    assert not found_with.is_on, "it was found with an attitude that is wrong"
     x: Any = np.zeros(1, FILTER)
     evidence = np.zeros(1, EVIDENCE)
     x["witness"][0, 0] = 1.0
@@ -279,6 +282,22 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     for look_ in range(60, 90):
         look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
     assert not evidence[0]["ratio"].any(), "nothing is known of them"
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(("gains", "source"), [(1.0, Source.ATTITUDE), (4.0, Source.POSE)])
+def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a_tilt_explains(
+    gains: float, source: Source
+) -> None:
+    ratios, sizes = [0.0] * redundancy.COUNT, [0.0] * redundancy.COUNT
+    for k in (redundancy.GP, redundancy.MP_TURN, redundancy.AP, redundancy.MP_FORCE):
+        ratios[k] = 3.0
+    sizes[redundancy.AP] = sizes[redundancy.MP_FORCE] = gains
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
+    assert verdict.wrong == source
+    ratios[redundancy.GP] = ratios[redundancy.MP_TURN] = 0.0
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
+    assert verdict.wrong == Source.POSE, "its attitude agrees"
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
