@@ -34,7 +34,7 @@ else:
 
         def made(definition):
             kind = dataclasses.dataclass(slots=slots, unsafe_hash=True)(definition)
-            names = [field.name for field in dataclasses.fields(kind) if field.init]
+            names = [field.name for field in dataclasses.fields(kind)]
             # Where a value checks itself, and for one field, of which attrgetter makes no tuple,
             # the library's replace does.
             if len(names) > 1 and not hasattr(kind, "__post_init__"):

@@ -14,19 +14,15 @@ from fsw.estimation.error_state import (
     BA,
     BARO,
     BG,
-    COLUMNS,
     DELAY,
     ERRORS,
     FIELD,
     FRAME,
     IMU_CAPACITY,
     LOST,
-    PUSHES,
     RATE,
-    ROWS,
     TH,
     TIME,
-    WITNESS,
     Array,
     Filter,
     P,
@@ -50,7 +46,7 @@ from fsw.tick_record import Estimate
 
 Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
 # What ``tick`` does, in this order.
-COPY, PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16, 32
+PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
 # What came of it.
 FAULT, FINITE = 1, 2
 
@@ -96,9 +92,8 @@ PRESENT_AT = Asked.place("present")
 
 @kernel
 def tick(
-    old: Filter,
+    filters: Filter,
     law: Law,
-    new: Filter,
     requests: NDArray[Any],
     parts: int,
     now: float,
@@ -106,14 +101,12 @@ def tick(
 ) -> int:
     """Do some ``parts`` [1] of a tick as asked by one of ``requests`` (1,) [SI]; what came of it.
 
-    ``COPY`` the filter, so that a tick leaves its inputs as they were; ``PUSH``: note what torques
-    made of the joints; take in encoders; take in a reading of the IMU; ``ADVANCE`` ``until`` [s];
-    and at the ``END`` predict the present ``now`` [s] from there, which may be no number.
+    ``PUSH``: note what torques made of the joints; take in encoders; take in a reading of the IMU;
+    ``ADVANCE`` ``until`` [s]; and at the ``END`` predict the present ``now`` [s] from there, which
+    may be no number.
     """
-    x, t, a = new[0], law[0].tuning, requests[0]
+    x, t, a = filters[0], law[0].tuning, requests[0]
     model = a.model[0], a.model[1], a.model[2], a.model[3]
-    if parts & COPY:
-        _copy(old[0], x)
     if parts & PUSH:
         joint_filter.push(x, t, now, a.dt, (a.u[0], a.u[1]))
     a.of_imu, a.of_encoders = 0, 0
@@ -152,76 +145,6 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
         known.q_arm[i], known.qd_arm[i] = angles[i], rates[i]
     known.yaw, known.specific_force = yaw_of(R), -force[2]
     return finite and varies(x), R
-
-
-@compilable
-def _copy(a: Any, b: Any) -> None:
-    b.time, b.baro_bias, b.pose_delay = a.time, a.baro_bias, a.pose_delay
-    b.first, b.end, b.lost = a.first, a.end, a.lost
-    for i in range(3):
-        b.p[i], b.v[i] = a.p[i], a.v[i]
-        b.accel_bias[i], b.gyro_bias[i] = a.accel_bias[i], a.gyro_bias[i]
-        b.rate[i], b.acceleration[i] = a.rate[i], a.acceleration[i]
-    for i in range(4):
-        b.q[i] = a.q[i]
-    for i in range(6):
-        b.kept_bias[i], b.kept_variance[i] = a.kept_bias[i], a.kept_variance[i]
-    for i in range(ERRORS):
-        for j in range(ERRORS):
-            b.covariance[i, j] = a.covariance[i, j]
-    _copy_frame(a, b)
-    for k in range(a.first - 1, a.end):
-        for i in range(COLUMNS):
-            b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
-    for i in range(6):
-        b.newest[i], b.same[i] = a.newest[i], a.same[i]
-    _copy_halves(a, b)
-    _copy_joints(a, b)
-
-
-@compilable
-def _copy_halves(a: Any, b: Any) -> None:
-    for i in range(2):
-        b.steady[i] = a.steady[i]
-        b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
-        b.model_walk[i] = a.model_walk[i]
-    b.out, b.suspect, b.believed = a.out, a.suspect, a.believed
-    for i in range(WITNESS):
-        b.witness[i] = a.witness[i]
-    for i in range(9):
-        b.baseline[i] = a.baseline[i]
-    for i in range(4):
-        b.noise_scale[i] = a.noise_scale[i]
-        for j in range(ROWS):
-            b.innovated_last[i, j] = a.innovated_last[i, j]
-
-
-@compilable
-def _copy_joints(a: Any, b: Any) -> None:
-    b.joint_time, b.pushed, b.pushes_end = a.joint_time, a.pushed, a.pushes_end
-    b.encoder_steady, b.encoder_calm = a.encoder_steady, a.encoder_calm
-    b.encoder_doubted, b.encoder_leapt = a.encoder_doubted, a.encoder_leapt
-    for i in range(3):
-        b.encoders[i] = a.encoders[i]
-        for j in range(3):
-            b.joint_variance[i, j] = a.joint_variance[i, j]
-    for i in range(2):
-        b.encoder_zero[i], b.encoder_leap[i] = a.encoder_zero[i], a.encoder_leap[i]
-        for j in range(3):
-            b.joints[i, j] = a.joints[i, j]
-    for k in range(max(a.pushed - 1, 0), a.pushes_end):
-        for i in range(3):
-            b.pushes[k % PUSHES, i] = a.pushes[k % PUSHES, i]
-
-
-@compilable
-def _copy_frame(a: Any, b: Any) -> None:
-    b.drifts, b.compass = a.drifts, a.compass
-    for i in range(ERRORS):
-        for j in range(FRAME):
-            b.shared[i, j] = a.shared[i, j]
-        for j in range(FIELD):
-            b.with_offset[i, j] = a.with_offset[i, j]
 
 
 @kernel

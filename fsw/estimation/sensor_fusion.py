@@ -23,7 +23,6 @@ from fsw.estimation.confirmation import Confirmation, Run
 from fsw.estimation.error_state import (
     DELAY,
     ERRORS,
-    FILTER,
     FRAME,
     TH,
     Array,
@@ -37,12 +36,12 @@ from fsw.estimation.fusion_memory import (
     Trail,
     Waiting,
     at_start,
+    copied,
 )
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.estimation.kernels import (
     ADVANCE,
-    COPY,
     END,
     FAULT,
     FINITE,
@@ -98,7 +97,6 @@ _SOURCES: Final = {
     GnssSample: Source.GNSS,
     MagneticSample: Source.COMPASS,
 }
-_FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
@@ -118,7 +116,7 @@ class SensorFusion:
         self._arbitration = Arbitration(tuning, self._stated, self._update, self._again)
         self._asked, x = Asked(), at_start().numbers  # written anew in each call
         self._requests = self._asked.array
-        self._tick = machine_code(kernels.tick, x, self.law, x, self._requests, 0, 0.0, 0.0)
+        self._tick = machine_code(kernels.tick, x, self.law, self._requests, 0, 0.0, 0.0)
 
     def warm_up(self) -> StateEstimate:
         """Compile every kernel: stand for a while with every sensor, then take jumps."""
@@ -176,20 +174,20 @@ class SensorFusion:
         reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
-        x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
+        x = copied(memory.numbers)
         asked = self._asked
         asked.begin(now, dt, joint_acceleration, model)
         memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
         if silent:
             # In place of a reading what the model makes of the last one; it is no fault.
             if parts & READING:
-                memory, parts = self._done(memory, x, parts, now)
+                memory, parts = self._done(memory, x, parts, now), 0
             asked.read(now, _LOST, _LOST)
             parts |= READING
         ready = memory.started and joints_came >= 0.0
         if ready:
             parts |= END
-        found = self._tick(memory.numbers, self.law, x, self._requests, parts, now, 0.0)
+        found = self._tick(x, self.law, self._requests, parts, now, 0.0)
         if found & FAULT:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         # By position, because it is done in every tick: what every tick renews, and the rest.
@@ -211,7 +209,7 @@ class SensorFusion:
         Also the parts that are asked for by then, and when each sensor came last [s]. Of a second
         reading of a sensor the first is done at once.
         """
-        asked, parts = self._asked, COPY | PUSH
+        asked, parts = self._asked, PUSH
         imu_came, joints_came = memory.imu_came, memory.joints_came
         for sample in samples:
             if isinstance(sample, ImuSample):
@@ -219,7 +217,7 @@ class SensorFusion:
                     memory = memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, now)
                     continue
                 if parts & READING:
-                    memory, parts = self._done(memory, x, parts, now)
+                    memory, parts = self._done(memory, x, parts, now), 0
                 asked.read(sample.time, sample.acceleration, sample.rate)
                 parts, imu_came = parts | READING, now
             elif isinstance(sample, JointSample):
@@ -229,7 +227,7 @@ class SensorFusion:
                     if fault is not SensorFault.SELDOM:
                         continue
                 if joints_came < 0.0 or parts & JOINTS:
-                    memory, parts = self._done(memory, x, parts, now)
+                    memory, parts = self._done(memory, x, parts, now), 0
                 if joints_came < 0.0:
                     kernels.set_joints(x, self.law, sample.time, sample.angles)
                 else:
@@ -281,36 +279,27 @@ class SensorFusion:
                 memory = self.take(memory, sample, now)
         if estimate is not None and _rests(memory, now):
             return memory, estimate
-        x = np.ndarray(1, FILTER, np.empty(_FLOATS))
+        x = copied(memory.numbers)
+        memory = made(FusionMemory, (x, *memory[1:]))
         self._asked.begin(now, 0.0, (0.0, 0.0), UNKNOWN)
-        parts = COPY
         if not memory.started:
-            memory, parts = self._done(memory, x, parts, now)
             memory = self._start(memory)
         if not (memory.started and memory.joints_came >= 0.0):
-            return self._done(memory, x, parts, now)[0], None
+            return memory, None
         until = now - memory.delay - _MARGIN
         while memory.waiting and memory.waiting[0].time <= until:
-            memory, parts = self._done(memory, x, parts | ADVANCE, now, memory.waiting[0].time)
+            self._tick(x, self.law, self._requests, ADVANCE, now, memory.waiting[0].time)
             memory = self._fuse_first(memory, now)
-        found = self._tick(
-            memory.numbers, self.law, x, self._requests, parts | ADVANCE | END, now, until
-        )
-        memory = made(FusionMemory, (x, *memory[1:]))
-        if found & FINITE:
+        if self._tick(x, self.law, self._requests, ADVANCE | END, now, until) & FINITE:
             return memory, estimate_in(self._asked, PRESENT_AT)
         return _anew(memory), None
 
-    def _done(
-        self, memory: FusionMemory, x: Filter, parts: int, now: float, until: float = 0.0
-    ) -> tuple[FusionMemory, int]:
-        """The memory once the filter has done ``parts`` of what is asked; nothing is any more."""
+    def _done(self, memory: FusionMemory, x: Filter, parts: int, now: float) -> FusionMemory:
+        """The memory once the filter has taken in ``parts`` of what is asked."""
         asked = self._asked
-        found = self._tick(memory.numbers, self.law, x, self._requests, parts, now, until)
-        memory = made(FusionMemory, (x, *memory[1:]))
-        if found & FAULT:
+        if self._tick(x, self.law, self._requests, parts, now, 0.0) & FAULT:
             memory = memory.noting_faults(asked.of_imu, asked.of_encoders, now)
-        return memory, 0
+        return memory
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""

@@ -9,7 +9,7 @@ from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import Array, P
-from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start
+from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start, copied
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
@@ -311,7 +311,7 @@ def _watched(
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:
     """The memory with an arm that stands still where a ``reading`` is, and nothing disturbs it."""
-    numbers = memory.numbers.copy()
+    numbers = copied(memory.numbers)
     kernels.set_joints(numbers, law, reading.time, reading.angles)
     return memory._replace(numbers=numbers)
 
