@@ -116,8 +116,8 @@ class Arbitration:
         for sample, last in zip(newest, before.seen, strict=True):
             aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
             seen.append(sample)
-        verdict = before.hearing_nothing_of(_silent(memory, now), now)
-        lost = verdict.lost(now) | _stuck(memory)
+        verdict = before.hearing_nothing_of(_silent(memory, now) | _stuck(memory), now)
+        lost = verdict.lost(now)
         learns = not (before.is_on or before.wrong or lost)
         redundancy.look(evidence, memory.numbers, now, *aids, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())

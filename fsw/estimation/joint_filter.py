@@ -93,6 +93,12 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
     _advance(x, law, time)
     said = _less_zero(x, angles)
     far, before_it = _is_far(x, said), x.encoder_doubted
+    if far and not x.encoder_leapt > 0.0:
+        # No reading has leapt since one was believed: the joint moves as torques do not make it.
+        rates = x.joints[0, 1], x.joints[1, 1]
+        begin(x, law, time, said)
+        x.joints[0, 1], x.joints[1, 1] = rates
+        far = False
     x.encoder_doubted, x.encoder_calm = doubt(
         x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
     )

@@ -84,6 +84,7 @@ COUNT: Final = len(OF)
 SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
 WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
 EVERY: Final = 0.02  # s, between looks
+CONTAINED: Final = 2.0 * WINDOWS[-1]  # s, for which a reading is in some of them, or before one
 _LONG: Final = 3.0  # s, over which means of half a second are compared
 _MEAN: Final = 0.5  # s
 _ROWS: Final = 256  # looks: 5 s
@@ -690,7 +691,7 @@ class Verdict(NamedTuple):
         """The verdict with what says nothing at ``now`` [s]."""
         if not silent:
             return self
-        over = now + WINDOWS[-1]
+        over = now + CONTAINED
         until = zip(Source, self.lost_until, strict=True)
         return self._replace(lost_until=tuple([over if one & silent else t for one, t in until]))
 

@@ -152,3 +152,22 @@ def test_a_reading_again_and_one_older_than_the_state_are_named() -> None:
     now = TICK * 1000
     assert SensorFault(read(arm.x, LAW, now, (0.0, 0.0), TICK)) is SensorFault.REPEATED
     assert all(np.isfinite(np.ravel(arm.x.joints)))
+
+
+@pytest.mark.requirement("REQ-ACT-4")
+@pytest.mark.parametrize("falls", [150.0, 400.0])
+def test_a_joint_that_falls_as_no_torque_makes_it_is_followed_and_is_no_jump(falls: float) -> None:
+    """Encoders were blamed for a limp joint, and joints are not judged without encoders."""
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    begin(x, LAW, 0.0, (0.0, 0.0))
+    q, w, worst = 0.0, 0.0, 0.0
+    for k in range(1, 650):
+        now = TICK * k
+        a = falls if now > 1.0 and w < 8.0 else 0.0
+        q, w = q + TICK * (w + 0.5 * TICK * a), w + TICK * a
+        push(x, LAW, now, TICK, (0.0, 0.0))
+        seen = round(q / STEP) * STEP
+        assert read(x, LAW, now, (seen, -0.5 * seen), 0.0) == SensorFault.NONE
+        (first, _), _ = present_joints(x, now)
+        worst = max(worst, abs(first - q))
+    assert worst < 0.12
