@@ -31,6 +31,8 @@ ROTORS: Final = 8  # at most
 Floats = NDArray[np.float64]
 Two = Annotated[Floats, 2]
 Three = Annotated[Floats, 3]
+Four = Annotated[Floats, 4]
+Five = Annotated[Floats, 5]
 Nine = Annotated[Floats, 9]  # a rotation, row by row
 PerJoint = Annotated[Floats, JOINTS]
 PerRotor = Annotated[Floats, ROTORS]
@@ -65,6 +67,16 @@ class Record:
         """Of zeros, or over ``memory`` of as many numbers, which it then shares."""
         self.memory = bytearray(self.size * _NUMBER) if memory is None else memory
         self._views: dict[Any, Any] = {}  # of the whole, and of arrays and records in it
+
+    @classmethod
+    def place(cls, *names: str) -> int:
+        """Where a field is, by its name and those of the records around it [byte]."""
+        at, layout = 0, cls.dtype
+        for name in names:
+            assert layout.fields is not None
+            layout, offset = layout.fields[name][:2]
+            at += offset
+        return at
 
     @property
     def numbers(self) -> Floats:

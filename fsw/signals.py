@@ -11,6 +11,7 @@ time of a frozen dataclass (docs/decisions/0017-one-compiled-call-a-tick.md).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import field
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
@@ -43,6 +44,14 @@ class Mode(Enum):
     TRAJECTORY = "trajectory"
     DESCEND = "descend"
     FAULT = "fault"
+
+    @property
+    def armed(self) -> bool:
+        """Whether actuators may move."""
+        return self is not _DISARMED and self is not _FAULT
+
+
+_DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT  # found in a tenth of the time
 
 
 class SolverStatus(IntEnum):
@@ -914,6 +923,28 @@ class TickInputs:
     refused: tuple[str, ...] = ()  # what a link refused since the last tick, and why
     setpoint_problem: str = ""  # why the newest of the refused setpoints is; empty: it is not ours
 
+    @property
+    def has_only_sensors(self) -> bool:
+        """Whether nothing came but a frame of exact states, and that in time."""
+        return self.tuning is None and not (
+            self.samples
+            or self.stale_us
+            or self.plan
+            or self.targets
+            or self.commands
+            or self.announced
+            or self.motion
+            or self.attitude
+            or self.joints
+            or self.refused
+            or self.refused_setpoints
+            or self.ground_station_heard
+            or self.mission
+            or self.battery
+            or self.host
+            or self.sensor_clock_jump_us
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -934,10 +965,16 @@ class TickOutputs:
     """Everything one tick says."""
 
     actuators: ActuatorCommand
-    snapshot: FlightSnapshot
+    mode: Mode
+    shown: FlightSnapshot | Callable[[], FlightSnapshot]  # made when it is asked for
     plan_request: PlanRequest | None = None
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = field(default=())
     tuning_taken: bool | None = (
         None  # whether the requested one is in use; None: none was requested
     )
+
+    @property
+    def snapshot(self) -> FlightSnapshot:
+        """The vehicle as telemetry shows it."""
+        return self.shown if isinstance(self.shown, FlightSnapshot) else self.shown()

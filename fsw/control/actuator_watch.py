@@ -25,9 +25,9 @@ ICRA 2003, for the joints; docs/decisions/0033-actuators-that-fail.md.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel
@@ -37,6 +37,7 @@ from fsw.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.rotors import hanging_arm, lag_rotors
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
+from fsw.tick_record import NO_ROTOR, Watched, watch_anew
 
 OBSERVER: Final = 30.0  # 1/s; the gyro's noise in a laboratory's suite is 0.5 N of a rotor then
 MEMORY: Final = 0.1  # s, of mean squares
@@ -81,7 +82,6 @@ JOINT_TIME: Final = 0.1  # s
 STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that stands
 MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
 
-NONE: Final = -1
 # What is known of parts that have failed, which lasts while nothing can be observed.
 _OF_FAILED: Final = (
     "failed",
@@ -97,110 +97,41 @@ _OF_FAILED: Final = (
     "stood_at",
 )
 
-WATCH: Final = np.dtype(
-    [
-        ("running", float),  # s, since it began
-        ("thrust", float, (4,)),  # N, of rotors that give what is commanded
-        ("rate", float, (3,)),  # rad/s, of the last tick
-        ("torque", float, (2,)),  # N m about x and y, observed beside the model
-        ("lift", float),  # N, observed the same, beside what lasts
-        ("lasting", float),  # share of the thrust that lasts along z
-        # Means of products of what is observed, in newtons of a rotor: xx, yy, zz, xz, yz.
-        ("products", float, (5,)),
-        ("extra", float, (4,)),  # N, of each rotor beside its command, by its pattern
-        ("by_thrust", float, (4,)),  # N^2, of x and the thrust
-        ("thrust2", float, (4,)),  # N^2, of the thrust
-        ("slow", float, (4,)),  # N, of rotors that are twice as slow
-        ("slow_torque", float, (2,)),  # N m about x and y, what they would leave
-        ("slow_lift", float),  # N, the same
-        ("slow_by", float),  # N^2, mean of what they would leave and what is observed
-        ("slow2", float),  # N^2, mean square of what they would leave
-        ("suspect", np.int64),  # rotor, or NONE
-        ("suspected", float),  # s, for how long
-        ("failed", np.int64),  # rotor, or NONE
-        ("effect", float),  # thrust over command, of the failed rotor, as allocation takes it
-        ("failed2", float),  # N^2, mean square of what it gives beside its command, by what turns
-        ("failed_by_thrust", float),  # N^2, mean of that and the thrust
-        ("failed_thrust2", float),  # N^2, of the thrust
-        ("failed_more2", float),  # N^2, mean square of what it gives too much
-        ("gives", float),  # N, of the failed rotor
-        ("lost_for", float),  # s
-        ("others_lost_for", float, (4,)),  # s, of each rotor beside the failed one
-        ("lost", np.int64),
-        ("disobeys", np.int64),
-        ("quiet_for", float),  # s
-        # Joints.
-        ("arm_seen", float),  # s, since encoders tell its angles
-        ("momentum", float, (2,)),  # N m s
-        ("undone", float, (2,)),  # N m, observed beside the model
-        ("asked", float, (2,)),  # N m, as late as that
-        ("odd2", float),  # N^2 m^2, mean square of what base and arm do not feel of each other
-        ("undone2", float, (2,)),  # means of squares, and of the product
-        ("asked2", float, (2,)),
-        ("undoing", float, (2,)),
-        ("rate2", float, (2,)),  # rad^2/s^2
-        ("behind2", float, (2,)),  # rad^2, mean square of the distance from the reference
-        ("joint_for", float, (2,)),  # s, for how long it has been suspected
-        ("joint", float, (2,)),  # SOUND, STUCK or LIMP
-        ("stood_at", float, (2,)),  # rad, where it was found stuck
-    ],
-    align=True,
-)
-Watch = NDArray[Any]  # (1,) of WATCH
 Law = NDArray[Any]
-_FLOATS: Final = WATCH.itemsize // 8
 
 
-def at_start() -> Watch:
-    """Memory before the first tick."""
-    memory = np.zeros(1, dtype=WATCH)
-    memory["suspect"] = memory["failed"] = NONE
-    memory["effect"] = 1.0
-    return memory
-
-
-def blank() -> Watch:
-    """Room for a memory; eight times as fast as an empty array of records."""
-    return np.ndarray(1, WATCH, np.empty(_FLOATS))
-
-
-def paused(memory: Watch | None) -> Watch | None:
-    """The memory while nothing can be observed: what has failed, or None if nothing has."""
-    if memory is None or (memory[0]["failed"] == NONE and not memory[0]["joint"].any()):
-        return None
-    kept = at_start()
-    for name in _OF_FAILED:
-        kept[name] = memory[name]
-    return kept
+def pause(s: Watched) -> None:
+    """Forget all but what has failed, while nothing can be observed."""
+    kept = Watched(bytearray(s.numbers.tobytes()))
+    watch_anew(s)
+    if kept.failed != NO_ROTOR or kept.joint.any():
+        for name in _OF_FAILED:
+            setattr(s, name, getattr(kept, name))
 
 
 @kernel
 def watch(
-    before: Watch,
-    after: Watch,
+    before: NDArray[Any],
+    after: NDArray[Any],
     laws: Law,
     decay: float,
     dt: float,
-    thrust: Vec4,
-    torque: Vec2,
-    reference: Vec2,
-    rate: Vec3,
-    q_arm: Vec2,
-    qd_arm: Vec2,
-    specific_force: float,
     angles_known: bool,
 ) -> bool:
-    """Bring the memory ``dt`` [s] on, into ``after``; whether anything has failed by now.
+    """Watch the actuators over a tick of ``dt`` [s]; whether any of them has failed by now.
 
-    Where the joints' angles are not known by encoders only rotors are judged.
-
-    Commanded meanwhile were ``thrust`` [N] and ``torque`` [N m]; the joints' ``reference`` [rad].
-    Body ``rate`` [rad/s, FRD], joints ``q_arm`` [rad], ``qd_arm`` [rad/s], ``specific_force``
-    [m/s^2] along -z; a rotor's error shrinks by ``decay`` [1].
+    It reads the command of the record ``before`` (1,) [SI], and estimate and joints of the one
+    ``after`` (1,) [SI], whose watch it writes. A rotor's error shrinks by ``decay`` [1]. Where the
+    joints' angles are not known by encoders only rotors are judged.
     """
-    airframe = laws[0]
-    after[0] = before[0]
-    s = after[0]
+    airframe, sent, r = laws[0], before[0].sent, after[0]
+    s, x = r.watch, r.estimate
+    thrust = sent.rotor_thrust[0], sent.rotor_thrust[1], sent.rotor_thrust[2], sent.rotor_thrust[3]
+    torque = sent.joint_torque[0], sent.joint_torque[1]
+    reference = r.joints.reference[0], r.joints.reference[1]
+    rate = x.w_WB_B[0], x.w_WB_B[1], x.w_WB_B[2]
+    q_arm, qd_arm = (x.q_arm[0], x.q_arm[1]), (x.qd_arm[0], x.qd_arm[1])
+    specific_force = x.specific_force
     if s.running == 0.0:
         for i in range(4):
             s.thrust[i] = s.slow[i] = thrust[i]
@@ -224,7 +155,7 @@ def watch(
 
 @compilable
 def _observe_base(
-    s: Any,
+    s: Watched,
     airframe: Airframe,
     decay: float,
     dt: float,
@@ -297,11 +228,11 @@ def _observe_base(
 
 @compilable
 def _observe_slow(
-    s: Any, dt: float, decay: float, commanded: Vec4, modelled: Vec4, arm: float, seen: Vec3
+    s: Watched, dt: float, decay: float, commanded: Vec4, modelled: Vec4, arm: float, seen: Vec3
 ) -> None:
     """What rotors twice as slow would leave, as what is ``seen`` [N], and how alike both are."""
     f = (s.slow[0], s.slow[1], s.slow[2], s.slow[3])
-    g = lag_rotors(f, commanded, np.sqrt(decay))
+    g = lag_rotors(f, commanded, math.sqrt(decay))
     off = (
         0.5 * (f[0] + g[0]) - modelled[0],
         0.5 * (f[1] + g[1]) - modelled[1],
@@ -320,7 +251,7 @@ def _observe_slow(
 
 
 @compilable
-def mean_square(s: Any, rotor: int) -> float:
+def mean_square(s: Watched, rotor: int) -> float:
     """Mean square [N^2] of what a rotor gives beside its command, by its pattern (0 to 3)."""
     xx, yy, zz, xz, yz = s.products[0], s.products[1], s.products[2], s.products[3], s.products[4]
     if rotor == 0:
@@ -335,13 +266,13 @@ def mean_square(s: Any, rotor: int) -> float:
 
 
 @compilable
-def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
+def _judge_rotors(s: Watched, dt: float, settled: bool) -> None:
     if s.failed >= 0:
         _follow_failed(s, dt)
         if settled and not s.lost:
             _judge_others(s)
         return
-    found, most = NONE, 0.0
+    found, most = NO_ROTOR, 0.0
     for i in range(4):
         size = mean_square(s, i)
         if size > most:
@@ -354,7 +285,7 @@ def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
     if slow and 0.0 < s.slow_by < SLOW * s.slow2:
         mistaken = True
     if not (settled and alike and not mistaken):
-        s.suspect, s.suspected = NONE, 0.0
+        s.suspect, s.suspected = NO_ROTOR, 0.0
         return
     s.suspected = s.suspected + dt if found == s.suspect else 0.0
     s.suspect = found
@@ -363,7 +294,7 @@ def _judge_rotors(s: Any, dt: float, settled: bool) -> None:
 
 
 @compilable
-def _name(s: Any, found: int, size: float) -> None:
+def _name(s: Watched, found: int, size: float) -> None:
     """Follow a failed rotor from now on; ``size`` [N^2] is the mean square by its pattern."""
     s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
     s.gives = s.thrust[found] + s.extra[found]
@@ -373,7 +304,7 @@ def _name(s: Any, found: int, size: float) -> None:
 
 
 @compilable
-def _judge_others(s: Any) -> None:
+def _judge_others(s: Watched) -> None:
     """Whether a second rotor is lost; then it is the failed one."""
     for i in range(4):
         if s.others_lost_for[i] > LOST_TIME:
@@ -384,13 +315,13 @@ def _judge_others(s: Any) -> None:
 
 
 @compilable
-def effect_seen(s: Any) -> float:
+def effect_seen(s: Watched) -> float:
     """Thrust over command of the failed rotor [1], by the means of a tenth of a second."""
     return clamp(1.0 + float(s.failed_by_thrust) / max(float(s.failed_thrust2), 1e-6), 0.0, 1.0)
 
 
 @compilable
-def _follow_failed(s: Any, dt: float) -> None:
+def _follow_failed(s: Watched, dt: float) -> None:
     """What of the failed rotor is left, and whether it is back."""
     by_effect = s.failed_by_thrust * s.failed_by_thrust / max(s.failed_thrust2, 1e-6)
     explained = s.failed2 - by_effect < ASTRAY * ASTRAY
@@ -406,12 +337,12 @@ def _follow_failed(s: Any, dt: float) -> None:
     quiet = s.failed2 < QUIET * QUIET and not s.lost and not s.disobeys
     s.quiet_for = s.quiet_for + dt if quiet else 0.0
     if s.quiet_for > QUIET_TIME:
-        s.failed, s.effect, s.suspect, s.suspected = NONE, 1.0, NONE, 0.0
+        s.failed, s.effect, s.suspect, s.suspected = NO_ROTOR, 1.0, NO_ROTOR, 0.0
 
 
 @compilable
 def _observe_arm(
-    s: Any,
+    s: Watched,
     airframe: Airframe,
     dt: float,
     torque: Vec2,
@@ -447,7 +378,7 @@ def _observe_arm(
 
 
 @compilable
-def _forget_arm(s: Any) -> None:
+def _forget_arm(s: Watched) -> None:
     """Begin anew when encoders are back."""
     s.arm_seen, s.odd2 = 0.0, 0.0
     for k in range(2):
@@ -457,7 +388,7 @@ def _forget_arm(s: Any) -> None:
 
 
 @compilable
-def _judge_joint(s: Any, k: int, dt: float, settled: bool, angle: float) -> None:
+def _judge_joint(s: Watched, k: int, dt: float, settled: bool, angle: float) -> None:
     if s.joint[k] == STUCK and abs(angle - s.stood_at[k]) > MOVED:
         s.joint[k] = LIMP
     if s.joint[k] != SOUND:

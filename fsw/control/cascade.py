@@ -40,6 +40,7 @@ from fsw.control.tracking import (
     velocity_of_mass,
     wanted_accelerations,
 )
+from fsw.control.tube import NO_TUBE, TubeAround, beyond_covered
 from fsw.geometry.rotation import rotate_back, wrap_angle
 from fsw.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.model.actuator_health import (
@@ -62,12 +63,14 @@ from fsw.model.rotors import (
 )
 from fsw.record import Floats
 from fsw.shapes.zones import NO_ZONES
-from fsw.signals import Mat3, PlanInput, PredictionState, StateEstimate, Vec2, Vec3, Vec4
+from fsw.signals import Mat3, StateEstimate, Vec2, Vec3, Vec4
 from fsw.tick_record import (
+    BREACH,
     FILTER_ACTED,
     FLOWN_ROTORS,
     GATE_NEEDED,
     IMPAIRED,
+    OFF_PLAN,
     Estimate,
     Tick,
     new_tick,
@@ -81,17 +84,21 @@ _NONE: Vec3 = (0.0, 0.0, 0.0)
 _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def at_rest(airframe: Airframe, estimate: StateEstimate) -> Tick:
-    """Record of a vehicle whose rotors stand still."""
+def at_rest(airframe: Airframe, estimate: StateEstimate, before: Tick | None = None) -> Tick:
+    """Record of a vehicle whose rotors stand still; ``before`` had its plan and its actuators."""
     r = new_tick(airframe.mass)
+    if before is not None:
+        r.take_given(before)
+        r.watch = before.watch
+    r.known = estimate
     r.observed.v[:] = estimate.v_WB
     rest_joints(r.joints, airframe, estimate)
     return r
 
 
-def in_hover(airframe: Airframe, estimate: StateEstimate) -> Tick:
+def in_hover(airframe: Airframe, estimate: StateEstimate, before: Tick | None = None) -> Tick:
     """Record of a vehicle taken over in hover."""
-    r = at_rest(airframe, estimate)
+    r = at_rest(airframe, estimate, before)
     r.rotors[:FLOWN_ROTORS] = r.sent.rotor_thrust[:FLOWN_ROTORS] = 0.25 * airframe.mass * GRAVITY
     return r
 
@@ -155,8 +162,9 @@ class Cascade:
         self.probes = filter_probes(clear.body)
         self.packed = packed(self.law)
         example = self.packed, new_tick(airframe.mass).array
-        self._close_loops = machine_code(_close_loops, *example, 1, NO_ZONES, self.probes)
-        self._expected = machine_code(_expected, *example, _NONE, (0.0, 0.0), (0.0, 0.0), 1.0)
+        rest = NO_ZONES, self.probes, NO_TUBE
+        self._close_loops = machine_code(_close_loops, *example, 1, *rest)
+        self._expected = machine_code(_expected, *example)
 
     def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -165,37 +173,27 @@ class Cascade:
         rotors = lag_rotors(r.rotors.tolist(), settling_at, self.law.rotor_decay)
         return motion_state(self.law.airframe, r.mass, estimate, rotors, sent.joint_torque[0])
 
-    def expected(self, r: Tick, estimate: StateEstimate) -> tuple[Vec2, Model]:
+    def expected(self, r: Tick) -> tuple[Vec2, Model]:
         """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
-        x = estimate
-        return self._expected(self.packed, r.array, x.w_WB_B, x.q_arm, x.qd_arm, x.specific_force)
+        return self._expected(self.packed, r.array)
 
-    def joint_acceleration(self, r: Tick, estimate: StateEstimate) -> Vec2:
+    def joint_acceleration(self, r: Tick) -> Vec2:
         """The joints' part of ``expected`` [rad/s^2]."""
-        return self.expected(r, estimate)[0]
+        return self.expected(r)[0]
 
     def step(
         self,
-        before: Tick,
-        estimate: StateEstimate,
-        plan: PredictionState,
-        u: PlanInput,
+        r: Tick,
         ticks: int = 1,
         zones: NDArray[np.float64] = NO_ZONES,
         health: ActuatorHealth = HEALTHY,
-    ) -> Tick:
-        """The record after ``before``; see ``close_loops``, ``zones`` (zones, k) [SI]."""
-        after = before.copy()
-        after.give(estimate, plan, u)
-        if health is not HEALTHY or before.flags & IMPAIRED:
-            note_health(after.health, health)
-            after.flags = 0 if health is HEALTHY else IMPAIRED
-        self.close(after, zones, ticks)
-        return after
-
-    def close(self, r: Tick, zones: NDArray[np.float64], ticks: int = 1) -> None:
-        """The machine code of ``close_loops``, for ``zones`` (zones, k) [SI]."""
-        self._close_loops(self.packed, r.array, ticks, zones, self.probes)
+        tube: TubeAround = NO_TUBE,
+    ) -> None:
+        """Close the loops of a record; see ``close_loops``, ``zones`` (zones, k) [SI]."""
+        if health is not HEALTHY or r.flags & IMPAIRED:
+            note_health(r.health, health)
+            r.flags = 0 if health is HEALTHY else IMPAIRED
+        self._close_loops(self.packed, r.array, ticks, zones, self.probes, tube)
 
 
 @compilable
@@ -271,6 +269,8 @@ def keep_off_zones(
     a = add_scaled(motion.a, r.observed.d, 1.0)
     safe, changed, margin = filtered(law.filter, probes, zones, r.estimate, r.observed.v, a, wanted)
     r.margin = margin
+    if not margin >= 0.0:
+        r.flags |= BREACH
     if changed:
         r.flags |= FILTER_ACTED
         push = subtract(safe, asked)
@@ -356,6 +356,17 @@ def send(r: Tick, airframe: Airframe, thrust: Vec4, torque: Vec2) -> None:
 
 
 @compilable
+def compare_with_plan(r: Tick, tube: TubeAround) -> None:
+    """Whether the base has left the tube around its plan. Reads estimate, plan, observed."""
+    bias = r.observed.disturbance_bias
+    aside = beyond_covered(tube, (bias[0], bias[1]))
+    most = tube.radius + max(aside[0], aside[1]) + tube.unsure
+    for i in range(3):
+        if not -most <= r.estimate.p_WB[i] - r.plan.p[i] <= most:
+            r.flags |= OFF_PLAN
+
+
+@compilable
 def _joints_are_sound(r: Tick) -> bool:
     return bool(r.health.joints[0] == SOUND and r.health.joints[1] == SOUND)
 
@@ -367,21 +378,18 @@ def _close_loops(
     count: int,
     zones: NDArray[np.float64],
     probes: NDArray[np.float64],
+    tube: TubeAround,
 ) -> None:
     close_loops(ticks[0], law[0], count, zones, probes)
+    compare_with_plan(ticks[0], tube)
 
 
 @kernel
-def _expected(
-    laws: NDArray[Any],
-    ticks: NDArray[Any],
-    rate: Vec3,
-    q_arm: Vec2,
-    qd_arm: Vec2,
-    specific_force: float,
-) -> tuple[Vec2, Model]:
+def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
     airframe, r = laws[0].airframe, ticks[0]
-    torque = r.sent.joint_torque
+    x, torque = r.estimate, r.sent.joint_torque
+    rate, specific_force = (x.w_WB_B[0], x.w_WB_B[1], x.w_WB_B[2]), x.specific_force
+    q_arm, qd_arm = (x.q_arm[0], x.q_arm[1]), (x.qd_arm[0], x.qd_arm[1])
     f = lag_rotors(r.rotors, given(r.health, r.sent.rotor_thrust), laws[0].rotor_decay)
     rolling = airframe.rotor_arm * (f[1] - f[3]) / hanging_arm(airframe, q_arm).roll_inertia
     yawing = airframe.yaw_per_thrust * (f[0] - f[1] + f[2] - f[3]) / airframe.inertia[2]

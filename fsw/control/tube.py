@@ -33,10 +33,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
+from fsw.compiled import compilable
 from fsw.control.gains import TrackingGains, TrackingTuning
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.prediction import Array
@@ -50,6 +52,17 @@ RARE = 3.7  # standard deviations
 # m/s^2 an axis of the memory of wind that a plan's stand-off covers. For what is beyond it
 # clearances grow while it is in force.
 WIND_COVERED = 0.05
+
+
+class TubeAround(NamedTuple):
+    """The tube around a plan, at an instant."""
+
+    radius: float  # m
+    wind: float  # m per m/s^2 of the memory of wind, beyond what the radius covers
+    unsure: float  # m, that errors of the estimate add
+
+
+NO_TUBE: Final = TubeAround(math.inf, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,7 +358,8 @@ def random_steps(response: Array, per_hold: int) -> float:
     return float(np.sqrt(np.mean(variances) / 3.0))
 
 
-def beyond_covered(loop: Tube, memory: Vec2) -> Vec2:
+@compilable
+def beyond_covered(loop: Tube | TubeAround, memory: Vec2) -> Vec2:
     """What a ``memory`` of wind [m/s^2, NED] that is in force can add to the tube [m, NED].
 
     Beyond what the stand-off covers. However the push turns, the vehicle is no further off.

@@ -8,14 +8,23 @@ noise has an observer of its own (``control/tracking.py``), which knows the roto
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
-from fsw.compiled import compilable, compiled, machine_code
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
+from fsw.record import Floats
 from fsw.signals import Mat3, SensorFrame, StateEstimate, Vec2, Vec3, Vec4
+from fsw.tick_record import Estimate, Tick
 
+READINGS: Final = 20
+"""Numbers of a frame: position, velocity, quaternion, gyro, accelerometer, joints, their rates."""
+_FRAME: Final = struct.Struct(f"<{READINGS}d")
 POSE, INERTIAL, JOINTS = 1, 2, 4  # parts of a frame
 # Farther or faster is no vehicle of this kind.
 _PLACE_LIMIT: Final = 1e5  # m
@@ -27,15 +36,47 @@ FORCE_LIMIT: Final = 1000.0  # m/s^2
 
 def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
     """The vehicle's state, or None where a reading is no number, out of range or no attitude."""
-    missing, estimate = read_frame(sensors)
-    return None if missing else estimate
+    r = Tick()
+    return None if read_frame(sensors, r) else r.known
 
 
-def read_frame(sensors: SensorFrame) -> tuple[int, StateEstimate]:
-    """Parts of a frame that are no numbers or out of range, and the state that it tells."""
-    p, v, w, q, qd = sensors.p_WB, sensors.v_WB, sensors.gyro_B, sensors.q_arm, sensors.qd_arm
-    missing, R, yaw = _machine_code()(p, v, sensors.q_WB, w, sensors.accel_B, q, qd)
-    return missing, StateEstimate(sensors.t_us, p, v, R, w, yaw, q, qd, -sensors.accel_B[2])
+def read_frame(sensors: SensorFrame, r: Tick) -> int:
+    """Write the state that a frame tells; which parts of it are no numbers or out of range."""
+    return _machine_code()(r.array, reading_of(sensors), sensors.t_us)
+
+
+def reading_of(sensors: SensorFrame) -> Floats:
+    """The numbers of a frame (READINGS,) [SI]."""
+    s = sensors
+    parts = *s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *s.q_arm, *s.qd_arm
+    return np.frombuffer(_FRAME.pack(*parts))
+
+
+@kernel
+def _read(ticks: NDArray[Any], reading: Floats, now_us: int) -> int:
+    """Write the estimate that a ``reading`` (READINGS,) [SI] is."""
+    r = ticks[0]
+    r.has_estimate = 1
+    return read_into(r.estimate, reading, now_us)
+
+
+@compilable
+def read_into(x: Estimate, reading: Floats, now_us: int) -> int:
+    """The estimate of a ``reading`` (READINGS,) [SI]; which parts of that cannot be."""
+    s = reading
+    p, v, w = (s[0], s[1], s[2]), (s[3], s[4], s[5]), (s[10], s[11], s[12])
+    q_arm, qd_arm = (s[16], s[17]), (s[18], s[19])
+    missing, R, x.yaw = attitude(
+        p, v, (s[6], s[7], s[8], s[9]), w, (s[13], s[14], s[15]), q_arm, qd_arm
+    )
+    for i in range(3):
+        x.p_WB[i], x.v_WB[i], x.w_WB_B[i] = p[i], v[i], w[i]
+    for i in range(9):
+        x.R_WB[i] = R[i]
+    for i in range(len(q_arm)):
+        x.q_arm[i], x.qd_arm[i] = q_arm[i], qd_arm[i]
+    x.t_us, x.specific_force = now_us, -s[15]
+    return missing
 
 
 @compilable
@@ -75,11 +116,7 @@ def _within(values: Vec3 | Vec2, limit: float) -> bool:
     return within
 
 
-_attitude = compiled(attitude)
-
-
 @cache
-def _machine_code() -> Callable[..., tuple[int, Mat3, float]]:
-    """``attitude``, compiled when it is first wanted."""
-    none, arm = (0.0, 0.0, 0.0), (0.0, 0.0)
-    return machine_code(_attitude, none, none, (1.0, 0.0, 0.0, 0.0), none, none, arm, arm)
+def _machine_code() -> Callable[..., int]:
+    """``_read``, compiled when it is first wanted."""
+    return machine_code(_read, Tick().array, np.frombuffer(bytes(_FRAME.size)), 0)

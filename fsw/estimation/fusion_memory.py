@@ -179,8 +179,14 @@ class FusionMemory(NamedTuple):
         return self._replace(reset=Reset(self.reset.number + 1, position, velocity, turn))
 
 
+def copied(x: Filter) -> Filter:
+    """Another filter with the same numbers; as bytes in a fortieth of the time of an array."""
+    memory: Any = x.base
+    return np.ndarray(1, FILTER, bytearray(memory if type(memory) is bytearray else x.tobytes()))
+
+
 def at_start() -> FusionMemory:
     """Memory before the first sample."""
-    x = np.zeros(1, dtype=FILTER)
+    x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
     x["model_walk"] = LEAST_WALKS
     return FusionMemory(x)

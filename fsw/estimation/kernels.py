@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from typing import Any
 
 from numpy.typing import NDArray
@@ -13,19 +14,15 @@ from fsw.estimation.error_state import (
     BA,
     BARO,
     BG,
-    COLUMNS,
     DELAY,
     ERRORS,
     FIELD,
     FRAME,
     IMU_CAPACITY,
     LOST,
-    PUSHES,
     RATE,
-    ROWS,
     TH,
     TIME,
-    WITNESS,
     Array,
     Filter,
     P,
@@ -41,226 +38,119 @@ from fsw.estimation.error_state import (
     vec3,
     vec4,
 )
-from fsw.estimation.stated_variance import believable
-from fsw.geometry.quaternion import normalised
 from fsw.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.model.airframe import GRAVITY
+from fsw.record import Four, Record, Three, Two
 from fsw.signals import Mat3, Vec2, Vec3, Vec4
+from fsw.tick_record import Estimate
 
 Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
-Present = tuple[Vec3, Vec3, Mat3, Vec3, float, Vec2, Vec2, float]
-"""All of a StateEstimate but its time, in its order."""
-
-
-Reading = tuple[float, Vec3, Vec3]
-"""Time [s], specific force [m/s^2, FRD] and rate [rad/s, FRD] of the IMU."""
-Pose = tuple[float, float, Vec3, Vec4, Vec3, Vec3]
-"""When the filter reaches it [s], its own time [s], position, attitude and their variances."""
-
 # What ``tick`` does, in this order.
-COPY, PUSH, JOINTS, READING, END = 1, 2, 4, 8, 16
+PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
+# What came of it.
+FAULT, FINITE = 1, 2
+
+
+class Asked(Record):
+    """What the filter is asked to do in one call, and what it found."""
+
+    t_us: int  # now
+    dt: float  # s, length of the tick
+    u: Two  # rad/s^2, what torques made of the joints
+    model: Four  # SI, FRD: what rotors make of the vehicle, see ``imu.add_imu``
+    encoders: Three  # rad, rad, s: two angles and their age
+    time: float  # s, of a reading of the IMU
+    force: Three  # m/s^2, FRD
+    rate: Three  # rad/s, FRD
+    of_imu: int  # what is wrong with that, as ``SensorFault``
+    of_encoders: int
+    present: Estimate
+
+    def begin(self, now: float, dt: float, u: Vec2, model: Vec4) -> None:
+        """A tick of ``dt`` [s] that ends ``now`` [s].
+
+        Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle.
+        """
+        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *u, *model)
+
+    def read_joints(self, angles: Vec2, age: float) -> None:
+        """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
+        _ENCODERS.pack_into(self.memory, _ENCODERS_AT, *angles, age)
+
+    def read(self, time: float, force: Vec3, rate: Vec3) -> None:
+        """What the IMU says: ``time`` [s], ``force`` [m/s^2, FRD] and ``rate`` [rad/s, FRD]."""
+        _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
+
+
+_TICK = struct.Struct("<q7d")
+_ENCODERS = struct.Struct("<3d")
+_ENCODERS_AT = Asked.place("encoders")
+_READING = struct.Struct("<7d")
+_READING_AT = Asked.place("time")
+PRESENT_AT = Asked.place("present")
 
 
 @kernel
 def tick(
-    old: Filter,
+    filters: Filter,
     law: Law,
-    more: int,
+    requests: NDArray[Any],
+    parts: int,
+    now: float,
     until: float,
-    new: Filter,
-    parts: int,
-    times: Vec2,
-    u: Vec2,
-    encoders: Vec3,
-    reading: Reading,
-    model: Vec4,
-) -> tuple[int, int, bool, Present]:
-    """Do ``parts`` of a tick and ``more``; what is wrong with IMU and encoders, and the present.
+) -> int:
+    """Do some ``parts`` [1] of a tick as asked by one of ``requests`` (1,) [SI]; what came of it.
 
-    ``COPY`` the filter, so that a tick leaves its inputs as they were; ``PUSH``: note what torques
-    made of the joints, accelerated by ``u`` [rad/s^2]; take in ``encoders`` [rad, rad, s], two
-    angles and their age; take in a ``reading`` of the IMU, or what a ``model`` [SI, FRD] makes of
-    it; predict ``until`` [s] the horizon and from there the present, which may be no number.
-    ``times`` [s]: now, and the tick's length.
+    ``PUSH``: note what torques made of the joints; take in encoders; take in a reading of the IMU;
+    ``ADVANCE`` ``until`` [s]; and at the ``END`` predict the present ``now`` [s] from there, which
+    may be no number.
     """
-    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
-    finite, known = False, _nothing()
-    if more & END:
-        finite, known = _predicted(new, law, times[0], until)
-        if times[1] > 0.0:
-            redundancy.witness(new[0], known[2], times[1], model)
-    return fault, of_encoders, finite, known
-
-
-@kernel
-def tick_with_pose(
-    old: Filter,
-    law: Law,
-    until: float,
-    new: Filter,
-    parts: int,
-    times: Vec2,
-    u: Vec2,
-    encoders: Vec3,
-    reading: Reading,
-    model: Vec4,
-    pose: Pose,
-    least: Vec2,
-) -> tuple[int, int, bool, Present, Vec2, tuple[Vec3, Vec3]]:
-    """The same with a ``pose`` that the filter reaches, of a frame that does not drift.
-
-    Also chi-square over gate of its two halves, and their innovation. Where one is beyond its gate
-    the filter stays at the pose, and there is no present yet. Its variances are at least ``least``
-    [m^2, rad^2]. ``until`` [s], ``times`` [s], ``u`` [rad/s^2], ``encoders`` [rad, rad, s],
-    ``model`` [SI, FRD].
-    """
-    fault, of_encoders = _taken_in(old, law, new, parts, times, u, encoders, reading, model)
-    x, t = new[0], law[0].tuning
-    reached, time, p, q, of_place, of_attitude = pose
-    advance(x, t, reached)
-    if t.pose_delay_sigma == 0.0:
-        x.pose_delay = t.pose_delay
-    noise = believable(of_place, least[0]), believable(of_attitude, least[1])
-    ratio = fusion.fuse_pose(x, t, law[0].gates, time, p, normalised(q), *noise)
-    innovation = vec3(x.innovation[0], 0), vec3(x.innovation[1], 0)
-    finite, known = False, _nothing()
-    if ratio[0] <= 1.0 and ratio[1] <= 1.0:
-        finite, known = _predicted(new, law, times[0], until)
-        if times[1] > 0.0:
-            redundancy.witness(new[0], known[2], times[1], model)
-    return fault, of_encoders, finite, known, ratio, innovation
-
-
-@compilable
-def _taken_in(
-    old: Filter,
-    law: Law,
-    new: Filter,
-    parts: int,
-    times: Vec2,
-    u: Vec2,
-    encoders: Vec3,
-    reading: Reading,
-    model: Vec4,
-) -> tuple[int, int]:
-    """All but the ``END``: what is wrong with the IMU and with the encoders."""
-    now, dt = times
-    if parts & COPY:
-        _copy(old[0], new[0])
+    x, t, a = filters[0], law[0].tuning, requests[0]
+    model = a.model[0], a.model[1], a.model[2], a.model[3]
     if parts & PUSH:
-        joint_filter.push(new[0], law[0].tuning, now, dt, u)
-    of_encoders, fault = 0, 0
+        joint_filter.push(x, t, now, a.dt, (a.u[0], a.u[1]))
+    a.of_imu, a.of_encoders = 0, 0
     if parts & JOINTS:
-        angles = (encoders[0], encoders[1])
-        of_encoders = joint_filter.read(new[0], law[0].tuning, now, angles, encoders[2])
+        angles = (a.encoders[0], a.encoders[1])
+        a.of_encoders = joint_filter.read(x, t, now, angles, a.encoders[2])
     if parts & READING:
-        time, f, w = reading
-        fault = imu.add_imu(new[0], law[0].tuning, now, time, f, w, model)
-    return fault, of_encoders
+        f, w = (a.force[0], a.force[1], a.force[2]), (a.rate[0], a.rate[1], a.rate[2])
+        a.of_imu = imu.add_imu(x, t, now, a.time, f, w, model)
+    found = FAULT if a.of_imu or a.of_encoders else 0
+    if parts & ADVANCE:
+        advance(x, t, until)
+    if parts & END:
+        a.present.t_us = a.t_us
+        finite, R = _predict(x, now, a.present)
+        if finite:
+            found |= FINITE
+        if a.dt > 0.0:
+            redundancy.witness(x, R, a.dt, model)
+    return found
 
 
 @compilable
-def _predicted(x: Filter, law: Law, now: float, until: float) -> tuple[bool, Present]:
-    """The present, with the filter at its horizon; whether it has numbers and variances."""
-    advance(x[0], law[0].tuning, until)
-    p, v, q, rate, force = present(x[0], now)
-    angles, rates = joint_filter.present_joints(x[0], now)
+def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
+    """Write the present; whether it has numbers and variances, and its rotation."""
+    p, v, q, rate, force = present(x, now)
+    angles, rates = joint_filter.present_joints(x, now)
     R = matrix_from_quaternion(q)
     total = p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + R[0] + rate[0] + rate[1] + rate[2] + force[2]
     finite = math.isfinite(total + angles[0] + angles[1] + rates[0] + rates[1])
-    return finite and varies(x[0]), (p, v, R, rate, yaw_of(R), angles, rates, -force[2])
-
-
-@compilable
-def _nothing() -> Present:
-    none, still = (0.0, 0.0, 0.0), (0.0, 0.0)
-    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    return none, none, R, none, 0.0, still, still, 0.0
-
-
-@compilable
-def _copy(a: Any, b: Any) -> None:
-    b.time, b.baro_bias, b.pose_delay = a.time, a.baro_bias, a.pose_delay
-    b.first, b.end, b.lost = a.first, a.end, a.lost
     for i in range(3):
-        b.p[i], b.v[i] = a.p[i], a.v[i]
-        b.accel_bias[i], b.gyro_bias[i] = a.accel_bias[i], a.gyro_bias[i]
-        b.rate[i], b.acceleration[i] = a.rate[i], a.acceleration[i]
-    for i in range(4):
-        b.q[i] = a.q[i]
-    for i in range(6):
-        b.kept_bias[i], b.kept_variance[i] = a.kept_bias[i], a.kept_variance[i]
-    for i in range(ERRORS):
-        for j in range(ERRORS):
-            b.covariance[i, j] = a.covariance[i, j]
-    _copy_frame(a, b)
-    for k in range(a.first - 1, a.end):
-        for i in range(COLUMNS):
-            b.imu[k % IMU_CAPACITY, i] = a.imu[k % IMU_CAPACITY, i]
-    for i in range(6):
-        b.newest[i], b.same[i] = a.newest[i], a.same[i]
-    _copy_halves(a, b)
-    _copy_joints(a, b)
-
-
-@compilable
-def _copy_halves(a: Any, b: Any) -> None:
-    for i in range(2):
-        b.steady[i] = a.steady[i]
-        b.calm[i], b.doubted[i] = a.calm[i], a.doubted[i]
-        b.model_walk[i] = a.model_walk[i]
-    b.out, b.suspect, b.believed = a.out, a.suspect, a.believed
-    for i in range(WITNESS):
-        b.witness[i] = a.witness[i]
+        known.p_WB[i], known.v_WB[i], known.w_WB_B[i] = p[i], v[i], rate[i]
     for i in range(9):
-        b.baseline[i] = a.baseline[i]
-    for i in range(4):
-        b.noise_scale[i] = a.noise_scale[i]
-        for j in range(ROWS):
-            b.innovated_last[i, j] = a.innovated_last[i, j]
-
-
-@compilable
-def _copy_joints(a: Any, b: Any) -> None:
-    b.joint_time, b.pushed, b.pushes_end = a.joint_time, a.pushed, a.pushes_end
-    b.encoder_steady, b.encoder_calm = a.encoder_steady, a.encoder_calm
-    b.encoder_doubted, b.encoder_leapt = a.encoder_doubted, a.encoder_leapt
-    b.encoder_scale = a.encoder_scale
-    for i in range(3):
-        b.encoders[i] = a.encoders[i]
-        for j in range(3):
-            b.joint_variance[i, j] = a.joint_variance[i, j]
+        known.R_WB[i] = R[i]
     for i in range(2):
-        b.encoder_zero[i], b.encoder_leap[i] = a.encoder_zero[i], a.encoder_leap[i]
-        b.encoder_surprise[i] = a.encoder_surprise[i]
-        for j in range(3):
-            b.joints[i, j] = a.joints[i, j]
-    for k in range(max(a.pushed - 1, 0), a.pushes_end):
-        for i in range(3):
-            b.pushes[k % PUSHES, i] = a.pushes[k % PUSHES, i]
-
-
-@compilable
-def _copy_frame(a: Any, b: Any) -> None:
-    b.drifts, b.compass = a.drifts, a.compass
-    for i in range(ERRORS):
-        for j in range(FRAME):
-            b.shared[i, j] = a.shared[i, j]
-        for j in range(FIELD):
-            b.with_offset[i, j] = a.with_offset[i, j]
+        known.q_arm[i], known.qd_arm[i] = angles[i], rates[i]
+    known.yaw, known.specific_force = yaw_of(R), -force[2]
+    return finite and varies(x), R
 
 
 @kernel
 def _set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
     """Start from an arm that stands still."""
     joint_filter.begin(x[0], law[0].tuning, time, angles)
-
-
-@kernel
-def _advance(x: Filter, law: Law, until: float) -> float:
-    """Predict up to ``until``; returns the state's time."""
-    advance(x[0], law[0].tuning, until)
-    return float(x[0].time)
 
 
 @kernel
@@ -469,7 +359,6 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> 
 
 
 set_joints = of_fixed_types(_set_joints)
-advance_to = of_fixed_types(_advance)
 begin = of_fixed_types(_begin)
 couple_level = of_fixed_types(_couple_level)
 set_place = of_fixed_types(_set_place)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from fsw.estimation.confirmation import Confirmation, Run
 from fsw.estimation.error_state import (
     DELAY,
     ERRORS,
-    FILTER,
     FRAME,
     TH,
     Array,
@@ -31,16 +30,27 @@ from fsw.estimation.error_state import (
 )
 from fsw.estimation.filter_start import FilterStart
 from fsw.estimation.fusion_memory import (
-    NO_TURN,
     EncoderWatch,
     FusionMemory,
     TickInputs,
     Trail,
     Waiting,
     at_start,
+    copied,
 )
 from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
+from fsw.estimation.kernels import (
+    ADVANCE,
+    END,
+    FAULT,
+    FINITE,
+    JOINTS,
+    PRESENT_AT,
+    PUSH,
+    READING,
+    Asked,
+)
 from fsw.estimation.measurement_update import MeasurementUpdate, attitude
 from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
 from fsw.estimation.sensor_checks import (
@@ -68,6 +78,7 @@ from fsw.measurements import (
     Sample,
 )
 from fsw.signals import StateEstimate, Vec2, Vec3, Vec4
+from fsw.tick_record import estimate_in
 
 _FARTHEST_BEHIND: Final = 0.1  # s, that the filter stays behind while there is nothing to fuse
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
@@ -86,25 +97,10 @@ _SOURCES: Final = {
     GnssSample: Source.GNSS,
     MagneticSample: Source.COMPASS,
 }
-_FLOATS: Final = FILTER.itemsize // 8  # that a filter has room for
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
-_USUAL_PARTS: Final = kernels.COPY | kernels.PUSH | kernels.JOINTS | kernels.READING
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
-_NO_READING: kernels.Reading = (0.0, _REST, _REST)
-
-
-class Asked(NamedTuple):
-    """What the filter is asked to do in one call: arguments of ``kernels.tick``, in its order."""
-
-    x: Filter  # the new one
-    parts: int
-    times: Vec2  # s: now, and the tick's length
-    u: Vec2  # rad/s^2, of the joints
-    encoders: Vec3 = _REST  # the same object: there was no reading
-    reading: kernels.Reading = _NO_READING
-    model: Vec4 = UNKNOWN  # SI, FRD: see ``imu.add_imu``
 
 
 class SensorFusion:
@@ -118,13 +114,9 @@ class SensorFusion:
         self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
         self._update = MeasurementUpdate(tuning, self.law, self._stated)
         self._arbitration = Arbitration(tuning, self._stated, self._update, self._again)
-        x, none = at_start().numbers, (0.0, 0.0)
-        asked = Asked(x, kernels.COPY, none, none)
-        pose = (0.0, 0.0, _REST, NO_TURN, _REST, _REST)
-        self._tick = machine_code(kernels.tick, x, self.law, 0, 0.0, *asked)
-        self._tick_with_pose = machine_code(
-            kernels.tick_with_pose, x, self.law, 0.0, *asked, pose, self._stated.least_pose
-        )
+        self._asked, x = Asked(), at_start().numbers  # written anew in each call
+        self._requests = self._asked.array
+        self._tick = machine_code(kernels.tick, x, self.law, self._requests, 0, 0.0, 0.0)
 
     def warm_up(self) -> StateEstimate:
         """Compile every kernel: stand for a while with every sensor, then take jumps."""
@@ -182,35 +174,22 @@ class SensorFusion:
         reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
-        x = np.ndarray(1, FILTER, np.empty(_FLOATS))  # eight times as fast as an empty record
-        usual = None if silent else self._usual(memory, samples, now)
-        if usual is not None:
-            imu_came, joints_came, ready = now, now, True
-            of_imu, of_encoders, finite, present = self._tick(
-                memory.numbers,
-                self.law,
-                kernels.END,
-                -math.inf,
-                x,
-                _USUAL_PARTS,
-                (now, dt),
-                joint_acceleration,
-                *usual,
-                model,
-            )
-            if of_imu or of_encoders:
-                memory = memory.noting_faults(of_imu, of_encoders, now)
-            known = present if finite else None
-        else:
-            parts = kernels.COPY | kernels.PUSH
-            asked = Asked(x, parts, (now, dt), joint_acceleration, model=model)
-            memory, asked = self._take_each(memory, asked, samples)
-            imu_came = memory.imu_came if asked.reading is _NO_READING else now
-            if silent:
-                memory, asked = self._take_no_imu(memory, asked)
-            joints_came = memory.joints_came if asked.encoders is _REST else now
-            ready = memory.started and joints_came >= 0.0
-            memory, known = self._do(memory, asked, kernels.END if ready else 0, -math.inf)
+        x = copied(memory.numbers)
+        asked = self._asked
+        asked.begin(now, dt, joint_acceleration, model)
+        memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
+        if silent:
+            # In place of a reading what the model makes of the last one; it is no fault.
+            if parts & READING:
+                memory, parts = self._done(memory, x, parts, now), 0
+            asked.read(now, _LOST, _LOST)
+            parts |= READING
+        ready = memory.started and joints_came >= 0.0
+        if ready:
+            parts |= END
+        found = self._tick(x, self.law, self._requests, parts, now, 0.0)
+        if found & FAULT:
+            memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         # By position, because it is done in every tick: what every tick renews, and the rest.
         watched = memory.encoders if watch is None else watch
         trail = memory.trail
@@ -218,9 +197,44 @@ class SensorFusion:
             tick = samples, now, joint_acceleration, model, silent
             trail = made(Trail, (trail.start, trail.began, (tick, trail.ticks)))
         memory = made(FusionMemory, (x, now, imu_came, joints_came, watched, trail, *memory[6:]))
-        if known is None:
-            return (_anew(memory) if ready else memory), None
-        return memory, made(StateEstimate, (round(1e6 * now), *known))
+        if found & FINITE:
+            return memory, estimate_in(asked, PRESENT_AT)
+        return (_anew(memory) if ready else memory), None
+
+    def _take_each(
+        self, memory: FusionMemory, x: Filter, samples: Sequence[Sample], now: float
+    ) -> tuple[FusionMemory, int, float, float]:
+        """Ask for readings of IMU and encoders to be taken in, one after the other.
+
+        Also the parts that are asked for by then, and when each sensor came last [s]. Of a second
+        reading of a sensor the first is done at once.
+        """
+        asked, parts = self._asked, PUSH
+        imu_came, joints_came = memory.imu_came, memory.joints_came
+        for sample in samples:
+            if isinstance(sample, ImuSample):
+                if sample.time < now - IMU_TOO_OLD and memory.started:
+                    memory = memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, now)
+                    continue
+                if parts & READING:
+                    memory, parts = self._done(memory, x, parts, now), 0
+                asked.read(sample.time, sample.acceleration, sample.rate)
+                parts, imu_came = parts | READING, now
+            elif isinstance(sample, JointSample):
+                fault = _fault_of_encoders(sample, now, joints_came)
+                if fault:
+                    memory = memory.noting_fault(Sensor.ENCODERS, fault, now)
+                    if fault is not SensorFault.SELDOM:
+                        continue
+                if joints_came < 0.0 or parts & JOINTS:
+                    memory, parts = self._done(memory, x, parts, now), 0
+                if joints_came < 0.0:
+                    kernels.set_joints(x, self.law, sample.time, sample.angles)
+                else:
+                    asked.read_joints(sample.angles, now - sample.time)
+                    parts |= JOINTS
+                joints_came = now
+        return memory, parts, imu_came, joints_came
 
     def catch_up(
         self,
@@ -265,170 +279,27 @@ class SensorFusion:
                 memory = self.take(memory, sample, now)
         if estimate is not None and _rests(memory, now):
             return memory, estimate
-        x = np.ndarray(1, FILTER, np.empty(_FLOATS))
-        asked = Asked(x, kernels.COPY, (now, 0.0), (0.0, 0.0))
+        x = copied(memory.numbers)
+        memory = made(FusionMemory, (x, *memory[1:]))
+        self._asked.begin(now, 0.0, (0.0, 0.0), UNKNOWN)
         if not memory.started:
-            memory, asked = self._done(memory, asked)
             memory = self._start(memory)
-        known, ready = None, memory.started and memory.joints_came >= 0.0
-        if ready:
-            memory, known = self._predicted(memory, asked, now - memory.delay - _MARGIN)
-        else:
-            memory, _ = self._done(memory, asked)
-        memory = FusionMemory(x, *memory[1:])
-        if known is None:
-            return (_anew(memory) if ready else memory), None
-        return memory, made(StateEstimate, (round(1e6 * now), *known))
+        if not (memory.started and memory.joints_came >= 0.0):
+            return memory, None
+        until = now - memory.delay - _MARGIN
+        while memory.waiting and memory.waiting[0].time <= until:
+            self._tick(x, self.law, self._requests, ADVANCE, now, memory.waiting[0].time)
+            memory = self._fuse_first(memory, now)
+        if self._tick(x, self.law, self._requests, ADVANCE | END, now, until) & FINITE:
+            return memory, estimate_in(self._asked, PRESENT_AT)
+        return _anew(memory), None
 
-    def _usual(
-        self, memory: FusionMemory, samples: Sequence[Sample], now: float
-    ) -> tuple[Vec3, kernels.Reading] | None:
-        """Encoders and reading of a tick in which each came once, at the end.
-
-        None: samples have to be taken one by one. Most ticks are so, and this takes half as long.
-        """
-        count = len(samples)
-        if not 2 <= count <= 3 or not memory.started:
-            return None
-        arm, unit = samples[-2:]
-        if type(arm) is not JointSample or type(unit) is not ImuSample:
-            return None
-        if count == 3 and isinstance(samples[0], _OF_EVERY_TICK):
-            return None
-        came = memory.joints_came
-        if came < 0.0 or unit.time < now - IMU_TOO_OLD or _fault_of_encoders(arm, now, came):
-            return None
-        first, second = arm.angles
-        return (first, second, now - arm.time), (unit.time, unit.acceleration, unit.rate)
-
-    def _take_each(
-        self, memory: FusionMemory, asked: Asked, samples: Sequence[Sample]
-    ) -> tuple[FusionMemory, Asked]:
-        """Take in samples of IMU and encoders, one after the other."""
-        for sample in samples:
-            if isinstance(sample, ImuSample):
-                memory, asked = self._take_imu(memory, asked, sample)
-            elif isinstance(sample, JointSample):
-                memory, asked = self._take_joints(memory, asked, sample)
-        return memory, asked
-
-    def _take_imu(
-        self, memory: FusionMemory, asked: Asked, sample: ImuSample
-    ) -> tuple[FusionMemory, Asked]:
-        """Ask the filter to take in a reading of the IMU."""
-        if sample.time < asked.times[0] - IMU_TOO_OLD and memory.started:
-            return memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, asked.times[0]), asked
-        if asked.parts & kernels.READING:
-            memory, asked = self._done(memory, asked)
-        x, parts, times, u, encoders, _, model = asked
-        reading = sample.time, sample.acceleration, sample.rate
-        return memory, Asked(x, parts | kernels.READING, times, u, encoders, reading, model)
-
-    def _take_no_imu(self, memory: FusionMemory, asked: Asked) -> tuple[FusionMemory, Asked]:
-        """In place of a reading of the IMU, ask for what the model makes of the last one."""
-        if asked.parts & kernels.READING:
-            memory, asked = self._done(memory, asked)
-        reading = asked.times[0], _LOST, _LOST
-        return memory, asked._replace(parts=asked.parts | kernels.READING, reading=reading)
-
-    def _take_joints(
-        self, memory: FusionMemory, asked: Asked, sample: JointSample
-    ) -> tuple[FusionMemory, Asked]:
-        """Ask the filter to take in a reading of the encoders."""
-        now = asked.times[0]
-        came = memory.joints_came if asked.encoders is _REST else now
-        fault = _fault_of_encoders(sample, now, came)
-        if fault:
-            memory = memory.noting_fault(Sensor.ENCODERS, fault, now)
-            if fault is not SensorFault.SELDOM:
-                return memory, asked
-        if came < 0.0 or asked.parts & kernels.JOINTS:
-            memory, asked = self._done(memory, asked)
-        x, parts, times, u, _, reading, model = asked
-        if came < 0.0:
-            kernels.set_joints(x, self.law, sample.time, sample.angles)
-        else:
-            parts |= kernels.JOINTS
-        first, second = sample.angles
-        angles = first, second, now - sample.time
-        return memory, Asked(x, parts, times, u, angles, reading, model)
-
-    def _do(
-        self, memory: FusionMemory, asked: Asked, more: int, until: float
-    ) -> tuple[FusionMemory, kernels.Present | None]:
-        """Let the filter do what is asked of it, and ``more`` ``until`` [s].
-
-        None: no present, or one without numbers.
-        """
-        old = memory.numbers if asked.parts & kernels.COPY else asked.x
-        of_imu, of_encoders, finite, known = self._tick(old, self.law, more, until, *asked)
-        if of_imu or of_encoders:
-            memory = memory.noting_faults(_of_reading(asked, of_imu), of_encoders, asked.times[0])
-        return memory, known if finite else None
-
-    def _done(self, memory: FusionMemory, asked: Asked) -> tuple[FusionMemory, Asked]:
-        """The memory of a filter that has done what was asked of it; nothing is any more."""
-        if not asked.parts:
-            return memory, asked
-        memory, _ = self._do(memory, asked, 0, 0.0)
-        return FusionMemory(asked.x, *memory[1:]), asked._replace(parts=0)
-
-    def _predicted(
-        self, memory: FusionMemory, asked: Asked, until: float
-    ) -> tuple[FusionMemory, kernels.Present | None]:
-        """Let the filter go on ``until`` [s], fuse what it reaches, and predict the present."""
-        waits = memory.waiting
-        if waits and waits[0].time <= until:
-            if (len(waits) == 1 or waits[1].time > until) and self._is_plain(
-                memory, waits[0], asked.times[0]
-            ):
-                memory, known, fused = self._do_with_pose(memory, asked, waits[0], until)
-                if fused:
-                    return memory, known
-                asked = asked._replace(parts=0)
-            else:
-                memory, asked = self._done(memory, asked)
-            while memory.waiting and memory.waiting[0].time <= until:
-                kernels.advance_to(asked.x, self.law, memory.waiting[0].time)
-                memory = self._fuse_first(memory, asked.times[0])
-        return self._do(memory, asked, kernels.END, until)
-
-    def _is_plain(self, memory: FusionMemory, one: Waiting, now: float) -> bool:
-        """Whether a sample is a pose as most are: of a frame that stays, and has not jumped."""
-        sample = one.sample
-        return (
-            isinstance(sample, PoseSample)
-            and not sample.drifts
-            and sample.turns
-            and memory.reset_counter in (None, sample.reset_counter)
-            and memory.delay_sigma == self.tuning.pose_delay_sigma
-            and not any(self._long_refused(memory, now))
-        )
-
-    def _do_with_pose(
-        self, memory: FusionMemory, asked: Asked, one: Waiting, until: float
-    ) -> tuple[FusionMemory, kernels.Present | None, bool]:
-        """``_do`` with a plain pose to fuse, and whether it was; if not the filter stays there."""
-        sample, now = one.sample, asked.times[0]
-        assert isinstance(sample, PoseSample)
-        pose = (
-            *(one.time, sample.time, sample.position, sample.attitude),
-            *(sample.position_variance, sample.attitude_variance),
-        )
-        old = memory.numbers if asked.parts & kernels.COPY else asked.x
-        of_imu, of_encoders, finite, known, ratio, (place, turn) = self._tick_with_pose(
-            old, self.law, until, *asked, pose, self._stated.least_pose
-        )
-        memory = FusionMemory(asked.x, *memory[1:])
-        if of_imu or of_encoders:
-            memory = memory.noting_faults(_of_reading(asked, of_imu), of_encoders, now)
-        innovation, fused = (*place, *turn), ratio[0] <= 1.0 and ratio[1] <= 1.0
-        if fused:
-            health = memory.of(Sensor.POSE).with_fused((now, now), ratio, innovation)
-            memory = memory.after(one, health, memory.runs)
-        else:
-            memory = self._judged(memory, one, ratio, innovation, now)
-        return memory, known if finite else None, fused
+    def _done(self, memory: FusionMemory, x: Filter, parts: int, now: float) -> FusionMemory:
+        """The memory once the filter has taken in ``parts`` of what is asked."""
+        asked = self._asked
+        if self._tick(x, self.law, self._requests, parts, now, 0.0) & FAULT:
+            memory = memory.noting_faults(asked.of_imu, asked.of_encoders, now)
+        return memory
 
     def covariance(self, memory: FusionMemory, now: float) -> Array:
         """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
@@ -510,6 +381,12 @@ class SensorFusion:
         kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
         ratio = self._update.fuse(memory, one)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
+        if not (announced or any(refused)) and max(ratio) <= 1.0:  # as nearly always
+            health = memory.of(SENSOR_OF[type(sample)])
+            shown = innovation if len(ratio) > 1 else innovation[:1]
+            return memory.after(
+                one, health.with_fused((now,) * len(ratio), ratio, shown), memory.runs
+            )
         passes = [r <= 1.0 and long for r, long in zip(ratio, refused, strict=False)]
         if any(passes) and not _is_small(sample, innovation):
             # By now the gate is so wide that of garbage some is within it: a run has to say so.
@@ -629,11 +506,6 @@ def _anew(memory: FusionMemory) -> FusionMemory:
         trail=None,
         trail_before=None,
     )
-
-
-def _of_reading(asked: Asked, fault: int) -> int:
-    """The ``fault`` [SensorFault] of a reading of the IMU; 0 where there was none."""
-    return 0 if asked.reading[1] is _LOST else fault
 
 
 def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFault:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsw.control.actuator_watch import Watch, paused
+from fsw.control.actuator_watch import pause
 from fsw.control.cascade import Cascade, KeepClear, at_rest, in_hover
 from fsw.control.safety_gate import gate
 from fsw.control.tube import beyond_covered
@@ -20,6 +20,7 @@ from fsw.estimation.sensor_fault import Sensor
 from fsw.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.flight.before_estimate import nothing_known, nowhere, told
 from fsw.flight.bounds import bounded_update, target_problem
+from fsw.flight.calm_tick import CalmTick
 from fsw.flight.commander import Commander
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.descent import Descent
@@ -29,14 +30,19 @@ from fsw.flight.land_detector import with_range
 from fsw.flight.missed_ticks import loops_resumed, plan_resumed
 from fsw.flight.modes.mission import with_update
 from fsw.flight.modes.offboard import accept_setpoints
-from fsw.flight.plan_exchange import PlanExchange, measured_state, nominal_at_rest, requested
-from fsw.flight.quiet_ticks import QuietTicks
+from fsw.flight.plan_exchange import (
+    PlanExchange,
+    measured_state,
+    nominal_at_rest,
+    requested,
+    with_nominal,
+)
 from fsw.flight.reference_horizon import ReferenceHorizon
 from fsw.flight.restart import restarted
 from fsw.flight.safe_set import SafeSetCheck
 from fsw.flight.safety_watch import SafetyWatch
 from fsw.flight.sensed_state import CaughtUp, SensedState
-from fsw.flight.snapshot import snapshot_of
+from fsw.flight.snapshot import Shown
 from fsw.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
 from fsw.flight.zone_room import ZoneRoom
@@ -61,7 +67,6 @@ from fsw.signals import (
     Mode,
     Plan,
     PlanFailure,
-    PlanInput,
     PlanRequest,
     PredictionState,
     SafeSet,
@@ -73,7 +78,7 @@ from fsw.signals import (
     TickOutputs,
     Vec2,
 )
-from fsw.tick_record import FILTER_ACTED, GATE_NEEDED, Tick
+from fsw.tick_record import BREACH, FILTER_ACTED, GATE_NEEDED, OFF_PLAN, Tick
 
 _STILL = SensorFrame(
     t_us=1_000_000,
@@ -96,16 +101,15 @@ class Controlled(NamedTuple):
     answer: Answer
     inputs: TickInputs
     state: FlightState  # with what was received, commanded and decided
-    memory: Tick  # of the loops, for the next tick
+    memory: Tick  # for the next tick
     estimate: StateEstimate | None = None  # None: there has been none yet
     fusion: FusionMemory | None = None
     flown: bool = False  # the loops are closed
-    nominal: PredictionState | None = None  # where the running plan wants the vehicle now
     plan: PlanMemory = PlanMemory()
-    u: PlanInput = REST_INPUT
     ticks: int = 1  # since the last one
     replaced: bool = False  # the command, by the safety gate
     caught: CaughtUp | None = None  # what else is known, where that had to be known at once
+    calm: bool = False  # nothing happened, and ``memory`` is all that is new
 
 
 class Autopilot:
@@ -114,6 +118,7 @@ class Autopilot:
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
         tick = config.tick_period_us * 1e-6
+        self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
         self._safe_sets = SafeSetCheck(config)
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
@@ -128,6 +133,9 @@ class Autopilot:
         reallocates = bool(config.limits.failed_rotor_mode)
         self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
         self._watches = bool(config.limits.watches_actuators)
+        self.calm = CalmTick(
+            config, self._cascade, self._plans.model, self._damage, self._watch, self.zones_now
+        )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
             config.limits.clearance_sigmas,
@@ -140,7 +148,6 @@ class Autopilot:
             + self._cascade.law.filter.lag,
         )
         self._room = ZoneRoom(config)
-        self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
         self._tick_us = config.tick_period_us
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
         self._most_us = config.catch_up_ticks * config.tick_period_us
@@ -149,24 +156,13 @@ class Autopilot:
         """Compile every kernel of the tick, before anything flies."""
         estimate = estimate_state(_STILL)
         assert estimate is not None
-        nominal = self._plans.step(nominal_at_rest(estimate), REST_INPUT)
-        self._cascade.step(in_hover(self.config.airframe, estimate), estimate, nominal, REST_INPUT)
+        r = with_nominal(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
+        self._plans.model.move(r, 1)
+        self._cascade.step(r)
         self._safe_sets.warm_up(estimate)
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
-
-    def quiet_ticks(self) -> QuietTicks:
-        """What flies ticks of this configuration in which nothing happens."""
-        return QuietTicks(
-            self.config,
-            self._cascade,
-            self._plans.model,
-            self._damage.law,
-            self._damage.decay,
-            self._watch.upright,
-            self._watch.radius,
-        )
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -184,20 +180,22 @@ class Autopilot:
 
     def control(self, state: FlightState, inputs: TickInputs) -> Controlled:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
+        calm = self.calm.fly(state, inputs)
+        if calm is not None:
+            answer = Answer(calm.commanded, True, state.vehicle.mode)
+            return Controlled(answer, inputs, state, calm, calm=True)
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         if state.vehicle.restarts:
             state = restarted(state)
-        fusion, caught, came = state.fusion, None, inputs
-        if inputs.samples or fusion is not None:
-            if state.index >= 0:
-                state, inputs = self._sensed.take_missed(state, inputs)
-            state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
-        else:
-            state, estimate = self._exact.estimate(state, inputs, texts)
+        came = inputs
+        if state.index >= 0 and inputs.samples:
+            state, inputs = self._sensed.take_missed(state, inputs)
+        state, r, estimate, fusion, caught = self._estimate(state, inputs, texts)
+        began = state.cascade
         state = self._receive(state, came, texts)
         if estimate is None:
-            return self._blind(state, inputs, texts)._replace(fusion=fusion, caught=caught)
+            return self._blind(state, r, inputs, texts)._replace(fusion=fusion, caught=caught)
 
         acks: list[CommandAck] = []
         if inputs.commands:
@@ -209,31 +207,35 @@ class Autopilot:
         ticks = looped = self._elapsed_ticks(state, now_us)
         vehicle = state.vehicle
         armed = vehicle.armed
-        flown = vehicle.flies and vehicle.unloaded is None and state.nominal is not None
+        flown = vehicle.flies and vehicle.unloaded is None and bool(state.cascade.has_plan)
         if flown and now_us - state.t_us > self._most_us:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
-        nominal, plan, u = state.nominal, state.plan, REST_INPUT
-        if flown and nominal is not None:
-            nominal, plan, u = self._follow(state, estimate, nominal, inputs.plan, looped)
-        followed = nominal if flown else None
-        sent, memory, replaced = self._actuate(state, estimate, followed, u, looped, armed=armed)
+        if state.cascade is not began:  # loops or plan begin anew
+            r = state.cascade.copy()
+            r.known = estimate
+        plan = state.plan
+        if flown:
+            plan = self._follow(state, r, estimate, inputs.plan, looped)
+        else:
+            r.input = REST_INPUT
+        sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
         answer = Answer(sent, armed, vehicle.mode, tuple(acks), tuple(texts))
-        # By position, as what follows: each is made in every tick, and names cost a microsecond.
         return Controlled(
-            answer,
-            inputs,
-            state,
-            memory,
-            estimate,
-            fusion,
-            flown,
-            nominal,
-            plan,
-            u,
-            ticks,
-            replaced,
-            caught,
+            answer, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
         )
+
+    def _estimate(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> tuple[FlightState, Tick, StateEstimate | None, FusionMemory | None, CaughtUp | None]:
+        """The record of this tick, with its estimate or the last one, and the estimator's part."""
+        if not inputs.samples and state.fusion is None:
+            state, r = self._exact.estimate(state, inputs, texts)
+            return state, r, r.known, None, None
+        state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
+        r = state.cascade.copy()
+        if estimate is not None:
+            r.known = estimate
+        return state, r, estimate, fusion, caught
 
     def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
         """The rest of the tick, for which the actuators need not wait.
@@ -241,23 +243,29 @@ class Autopilot:
         What it finds out is acted upon in the next tick.
         """
         c = controlled
-        answer, inputs, state, memory, estimate, fusion = c[:6]
-        nominal, plan, flown, texts = c.nominal, c.plan, c.flown, answer.texts
-        safety = state.safety
-        if estimate is not None:
+        answer, inputs, state, r, estimate, fusion, flown = c[:7]
+        if c.calm:
+            state = self.calm.after(state, r)
+            return state, TickOutputs(answer.actuators, answer.mode, Shown(state, inputs.sensors))
+        plan, texts, safety = c.plan, answer.texts, state.safety
+        flags = r.flags if flown else 0
+        if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
             safety = self._watch.off_plan(
                 safety,
                 estimate,
-                nominal if flown else None,
+                r.nominal if flown else None,
                 state.accuracy.reach,
-                max(self._wind_room(memory)),
+                max(self._wind_room(r)),
             )
         if fusion is not None:
             caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
-            fusion, estimate, reset, said = caught
+            fusion, found, reset, said = caught
             texts += said
             if reset is not None:
-                nominal, memory = moved_along(nominal, memory, reset)
+                r = moved_along(r, reset)
+            if found is not None and found is not estimate:
+                r.known = found
+            estimate = found
         if c.estimate is None or estimate is None:
             # Ticks are counted from the first estimate on; what looks now and then goes by time.
             t_us = inputs.sensors.t_us
@@ -267,73 +275,69 @@ class Autopilot:
         index = state.index + c.ticks
         request = None
         if index // per_plan != state.index // per_plan:
-            mission = self._safe_sets.hold_silent_zones(state.mission, now_us)
-            if mission is not state.mission:
-                state = replace(state, mission=mission)
-            covariance = self._sensed.covariance(fusion)
-            pose = self._pose_error(state, estimate, fusion, covariance)
-            state = self._keep_clear(state, estimate, pose)
-            if flown and nominal is not None:
-                state, request, plan, said = self._request_plan(
-                    state, estimate, nominal, plan, now_us, safety.replan
-                )
-                texts += said
-                safety = replace(safety, replan=False) if safety.replan else safety
-            state = self._report_slowly(state, estimate, now_us)
-            state = self._sensed.reported(state, fusion, estimate, covariance)
-            state, accuracy = self._see_accuracy(state, estimate, covariance, pose)
-            texts = (*texts, *accuracy)
-            announced = len(state.mission.announced.zones)
-            safety = self._watch.breach(safety, estimate, state.constraints, announced, flies=flown)
-        pushed, margin = flown and bool(memory.flags & FILTER_ACTED), memory.margin
-        if pushed or safety.filter_us >= 0:
-            safety = self._watch.filtered(safety, now_us, pushed=pushed)
-        if flown and not margin >= 0.0:
-            safety = self._breached(state, safety, estimate, margin)
-        damage, watch = self._see_damage(state, memory, estimate, c)
-        state = FlightState(
-            index,
-            now_us,
-            estimate,
-            state.invalid_ticks,
-            nominal,
-            c.replaced,
-            memory,
-            state.vehicle,
-            state.mission,
-            plan,
-            state.constraints,
-            state.reference,
-            state.tuning,
-            state.setpoint,
-            state.offboard,
-            state.battery,
-            state.arming_refusal,
-            state.arming,
-            safety,
-            fusion,
-            state.estimator,
-            state.aiding,
-            state.dropout,
-            state.kept,
-            state.accuracy,
-            state.host,
-            damage,
-            watch,
-            state.limited,
+            nominal = r.nominal if flown else None
+            state = replace(state, plan=plan, safety=safety, fusion=fusion)
+            state, request, news = self._each_period(state, estimate, nominal, now_us)
+            plan, safety, texts = state.plan, state.safety, (*texts, *news)
+        if flags & FILTER_ACTED or safety.filter_us >= 0:
+            safety = self._watch.filtered(safety, now_us, pushed=bool(flags & FILTER_ACTED))
+        if flags & BREACH:
+            safety = self._breached(state, safety, estimate, r.margin)
+        state = replace(
+            state,
+            index=index,
+            t_us=now_us,
+            output_replaced=c.replaced,
+            cascade=r,
+            plan=plan,
+            safety=safety,
+            fusion=fusion,
+            damage=self._see_damage(state, r, c),
         )
-        snapshot = snapshot_of(state, estimate, c.u, inputs)
-        taken = answer.tuning_taken
-        return state, TickOutputs(answer.actuators, snapshot, request, answer.acks, texts, taken)
+        shown = Shown(state, inputs.sensors)
+        return state, TickOutputs(
+            answer.actuators, answer.mode, shown, request, answer.acks, texts, answer.tuning_taken
+        )
 
-    def _blind(self, state: FlightState, inputs: TickInputs, texts: list[StatusText]) -> Controlled:
+    def _each_period(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState | None,
+        now_us: int,
+    ) -> tuple[FlightState, PlanRequest | None, list[StatusText]]:
+        """What is looked at once a planning period, and the request for a plan of what is flown.
+
+        The record of the ``state`` is that of the tick before.
+        """
+        mission, fusion, request = state.mission, state.fusion, None
+        held = self._safe_sets.hold_silent_zones(mission, now_us)
+        if held is not mission:
+            state = replace(state, mission=held)
+        covariance = self._sensed.covariance(fusion)
+        pose = self._pose_error(state, estimate, fusion, covariance)
+        state = self._keep_clear(state, estimate, pose)
+        texts: list[StatusText] = []
+        if nominal is not None:
+            state, request = self._request_plan(state, estimate, nominal, now_us, texts)
+        state = self._report_slowly(state, estimate, now_us)
+        state = self._sensed.reported(state, fusion, estimate, covariance)
+        state = self._see_accuracy(state, estimate, covariance, pose, texts)
+        announced, safety = len(state.mission.announced.zones), state.safety
+        flies = nominal is not None
+        safety = self._watch.breach(safety, estimate, state.constraints, announced, flies=flies)
+        return replace(state, safety=safety), request, texts
+
+    def _blind(
+        self, state: FlightState, r: Tick, inputs: TickInputs, texts: list[StatusText]
+    ) -> Controlled:
         """Before the first estimate: actuators off, and no command that needs one."""
         state, acks = self._commander.handle_commands(
             state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
         )
         texts += told(state, self._tick_us)
         answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
-        return Controlled(answer, inputs, state, state.cascade)
+        return Controlled(answer, inputs, state, r)
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
@@ -348,21 +352,24 @@ class Autopilot:
     def _follow(
         self,
         state: FlightState,
+        r: Tick,
         estimate: StateEstimate,
-        nominal: PredictionState,
         answer: Plan | PlanFailure | None,
         ticks: int,
-    ) -> tuple[PredictionState, PlanMemory, PlanInput]:
-        """The plan's state now; in Descend it is none of a plan, though plans are asked for."""
-        now_us = estimate.t_us
-        planned, plan, u = self._plans.follow(state.plan, nominal, answer, now_us, ticks)
-        if state.vehicle.mode is _DESCEND:
+    ) -> PlanMemory:
+        """Write the plan's state now; in Descend it is none of a plan, though plans are asked for.
+
+        Reads plan; writes plan, u.
+        """
+        plan = self._plans.follow(state.plan, r, answer, estimate.t_us, ticks)
+        before = state.nominal if state.vehicle.mode is _DESCEND else None
+        if before is not None:
             goal = state.setpoint.goal
             place = None if goal is None else goal.motion.p
-            planned, u = self._descent.step(nominal, estimate, state.aiding, ticks, place)
+            r.nominal, r.input = self._descent.step(before, estimate, state.aiding, ticks, place)
         if state.damage.joint:
-            planned, u = frozen_arm(planned, u, estimate, state.damage.report.joints)
-        return planned, plan, u
+            freeze_arm(r, estimate, state.damage.report.joints)
+        return plan
 
     def _breached(
         self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
@@ -463,23 +470,22 @@ class Autopilot:
         state: FlightState,
         estimate: StateEstimate,
         nominal: PredictionState,
-        plan: PlanMemory,
         now_us: int,
-        replan: bool,
-    ) -> tuple[FlightState, PlanRequest, PlanMemory, tuple[StatusText, ...]]:
-        """Request a plan that takes effect after a fixed delay, from the vehicle if ``replan``.
+        texts: list[StatusText],
+    ) -> tuple[FlightState, PlanRequest]:
+        """Request a plan that takes effect after a fixed delay, from the vehicle to ``replan``.
 
-        With what is to be said of its reference.
+        Appends what is to be said of its reference.
         """
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
         mode, limited = self._commander.mode(state), state.limited
         state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
-        said: tuple[StatusText, ...] = ()
         if state.limited and state.limited != limited:
-            said = (StatusText(Severity.WARNING, f"reference limited: {state.limited}"),)
+            texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
+        plan, safety = state.plan, state.safety
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
-        start, from_nominal = self._plans.start(plan, nominal, measured, now_us, replan)
+        start, from_nominal = self._plans.start(plan, nominal, measured, now_us, safety.replan)
         request = PlanRequest(
             plan_id=plan.next_id,
             t_apply_us=apply_us,
@@ -490,7 +496,9 @@ class Autopilot:
             joint_targets=joints,
             recent_disturbance=state.cascade.observed.recent,
         )
-        return state, request, requested(plan, apply_us), said
+        if safety.replan:
+            safety = replace(safety, replan=False)
+        return replace(state, plan=requested(plan, apply_us), safety=safety), request
 
     def _see_accuracy(
         self,
@@ -498,21 +506,21 @@ class Autopilot:
         estimate: StateEstimate,
         covariance: Array | None,
         pose: Array | None,
-    ) -> tuple[FlightState, list[StatusText]]:
+        texts: list[StatusText],
+    ) -> FlightState:
         """Say what the sensors' errors add to the tube, once that is known."""
-        texts: list[StatusText] = []
         if covariance is None or pose is None or state.accuracy.told:
-            return state, texts
+            return state
         if state.aiding.unaided_us >= self.config.limits.aiding_loss_us:
             # How sure it is without a position is no property of the sensors: look anew later.
             begun = state.accuracy == AccuracyMemory()
-            return (state if begun else replace(state, accuracy=AccuracyMemory())), texts
+            return state if begun else replace(state, accuracy=AccuracyMemory())
         safe_set, source = state.kept.source, state.aiding.pose.value
         position = self._clearance.deviation(estimate, pose) if safe_set.zones else 0.0
         sure = self._accuracy.see(
             state.accuracy, state.t_us, safe_set, source, position, covariance, texts
         )
-        return replace(state, accuracy=sure), texts
+        return replace(state, accuracy=sure)
 
     def _keep_clear(
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
@@ -586,47 +594,41 @@ class Autopilot:
     def _actuate(
         self,
         state: FlightState,
+        r: Tick,
         estimate: StateEstimate,
-        nominal: PredictionState | None,
-        u: PlanInput,
         ticks: int,
         *,
         armed: bool,
+        flown: bool,
     ) -> tuple[ActuatorCommand, Tick, bool]:
-        """Close the loops, idle or stay still; the safety gate is the last law.
+        """Close the loops of a record, idle or stay still; the safety gate is the last law.
 
-        Without a ``nominal`` state nothing is flown. Also says whether the gate replaced the
-        command.
+        Also the record for the next tick, and whether the gate replaced the command.
         """
         last, airframe = state.cascade, self.config.airframe
-        if nominal is not None:
-            zones, health = self.zones_now(state), state.damage.health
-            memory = self._cascade.step(last, estimate, nominal, u, ticks, zones, health)
-            wanted = memory.commanded
-            if armed and not memory.flags & GATE_NEEDED:
-                return wanted, memory, False
+        if flown:
+            tube = self._watch.tube(state)
+            self._cascade.step(r, ticks, self.zones_now(state), state.damage.health, tube)
+            wanted = r.commanded
+            if armed and not r.flags & GATE_NEEDED:
+                return wanted, r, False
         elif armed:
             idle = self.config.limits.idle_thrust
             wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
-            memory = at_rest(airframe, estimate)
+            r = at_rest(airframe, estimate, r)
         else:
-            wanted, memory = STOPPED, last.copy()
+            wanted = STOPPED
         sent, replaced = gate(airframe, wanted, last.commanded, armed)
         if replaced:
             # The NaN is in the loops' new memory as well: discard that.
-            flags, margin, memory = memory.flags, memory.margin, last.copy()
-            memory.flags, memory.margin = flags, margin
-        memory.commanded = sent
-        return sent, memory, replaced
+            found, r = r, last.copy()
+            r.take_given(found)
+            r.flags, r.margin = found.flags, found.margin
+        r.commanded = sent
+        return sent, r, replaced
 
-    def _see_damage(
-        self,
-        state: FlightState,
-        memory: Tick,
-        estimate: StateEstimate,
-        controlled: Controlled,
-    ) -> tuple[Damage, Watch | None]:
-        """What is known of the actuators; ``memory`` is the loops' for the next tick.
+    def _see_damage(self, state: FlightState, r: Tick, controlled: Controlled) -> Damage:
+        """What is known of the actuators. Reads estimate, joints; writes watch.
 
         Without an inertial unit, how the vehicle moves shows nothing, and without encoders nothing
         of the joints; nor does it after a jump of time: what was commanded has not been done
@@ -634,14 +636,14 @@ class Autopilot:
         """
         lost = state.aiding.lost
         blind = bool(lost) and state.aiding.has_lost(Sensor.IMU)
-        if blind or not (controlled.flown and self._watches) or self._jumped(state, estimate.t_us):
-            return state.damage, paused(state.watch)
+        watches = controlled.flown and self._watches and not blind
+        if not watches or self._jumped(state, controlled.inputs.sensors.t_us):
+            pause(r.watch)
+            return state.damage
         return self._damage.see(
             state.damage,
-            state.watch,
             state.cascade,
-            memory,
-            estimate,
+            r,
             controlled.ticks,
             angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
             angles_known=not lost,
@@ -686,20 +688,9 @@ def _let_down(estimate: StateEstimate) -> Vec2:
     return -damping1 * rate1, -damping2 * rate2
 
 
-def frozen_arm(
-    nominal: PredictionState, u: PlanInput, estimate: StateEstimate, kinds: Vec2
-) -> tuple[PredictionState, PlanInput]:
-    """The plan's state and input with the failed joints, by their ``kinds`` [1], as they are."""
-    failed = kinds[0] != SOUND, kinds[1] != SOUND
-
-    def kept(planned: Vec2, measured: Vec2) -> Vec2:
-        return (
-            measured[0] if failed[0] else planned[0],
-            measured[1] if failed[1] else planned[1],
-        )
-
-    still = (0.0, 0.0)
-    frozen = nominal._replace(
-        q_arm=kept(nominal.q_arm, estimate.q_arm), qd_arm=kept(nominal.qd_arm, still)
-    )
-    return frozen, u._replace(qdd_arm=kept(u.qdd_arm, still))
+def freeze_arm(r: Tick, estimate: StateEstimate, kinds: Vec2) -> None:
+    """Plan the failed joints, by their ``kinds`` [1], as they are. Writes plan, u."""
+    for i in range(len(kinds)):
+        if kinds[i] != SOUND:
+            r.plan.q_arm[i], r.plan.qd_arm[i] = estimate.q_arm[i], 0.0
+            r.u.qdd_arm[i] = 0.0

@@ -108,4 +108,4 @@ def nothing_known(
         safe_set=state.mission.safe_set,
     )
     taken = answer.tuning_taken
-    return TickOutputs(answer.actuators, snapshot, None, answer.acks, texts, taken)
+    return TickOutputs(answer.actuators, answer.mode, snapshot, None, answer.acks, texts, taken)

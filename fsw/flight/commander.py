@@ -365,11 +365,12 @@ class Commander:
             conditions=(),  # what is so is told again, and acted upon
             failsafe=NOTHING_DONE,
         )
+        state, begin = without_plan(state, estimate), at_rest if landed else in_hover
         state = replace(
-            without_plan(state, estimate),
+            state,
             vehicle=vehicle,
             setpoint=SetpointMemory(),
-            cascade=at_rest(airframe, estimate) if landed else in_hover(airframe, estimate),
+            cascade=begin(airframe, estimate, state.cascade),
         )
         if intended is Mode.HOLD:
             return state

@@ -7,17 +7,17 @@ again.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from fsw.compiled import machine_code, packed
-from fsw.control.actuator_watch import NONE, Watch, at_start, blank, watch
+from fsw.control.actuator_watch import watch
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.flight.state import Damage
 from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.model.airframe import GRAVITY, Airframe
 from fsw.model.rotors import rotor_decay
-from fsw.signals import ActuatorReport, StateEstimate, Vec2, Vec4
-from fsw.tick_record import Tick
+from fsw.signals import ActuatorReport, Vec2, Vec4
+from fsw.tick_record import NO_ROTOR, Tick, Watched
 
 ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
@@ -31,65 +31,50 @@ class DamageWatch:
 
     def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
         """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
-        self.law = packed(airframe)
+        self._law = packed(airframe)
         self._top = airframe.rotor_thrust_max
         self._hover = 0.25 * airframe.mass * GRAVITY
         self._tick = tick
-        self.decay = rotor_decay(airframe, tick)
+        self._decay = rotor_decay(airframe, tick)
         self._reallocates = reallocates
-        self._start = at_start()
-        none4, none3, none2 = (0.0,) * 4, (0.0,) * 3, (0.0,) * 2
-        rest: tuple[Any, ...] = (none4, none2, none2, none3, none2, none2, 1.0, True)
-        self._watch = machine_code(watch, self._start, blank(), self.law, 1.0, 1.0, *rest)
+        example = Tick().array
+        self._watch = machine_code(watch, example, example, self._law, 1.0, 1.0, True)
 
     def see(
         self,
         damage: Damage,
-        memory: Watch | None,
-        sent: Tick,
-        now: Tick,
-        estimate: StateEstimate,
+        before: Tick,
+        after: Tick,
         ticks: int,
         *,
         angles_repeat: bool = False,
         angles_known: bool = True,
-    ) -> tuple[Damage, Watch]:
-        """What is known of actuators a tick, or some ``ticks``, later, and the memory for the next.
+    ) -> Damage:
+        """What is known of actuators a tick, or some ``ticks``, later.
 
-        The record ``sent`` holds what was commanded meanwhile, ``now`` their references.
+        Reads what was commanded in the record ``before``; writes the watch of that ``after``.
         Where the encoders' ``angles_repeat``, a joint without torque may be one that is not seen.
         Where the angles are not known by encoders, joints are not judged.
         """
-        after = blank()
-        thrust, torque = sent.commanded
-        dt, decay = self._tick, self.decay
+        dt, decay = self._tick, self._decay
         if ticks != 1:
             dt, decay = ticks * dt, decay**ticks
-        failed = self._watch(
-            self._start if memory is None else memory,
-            after,
-            self.law,
-            decay,
-            dt,
-            thrust,
-            torque,
-            now.joint_reference,
-            estimate.w_WB_B,
-            estimate.q_arm,
-            estimate.qd_arm,
-            estimate.specific_force,
-            angles_known,
-        )
+        failed = self._watch(before.array, after.array, self._law, decay, dt, angles_known)
         if failed or damage.rotor:
-            back = memory is not None and memory[0]["failed"] != NONE and after[0]["failed"] == NONE
-            damage = self._of_rotors(damage, after[0], estimate.t_us, back=bool(back))
-            damage = _of_joints(damage, after[0], estimate.t_us, angles_repeat)
-        return damage, after
+            s, now_us = after.watch, after.estimate.t_us
+            back = before.watch.failed != NO_ROTOR and s.failed == NO_ROTOR
+            damage = self._of_rotors(damage, s, now_us, back=back)
+            damage = _of_joints(damage, s, now_us, angles_repeat)
+        return damage
 
-    def _of_rotors(self, before: Damage, s: Any, now_us: int, *, back: bool) -> Damage:
+    def finds(self, before: Tick, after: Tick) -> bool:
+        """Watch healthy actuators over a tick, as ``see``; whether any of them has failed."""
+        return self._watch(before.array, after.array, self._law, self._decay, self._tick, True)
+
+    def _of_rotors(self, before: Damage, s: Watched, now_us: int, *, back: bool) -> Damage:
         """What is known of rotors; the one that had failed is ``back``, or not seen any more."""
-        k, known = int(s["failed"]), before.report
-        if k == NONE:
+        k, known = s.failed, before.report
+        if k == NO_ROTOR:
             if not back:
                 return before
             joints = before.health.joints
@@ -98,26 +83,26 @@ class DamageWatch:
             return before._replace(rotor="", report=report, health=health)
         found = known._replace(
             rotor=k + 1,
-            effect=float(s["effect"]),
-            lost=bool(s["lost"]),
-            disobeys=bool(s["disobeys"]),
+            effect=s.effect,
+            lost=bool(s.lost),
+            disobeys=bool(s.disobeys),
         )
         after, health = before, before.health
         if found._replace(effect=known.effect) != known:
             since_us = before.rotor_us
             if found.rotor != known.rotor:
-                since_us = now_us - round(1e6 * float(s["suspected"]))
+                since_us = now_us - round(1e6 * s.suspected)
             after = before._replace(rotor=_sentence(s, found), rotor_us=since_us)
         if self._reallocates:
             health = self._health(s, k, found, before.health.joints)
         return after._replace(report=found, health=health)
 
-    def _health(self, s: Any, k: int, found: ActuatorReport, joints: Vec2) -> ActuatorHealth:
+    def _health(self, s: Watched, k: int, found: ActuatorReport, joints: Vec2) -> ActuatorHealth:
         """What loops reckon with for rotor ``k`` (from 0)."""
         if not found.disobeys:
             return ActuatorHealth(_with(HEALTHY.effectiveness, k, found.effect), joints=joints)
         # It is commanded what it gives in hover, and reckoned with as what it really gives.
-        gives = min(max(float(s["gives"]), _LEAST_GIVEN), self._top)
+        gives = min(max(s.gives, _LEAST_GIVEN), self._top)
         return ActuatorHealth(
             _with(HEALTHY.effectiveness, k, gives / self._hover),
             _with(HEALTHY.least, k, gives),
@@ -126,23 +111,23 @@ class DamageWatch:
         )
 
 
-def _of_joints(before: Damage, s: Any, now_us: int, angles_repeat: bool) -> Damage:
+def _of_joints(before: Damage, s: Watched, now_us: int, angles_repeat: bool) -> Damage:
     kinds = (
-        float(s["joint"][0]) or before.report.joints[0],
-        float(s["joint"][1]) or before.report.joints[1],
+        float(s.joint[0]) or before.report.joints[0],
+        float(s.joint[1]) or before.report.joints[1],
     )
     if kinds == before.report.joints:
         return before
     failed = [k for k in range(2) if kinds[k] != SOUND]
     undecided = angles_repeat and LIMP in kinds and not before.joint
-    if undecided and max(s["joint_for"][k] for k in failed) < _UNDECIDED:
+    if undecided and max(s.joint_for[k] for k in failed) < _UNDECIDED:
         return before  # a joint that hangs loose would move: encoders that are stuck show soon
     text = " and ".join([f"joint {k + 1} {_HOWS[kinds[k]]}" for k in failed])
     if angles_repeat and LIMP in kinds:  # one that hangs loose hardly ever stands so still
         text += f", or {sentence(Sensor.ENCODERS, SensorFault.STUCK)}"
     since_us = before.joint_us
     if not before.joint:
-        since_us = now_us - round(1e6 * float(s["joint_for"][failed[0]]))
+        since_us = now_us - round(1e6 * float(s.joint_for[failed[0]]))
     report, health = before.report._replace(joints=kinds), before.health._replace(joints=kinds)
     return before._replace(joint=text, joint_us=since_us, report=report, health=health)
 
@@ -152,7 +137,7 @@ def _with(values: Vec4, k: int, value: float) -> Vec4:
     return a, b, c, d
 
 
-def _sentence(s: Any, found: ActuatorReport) -> str:
+def _sentence(s: Watched, found: ActuatorReport) -> str:
     """What is wrong with a rotor."""
     k = found.rotor - 1
     name = f"rotor {ROTORS[k]}"
@@ -161,7 +146,7 @@ def _sentence(s: Any, found: ActuatorReport) -> str:
     if found.disobeys:
         return f"{name} does not obey"
     # As it is at the moment: means of a tenth of a second are behind when a rotor has just failed.
-    share = 1.0 + float(s["extra"][k]) / max(float(s["thrust"][k]), 1.0)
+    share = 1.0 + float(s.extra[k]) / max(float(s.thrust[k]), 1.0)
     if share > _WEAK_AT_MOST:
         return f"{name} gives another thrust than is commanded"
     return f"{name} gives {100.0 * max(share, 0.0):.0f} % of what is commanded"

@@ -19,6 +19,7 @@ from fsw.flight.jump import returned
 from fsw.flight.state import AIDED, COMPLETE, Aiding, FlightState, LostSensor
 from fsw.frozen import replace
 from fsw.signals import Severity, StateEstimate, StatusText, TickInputs
+from fsw.tick_record import Tick
 
 
 class ExactState:
@@ -29,26 +30,39 @@ class ExactState:
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
-    ) -> tuple[FlightState, StateEstimate | None]:
-        """The estimate of this tick, or the last one while there is none; appends to ``texts``."""
-        sensors, before = inputs.sensors, state.estimate
-        missing, found = read_frame(sensors)
+    ) -> tuple[FlightState, Tick]:
+        """The record of this tick with its estimate, the last one while there is none.
+
+        Appends to ``texts``.
+        """
+        sensors, last = inputs.sensors, state.cascade
+        r = last.copy()
+        missing = read_frame(sensors, r)
+        if not (missing or inputs.stale_us or state.invalid_ticks) and state.dropout is COMPLETE:
+            return state, r
+        before, found = last.known, r.known
+        assert found is not None
         if before is not None and state.vehicle.flies:
             lost = state.dropout is not COMPLETE and state.dropout.lost
             if lost and inputs.stale_us:
                 found = moved_on(before, 1e-6 * (sensors.t_us - before.t_us))
-                return state, found._replace(t_us=sensors.t_us)
+                r.known = found._replace(t_us=sensors.t_us)
+                return state, r
             if (missing or lost) and not inputs.stale_us:
-                return self._incomplete(state, before, found, missing, inputs, texts)
+                state, found = self._incomplete(state, before, found, missing, inputs, texts)
+                r = state.cascade.copy()
+                r.known = found
+                return state, r
         elif state.dropout is not COMPLETE and not (missing or inputs.stale_us):
             state = replace(state, dropout=COMPLETE, aiding=AIDED)
         if missing:
-            # Telemetry goes by its time, and goes on.
-            last = None if before is None else before._replace(t_us=sensors.t_us)
-            return replace(state, invalid_ticks=state.invalid_ticks + 1), last
+            r = last.copy()
+            if before is not None:  # telemetry goes by its time, and goes on
+                r.known = before._replace(t_us=sensors.t_us)
+            return replace(state, invalid_ticks=state.invalid_ticks + 1), r
         if inputs.stale_us:
-            found = moved_on(found, 1e-6 * inputs.stale_us)
-        return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), found
+            r.known = moved_on(found, 1e-6 * inputs.stale_us)
+        return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), r
 
     def _incomplete(
         self,
@@ -65,7 +79,7 @@ class ExactState:
         texts.extend(StatusText(Severity.WARNING, text) for text in sentences)
         aiding = AIDED
         if missing:
-            joints = partial(self._cascade.joint_acceleration, state.cascade, before)
+            joints = partial(self._cascade.joint_acceleration, state.cascade)
             found = filled(missing, inputs.sensors, found, before, joints)
             aiding = _aiding(dropout, found.t_us)
         if away and dropout.pose.since_us < 0:

@@ -16,7 +16,7 @@ from fsw.geometry.rotation import (
     yaw_of,
 )
 from fsw.geometry.vectors import add_scaled, norm
-from fsw.signals import PredictionState, Severity, StateEstimate, StatusText
+from fsw.signals import Severity, StateEstimate, StatusText
 from fsw.tick_record import Tick
 
 _TOLD: Final = 0.02  # m, of a jump that the operator reads about
@@ -42,18 +42,16 @@ def told(reset: Reset) -> str:
     return f"estimate moved by {place:.0f} mm, {abs(yaw):.3f} rad: the plan moves along"
 
 
-def moved_along(
-    nominal: PredictionState | None, cascade: Tick, reset: Reset
-) -> tuple[PredictionState | None, Tick]:
-    """The plan's state and the observer's velocity, moved along with the estimate."""
-    yaw = yaw_of(matrix_from_quaternion(reset.turn))
+def moved_along(r: Tick, reset: Reset) -> Tick:
+    """The record with the plan's state and the observer's velocity moved along."""
+    r, nominal = r.copy(), r.nominal
     if nominal is not None:
-        nominal = nominal._replace(
+        yaw = yaw_of(matrix_from_quaternion(reset.turn))
+        r.nominal = nominal._replace(
             p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
         )
-    cascade = cascade.copy()
-    cascade.observed.v += reset.velocity
-    return nominal, cascade
+    r.observed.v += reset.velocity
+    return r
 
 
 def on_return(found: StateEstimate, before: StateEstimate) -> tuple[Reset, list[StatusText]]:
@@ -77,5 +75,4 @@ def returned(
     """
     reset, said = on_return(found, before)
     texts += said
-    nominal, cascade = moved_along(state.nominal, state.cascade, reset)
-    return replace(state, nominal=nominal, cascade=cascade)
+    return replace(state, cascade=moved_along(state.cascade, reset))

@@ -91,7 +91,7 @@ def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) 
 
 def _measured_now(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> Vec2 | None:
     now, legs = 1e-6 * estimate.t_us, config.airframe.leg_length
-    return _measured_height(state.vehicle.range, now, estimate, legs, _RANGE_AGE)
+    return _measured_height(state.vehicle.range, now, estimate.R_WB[8], legs, _RANGE_AGE)
 
 
 def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool:
@@ -100,25 +100,26 @@ def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool
     By the rangefinder's reading, if that is not ``oldest`` [s], because the estimate may be what is
     wrong; else by that, as far as it knows its height.
     """
-    estimate, vehicle = state.estimate, state.vehicle
-    if estimate is None or not vehicle.flies:
+    r, vehicle = state.cascade, state.vehicle
+    if not (r.has_estimate and vehicle.flies):
         return False
-    measured = _measured_height(vehicle.range, now, estimate, legs, oldest)
+    measured = _measured_height(vehicle.range, now, r.upright, legs, oldest)
     if measured is not None:
         return measured[0] > _CLOSE
-    return -estimate.p_WB[2] - legs - _SIGMAS * state.aiding.height_sigma > _CLOSE
+    return -r.down - legs - _SIGMAS * state.aiding.height_sigma > _CLOSE
 
 
 def _measured_height(
-    seen: RangeSample | None, now: float, estimate: StateEstimate, legs: float, oldest: float
+    seen: RangeSample | None, now: float, upright: float, legs: float, oldest: float
 ) -> Vec2 | None:
     """Height of the ``legs`` [m, long] above the ground [m], and its deviation [m].
 
     By what the rangefinder has ``seen``; None if that is ``oldest`` [s] or more at ``now`` [s].
+    The cosine of the tilt is ``upright`` [1].
     """
     if seen is None or not 0.0 <= now - seen.time < oldest:
         return None
-    return seen.distance * estimate.R_WB[8] - legs, math.sqrt(max(seen.variance, 0.0))
+    return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
 
 
 def feel_ground(

@@ -13,7 +13,12 @@ from typing import Final
 
 from fsw.control.joints import rest_joints
 from fsw.estimation.imu import IMU_TOO_OLD
-from fsw.flight.plan_exchange import measured_state, with_arm_in_bounds, without_plan
+from fsw.flight.plan_exchange import (
+    measured_state,
+    with_arm_in_bounds,
+    with_nominal,
+    without_plan,
+)
 from fsw.flight.state import FlightState
 from fsw.frozen import replace
 from fsw.measurements import Sample
@@ -66,4 +71,5 @@ def plan_resumed(
     """The state without a plan, to brake from the measured motion until there is one."""
     measured = measured_state(estimate, motion)
     settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
-    return replace(without_plan(state, estimate), nominal=settled)
+    state = without_plan(state, estimate)
+    return replace(state, cascade=with_nominal(state.cascade, settled))

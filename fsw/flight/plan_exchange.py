@@ -24,6 +24,7 @@ from fsw.signals import (
     StateEstimate,
     Vec3,
 )
+from fsw.tick_record import Tick
 
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
@@ -153,30 +154,36 @@ class PlanExchange:
     def follow(
         self,
         memory: PlanMemory,
-        nominal: PredictionState,
+        r: Tick,
         answer: Plan | PlanFailure | None,
         now_us: int,
         ticks: int,
-    ) -> tuple[PredictionState, PlanMemory, PlanInput]:
+    ) -> PlanMemory:
         """Bring the plan's state of the last tick to this one, by a new plan or by as many steps.
 
-        ``ticks`` passed since, more than one where some were missed. Returns the plan's state, the
-        memory, and the plan's input now.
+        ``ticks`` passed since, more than one where some were missed. Reads plan; writes plan, u.
         """
         tick_us, running = self._config.tick_period_us, memory.running
         memory, new_plan = take_answer(memory, answer, now_us)
         if new_plan is not None:
             late = max(now_us - new_plan.t_us, 0) // tick_us
-            nominal = self.model.advance(new_plan.start, new_plan.inputs[0], late)
+            r.nominal, r.input = new_plan.start, new_plan.inputs[0]
+            self.model.move(r, late)
         elif now_us > memory.since_us:
             for ago in range(ticks, 0, -1):
-                u = plan_input(running, nominal, now_us - ago * tick_us, self._brake)
-                nominal = self.model.step(nominal, u)
-        return nominal, memory, plan_input(memory.running, nominal, now_us, self._brake)
+                self._steer(running, r, now_us - ago * tick_us)
+                self.model.move(r, 1)
+        self._steer(memory.running, r, now_us)
+        return memory
 
-    def step(self, nominal: PredictionState, u: PlanInput) -> PredictionState:
-        """The plan's state one tick later."""
-        return self.model.step(nominal, u)
+    def _steer(self, plan: Plan | None, r: Tick, now_us: int) -> None:
+        """The running plan's input at its age; braking where there is none young enough."""
+        u = None if plan is None else planned_input(plan, now_us)
+        if u is None:
+            nominal = r.nominal
+            assert nominal is not None
+            u = self._brake(nominal)
+        r.input = u
 
     def start(
         self,
@@ -226,4 +233,11 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
     """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
     last = state.plan
     plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
-    return replace(state, nominal=nominal_at_rest(estimate), plan=plan)
+    return replace(state, cascade=with_nominal(state.cascade, nominal_at_rest(estimate)), plan=plan)
+
+
+def with_nominal(r: Tick, nominal: PredictionState) -> Tick:
+    """A record with another state of the plan."""
+    r = r.copy()
+    r.nominal = nominal
+    return r

@@ -113,9 +113,10 @@ class ReferenceHorizon:
 
     def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
         """Whether the fast loop is off the plan: then the reference does not advance."""
-        if state.nominal is None:
+        nominal = state.nominal
+        if nominal is None:
             return False
-        (x, y, z), (px, py, pz) = estimate.p_WB, state.nominal.p
+        (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
         # On the ground the plan may well be lower.
         low = height_above_ground(self._config, estimate) < self._config.limits.airborne_height
         return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
-from fsw.control.tube import Tube
+from fsw.control.tube import Tube, TubeAround
 from fsw.flight.land_detector import height_above_ground
-from fsw.flight.state import SafetyMemory
+from fsw.flight.state import FlightState, SafetyMemory
 from fsw.frozen import replace
 from fsw.parameters.consistency import base_reach
 from fsw.parameters.flight_config import FlightConfig
@@ -42,6 +42,13 @@ class SafetyWatch:
         # More upright than this, neither roll nor pitch is beyond its limit.
         beyond = [a for a in (config.limits.roll_failure, config.limits.pitch_failure) if a > 0.0]
         self.upright = math.cos(min([*beyond, 0.5 * math.pi])) if beyond else -2.0
+
+        self._tube = TubeAround(self.radius, loop.wind if follows_state else 0.0, 0.0)
+
+    def tube(self, state: FlightState) -> TubeAround:
+        """The tube around the plan in a tick that starts from a state."""
+        unsure = beyond_room(state.accuracy.reach)
+        return self._tube._replace(unsure=unsure) if unsure else self._tube
 
     def attitude(
         self, memory: SafetyMemory, estimate: StateEstimate, *, flies: bool
@@ -74,7 +81,7 @@ class SafetyWatch:
             return memory if memory.off_plan_us < 0 else replace(memory, off_plan_us=-1)
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
         dx, dy, dz = x - px, y - py, z - pz
-        most = off_plan_bound(self.radius + wind, unsure)
+        most = self.radius + wind + beyond_room(unsure)
         if (
             memory.off_plan_us < 0
             and -most <= dx <= most
@@ -154,12 +161,9 @@ class SafetyWatch:
         return height_above_ground(config, estimate) < config.limits.airborne_height
 
 
-def off_plan_bound(radius: float, unsure: float) -> float:
-    """How far [m] the base may be off its plan on an axis, of a tube's ``radius`` [m].
-
-    ``unsure`` [m] is what the estimate's errors add; the radius has room for some of it.
-    """
-    return radius + max(unsure - NOISE_ROOM, 0.0)
+def beyond_room(unsure: float) -> float:
+    """What errors of the estimate, ``unsure`` [m], add to the radius: it has room for some [m]."""
+    return max(unsure - NOISE_ROOM, 0.0)
 
 
 def _least_margins(report: ConstraintReport, announced: int) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import Array, P
-from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start
+from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start, copied
 from fsw.estimation.imu import IMU_TOO_OLD
 from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
@@ -72,7 +72,7 @@ class SensedState:
     def warm_up(self) -> None:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
-        self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate), estimate)
+        self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate))
 
     def covariance(self, memory: FusionMemory | None) -> Array | None:
         """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""
@@ -95,8 +95,8 @@ class SensedState:
         now = 1e-6 * inputs.sensors.t_us
         before = _memory(state, now)
         pushed, model = (0.0, 0.0), UNKNOWN
-        if state.estimate is not None:
-            pushed, model = self._cascade.expected(state.cascade, state.estimate)
+        if state.cascade.has_estimate:
+            pushed, model = self._cascade.expected(state.cascade)
             # On the ground thrust does not explain how the vehicle moves.
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
@@ -111,7 +111,7 @@ class SensedState:
         if came:
             memory = memory._replace(imu_came=came)
         caught = None
-        if estimate is None and state.estimate is None:
+        if estimate is None and not state.cascade.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
             estimate = caught.estimate
         if estimate is None:
@@ -135,7 +135,11 @@ class SensedState:
             memory, found = self._fusion.catch_up(
                 memory, one.samples, now, estimate, aloft=aloft, damaged=_is_damaged(state)
             )
-            state = replace(state, fusion=memory, estimate=found or estimate or state.estimate)
+            state, known = replace(state, fusion=memory), found or estimate
+            if known is not None:
+                r = state.cascade.copy()
+                r.known = known
+                state = replace(state, cascade=r)
         return state, inputs
 
     def catch_up(
@@ -328,7 +332,7 @@ def _watched(
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:
     """The memory with an arm that stands still where a ``reading`` is, and nothing disturbs it."""
-    numbers = memory.numbers.copy()
+    numbers = copied(memory.numbers)
     kernels.set_joints(numbers, law, reading.time, reading.angles)
     return memory._replace(numbers=numbers)
 

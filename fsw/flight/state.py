@@ -6,7 +6,6 @@ from dataclasses import field
 from functools import partial
 from typing import Final, NamedTuple
 
-from fsw.control.actuator_watch import Watch
 from fsw.estimation.frame_dropout import Dropout
 from fsw.estimation.fusion_memory import FusionMemory
 from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
@@ -261,9 +260,7 @@ class FlightState:
 
     index: int = -1  # of the last tick on the absolute grid, missed ones counted
     t_us: int = 0  # of the last tick
-    estimate: StateEstimate | None = None  # last valid
     invalid_ticks: int = 0
-    nominal: PredictionState | None = None  # where the running plan wants the vehicle now
     output_replaced: bool = False
     cascade: Tick = field(default_factory=partial(new_tick, AIRFRAME.mass))
 
@@ -287,5 +284,14 @@ class FlightState:
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = Damage()
-    watch: Watch | None = None  # over the actuators, in flight
     limited: str = ""  # why the reference is not what was asked for; empty: it is
+
+    @property
+    def estimate(self) -> StateEstimate | None:
+        """The last valid one, made anew each time."""
+        return self.cascade.known
+
+    @property
+    def nominal(self) -> PredictionState | None:
+        """Where the running plan wants the vehicle now, made anew each time."""
+        return self.cascade.nominal

@@ -175,34 +175,38 @@ class Inbox:
 
         The sensors' readings are ``stale_us`` older than their stamp says.
         """
-        # By position: it is made in every tick, and in most of them there are samples alone.
-        if not self._is_news:
-            samples, self._received.samples = self._received.samples, []
+        if not self._is_news:  # as in most ticks: there are samples alone
+            samples, self._received.samples = tuple(self._received.samples), []
             return TickInputs(
-                *(sensors, plan, (), (), (), None, None, None, 0, False),
-                *(mission, tuning, stale_us, tuple(samples), None, host, 0, (), ""),
+                sensors,
+                plan,
+                mission=mission,
+                tuning=tuning,
+                stale_us=stale_us,
+                samples=samples,
+                host=host,
             )
         came = self.take()
         return TickInputs(
             sensors,
             plan,
-            tuple(came.commands),
-            tuple(came.targets),
-            tuple([_begun(one, sensors.t_us) for one in came.announced]),
-            came.motion,
-            came.attitude,
-            came.joints,
-            came.refused_setpoints,
-            came.station_heard,
-            mission,
-            tuning,
-            stale_us,
-            tuple(came.samples),
-            came.battery,
-            host,
-            came.sensor_clock_jump_us,
-            tuple(came.refused),
-            came.setpoint_problem,
+            mission=mission,
+            tuning=tuning,
+            stale_us=stale_us,
+            host=host,
+            commands=tuple(came.commands),
+            targets=tuple(came.targets),
+            announced=tuple([_begun(one, sensors.t_us) for one in came.announced]),
+            motion=came.motion,
+            attitude=came.attitude,
+            joints=came.joints,
+            refused_setpoints=came.refused_setpoints,
+            ground_station_heard=came.station_heard,
+            samples=tuple(came.samples),
+            battery=came.battery,
+            sensor_clock_jump_us=came.sensor_clock_jump_us,
+            refused=tuple(came.refused),
+            setpoint_problem=came.setpoint_problem,
         )
 
     def _command(

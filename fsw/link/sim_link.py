@@ -304,7 +304,6 @@ class SimLink:
         rate, force = _NO_VECTOR, _NO_VECTOR
         if type(newest) is ImuSample:
             rate, force = newest.rate, newest.acceleration
-        # By position: it is made in every tick.
         return SensorFrame(
             t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, _NO_JOINTS, _NO_JOINTS
         )

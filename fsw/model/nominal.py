@@ -11,11 +11,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.compiled import compilable, kernel, machine_code, packed
-from fsw.frozen import made
 from fsw.model.airframe import Airframe
 from fsw.model.prediction import A, P, S, discretise
 from fsw.signals import PlanInput, PredictionState, Vec3
-from fsw.tick_record import Accelerations, PlanState
+from fsw.tick_record import Accelerations, PlanState, Tick
 
 REST_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
 REST_STATE = PredictionState(
@@ -55,15 +54,24 @@ class NominalModel:
             tuple((*a[row, vertical].tolist(), float(b[row, 2])) for row in vertical),
         )
         self.packed = packed(self.model)
-        self._advance = machine_code(_advance, self.packed, REST_STATE, REST_INPUT, 1)
+        self._move = machine_code(_move, self.packed, Tick().array, 1)
+
+    def move(self, r: Tick, ticks: int) -> None:
+        """Bring the plan's state of a record some ticks on. Reads plan, u; writes plan."""
+        self._move(self.packed, r.array, ticks)
 
     def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
         """The state one tick later."""
-        return made(PredictionState, self._advance(self.packed, x, u, 1))
+        return self.advance(x, u, 1)
 
     def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
         """The state some ticks later under one input."""
-        return made(PredictionState, self._advance(self.packed, x, u, ticks))
+        r = Tick()
+        r.nominal, r.input = x, u
+        self.move(r, ticks)
+        moved = r.nominal
+        assert moved is not None
+        return moved
 
 
 @compilable
@@ -78,19 +86,12 @@ def put_plan(into: PlanState, x: PredictionState) -> None:
     into.yaw, into.yaw_rate = x.yaw, x.yaw_rate
 
 
-@compilable
-def advance(model: TickModel, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
-    """The state some ticks later under one input."""
-    for _ in range(ticks):
-        x = next_state(model, x, u)
-    return x
-
-
 @kernel
-def _advance(model: NDArray[Any], x: PredictionState, u: PlanInput, ticks: int) -> tuple[Any, ...]:
-    """``advance`` that returns a plain tuple, which leaves machine code at half the cost."""
-    x = advance(model[0], x, u, ticks)
-    return (x.p, x.v, x.a, x.j, x.s, x.yaw, x.yaw_rate, x.q_arm, x.qd_arm)
+def _move(models: NDArray[Any], ticks: NDArray[Any], count: int) -> None:
+    """Bring the plan's state ``count`` ticks on."""
+    model, r = models[0], ticks[0]
+    for _ in range(count):
+        put_plan(r.plan, next_state(model, r.plan, r.u))
 
 
 @compilable

@@ -359,8 +359,8 @@ def fly(
         time_s = simulation.time_s
         outputs = loop.step(_inputs(situation, loop))
         seen.see(time_s, outputs)
-        if outputs.snapshot.mode is not Mode.TRAJECTORY and time_s > _FOLLOWS_S:
-            simulation.leave_trajectory(simulation.t_us, outputs.snapshot.mode.value)
+        if outputs.mode is not Mode.TRAJECTORY and time_s > _FOLLOWS_S:
+            simulation.leave_trajectory(simulation.t_us, outputs.mode.value)
     if simulation.ended is not None and simulation.time_s < situation.fault_s:
         seen.problem = seen.problem or f"{simulation.ended.sentence}, before anything failed"
     away_m = math.dist(started_m, simulation.truth().p_WB)

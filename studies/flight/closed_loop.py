@@ -14,8 +14,9 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from fsw.estimation.estimator import READINGS
 from fsw.flight.autopilot import Autopilot
-from fsw.flight.quiet_ticks import READINGS, QuietTicks
+from fsw.flight.calm_tick import CalmTick
 from fsw.flight.state import FlightState
 from fsw.measurements import Sample, Vec2, Vec4
 from fsw.model.airframe import Airframe
@@ -137,7 +138,7 @@ class ClosedLoop(Generic[State]):
             self.planner.submit(outputs.plan_request)
         if before_advancing is not None:
             before_advancing(outputs)
-        self.simulation.advance(self.controls(outputs.actuators, armed=outputs.snapshot.armed))
+        self.simulation.advance(self.controls(outputs.actuators, armed=outputs.mode.armed))
         return outputs
 
     def controls(self, command: tuple[Vec4, Vec2], *, armed: bool) -> Controls:
@@ -149,38 +150,35 @@ class ClosedLoop(Generic[State]):
         return Controls(thrust, (t1 / torque, t2 / torque), armed)
 
 
-class QuietStretch:
-    """Flies the ticks of a loop in which nothing happens, without what only others need of a tick.
+class CalmStretch:
+    """Flies the calm ticks of a loop without the inputs and outputs of each, which nobody reads.
 
-    For studies of exact states: see ``fsw.flight.quiet_ticks``.
+    For studies of exact states: see ``fsw.flight.calm_tick``.
     """
 
-    def __init__(
-        self, loop: ClosedLoop[FlightState], autopilot: Autopilot, *, allowed: bool
-    ) -> None:
+    def __init__(self, loop: ClosedLoop[FlightState], calm: CalmTick, *, allowed: bool) -> None:
         """Fly none unless it is ``allowed``."""
-        self._loop, self._autopilot = loop, autopilot
-        self._ticks: QuietTicks | None = None
-        if allowed and loop.simulation.tells_its_state:
-            self._ticks = autopilot.quiet_ticks()
+        self._loop, self._calm = loop, calm
+        self._allowed = allowed and loop.simulation.tells_its_state
         self._reading = np.empty(READINGS)
 
     def fly(self) -> bool:
         """Go on as far as nothing happens, often not at all; whether the run is not over then."""
-        loop, ticks = self._loop, self._ticks
+        loop, calm, reading = self._loop, self._calm, self._reading
         simulation, before = loop.simulation, loop.state
-        if ticks is None or simulation.t_us != before.t_us + STEP_US:
-            return simulation.ended is None
-        reading = self._reading
-        for _ in range(ticks.begin(before, self._autopilot.zones_now(before))):
+        r, flown = before.cascade, 0
+        allowed = self._allowed and simulation.t_us == before.t_us + STEP_US
+        for _ in range(calm.ticks(before) if allowed else 0):
             simulation.exact_state(reading)
-            quiet, thrust, torque = ticks.tick(reading)
-            if not quiet:
+            after = calm.step(r, reading, simulation.t_us)
+            if after is None:
                 break
-            simulation.advance(loop.controls((thrust, torque), armed=True))
+            r, flown = after, flown + 1
+            simulation.advance(loop.controls(r.commanded, armed=True))
             if simulation.ended is not None:
                 break
-        loop.state = ticks.end(before)
+        if flown:
+            loop.state = calm.after(before, r, flown)
         return simulation.ended is None
 
 
@@ -233,7 +231,7 @@ def simulate(
     autopilot = Autopilot(config)
     loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
     # A trace is of every so many ticks, and a fault of a sensor may be in each.
-    stretch = QuietStretch(loop, autopilot, allowed=fault is None and not traced)
+    stretch = CalmStretch(loop, autopilot.calm, allowed=fault is None and not traced)
     steps_per_plan = config.mpc_period_us // config.tick_period_us
     faulty, mode = FaultySensors(fault, seed), Mode.TRAJECTORY
     while stretch.fly():
@@ -262,8 +260,8 @@ def simulate(
         if outputs.texts:
             time_s = 1e-6 * (sensors.t_us - START_US)
             recorder.texts += [(time_s, one.text) for one in outputs.texts]
-        if outputs.snapshot.mode is not mode and step >= len(FIRST_COMMANDS):
-            mode = outputs.snapshot.mode
+        if outputs.mode is not mode and step >= len(FIRST_COMMANDS):
+            mode = outputs.mode
             recorder.modes.append(mode.value)
             # As the scenario's pilot would, who looks on.
             why = f"the vehicle left the trajectory for {mode.value}"

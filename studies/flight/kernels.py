@@ -99,9 +99,7 @@ def _build(half: str) -> None:
 
         config = flight_config()
         Planner(config.planner, config.airframe, processor_time_us).warm_up()
-        autopilot = Autopilot(config)
-        autopilot.warm_up()
-        autopilot.quiet_ticks()
+        Autopilot(config).warm_up()
     else:
         from sitl.rehearsal import rehearse
         from sitl.scenario_file import load_scenario

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fsw.compiled import compilable, packed
 from fsw.control.cascade import Cascade, CascadeLaw, close_loops
+from fsw.estimation.estimator import READINGS, read_into
 from fsw.flight.autopilot import keep_clear
-from fsw.flight.quiet_ticks import READINGS, read_into
 from fsw.model.prediction import Array
 from fsw.parameters.flight_config import FlightConfig
 from fsw.tick_record import FILTER_ACTED, Accelerations, PlanState, Tick

@@ -102,7 +102,7 @@ class WholeFlight:
             outputs = self._step(steer)
             truth = simulation.truth()
             arrived = truth.p_WB
-            if outputs.snapshot.mode is not Mode.TRAJECTORY:
+            if outputs.mode is not Mode.TRAJECTORY:
                 simulation.leave_trajectory(simulation.t_us, "a failsafe took over")
             least = min(least, *truth.margins_m, math.inf)
         ended, safety = simulation.ended, self._loop.state.safety

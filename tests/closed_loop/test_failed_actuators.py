@@ -164,5 +164,5 @@ def test_walls_with_a_healthy_vehicle_count_on_every_rotor_exactly() -> None:
     flight = Flight(load_scenario("walls"))
     flight.follow()
     flight.run(1.5)
-    assert flight.state.watch is not None
+    assert flight.state.cascade.watch.running > 1.0
     assert flight.state.damage.health.effectiveness == (1.0, 1.0, 1.0, 1.0)

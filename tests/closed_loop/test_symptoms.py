@@ -11,6 +11,7 @@ import pytest
 from fsw.signals import ConstraintKind, Mode, SensorFrame
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, LAND, Flight, command, hover, on_the_ground
+from tests.fsw.records import with_record
 
 
 def test_walls_announced_with_an_invalid_first_frame_are_kept() -> None:
@@ -80,7 +81,7 @@ def test_one_tick_of_nonsense_does_not_leave_the_vehicle_in_open_loop() -> None:
     flight.run(0.5)
     nominal = flight.state.nominal
     assert nominal is not None
-    flight.state = replace(flight.state, nominal=nominal._replace(q_arm=(math.nan, 0.0)))
+    flight.state = with_record(flight.state, nominal=nominal._replace(q_arm=(math.nan, 0.0)))
     flight.step()
     assert flight.state.output_replaced
     flight.run(0.5)

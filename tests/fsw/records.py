@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from fsw.control import tracking
 from fsw.control.gains import TrackingTuning
+from fsw.flight.state import FlightState
 from fsw.record import Record
-from fsw.signals import Vec3
-from fsw.tick_record import Observed
+from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
+from fsw.tick_record import Observed, Tick
 
 Kind = TypeVar("Kind", bound=Record)
 
@@ -26,6 +28,18 @@ def changed(record: Kind, **fields: Any) -> Kind:
         else:
             setattr(after, name, value)
     return after
+
+
+def with_given(before: Tick, estimate: StateEstimate, plan: PredictionState, u: PlanInput) -> Tick:
+    """The record of a tick that is given these, before the loops are closed."""
+    r = before.copy()
+    r.known, r.nominal, r.input = estimate, plan, u
+    return r
+
+
+def with_record(state: FlightState, **fields: Any) -> FlightState:
+    """A state whose record has other fields, the estimate as ``known``."""
+    return replace(state, cascade=changed(state.cascade, **fields))
 
 
 def observed(v: Vec3, d: Vec3, recent: float = 1.0) -> Observed:

@@ -226,7 +226,7 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
     outputs = outputs_at(inputs.sensors.t_us)
     snapshot = replace(outputs.snapshot, counters=PlannerCounters())
     request = cast(PlanRequest, "a request") if state % 50 == 0 else None
-    return state + 1, replace(outputs, snapshot=snapshot, plan_request=request, texts=())
+    return state + 1, replace(outputs, shown=snapshot, plan_request=request, texts=())
 
 
 def test_the_table_is_the_configuration_s_and_the_dialect_s() -> None:

@@ -26,8 +26,9 @@ from fsw.signals import (
     Vec2,
     Vec3,
 )
+from fsw.tick_record import Tick
 from tests.fsw.random_states import estimate_of
-from tests.fsw.records import changed, observe, observed
+from tests.fsw.records import changed, observe, observed, with_given
 
 DT = 0.002
 TUNING = LoopGains()
@@ -46,6 +47,19 @@ def torque_of(command: ActuatorCommand) -> Array:
     return np.array([0.3 * (f2 - f4), 0.3 * (f3 - f1), 0.016 * (f1 - f2 + f3 - f4)])
 
 
+def after_step(
+    cascade: Cascade,
+    before: Tick,
+    estimate: StateEstimate,
+    plan: PredictionState,
+    u: PlanInput,
+    ticks: int = 1,
+) -> Tick:
+    r = with_given(before, estimate, plan, u)
+    cascade.step(r, ticks)
+    return r
+
+
 def one_step(
     estimate: StateEstimate,
     plan: PredictionState,
@@ -53,7 +67,7 @@ def one_step(
     inner: Inner = "tracking",
 ) -> ActuatorCommand:
     cascade = Cascade(AIRFRAME, TUNING, inner, DT)
-    return cascade.step(in_hover(AIRFRAME, estimate), estimate, plan, u).commanded
+    return after_step(cascade, in_hover(AIRFRAME, estimate), estimate, plan, u).commanded
 
 
 def turned(yaw: float, w: Vec3 = STILL) -> StateEstimate:
@@ -128,7 +142,7 @@ def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
-    after = cascade.step(changed(memory, commanded=sent), estimate, plan_at(), NO_INPUT)
+    after = after_step(cascade, changed(memory, commanded=sent), estimate, plan_at(), NO_INPUT)
     share = 1.0 - math.exp(-DT / AIRFRAME.rotor_lag)
     hover = 3.5 * 9.81 / 4.0
     assert after.rotors[:4] == pytest.approx([hover + share * (10.0 - hover)] * 4)
@@ -161,7 +175,7 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
     memory = changed(in_hover(AIRFRAME, turned(0.0)), commanded=sent)
-    after = cascade.step(memory, estimate, plan_at(), NO_INPUT, ticks)
+    after = after_step(cascade, memory, estimate, plan_at(), NO_INPUT, ticks)
     hover = 3.5 * 9.81 / 4.0
     left = math.exp(-ticks * DT / AIRFRAME.rotor_lag)
     assert after.rotors[:4] == pytest.approx([10.0 + left * (hover - 10.0)] * 4)
@@ -189,7 +203,7 @@ def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
         memory = changed(in_hover(AIRFRAME, estimate), rotors=each, commanded=sent)
         # The accelerometer agrees that the mass is what it was.
         seen = estimate._replace(specific_force=thrust / 3.5)
-        command = cascade.step(memory, seen, plan_at(q_arm=q_arm), NO_INPUT).commanded
+        command = after_step(cascade, memory, seen, plan_at(q_arm=q_arm), NO_INPUT).commanded
         # The observers see a vehicle at rest that should be rising, and believe a little of it.
         np.testing.assert_allclose(command.joint_torque, (upper + lower, lower), rtol=0.05)
 
@@ -224,7 +238,9 @@ def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
     estimate = estimate_of(Rotation.identity(), w)
     free = replace(TUNING, attitude=PidGains(0.0, 0.0, 0.0, 1.0))
     cascade = Cascade(unlike, free, "pid", DT)
-    command = cascade.step(in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT).commanded
+    command = after_step(
+        cascade, in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT
+    ).commanded
     inertia, spin = np.array(unlike.inertia), np.array(w)
     expected = np.cross(spin, inertia * spin) + [0.0, command.joint_torque[0], 0.0]
     np.testing.assert_allclose(torque_of(command), expected, atol=1e-9)

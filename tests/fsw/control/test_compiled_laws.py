@@ -10,19 +10,32 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fsw.control.cascade import Cascade, Inner, close_loops, in_hover
+from fsw.control.actuator_watch import watch
+from fsw.control.cascade import Cascade, Inner, close_loops, compare_with_plan, in_hover
 from fsw.control.gains import LoopGains
+from fsw.control.tube import TubeAround
 from fsw.estimation.estimator import attitude, estimate_state
+from fsw.flight.damage_watch import DamageWatch
+from fsw.model.actuator_health import HEALTHY
 from fsw.model.airframe import AIRFRAME, AttitudeLag
-from fsw.model.nominal import NominalModel, advance
+from fsw.model.nominal import NominalModel, next_state
+from fsw.model.rotors import rotor_decay
 from fsw.shapes.ball import point
 from fsw.shapes.half_space import wall
 from fsw.shapes.zones import moving_zones
-from fsw.signals import ActuatorCommand, PlanInput, SafeSet, SensorFrame, Vec4
+from fsw.signals import (
+    ActuatorCommand,
+    PlanInput,
+    SafeSet,
+    SensorFrame,
+    Vec4,
+)
 from fsw.tick_record import FILTER_ACTED, GATE_NEEDED, Tick
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
+from tests.fsw.records import with_given
 
 STATES = 300
+TUBE = TubeAround(1.5, 0.2, 0.01)
 TUNINGS = [LoopGains(), replace(LoopGains(), compensate=False)]
 
 
@@ -82,10 +95,11 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
     for _ in range(STATES):
         before, estimate = memory(random), random_estimate(random)
         plan, u = as_state(prediction_vector(random)), plan_input(random)
-        ours = cascade.step(before, estimate, plan, u, ticks, zones)
-        plain = before.copy()
-        plain.give(estimate, plan, u)
+        ours = with_given(before, estimate, plan, u)
+        plain = ours.copy()
+        cascade.step(ours, ticks, zones, HEALTHY, TUBE)
         close_loops(plain, cascade.law, ticks, zones, cascade.probes)
+        compare_with_plan(plain, TUBE)
         np.testing.assert_allclose(ours.numbers, plain.numbers, rtol=0, atol=1e-9)
         assert ours.flags == plain.flags
         pushed += ours.flags & FILTER_ACTED
@@ -96,7 +110,8 @@ def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> No
     random = np.random.default_rng(8)
     cascade = Cascade(AIRFRAME, LoopGains(), "tracking", 0.002)
     plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
-    after = cascade.step(memory(random), random_estimate(random), plan, plan_input(random))
+    after = with_given(memory(random), random_estimate(random), plan, plan_input(random))
+    cascade.step(after)
     assert not math.isfinite(sum(after.commanded.joint_torque))
     assert after.flags & GATE_NEEDED
 
@@ -107,9 +122,11 @@ def test_the_plans_state_moves_on_as_in_python(lag: AttitudeLag) -> None:
     nominal = NominalModel(replace(AIRFRAME, attitude_lag=lag), 0.002)
     for ticks in range(20):
         x, u = as_state(prediction_vector(random)), plan_input(random)
-        plain = list(numbers(advance(nominal.model, x, u, ticks)))
+        plain = x
+        for _ in range(ticks):
+            plain = next_state(nominal.model, plain, u)
         np.testing.assert_allclose(
-            list(numbers(nominal.advance(x, u, ticks))), plain, rtol=0, atol=1e-9
+            list(numbers(nominal.advance(x, u, ticks))), list(numbers(plain)), rtol=0, atol=1e-9
         )
 
 
@@ -126,3 +143,26 @@ def test_the_estimate_is_the_one_of_python() -> None:
         assert estimate is not None
         np.testing.assert_allclose(estimate.R_WB, rotation, rtol=0, atol=1e-9)
         assert estimate.yaw == pytest.approx(yaw, abs=1e-9)
+
+
+def test_the_watch_over_actuators_is_the_one_of_python() -> None:
+    random = np.random.default_rng(11)
+    watcher = DamageWatch(AIRFRAME, 0.002, reallocates=True)
+    in_python = getattr(watch, "py_func", watch)
+    ours = memory(random)
+    plain, found = ours.copy(), 0
+    for k in range(STATES):
+        sent = ours.copy()
+        ours.known = plain.known = random_estimate(random)._replace(specific_force=9.81)
+        ours.joints.reference[:2] = plain.joints.reference[:2] = random.uniform(-1.0, 1.0, 2)
+        # Settled, and now and then one rotor is under suspicion for long.
+        for r in (ours, plain):
+            r.watch.running, r.watch.arm_seen = 2.0, float(k % 5)
+            if k == STATES // 2:
+                r.watch.failed, r.watch.effect = 2, 0.5
+        failed = watcher.finds(sent, ours)
+        decay = rotor_decay(AIRFRAME, 0.002)
+        assert in_python(sent, plain, (AIRFRAME,), decay, 0.002, True) == failed
+        np.testing.assert_allclose(ours.numbers, plain.numbers, rtol=1e-9, atol=1e-9)
+        found += failed
+    assert 0 < found < STATES

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.estimation.estimator import INERTIAL, JOINTS, POSE, estimate_state, read_frame
 from fsw.signals import SensorFrame, Vec4
+from fsw.tick_record import Tick
 from tests.fsw.random_states import mat3
 
 GOOD = SensorFrame(
@@ -68,8 +69,10 @@ PARTS = {"p_WB": POSE, "v_WB": POSE, "q_WB": POSE, "gyro_B": INERTIAL, "q_arm": 
 @pytest.mark.parametrize("name", PARTS)
 def test_a_part_that_is_no_number_is_named_and_the_others_stay(name: str) -> None:
     nothing: Any = (math.nan,) * len(getattr(GOOD, name))
-    missing, state = read_frame(replace(GOOD, **{name: nothing}))
-    assert missing == PARTS[name]
+    r = Tick()
+    assert read_frame(replace(GOOD, **{name: nothing}), r) == PARTS[name]
+    state = r.known
+    assert state is not None
     if name != "gyro_B":
         assert state.w_WB_B == GOOD.gyro_B
 

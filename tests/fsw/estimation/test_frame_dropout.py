@@ -13,6 +13,7 @@ from fsw.estimation.estimator import estimate_state, read_frame
 from fsw.estimation.frame_dropout import Dropout, filled
 from fsw.estimation.sensor_fault import Sensor
 from fsw.signals import SensorFrame, StateEstimate, Vec3
+from fsw.tick_record import Tick
 
 TICK = 0.002
 NAN = math.nan
@@ -46,7 +47,9 @@ def flown(
     dropout, said = Dropout(), []
     for k in range(1, ticks):
         s = spoil(k, frame(k))
-        missing, read = read_frame(s)
+        r = Tick()
+        missing, read = read_frame(s, r), r.known
+        assert read is not None
         dropout, sentences = dropout.after(missing, s.t_us)
         said += [(k, one) for one in sentences]
         estimate = filled(missing, s, read, estimate, lambda: (0.0, 0.3)) if missing else read

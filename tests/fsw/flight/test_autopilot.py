@@ -42,6 +42,7 @@ from fsw.signals import (
 )
 from tests.fsw.flight.asked import command
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, flying
+from tests.fsw.records import with_record
 
 AUTOPILOT = Autopilot(CONFIG)
 ARM = 400
@@ -259,7 +260,9 @@ def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_u
     seen = estimate_state(outside)
     assert seen is not None
     kept = KeptSet().of(mission.safe_set)
-    state = replace(flying(), mission=mission, kept=kept, nominal=nominal_at_rest(seen))
+    state = replace(
+        with_record(flying(), nominal=nominal_at_rest(seen)), mission=mission, kept=kept
+    )
     texts: list[str] = []
     for t_us in (1_000_000, 1_000_000 + again_us):
         state, outputs = tick(state, t_us, sensors=replace(outside, t_us=t_us))

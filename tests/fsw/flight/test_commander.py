@@ -45,6 +45,7 @@ from fsw.signals import (
     Vec3,
 )
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, HOME, flying, vehicle_at
+from tests.fsw.records import with_record
 
 COMMANDER = Commander(CONFIG)
 NUMBERS = itertools.count()  # of commands: the same one again would be a repetition
@@ -238,7 +239,8 @@ def test_a_repeated_command_acts_again_where_a_failsafe_has_changed_the_mode() -
 def test_a_mode_that_is_complete_is_what_its_command_led_to() -> None:
     state = asked(flying(), SwitchMode(Mode.LAND), 1, sender=255)
     answered = state.vehicle.answered
-    on_the_ground = replace(state, vehicle=replace(state.vehicle, landed=True), nominal=None)
+    on_the_ground = replace(state, vehicle=replace(state.vehicle, landed=True))
+    on_the_ground = with_record(on_the_ground, nominal=None)
     estimate = STANDING
     while on_the_ground.vehicle.mode is Mode.LAND:
         estimate = estimate._replace(t_us=estimate.t_us + 100_000)

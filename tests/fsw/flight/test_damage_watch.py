@@ -8,13 +8,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fsw.control.actuator_watch import Watch, at_start, paused
+from fsw.control.actuator_watch import pause
 from fsw.control.cascade import in_hover
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.state import Damage
 from fsw.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
 from fsw.model.airframe import AIRFRAME
 from fsw.signals import ActuatorCommand, StateEstimate
+from fsw.tick_record import Tick, new_tick
 from tests.fsw.records import changed
 
 DT = 0.002
@@ -53,7 +54,7 @@ class Motion:
         self.takeoff_s, self.asked, self.lag = takeoff_s, asked, lag
         self.given = given
         self.watcher = watcher
-        self.damage, self.memory = Damage(), None
+        self.damage = Damage()
         self.told_s = math.inf
         self.history: list[Damage] = []
         self.loops = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
@@ -67,12 +68,13 @@ class Motion:
     ) -> Damage:
         """Move for a while; ``push`` [m/s^2] along body -z. Nothing is seen while ``doubted``."""
         thrust, wx, wy = [EACH] * 4, 0.0, 0.0
-        memory: Watch | None = None
+        watch = self.loops.watch
         for k in range(round(seconds / DT)):
             t = k * DT
             share = min(t / self.takeoff_s, 1.0) if self.takeoff_s else 1.0
             each = tuple(share * self.asked(t, i) for i in range(4))
-            loops = changed(self.loops, commanded=ActuatorCommand(each, HANGING))
+            commanded = ActuatorCommand(each, HANGING)
+            loops = changed(self.loops, commanded=commanded, watch=watch)
             for i in range(4):
                 thrust[i] += DT / self.lag * (self.given(t, i) * each[i] - thrust[i])
             rear, left, front, right = thrust
@@ -81,10 +83,12 @@ class Motion:
             wy += DT * 0.3 * (front - rear) / 0.3
             felt = (9.81 if share < 1.0 else sum(thrust) / mass) + push(t)
             now = estimate(1.0 + t, (wx, wy, 0.0), felt)
+            after = changed(loops, known=now)
             if doubted(t):
-                memory = paused(memory)
+                pause(after.watch)
             else:
-                self.damage, memory = self.watcher.see(self.damage, memory, loops, loops, now, 1)
+                self.damage = self.watcher.see(self.damage, loops, after, 1)
+            watch = after.watch
             self.history.append(self.damage)
             if self.damage.rotor and self.told_s == math.inf:
                 self.told_s = t - FAULT_S
@@ -159,15 +163,16 @@ def test_a_rotor_that_is_known_to_be_bad_stays_so_while_sensors_are_doubted(
 def test_while_nothing_has_failed_the_watch_starts_anew_after_a_doubt() -> None:
     motion = Motion(lambda _t, _i: 1.0)
     assert motion.run(0.2) == Damage()
-    assert paused(None) is None
-    assert paused(at_start()) is None
-    limp = at_start()
-    limp["joint"][0, 1], limp["running"], limp["torque"] = LIMP, 5.0, 1.0
-    kept = paused(limp)
-    assert kept is not None
-    assert kept[0]["joint"].tolist() == [SOUND, LIMP]
-    assert kept[0]["running"] == 0.0
-    assert not kept[0]["torque"].any()
+    sound = new_tick(3.5).watch
+    sound.running, sound.torque[:] = 5.0, 1.0
+    limp = sound.copy()
+    limp.joint[1] = LIMP
+    pause(sound)
+    assert sound == new_tick(3.5).watch
+    pause(limp)
+    assert limp.joint[:2].tolist() == [SOUND, LIMP]
+    assert limp.running == 0.0
+    assert not limp.torque.any()
 
 
 @pytest.mark.parametrize(
@@ -277,14 +282,18 @@ def test_after_a_slow_take_off_a_lost_rotor_is_named_as_soon(rise_s: float) -> N
     assert motion.damage.rotor.startswith(NAMES[2])
 
 
+def with_failed(kinds: tuple[float, float], for_s: float, t_s: float) -> Tick:
+    """A record at a time [s] whose watch has found joints of these ``kinds`` for some time [s]."""
+    r = in_hover(AIRFRAME, estimate(t_s, (0.0, 0.0, 0.0), 9.81))
+    r.watch.joint[:2], r.watch.joint_for[:2] = kinds, for_s
+    return r
+
+
 def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
-    damage, memory = Damage(), at_start()
-    loops = in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
-    said = []
+    damage, said = Damage(), []
     for k, kinds in enumerate([(STUCK, SOUND), (STUCK, LIMP), (LIMP, LIMP)]):
-        memory["joint"], memory["joint_for"] = kinds, 0.1
-        now = estimate(5.0 + k, (0.0, 0.0, 0.0), 9.81)
-        damage, _ = WATCHER.see(damage, memory, loops, loops, now, 1)
+        loops = with_failed(kinds, 0.1, 5.0 + k)
+        damage = WATCHER.see(damage, loops, loops.copy(), 1)
         said.append(damage.joint)
         assert damage.report.joints == damage.health.joints == kinds
     assert said == [
@@ -299,14 +308,12 @@ def test_a_second_joint_that_fails_is_named_beside_the_first() -> None:
 def test_a_joint_that_hangs_loose_and_stands_still_may_be_one_that_is_not_seen(
     kind: float, doubted: bool
 ) -> None:
-    memory, loops = at_start(), in_hover(AIRFRAME, estimate(0.0, (0.0, 0.0, 0.0), 9.81))
-    memory["joint"], memory["joint_for"] = (SOUND, kind), 0.1
-    now = estimate(5.0, (0.0, 0.0, 0.0), 9.81)
-    soon, _ = WATCHER.see(Damage(), memory, loops, loops, now, 1, angles_repeat=True)
+    loops = with_failed((SOUND, kind), 0.1, 5.0)
+    soon = WATCHER.see(Damage(), loops, loops.copy(), 1, angles_repeat=True)
     assert bool(soon.joint) is not doubted, "stuck encoders are given time to show"
-    memory["joint_for"] = 0.5
+    loops = with_failed((SOUND, kind), 0.5, 5.0)
     for repeat in (True, False):
-        damage, _ = WATCHER.see(Damage(), memory, loops, loops, now, 1, angles_repeat=repeat)
+        damage = WATCHER.see(Damage(), loops, loops.copy(), 1, angles_repeat=repeat)
         assert damage.joint.startswith("joint 2 ")
         assert ("joint encoders are stuck" in damage.joint) is (doubted and repeat)
 

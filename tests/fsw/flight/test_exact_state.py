@@ -17,6 +17,7 @@ from fsw.flight.state import AIDED, COMPLETE, FlightState
 from fsw.frozen import replace
 from fsw.signals import SensorFrame, StateEstimate, StatusText, TickInputs
 from tests.fsw.flight.in_flight import CONFIG, flying
+from tests.fsw.records import with_record
 
 TICK_US = CONFIG.tick_period_us
 EXACT = ExactState(
@@ -44,14 +45,14 @@ def frame(k: int, **changes: Any) -> SensorFrame:
 def hovering() -> FlightState:
     seen = estimate_state(frame(0))
     assert seen is not None
-    return replace(flying(), estimate=seen, nominal=nominal_at_rest(seen))
+    return with_record(flying(), known=seen, nominal=nominal_at_rest(seen))
 
 
 def seen(state: FlightState, s: SensorFrame, stale_us: int = 0) -> tuple[FlightState, list[str]]:
     """The state after a tick of estimates, and what it said."""
     texts: list[StatusText] = []
-    state, estimate = EXACT.estimate(state, TickInputs(s, stale_us=stale_us), texts)
-    return replace(state, estimate=estimate), [one.text for one in texts]
+    state, r = EXACT.estimate(state, TickInputs(s, stale_us=stale_us), texts)
+    return replace(state, cascade=r), [one.text for one in texts]
 
 
 def estimate_of(state: FlightState) -> StateEstimate:

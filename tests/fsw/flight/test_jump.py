@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fsw.control.cascade import in_hover
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.flight.jump import returned
-from fsw.flight.plan_exchange import nominal_at_rest
+from fsw.flight.plan_exchange import nominal_at_rest, with_nominal
 from fsw.flight.state import FlightState
 from fsw.geometry.rotation import wrap_angle, yaw_of
 from fsw.model.airframe import AIRFRAME
@@ -41,10 +41,9 @@ def moving(random: np.random.Generator) -> tuple[FlightState, StateEstimate]:
         p_WB=tuple(random.uniform(-2.0, 2.0, 3).tolist()),
         v_WB=tuple(random.uniform(-1.0, 1.0, 3).tolist()),
     )
-    state = replace(flying(), nominal=nominal_at_rest(estimate))
-    cascade = in_hover(AIRFRAME, estimate)
+    cascade = with_nominal(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
     cascade.observed.v[:] = random.uniform(-1.0, 1.0, 3)
-    return replace(state, cascade=cascade), estimate
+    return replace(flying(), cascade=cascade), estimate
 
 
 def turned_and_moved(

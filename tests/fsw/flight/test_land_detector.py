@@ -21,7 +21,7 @@ from fsw.flight.state import AIDED, Aiding, FlightState
 from fsw.measurements import RangeSample
 from fsw.signals import Mode, Vec3
 from tests.fsw.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
-from tests.fsw.records import changed
+from tests.fsw.records import changed, with_record
 
 CONFIG = limits(landed_height=0.1, airborne_height=0.3, landed_speed=0.05, landed_time_us=500_000)
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -142,10 +142,11 @@ def test_legs_that_may_touch_the_ground_are_not_aloft(
     height: float, sigma: float, sample: RangeSample | None, aloft: bool
 ) -> None:
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
-    state = replace(flying(range=sample), aiding=Aiding(height_sigma=sigma), estimate=estimate)
+    state = replace(flying(range=sample), aiding=Aiding(height_sigma=sigma))
+    state = with_record(state, known=estimate)
     legs = CONFIG.airframe.leg_length
     assert is_aloft(state, 2.0, legs, oldest=0.5) is aloft
-    assert not is_aloft(replace(state, estimate=None), 2.0, legs, oldest=0.5)
+    assert not is_aloft(with_record(state, has_estimate=0), 2.0, legs, oldest=0.5)
 
 
 def test_a_distance_that_is_too_short_counts_once_a_second_one_says_so() -> None:

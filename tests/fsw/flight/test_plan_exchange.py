@@ -20,6 +20,7 @@ from fsw.flight.plan_exchange import (
     plan_input,
     take_answer,
     with_arm_in_bounds,
+    with_nominal,
 )
 from fsw.flight.state import PlanMemory
 from fsw.model.airframe import AIRFRAME
@@ -36,6 +37,7 @@ from fsw.signals import (
     SolverStatus,
     Vec3,
 )
+from fsw.tick_record import Tick
 from tests.fsw.random_states import as_state, estimate_of, prediction_vector, random_estimate
 
 PERIOD_US, TICK_US, START_US = 100_000, 2_000, 1_000_000
@@ -92,7 +94,9 @@ def test_a_plan_on_time_starts_where_it_says() -> None:
     assert (memory.running, memory.since_us, memory.awaited_id) == (new, START_US, -1)
     assert (memory.counters.plans, memory.counters.missed_deadlines) == (1, 0)
     exchange = PlanExchange(flight_config(body="points"))
-    assert exchange.follow(WAITING, moving(), plan(), START_US, 1)[0] == new.start
+    r = with_nominal(Tick(), moving())
+    exchange.follow(WAITING, r, plan(), START_US, 1)
+    assert r.nominal == new.start
 
 
 @pytest.mark.requirement("REQ-PLAN-1")
@@ -104,12 +108,11 @@ def test_a_late_plan_is_missed_once_and_starts_where_it_would_be_by_now() -> Non
         assert memory.counters.missed_deadlines == 1
     now_us = START_US + 3 * TICK_US
     new = plan()
-    state, memory, u = PlanExchange(flight_config(body="points")).follow(
-        memory, moving(), new, now_us, 1
-    )
+    r = with_nominal(Tick(), moving())
+    memory = PlanExchange(flight_config(body="points")).follow(memory, r, new, now_us, 1)
     assert (memory.counters.missed_deadlines, memory.counters.plans) == (1, 1)
-    assert state == MODEL.advance(new.start, new.inputs[0], 3)
-    assert u == new.inputs[0]
+    assert r.nominal == MODEL.advance(new.start, new.inputs[0], 3)
+    assert r.input == new.inputs[0]
 
 
 def test_before_its_time_nothing_is_missed() -> None:

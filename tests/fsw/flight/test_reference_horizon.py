@@ -30,6 +30,7 @@ from fsw.signals import (
     Vec3,
 )
 from tests.fsw.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at
+from tests.fsw.records import with_record
 
 HORIZON = ReferenceHorizon(CONFIG)
 PERIOD = CONFIG.planner.period
@@ -45,7 +46,8 @@ def under_way(
     reference = ReferenceState(False, HERE, (SPEED, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0))
     goal = goal or PositionGoal(MotionSetpoint(False, FAR))
     nominal = nominal_at_rest(estimate)._replace(p=plan_p)
-    return replace(flying(), setpoint=SetpointMemory(reference, goal), nominal=nominal)
+    state = replace(flying(), setpoint=SetpointMemory(reference, goal))
+    return with_record(state, nominal=nominal)
 
 
 def speed_after(state: FlightState, estimate: StateEstimate) -> float:
@@ -77,7 +79,7 @@ def test_a_vehicle_that_is_off_its_plan_is_asked_for_nothing_new(
 
 def test_without_a_plan_nothing_is_off_it() -> None:
     estimate = vehicle_at(HERE)
-    state = replace(under_way(estimate, HERE), nominal=None)
+    state = with_record(under_way(estimate, HERE), nominal=None)
     assert speed_after(state, estimate) > SPEED
 
 
@@ -93,7 +95,7 @@ def test_near_the_ground_the_plan_may_be_lower_than_the_vehicle(
     start = replace(reference, p=p, v=(0.1, 0.0, 0.0))
     state = replace(lower, setpoint=replace(lower.setpoint, reference=start))
     assert (speed_after(state, estimate) > 0.1) is on_plan
-    aside = replace(state, nominal=nominal_at_rest(estimate)._replace(p=(0.06, 0.0, p[2])))
+    aside = with_record(state, nominal=nominal_at_rest(estimate)._replace(p=(0.06, 0.0, p[2])))
     assert speed_after(aside, estimate) < 0.1
 
 

@@ -30,6 +30,7 @@ from fsw.signals import (
 from tests.fsw.flight.in_flight import CONFIG, flying
 from tests.fsw.flight.test_autopilot import frame, tick
 from tests.fsw.flight.test_failsafe_response import Watched
+from tests.fsw.records import with_record
 
 BEGIN_US = 1_002_000  # just after the table was looked at
 IN_THE_AIR = frame(BEGIN_US, p_WB=(0.5, 0.0, -3.0))
@@ -45,12 +46,14 @@ def hovering(**changes: Any) -> FlightState:
     assert seen is not None
     given = {
         "mission": MissionMemory(safe_set=AHEAD, announced=AHEAD),
-        "nominal": nominal_at_rest(seen),
         "plan": PlanMemory(since_us=BEGIN_US),
         **changes,
     }
+    nominal = given.pop("nominal", nominal_at_rest(seen))
     kept = KeptSet().of(given["mission"].safe_set)
-    return replace(flying(), index=0, t_us=BEGIN_US - 2_000, kept=kept, **given)
+    return replace(
+        with_record(flying(), nominal=nominal), index=0, t_us=BEGIN_US - 2_000, kept=kept, **given
+    )
 
 
 def told_after_us(

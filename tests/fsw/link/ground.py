@@ -103,7 +103,7 @@ class Ground:
             self.t_us += 2_000
             outputs = outputs_at(self.t_us)
             snapshot = replace(outputs.snapshot, **changes)
-            self.links.publish(replace(outputs, snapshot=snapshot))
+            self.links.publish(replace(outputs, shown=snapshot))
             self.ticks += 1
             if self.ticks % 100 == 0:
                 frames += self.heard()

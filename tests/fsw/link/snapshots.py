@@ -141,4 +141,6 @@ def outputs_at(t_us: int, **changes: object) -> TickOutputs:
     """What a tick would say at a time; keyword arguments replace fields of the outputs."""
     estimate = SNAPSHOT.estimate._replace(t_us=t_us)
     snapshot = replace(SNAPSHOT, t_us=t_us, estimate=estimate)
-    return replace(TickOutputs(ACTUATORS, snapshot), **changes)  # type: ignore[arg-type]
+    if "snapshot" in changes:
+        changes["shown"] = changes.pop("snapshot")
+    return replace(TickOutputs(ACTUATORS, snapshot.mode, snapshot), **changes)  # type: ignore[arg-type]

@@ -152,7 +152,7 @@ def test_each_step_of_a_mission_is_asked_about_in_its_own_tick() -> None:
             said = outputs_at(t_us)
             progress = MissionProgress(total=5, current=current)
             snapshot = replace(said.snapshot, mission=progress)
-            gcs.links.publish(replace(said, snapshot=snapshot))
+            gcs.links.publish(replace(said, shown=snapshot))
             assert service.polls == before + 1
 
 

@@ -464,7 +464,7 @@ def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: 
         t_us = 1_000_000 + 2_000 * step
         outputs = outputs_at(t_us)
         if step >= 700:
-            outputs = replace(outputs, snapshot=replace(outputs.snapshot, mode=Mode.HOLD))
+            outputs = replace(outputs, shown=replace(outputs.snapshot, mode=Mode.HOLD))
         wire.link.send_actuators(t_us, answer_of(outputs))
         for frame in split(wire.hear()):
             if frame.message_id == ids.HEARTBEAT:

@@ -53,7 +53,7 @@ def logged(
         samples = (ImuSample(1e-6 * t_us, (0.1 * (k % 2), 0.0, -9.81), NONE),) if sampled else ()
         inputs = TickInputs(replace(FRAME, t_us=t_us), samples=samples)
         outputs = outputs_at(t_us)
-        log.add(inputs, replace(outputs, snapshot=replace(snapshot, t_us=t_us)))
+        log.add(inputs, replace(outputs, shown=replace(snapshot, t_us=t_us)))
     log.close()
     assert log.unwritten_ticks == 0
     read = ULog(str(path))

@@ -128,7 +128,7 @@ def test_a_number_too_large_for_a_float_is_infinite_and_no_error() -> None:
     reported = outputs_at(1_000_000)
     snapshot = reported.snapshot
     far = snapshot.estimate._replace(p_WB=(1e300, -1e300, 0.0))
-    reported = dataclasses.replace(reported, snapshot=dataclasses.replace(snapshot, estimate=far))
+    reported = dataclasses.replace(reported, shown=dataclasses.replace(snapshot, estimate=far))
     encoder, out = LogEncoder(measured=True, thrust_max=16.0, link_length=(0.15, 0.15)), bytearray()
     encoder.add(inputs(1_000_000, random.Random(4)), reported, out)
     assert out

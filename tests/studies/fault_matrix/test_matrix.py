@@ -354,5 +354,5 @@ def test_a_return_that_a_failsafe_lands_has_not_just_gone_on(
         was = Mode.RETURN if failsafe and mode is Mode.LAND else None
         outputs = outputs_at(10**6 * k)
         snapshot = replace(outputs.snapshot, mode=mode, failsafe_from=was)
-        seen.see(4.0 + k, replace(outputs, snapshot=snapshot))
+        seen.see(4.0 + k, replace(outputs, shown=snapshot))
     assert seen.actions == actions

@@ -33,7 +33,7 @@ from fsw.signals import (
 )
 from tests.fsw.flight.contexts import READY
 from tests.fsw.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
-from tests.fsw.records import changed
+from tests.fsw.records import changed, with_record
 
 CONFIG = limits(setpoint_timeout_us=500_000, landed_time_us=500_000)
 OFFBOARD = Offboard(CONFIG)
@@ -128,7 +128,7 @@ def test_a_position_from_the_vehicle_or_above_home_is_a_place_from_its_arrival_o
     facing_east = vehicle_at((1.0, 2.0, -3.0))._replace(yaw=0.5 * math.pi)
     state = flying(Mode.OFFBOARD)
     vehicle = replace(state.vehicle, home=Home((5.0, 5.0, -0.25), 0.0))
-    state = replace(state, vehicle=vehicle, estimate=facing_east)
+    state = with_record(replace(state, vehicle=vehicle), known=facing_east)
 
     def place(motion: MotionSetpoint, at: FlightState = state) -> Vec3 | None:
         kept = accepted(OffboardMemory(), reported(motion=motion), vehicle=at).motion
@@ -144,7 +144,7 @@ def test_a_position_from_the_vehicle_or_above_home_is_a_place_from_its_arrival_o
     above = MotionSetpoint(False, p=(1.0, 0.0, -2.0), p_from=PositionFrom.HOME_HEIGHT)
     assert place(above) == (1.0, 0.0, -2.25)
     for motion, without in (
-        (offset, replace(state, estimate=None)),
+        (offset, with_record(state, has_estimate=0)),
         (above, replace(state, vehicle=replace(state.vehicle, home=None))),
         (replace(offset, p=(1000.0, 0.0, 0.0)), state),
     ):

@@ -185,7 +185,7 @@ def ticked(
     outputs = outputs_at(t_us)
     texts = (StatusText(Severity.CRITICAL, "no ground station", event),)
     snapshot = replace(outputs.snapshot, arming=report, armed=armed)
-    outputs = replace(outputs, snapshot=snapshot, texts=texts)
+    outputs = replace(outputs, shown=snapshot, texts=texts)
     log.observe(TickInputs(STILL, commands=commands if asked else ()), outputs)
 
 
