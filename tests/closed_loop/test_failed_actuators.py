@@ -11,7 +11,7 @@ from fsw.signals import Mode
 from sitl.faults.keys import Fault, Unit
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
-from studies.fault_matrix.flights import fly
+from studies.fault_matrix.flights import FaultFlight, fly
 from studies.flight.closed_loop import simulate
 from studies.paper import robustness
 from studies.paper.settings import Settings
@@ -96,22 +96,33 @@ def test_a_lost_rotor_ends_the_flight_before_it_tilts() -> None:
     assert math.degrees(math.acos(estimate.R_WB[8])) < 15.0
 
 
+def first_of(seen: FaultFlight, part: str) -> float:
+    """When a warning has named a ``part`` first [s after the fault]; infinite: none has."""
+    return min([said.after_s for said in seen.warnings if part in said.text], default=math.inf)
+
+
+def without_hold(seen: FaultFlight) -> tuple[str, ...]:
+    """The actions without the Hold for sensors and rotors that contradict each other before."""
+    return seen.actions[1:] if seen.actions[:1] == ("hold",) else seen.actions
+
+
 @pytest.mark.requirement("REQ-ACT-1", "REQ-ACT-3")
 @pytest.mark.long
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
 @pytest.mark.parametrize("mode", ["hold", "trajectory"])
 @pytest.mark.parametrize("rotor", range(4))
-@pytest.mark.parametrize(("share", "within_s"), [(0.8, 0.6), (0.6, 0.4), (0.4, 0.3), (0.0, 0.2)])
+@pytest.mark.parametrize(("share", "within_s"), [(0.8, 0.9), (0.6, 0.4), (0.4, 0.3), (0.0, 0.2)])
 def test_each_rotor_is_named_in_time(
     rotor: int, share: float, within_s: float, mode: str, suite: str
 ) -> None:
     fault = Fault("motor", "weak", instance=rotor + 1.0, share=share)
     seen = fly(mode, (fault,), suite)
     assert seen.warning is not None
-    assert NAMES[rotor] in seen.warning.text
-    assert seen.warning.after_s <= within_s
+    assert "rotor" in seen.warning.text, "by itself, or as one that gyro or rotors contradict"
+    assert seen.warning.after_s <= min(within_s, 0.6)
+    assert first_of(seen, NAMES[rotor]) <= within_s
     assert seen.contact == ("ground" if share == 0.0 else "")
-    assert seen.actions == (("land", "terminate") if share == 0.0 else ("land",))
+    assert without_hold(seen) == (("land", "terminate") if share == 0.0 else ("land",))
 
 
 @pytest.mark.requirement("REQ-ACT-2", "REQ-ACT-4")
@@ -122,10 +133,10 @@ def test_each_rotor_is_named_in_time(
 def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> None:
     fault = Fault("joint", kind, instance=float(joint))  # type: ignore[arg-type]
     seen = fly("trajectory", (fault,), suite)
-    assert seen.warning is not None
-    assert f"joint {joint}" in seen.warning.text
+    # One that does not move shows once it is asked to.
+    assert first_of(seen, f"joint failed: joint {joint}") <= 2.0
     assert not seen.contact
-    assert seen.actions == ("land",)
+    assert without_hold(seen)[0] == "land"
     assert seen.least_m is not None
     # Satellites are off by centimetres, and so is the way down.
     assert seen.least_m > (-0.05 if suite == "rtk" else 0.0)
@@ -136,8 +147,7 @@ def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> 
 def test_a_rotor_that_does_not_obey_is_flown_with_beside_walls(kind: str) -> None:
     fault = Fault("motor", kind, instance=2.0)  # type: ignore[arg-type]
     seen = fly("trajectory", (fault,), "mocap")
-    assert seen.warning is not None
-    assert "rotor 2" in seen.warning.text
+    assert first_of(seen, "rotor failed: rotor 2") <= 1.2
     assert not seen.contact
 
 
