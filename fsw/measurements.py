@@ -36,7 +36,6 @@ class PoseSample:
     attitude_variance: Vec3  # rad^2, of a small rotation, body
     reset_counter: int = 0  # another number: the sensor's own frame has jumped
     drifts: bool = False  # the frame does: by how much since it jumped last is in the variances
-    turns: bool = True  # the attitude is used
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ class Waiting(NamedTuple):
     time: float  # s
     number: int
     sample: Aiding
+    half: bool = False  # of a pose, only the place is used
 
 
 class Reset(NamedTuple):

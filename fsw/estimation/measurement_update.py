@@ -34,7 +34,6 @@ class MeasurementUpdate:
         self._stated = stated
         self._pose_delay, self._gnss_delay = tuning.pose_delay, tuning.gnss_delay
         self._fuse: dict[type, Callable[[FusionMemory, Any], tuple[float, ...]]] = {
-            PoseSample: self.fuse_pose,
             GnssSample: self._fuse_gnss,
             PressureSample: self._fuse_pressure,
             MagneticSample: self._fuse_heading,
@@ -46,10 +45,14 @@ class MeasurementUpdate:
 
         Infinite where it says nothing at present.
         """
+        if isinstance(one.sample, PoseSample):
+            return self.fuse_pose(memory, one.sample, half=one.half)
         return self._fuse[type(one.sample)](memory, one.sample)
 
-    def fuse_pose(self, memory: FusionMemory, sample: PoseSample) -> tuple[float, ...]:
-        """The same of a pose: position, attitude."""
+    def fuse_pose(
+        self, memory: FusionMemory, sample: PoseSample, *, half: bool
+    ) -> tuple[float, ...]:
+        """The same of a pose: position, attitude. Of ``half`` a pose the place is fused alone."""
         place, about = self.noise(memory, sample)
         return kernels.fuse_pose(
             memory.numbers,
@@ -58,7 +61,7 @@ class MeasurementUpdate:
             sample.position,
             normalised(sample.attitude),
             place,
-            about if sample.turns else _UNKNOWN,
+            _UNKNOWN if half else about,
         )
 
     def measured_at(self, memory: FusionMemory, sample: Aiding) -> float:

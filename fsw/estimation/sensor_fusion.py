@@ -63,7 +63,7 @@ from fsw.estimation.sensor_checks import (
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
-from fsw.frozen import made, replace
+from fsw.frozen import made
 from fsw.geometry.quaternion import conjugate, multiply
 from fsw.geometry.rotation import matrix_from_quaternion, rotate_back
 from fsw.geometry.vectors import add_scaled, norm
@@ -331,15 +331,15 @@ class SensorFusion:
         delay = memory.delay
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
             delay = self._delay(delay, now - time, now - before.came)
-        others, used = memory.without(health.sensor), None
+        others, used = memory.without(health.sensor), False
         if not fault:
             memory = memory.hearing(sample)
-            health, used = _as_judged(memory.verdict, sample, health, now, half)
-        if used is None:
+            health, used, half = _as_judged(memory.verdict, sample, health, now, half)
+        if not used:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
                 memory = memory._replace(without_fix=sample)
             return memory._replace(health=(*others, health), delay=delay)
-        waiting = (*memory.waiting, Waiting(time, memory.arrivals, used))
+        waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample, half))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
         known = (waiting, (*others, health), memory.arrivals + 1, delay)
@@ -439,7 +439,7 @@ class SensorFusion:
                 health = health.with_fault(SensorFault.JUMP, now)
             if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
                 kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
-                ratio = self._update.fuse_pose(memory, sample)
+                ratio = self._update.fuse_pose(memory, sample, half=one.half)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
@@ -532,8 +532,8 @@ def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
 
 def _as_judged(
     verdict: Verdict, sample: Aiding, health: Health, now: float, half: bool
-) -> tuple[Health, Aiding | None]:
-    """A sensor's health at ``now`` [s], and what is used of its ``sample`` (None: nothing).
+) -> tuple[Health, bool, bool]:
+    """A sensor's health at ``now`` [s], whether its ``sample`` is used, and only half of it.
 
     Of a pose that is wrong by ``half``, or whose attitude is named, the place is.
     """
@@ -543,10 +543,8 @@ def _as_judged(
         health = health.with_fault(SensorFault.DISAGREES, now)
     # A heading that may be wrong is not needed, and turns what else is measured.
     if wrong & ~Source.ATTITUDE or verdict.suspects & source & Source.COMPASS:
-        return health, None
-    if isinstance(sample, PoseSample) and (wrong or half):
-        sample = replace(sample, turns=False)
-    return health, sample
+        return health, False, half
+    return health, True, half or bool(wrong)
 
 
 def _tilts(memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...], now: float) -> bool:

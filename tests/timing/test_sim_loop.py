@@ -130,6 +130,9 @@ class Ground:
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         self.acks.append(ack)
 
+    def news(self) -> list[StatusText]:
+        return []
+
 
 class Null:
     """Every method exists and returns None."""

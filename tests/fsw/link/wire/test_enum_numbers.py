@@ -220,7 +220,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (encode_sensors, "BAROMETRIC", _HIL, "ABS_PRESSURE|PRESSURE_ALT|TEMPERATURE"),
     (encode_sensors, "_LOCAL_NED", "MAV_FRAME", "LOCAL_NED"),
     (encode_sensors, "_BODY_FRD", "MAV_FRAME", "BODY_FRD"),
-    (encode_sensors, "_VIO", "MAV_ESTIMATOR_TYPE", "VIO"),
+    (encode_sensors, "VIO", "MAV_ESTIMATOR_TYPE", "VIO"),
     (encode_sensors, "_MOTION_CAPTURE", "MAV_ESTIMATOR_TYPE", "MOCAP"),
     (encode_sensors, "_LASER", "MAV_DISTANCE_SENSOR", "LASER"),
     (encode_sensors, "_DOWNWARD", "MAV_SENSOR_ROTATION", "PITCH_270"),
