@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from command_line.options import OneOf, option, read, switch
+from command_line.actions import read_action
+from command_line.options import OneOf, option, switch
 from command_line.output import complain, json_text, say
 from command_line.parser import COULD_NOT_START, unknown_name
 from messages.addresses import LinkError, parse_link_address
@@ -123,15 +124,10 @@ Values: TypeAlias = "FileValues | ParameterClient"
 
 def main(argv: list[str]) -> int:
     """Do one thing with parameters; returns the exit code."""
-    if not argv or argv[0] in ("-h", "--help"):
-        print(_help())
-        return DONE
-    action = ACTIONS.get(argv[0])
-    if action is None:
-        complain("pandion param", f"{unknown_name('action', argv[0], ACTIONS)}")
-        return COULD_NOT_START
-    kind, act, what = action
-    options = read(kind, f"pandion param {argv[0]}", what, argv[1:])
+    found = read_action("pandion param", _USAGE, _PURPOSE, ACTIONS, argv)
+    if isinstance(found, int):
+        return found
+    options, act = found
     from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
 
     try:
@@ -262,6 +258,8 @@ def _number(value: float) -> str:
     return as_text(value)
 
 
+_USAGE: Final = "[options] [--vehicle ADDRESS | --file FILE]"
+_PURPOSE: Final = "Parameters of a running vehicle or in a file."
 ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]] = {
     "list": (_List, _list, "Show parameters; in PATTERN * and ? stand for anything."),
     "get": (_Get, _get, "Show parameters by name."),
@@ -273,12 +271,3 @@ ACTIONS: Final[dict[str, tuple[type[_Where], Callable[[Any, Values], int], str]]
         "Write all parameters; .parm is MAVProxy's format, anything else QGroundControl's.",
     ),
 }
-
-
-def _help() -> str:
-    rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
-    return "\n".join(
-        ("usage: pandion param ACTION [options] [--vehicle ADDRESS | --file FILE]", "")
-        + ("Parameters of a running vehicle or in a file.", "", "actions:", *rows, "")
-        + ("`pandion param ACTION --help` prints the options of an action.",)
-    )

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from command_line.options import option, read
+from command_line.actions import read_action
+from command_line.options import option
 from command_line.output import complain, unwritten
-from command_line.parser import COULD_NOT_START, unknown_name
+from command_line.parser import COULD_NOT_START
 from command_line.values import one_of, place
 from messages.addresses import LinkError, parse_link_address
 from sitl.arguments import rate
@@ -52,15 +53,10 @@ class _Params(_Plant):
 
 def main(argv: list[str]) -> int:
     """Do one thing; returns the exit code."""
-    if not argv or argv[0] in ("-h", "--help"):
-        print(_help())
-        return DONE
-    action = ACTIONS.get(argv[0])
-    if action is None:
-        complain("pandion px4", f"{unknown_name('action', argv[0], ACTIONS)}")
-        return COULD_NOT_START
-    kind, act, what = action
-    options = read(kind, f"pandion px4 {argv[0]}", what, argv[1:])
+    found = read_action("pandion px4", _USAGE, _PURPOSE, ACTIONS, argv)
+    if isinstance(found, int):
+        return found
+    options, act = found
     try:
         return act(options)
     except (ScenarioError, LinkError) as error:
@@ -132,6 +128,8 @@ def _print_environment(options: _Plant) -> int:
     return DONE
 
 
+_USAGE: Final = "[SCENARIO] [options]"
+_PURPOSE: Final = "What PX4 needs to fly the simulated vehicle."
 ACTIONS: Final[dict[str, tuple[type[Any], Callable[[Any], int], str]]] = {
     "params": (
         _Params,
@@ -140,12 +138,3 @@ ACTIONS: Final[dict[str, tuple[type[Any], Callable[[Any], int], str]]] = {
     ),
     "env": (_Plant, _print_environment, "print the environment of PX4's own start command"),
 }
-
-
-def _help() -> str:
-    rows = (f"  {name:8}{what}" for name, (_, _, what) in ACTIONS.items())
-    return "\n".join(
-        ("usage: pandion px4 ACTION [SCENARIO] [options]", "")
-        + ("What PX4 needs to fly the simulated vehicle.", "", "actions:", *rows, "")
-        + ("`pandion px4 ACTION --help` prints the options of an action.",)
-    )

@@ -57,17 +57,10 @@ def _run(options: SitlOptions, events: Events) -> int:
 
         flight = Flight(options, scenario, events)
         session = VehicleSession(options, endpoint)
-        stop = StopRequest()
-        stop.listen()
-        events.report("ready", "sitl: ready, waiting for the flight software")
+        stop = _stop_request(events, "the flight software")
         if wait_for_vehicle(endpoint, options.wait_s, stop):
             return flight.run(session, stop)
-        if not stop.requested:
-            raise CouldNotStart(
-                f"no flight software spoke to udp:{host}:{port} within {options.wait_s:g} s"
-            )
-        events.report("error", "sitl: interrupted before the flight began")
-        return NOT_COMPLETED
+        return _not_begun(options, events, stop, f"no flight software spoke to udp:{host}:{port}")
     finally:
         endpoint.close()
 
@@ -103,17 +96,30 @@ def _run_for_px4(options: SitlOptions, events: Events) -> int:
             )
         flight = Flight(options, on_the_ground(scenario), events)
         session = Px4Session(options, stream, events)
-        stop = StopRequest()
-        stop.listen()
-        events.report("ready", "sitl: ready, waiting for PX4")
+        stop = _stop_request(events, "PX4")
         if wait_for_px4(stream, options.wait_s, stop):
             return flight.run(session, stop)
-        if not stop.requested:
-            raise CouldNotStart(
-                f"no PX4 connected to tcp:{host}:{port} within {options.wait_s:g} s"
-            )
-        events.report("error", "sitl: interrupted before the flight began")
-        return NOT_COMPLETED
+        return _not_begun(options, events, stop, f"no PX4 connected to tcp:{host}:{port}")
+
+
+def _stop_request(events: Events, awaited: str) -> StopRequest:
+    """What ends the process early, from when it waits for who is ``awaited`` on."""
+    stop = StopRequest()
+    stop.listen()
+    events.report("ready", f"sitl: ready, waiting for {awaited}")
+    return stop
+
+
+def _not_begun(options: SitlOptions, events: Events, stop: StopRequest, nobody: str) -> int:
+    """The exit code of a flight that was interrupted before it began.
+
+    Raises:
+        CouldNotStart: It was not: there was ``nobody`` in time.
+    """
+    if not stop.requested:
+        raise CouldNotStart(f"{nobody} within {options.wait_s:g} s")
+    events.report("error", "sitl: interrupted before the flight began")
+    return NOT_COMPLETED
 
 
 def _wall_us() -> int:

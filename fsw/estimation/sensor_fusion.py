@@ -533,9 +533,9 @@ def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
 def _as_judged(
     verdict: Verdict, sample: Aiding, health: Health, now: float, half: bool
 ) -> tuple[Health, bool, bool]:
-    """A sensor's health at ``now`` [s], whether its ``sample`` is used, and only half of it.
+    """A sensor's health at ``now`` [s], whether its ``sample`` is used, and whether by ``half``.
 
-    Of a pose that is wrong by ``half``, or whose attitude is named, the place is.
+    Of a pose whose attitude repeats itself, or is named, the place is used alone.
     """
     source = _SOURCES.get(type(sample), NOBODY)
     wrong = verdict.wrong & source
