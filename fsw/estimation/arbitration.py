@@ -30,7 +30,7 @@ from fsw.estimation.error_state import (
     watch_biases,
 )
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
-from fsw.estimation.imu import IMU_TOO_OLD, is_stuck
+from fsw.estimation.imu import IMU_SILENT, is_stuck
 from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.estimation.measurement_update import MeasurementUpdate
 from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
@@ -275,7 +275,7 @@ def _silent(memory: FusionMemory, now: float) -> Source:
 
     Rotors explain it only where it is known how the arm moves.
     """
-    unit = now - memory.imu_came > IMU_TOO_OLD
+    unit = now - memory.imu_came > IMU_SILENT
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
     wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault not in _FOLLOWED
     arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
