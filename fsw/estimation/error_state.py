@@ -313,7 +313,9 @@ def _fade(x: Any, M: Array, left: float) -> None:
     ``M`` (17, 17) [SI] is the covariance.
     """
     for i in range(BA, BA + 3):
-        x.accel_bias[i - BA] = x.kept_bias[i - BA] + left * (x.accel_bias[i - BA] - x.kept_bias[i - BA])
+        x.accel_bias[i - BA] = x.kept_bias[i - BA] + left * (
+            x.accel_bias[i - BA] - x.kept_bias[i - BA]
+        )
         for j in range(ERRORS):
             M[i, j] *= left
         for j in range(ERRORS):
