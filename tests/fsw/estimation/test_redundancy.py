@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -325,6 +326,22 @@ def test_who_is_named_has_fired_and_nobody_is_while_nothing_does(ratios: list[fl
         fired |= redundancy.OF[k] if ratio > 1.0 else Source(0)
     assert not verdict.wrong & ~fired
     assert bool(verdict.is_on or verdict.wrong) == (max(ratios) > 1.0)
+
+
+@pytest.mark.parametrize(
+    ("since", "kept"), [(0.1, 0.0), (0.3, 1.5), (1.2, 2.0), (3.9, 3.0), (4.1, 4.0)]
+)
+def test_a_comparison_counts_as_soon_as_its_window_is_without_silence(
+    since: float, kept: float
+) -> None:
+    """Of a gyro that is garbage a second after a gap in its readings, nothing was heard for 4 s."""
+    e = redundancy.started()
+    redundancy.hear_nothing_of(e, Source.GYRO, 10.0)
+    s = SimpleNamespace(**{name: e[0][name] for name in redundancy.EVIDENCE.fields or ()})
+    s.came[redundancy.GM] = 10.0 + since
+    s.both[redundancy.GM] = 1.5, 2.0, 3.0, 4.0, 0.0
+    redundancy._note_largest(s, 10.0 + since, redundancy.GM)
+    assert s.ratio[redundancy.GM] == kept
 
 
 @given(st.sampled_from(list(Source)), st.floats(0.0, 0.19), st.floats(1.1, 20.0))
