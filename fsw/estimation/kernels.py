@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, kernel, of_fixed_types
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.estimation import fusion, imu, joint_filter, redundancy
 from fsw.estimation.error_state import (
     BA,
@@ -25,6 +25,7 @@ from fsw.estimation.error_state import (
     TIME,
     Array,
     Filter,
+    Law,
     P,
     V,
     add_noise,
@@ -44,7 +45,6 @@ from fsw.record import Four, Record, Three, Two
 from fsw.signals import Mat3, Vec2, Vec3, Vec4
 from fsw.tick_record import Estimate
 
-Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
 # What ``tick`` does, in this order.
 PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
 # What came of it.
@@ -147,14 +147,16 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
     return finite and varies(x), R
 
 
+@machine_code
 @kernel
-def _set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
+def set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
     """Start from an arm that stands still."""
     joint_filter.begin(x[0], law[0].tuning, time, angles)
 
 
+@machine_code
 @kernel
-def _begin(
+def begin(
     x: Filter,
     law: Law,
     time: float,
@@ -209,8 +211,9 @@ def _begin(
             M[TH + i, TH + i] += turned * turned
 
 
+@machine_code
 @kernel
-def _couple_level(x: Filter, law: Law) -> None:
+def couple_level(x: Filter, law: Law) -> None:
     """What is wrong with an attitude that the accelerometer gave is what is wrong with it.
 
     With d the vertical in body axes, a bias b turns it by -(d x b) / g.
@@ -230,8 +233,9 @@ def _couple_level(x: Filter, law: Law) -> None:
             M[TH + i, TH + j] += total * variance
 
 
+@machine_code
 @kernel
-def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec3:
+def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
     """Take a position as it is; returns by how much the state has jumped."""
     s = x[0]
     dt = time - s.time
@@ -246,8 +250,9 @@ def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec
     return jump
 
 
+@machine_code
 @kernel
-def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
+def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
     """Take a velocity as it is; returns by how much the state's has jumped."""
     s = x[0]
     jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
@@ -257,8 +262,9 @@ def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
     return jump
 
 
+@machine_code
 @kernel
-def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
+def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
     """Take an attitude as it is."""
     s = x[0]
     for i in range(4):
@@ -266,8 +272,9 @@ def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
     fusion.forget(s, TH, variance)
 
 
+@machine_code
 @kernel
-def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> None:
+def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> None:
     """Take the barometer's bias from an altitude as it is."""
     s = x[0]
     s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
@@ -281,55 +288,9 @@ def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: f
     s.covariance[BARO, BARO] = s.covariance[P + 2, P + 2] + variance
 
 
+@machine_code
 @kernel
-def _doubt(x: Filter, law: Law, place: float, turn: float) -> None:
-    """Of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad] know little more."""
-    fusion.doubt(x[0], place, turn)
-
-
-@kernel
-def _fuse_pose(
-    x: Filter,
-    law: Law,
-    time: float,
-    p: Vec3,
-    q: Vec4,
-    p_variance: Vec3,
-    q_variance: Vec3,
-) -> tuple[float, float]:
-    return fusion.fuse_pose(x[0], law[0].tuning, law[0].gates, time, p, q, p_variance, q_variance)
-
-
-@kernel
-def _fuse_gnss(
-    x: Filter,
-    law: Law,
-    time: float,
-    p: Vec3,
-    v: Vec3,
-    p_variance: Vec3,
-    v_variance: Vec3,
-) -> tuple[float, float]:
-    return fusion.fuse_gnss(x[0], law[0].tuning, law[0].gates, time, p, v, p_variance, v_variance)
-
-
-@kernel
-def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> float:
-    return fusion.fuse_pressure(x[0], law[0].tuning, law[0].gates, time, altitude, variance)
-
-
-@kernel
-def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3, believed: bool) -> float:
-    return fusion.fuse_heading(x[0], law[0].tuning, law[0].gates, time, field, believed)
-
-
-@kernel
-def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: float) -> float:
-    return fusion.fuse_range(x[0], law[0].tuning, law[0].gates, time, measured, variance)
-
-
-@kernel
-def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
+def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
     """The covariance (17, 17) of what ``tick`` returned, and that with the frame (17, 4)."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
@@ -356,19 +317,3 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> 
             add_noise(M, t, dt, int(row[LOST]), s.model_walk)
             p, v, q, _ = integrated(p, v, q, f, w, dt)
             time = end
-
-
-set_joints = of_fixed_types(_set_joints)
-begin = of_fixed_types(_begin)
-couple_level = of_fixed_types(_couple_level)
-set_place = of_fixed_types(_set_place)
-set_velocity = of_fixed_types(_set_velocity)
-set_attitude = of_fixed_types(_set_attitude)
-set_pressure = of_fixed_types(_set_pressure)
-doubt = of_fixed_types(_doubt)
-fuse_pose = of_fixed_types(_fuse_pose)
-fuse_gnss = of_fixed_types(_fuse_gnss)
-fuse_pressure = of_fixed_types(_fuse_pressure)
-fuse_heading = of_fixed_types(_fuse_heading)
-fuse_range = of_fixed_types(_fuse_range)
-present_covariance = of_fixed_types(_present_covariance)

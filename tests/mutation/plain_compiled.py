@@ -38,10 +38,6 @@ def machine_code(kernel: Callable[..., Any], *example: Any) -> Callable[..., Any
     return kernel
 
 
-def of_fixed_types(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    return kernel
-
-
 class _Record(list[Any]):
     """An array of one record, whose fields are those of the numbers themselves."""
 
