@@ -150,7 +150,7 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
 @machine_code
 @kernel
 def set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
-    """Start from an arm that stands still."""
+    """Start from an arm that stands still at ``angles`` [rad] at a ``time`` [s]."""
     joint_filter.begin(x[0], law[0].tuning, time, angles)
 
 
@@ -167,7 +167,10 @@ def begin(
     v_variance: Vec3,
     q_variance: Vec3,
 ) -> None:
-    """Start the filter from a known state; readings of the IMU before it are passed over.
+    """Start the filter from a known state of ``time`` [s]; earlier readings are passed over.
+
+    ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1]; ``p_variance`` [m^2, NED], ``v_variance``
+    [m^2/s^2, NED], ``q_variance`` [rad^2, FRD].
 
     Where the first reading came later than the state, the filter begins with that reading: until
     then the vehicle moved as it did, but for what is not known of its velocity and its turning. To
@@ -236,7 +239,7 @@ def couple_level(x: Filter, law: Law) -> None:
 @machine_code
 @kernel
 def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
-    """Take a position as it is; returns by how much the state has jumped."""
+    """Take ``p`` [m, NED] of ``time`` [s] as it is, ``variance`` [m^2, NED]; how far it jumped."""
     s = x[0]
     dt = time - s.time
     jump = (
@@ -253,7 +256,7 @@ def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
 @machine_code
 @kernel
 def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
-    """Take a velocity as it is; returns by how much the state's has jumped."""
+    """Take ``v`` [m/s, NED] as it is, ``variance`` [m^2/s^2, NED]; by how much it has jumped."""
     s = x[0]
     jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
     for i in range(3):
@@ -265,7 +268,7 @@ def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
 @machine_code
 @kernel
 def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
-    """Take an attitude as it is."""
+    """Take an attitude ``q`` [1] of ``variance`` [rad^2, FRD] as it is."""
     s = x[0]
     for i in range(4):
         s.q[i] = q[i]
@@ -275,7 +278,7 @@ def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
 @machine_code
 @kernel
 def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> None:
-    """Take the barometer's bias from an altitude as it is."""
+    """Explain an ``altitude`` [m, up] of ``time`` [s], ``variance`` [m^2], by the bias."""
     s = x[0]
     s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
     for j in range(FRAME):
@@ -291,7 +294,7 @@ def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> No
 @machine_code
 @kernel
 def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
-    """The covariance (17, 17) of what ``tick`` returned, and that with the frame (17, 4)."""
+    """Write the covariance ``M`` (17, 17) [SI] at ``now`` [s] and a frame's ``X`` (17, 4) [SI]."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):

@@ -59,7 +59,6 @@ from fsw.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
-    Answer,
     BatteryState,
     CommandAck,
     ConstraintKind,
@@ -98,7 +97,7 @@ _DESCEND = Mode.DESCEND  # found in a tenth of the time
 class Controlled(NamedTuple):
     """A tick whose command is decided; ``Autopilot.conclude`` does the rest."""
 
-    answer: Answer
+    outputs: TickOutputs  # so far
     inputs: TickInputs
     state: FlightState  # with what was received, commanded and decided
     memory: Tick  # for the next tick
@@ -182,8 +181,8 @@ class Autopilot:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
         calm = self.calm.fly(state, inputs)
         if calm is not None:
-            answer = Answer(calm.commanded, True, state.vehicle.mode)
-            return Controlled(answer, inputs, state, calm, calm=True)
+            outputs = TickOutputs(calm.commanded, state.vehicle.mode, True)
+            return Controlled(outputs, inputs, state, calm, calm=True)
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         if state.vehicle.restarts:
@@ -219,9 +218,9 @@ class Autopilot:
         else:
             r.input = REST_INPUT
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
-        answer = Answer(sent, armed, vehicle.mode, tuple(acks), tuple(texts))
+        outputs = TickOutputs(sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts))
         return Controlled(
-            answer, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
+            outputs, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
         )
 
     def _estimate(
@@ -243,11 +242,11 @@ class Autopilot:
         What it finds out is acted upon in the next tick.
         """
         c = controlled
-        answer, inputs, state, r, estimate, fusion, flown = c[:7]
+        outputs, inputs, state, r, estimate, fusion, flown = c[:7]
         if c.calm:
             state = self.calm.after(state, r)
-            return state, TickOutputs(answer.actuators, answer.mode, Shown(state, inputs.sensors))
-        plan, texts, safety = c.plan, answer.texts, state.safety
+            return state, replace(outputs, shown=Shown(state, inputs.sensors))
+        plan, texts, safety = c.plan, outputs.texts, state.safety
         flags = r.flags if flown else 0
         if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
             safety = self._watch.off_plan(
@@ -269,7 +268,7 @@ class Autopilot:
         if c.estimate is None or estimate is None:
             # Ticks are counted from the first estimate on; what looks now and then goes by time.
             t_us = inputs.sensors.t_us
-            unknown = nothing_known(answer, state, t_us, texts)
+            unknown = nothing_known(outputs, state, t_us, texts)
             return replace(state, t_us=t_us, fusion=fusion), unknown
         now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
         index = state.index + c.ticks
@@ -295,9 +294,7 @@ class Autopilot:
             damage=self._see_damage(state, r, c),
         )
         shown = Shown(state, inputs.sensors)
-        return state, TickOutputs(
-            answer.actuators, answer.mode, shown, request, answer.acks, texts, answer.tuning_taken
-        )
+        return state, replace(outputs, shown=shown, plan_request=request, texts=texts)
 
     def _each_period(
         self,
@@ -336,8 +333,8 @@ class Autopilot:
             state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
         )
         texts += told(state, self._tick_us)
-        answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
-        return Controlled(answer, inputs, state, r)
+        outputs = TickOutputs(STOPPED, Mode.DISARMED, False, acks=tuple(acks), texts=tuple(texts))
+        return Controlled(outputs, inputs, state, r)
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
