@@ -924,10 +924,9 @@ class TickInputs:
 
     @property
     def has_only_sensors(self) -> bool:
-        """Whether nothing came but a frame of exact states, and that in time."""
+        """Whether nothing came but what sensors have measured, and that in time."""
         return self.tuning is None and not (
-            self.samples
-            or self.stale_us
+            self.stale_us
             or self.plan
             or self.targets
             or self.commands
