@@ -537,6 +537,8 @@ def _as_judged(
 
     Of a pose whose attitude repeats itself, or is named, the place is used alone.
     """
+    if not (verdict.wrong or verdict.suspects):
+        return health, True, half
     source = _SOURCES.get(type(sample), NOBODY)
     wrong = verdict.wrong & source
     if wrong:
