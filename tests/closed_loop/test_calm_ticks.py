@@ -40,8 +40,12 @@ def told(x: Any) -> Any:
 class Flight:
     """A flight in the air, whose ticks are counted that are not controlled whole."""
 
-    def __init__(self, name: str, push: float = 0.0, suite: str = "perfect") -> None:
+    def __init__(
+        self, name: str, push: float = 0.0, suite: str = "perfect", fault: Fault | None = None
+    ) -> None:
         scenario = load_scenario(name, suite)
+        if fault is not None:
+            scenario = with_fields(scenario, faults=(fault,))
         if push > 0.0:
             scenario = with_fields(scenario, disturbances=(Uniform(push, 0.1),))
         config = flight_config(body=scenario.body)
@@ -113,6 +117,23 @@ def test_so_is_one_of_a_suite(suite: str, push: float, least_calm: float) -> Non
     flight = Flight("walls", push, suite)
     flight.fly(1500)
     assert flight.calm >= least_calm * flight.loop.simulation.step
+
+
+@pytest.mark.drawn(1)
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault("motor", "weak", start_s=1.0, instance=2),
+        Fault("gyro", "stuck", start_s=1.0),
+        Fault("vio", "off", start_s=1.0, duration_s=0.5),
+    ],
+    ids=lambda fault: f"{fault.unit} {fault.kind}",
+)
+def test_what_fails_in_a_suite_ends_the_calm(fault: Fault) -> None:
+    flight = Flight("walls", suite="mocap", fault=fault)
+    flight.fly(1200)
+    assert 400 < flight.calm < 1100
+    assert bool(flight.loop.state.damage.rotor) == (fault.unit == "motor")
 
 
 @pytest.mark.parametrize(("name", "push"), [("walls", 0.0), in_long("workspace", 3.0)])
