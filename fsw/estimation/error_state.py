@@ -128,6 +128,7 @@ FILTER: Final = np.dtype(
     align=True,
 )
 Filter = NDArray[Any]  # (1,) of FILTER
+Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
 
 
 @compilable

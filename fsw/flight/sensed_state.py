@@ -8,10 +8,9 @@ from typing import NamedTuple
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.estimation.error_state import Array, P
+from fsw.estimation.error_state import Array, Law, P
 from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start, copied
 from fsw.estimation.imu import IMU_SILENT, IMU_TOO_OLD
-from fsw.estimation.kernels import Law
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
 from fsw.estimation.redundancy import NOBODY, Source, names

@@ -178,7 +178,7 @@ class CalmStretch:
             if simulation.ended is not None:
                 break
         if flown:
-            loop.state = calm.after(before, r, flown)
+            loop.state = calm.after(before, r, ticks=flown)
         return simulation.ended is None
 
 
