@@ -43,7 +43,8 @@ $(shell .venv/bin/python -I -c '' 2>/dev/null || rm -f .venv/ready*; \
 READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_hook.py Makefile)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-processes tests-of-the-rest \
+.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-processes tests-of-the-plant \
+	tests-of-studies tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -62,23 +63,29 @@ define check
 endef
 
 test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
-	@echo "checks in two rows at once, one a core; each reports when it is over"
-	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
+	@echo "checks in three rows at once; each reports when it is over"
+	@$(MAKE) --no-print-directory --jobs=3 code-checks tests-of-processes tests-of-studies tests-of-the-rest
 
-# Each row compiles the kernels of one half first, because rows that compile the same kernels at once
-# take twice the time. Then comes what only reads the code in the row of the tests that often wait
-# for clocks: meanwhile the other row is done with the kernels that take longer.
-OF_PROCESSES := tests/benchmarks tests/cli tests/conversations tests/docs tests/interop tests/messages \
-	tests/processes tests/replay tests/studies tests/timing tests/view
-code-checks: sitl-kernels
+# Three rows for two cores: the one of processes often waits for clocks and clients, and the others
+# have its core meanwhile. Kernels are compiled once, before whoever needs them, because rows that
+# compile the same kernels at once take twice the time; what only reads the code comes before.
+OF_PROCESSES := tests/benchmarks tests/cli tests/fsw/link tests/interop tests/messages tests/processes tests/timing
+OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
+OF_STUDIES := tests/conversations tests/docs tests/replay tests/studies tests/view
+code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
-tests-of-processes: code-checks
+tests-of-processes: code-checks fsw-kernels sitl-kernels
 	$(call check,processes,$(PYTEST) -m "not long" $(OF_PROCESSES))
+tests-of-the-plant: sitl-kernels
+	$(call check,plant,$(PYTEST) -m "not long" $(OF_THE_PLANT))
+tests-of-studies: tests-of-the-plant fsw-kernels
+	$(call check,studies,$(PYTEST) -m "not long" $(OF_STUDIES))
 tests-of-the-rest: fsw-kernels
-	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
+	$(call check,the rest,$(PYTEST) -m "not long" \
+		$(addprefix --ignore=,$(OF_PROCESSES) $(OF_THE_PLANT) $(OF_STUDIES)))
 fsw-kernels sitl-kernels: %-kernels:
 	@$(BIN)/python -m studies.flight.kernels $*
 

@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types
+from command_line.kernel_types import compile_for_types, types_of
 
 # The shapes' kernels are called by a table of functions (fsw/shapes/zones.py), which numba has had
 # for years and still calls new.
@@ -101,7 +101,7 @@ def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
     dispatcher = cast(Any, kernel)
     if not hasattr(dispatcher, "typeof_pyval"):
         return kernel
-    types = tuple(dispatcher.typeof_pyval(argument) for argument in example)
+    types = types_of(dispatcher, example)
     return cast(Callable[P, R], dispatcher.compile(types))
 
 

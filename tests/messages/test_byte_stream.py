@@ -63,6 +63,7 @@ def read_until_quiet(stream: ByteStream, quiet_s: float = 0.35) -> tuple[bytes, 
     return came, found
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.parametrize("baud", [57_600, 115_200, 460_800, 921_600])
 @pytest.mark.parametrize("error_rate", [0.0, 1e-4, 1e-3])
 def test_every_intact_frame_is_read_from_a_noisy_line(baud: int, error_rate: float) -> None:
