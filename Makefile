@@ -66,12 +66,14 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 	@echo "checks in three rows at once; each reports when it is over"
 	@$(MAKE) --no-print-directory --jobs=3 code-checks tests-of-processes tests-of-studies tests-of-the-rest
 
-# Three rows for two cores: the one of processes often waits for clocks and clients, and the others
-# have its core meanwhile. Kernels are compiled once, before whoever needs them, because rows that
-# compile the same kernels at once take twice the time; what only reads the code comes before.
+# Folders are in rows that take about as long. Three rows for two cores: that of processes often waits
+# for clocks and clients, and the others have its core meanwhile. Kernels are compiled once, before
+# whoever needs them, because rows that compile the same kernels at once take twice the time; what
+# only reads the code comes before.
 OF_PROCESSES := tests/benchmarks tests/cli tests/fsw/link tests/interop tests/messages tests/processes tests/timing
 OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
-OF_STUDIES := tests/conversations tests/docs tests/replay tests/studies tests/view
+OF_STUDIES := tests/conversations tests/docs tests/fsw/control tests/fsw/estimation tests/replay tests/studies \
+	tests/view
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
