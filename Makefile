@@ -71,9 +71,9 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 # often wait for clocks, and the others have their core meanwhile. Kernels are compiled once, before
 # whoever needs them, because rows that compile the same kernels at once take twice the time; what
 # needs none comes before.
-OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages tests/timing
+OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages
 OF_CLIENTS := tests/conversations tests/interop
-OF_PROCESSES := tests/benchmarks tests/cli tests/processes
+OF_PROCESSES := tests/benchmarks tests/cli tests/processes tests/timing
 OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
 OF_STUDIES := tests/docs tests/fsw/control tests/fsw/estimation tests/replay tests/studies tests/view
 code-checks:
