@@ -43,7 +43,8 @@ $(shell .venv/bin/python -I -c '' 2>/dev/null || rm -f .venv/ready*; \
 READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_hook.py Makefile)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-processes tests-of-the-rest \
+.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-clocks tests-of-clients \
+	tests-of-processes tests-of-the-plant tests-of-studies tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -62,23 +63,37 @@ define check
 endef
 
 test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
-	@echo "checks in two rows at once, one a core; each reports when it is over"
-	@$(MAKE) --no-print-directory --jobs=2 tests-of-processes tests-of-the-rest
+	@echo "checks in four rows at once; each reports when it is over"
+	@$(MAKE) --no-print-directory --jobs=4 code-checks tests-of-processes tests-of-clients tests-of-studies \
+		tests-of-the-rest
 
-# Each row compiles the kernels of one half first, because rows that compile the same kernels at once
-# take twice the time. Then comes what only reads the code in the row of the tests that often wait
-# for clocks: meanwhile the other row is done with the kernels that take longer.
-OF_PROCESSES := tests/benchmarks tests/cli tests/conversations tests/docs tests/interop tests/messages \
-	tests/processes tests/replay tests/studies tests/timing tests/view
-code-checks: sitl-kernels
+# Folders are in rows that take about as long. Four rows for two cores: those of processes and clients
+# often wait for clocks, and the others have their core meanwhile. Kernels are compiled once, before
+# whoever needs them, because rows that compile the same kernels at once take twice the time; what
+# needs none comes before.
+OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages
+OF_CLIENTS := tests/conversations tests/interop
+OF_PROCESSES := tests/benchmarks tests/cli tests/processes tests/timing
+OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
+OF_STUDIES := tests/docs tests/fsw/control tests/fsw/estimation tests/replay tests/studies tests/view
+code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
 	$(call check,types,$(BIN)/mypy)
 	$(call check,imports,$(BIN)/lint-imports)
-tests-of-processes: code-checks
+tests-of-clocks: code-checks
+	$(call check,clocks,$(PYTEST) -m "not long" $(OF_CLOCKS))
+tests-of-clients: tests-of-clocks fsw-kernels sitl-kernels
+	$(call check,clients,$(PYTEST) -m "not long" $(OF_CLIENTS))
+tests-of-processes: fsw-kernels sitl-kernels
 	$(call check,processes,$(PYTEST) -m "not long" $(OF_PROCESSES))
+tests-of-the-plant: sitl-kernels
+	$(call check,plant,$(PYTEST) -m "not long" $(OF_THE_PLANT))
+tests-of-studies: tests-of-the-plant fsw-kernels
+	$(call check,studies,$(PYTEST) -m "not long" $(OF_STUDIES))
 tests-of-the-rest: fsw-kernels
-	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=,$(OF_PROCESSES)))
+	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=, \
+		$(OF_CLOCKS) $(OF_CLIENTS) $(OF_PROCESSES) $(OF_THE_PLANT) $(OF_STUDIES)))
 fsw-kernels sitl-kernels: %-kernels:
 	@$(BIN)/python -m studies.flight.kernels $*
 

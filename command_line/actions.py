@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from command_line.options import read
 from command_line.output import complain
-from command_line.parser import COULD_NOT_START, unknown_name
+from command_line.parser import COULD_NOT_START, Parser, unknown_name
 
 Actions = Mapping[str, tuple[type[Any], Callable[..., int], str]]
 """By name: the options' class, what does it, and its line in the help."""
@@ -20,6 +21,8 @@ def read_action(
 
     The exit code instead where that asks for help, or names none of the ``actions``.
     """
+    if "_ARGCOMPLETE" in os.environ:
+        _complete(actions, argv)
     if not argv or argv[0] in ("-h", "--help"):
         rows = (f"  {name:8}{what}" for name, (_, _, what) in actions.items())
         print("\n".join((f"usage: {prog} ACTION {usage}", "", purpose, "", "actions:", *rows, "")))
@@ -30,3 +33,13 @@ def read_action(
         return COULD_NOT_START
     kind, act, what = actions[argv[0]]
     return read(kind, f"{prog} {argv[0]}", what, argv[1:]), act
+
+
+def _complete(actions: Actions, argv: list[str]) -> None:
+    """Answer a shell that is at the action; the parser of an action completes the rest."""
+    if argv:
+        os.environ["_ARGCOMPLETE"] = "3"  # the program's name has three words
+        return
+    parser = Parser("pandion", "")
+    parser.add_argument("action", choices=list(actions))
+    parser.read(argv)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 
@@ -28,3 +28,26 @@ def compile_for_types(dispatcher: Any, without_value: Callable[[Any], Any]) -> N
         )
 
     dispatcher.get_call_template = of_types
+
+
+_OF_ARRAYS: dict[Any, Any] = {}
+
+
+def types_of(dispatcher: Any, arguments: Sequence[Any]) -> tuple[Any, ...]:
+    """Numba's types of the arguments of a call.
+
+    Those of arrays are kept: for one of records numba takes milliseconds, each time, and a flight
+    loop, of which every new tuning has one, is handed forty.
+    """
+    return tuple(_type_of(dispatcher, argument) for argument in arguments)
+
+
+def _type_of(dispatcher: Any, argument: Any) -> Any:
+    if type(argument).__name__ != "ndarray":
+        return dispatcher.typeof_pyval(argument)
+    dtype, flags = argument.dtype, argument.flags
+    order = flags.c_contiguous, flags.f_contiguous
+    key = dtype, dtype.isalignedstruct, argument.ndim, order, flags.aligned, flags.writeable
+    if key not in _OF_ARRAYS:
+        _OF_ARRAYS[key] = dispatcher.typeof_pyval(argument)
+    return _OF_ARRAYS[key]

@@ -11,6 +11,7 @@ from typing import NoReturn
 from command_line.output import complain
 
 COULD_NOT_START = 2  # exit code
+_MOST_NAMES = 40  # in a sentence; a vehicle has 200 parameters
 
 
 class Parser(argparse.ArgumentParser):
@@ -48,7 +49,10 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     # Dashes, which all options have in common, make any two of them alike.
     names = {one.lstrip("-"): one for one in known}
     nearest = difflib.get_close_matches(name.lstrip("-"), names, n=1, cutoff=0.51)
-    hint = (
-        f"did you mean {names[nearest[0]]}?" if nearest else f"known: {', '.join(names.values())}"
-    )
+    if nearest:
+        hint = f"did you mean {names[nearest[0]]}?"
+    elif len(names) > _MOST_NAMES:
+        hint = f"none of the {len(names)} that there are is like it"
+    else:
+        hint = f"known: {', '.join(names.values())}"
     return f"unknown {what} {name}; {hint}"

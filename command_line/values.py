@@ -60,6 +60,16 @@ def one_of(what: str, *names: str, old: Mapping[str, str] | None = None) -> Call
     return parse
 
 
+def known(*names: str) -> Callable[[str], str]:
+    """Any word; a shell offers these names."""
+
+    def parse(text: str) -> str:
+        return text
+
+    parse.names = names  # type: ignore[attr-defined]
+    return parse
+
+
 def output_file(text: str) -> str:
     """A file that can be made, or ``-`` for standard output."""
     if text != "-" and Path(text).is_dir():

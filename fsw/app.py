@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -84,6 +85,7 @@ class _Session:
         addresses(options.links)  # what is no address is refused before a minute of compiling
         directory = _output_directory(options.out)
         self._events.report("preparing", "fsw: preparing")
+        keeping = self._kept_parameters(directory)  # what is of no use, as well
         program = self._load(options)
         facts = program.facts
         record = FlightRecord(
@@ -91,7 +93,7 @@ class _Session:
             control=ControlMetrics(),
             health=LoopHealth(),
         )
-        keeping = self._keep_parameters(program, directory)
+        self._restore_parameters(keeping, program)
         # Early: a process forked now shares what was compiled, and no thread, port or log.
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
@@ -175,28 +177,39 @@ class _Session:
             FtpService(vehicle_files(logs)),
         )
 
-    def _keep_parameters(self, program: FlightProgram[Any], directory: Path) -> ParameterFile:
-        """Take over the parameters of the vehicle's file, and say what of it is of no use.
+    def _kept_parameters(self, directory: Path) -> ParameterFile:
+        """Read the parameters of the vehicle's file, and say what of it is of no use.
 
         Raises:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
+        # Imported here because they take a second, which the other refusals need not wait.
         from fsw.parameters.kept_file import ParameterFile
+        from fsw.runtime.assembly import configured
 
-        path = self._options.params
+        path, record = self._options.params, directory / "parameters.params"
         try:
-            keeping = ParameterFile(program.parameters, path, directory / "parameters.params")
-        except OSError as error:
-            where = path or directory
-            raise CouldNotStart(f"cannot keep parameters in {where}: {error.strerror}") from None
+            config = configured(self._options.control)
         except ValueError as error:
-            raise CouldNotStart(f"parameters in {path} contradict each other: {error}") from None
+            raise CouldNotStart(str(error)) from None
+        with _refused(path or directory):
+            keeping = ParameterFile(path, record, config)
         for complaint in keeping.complaints:
             self._events.report("warning", f"fsw: {path}, {complaint}")
+        return keeping
+
+    def _restore_parameters(self, keeping: ParameterFile, program: FlightProgram[Any]) -> None:
+        """Let the program take them over.
+
+        Raises:
+            CouldNotStart: They cannot be written, or no flight loop can be designed with them.
+        """
+        path = self._options.params
+        with _refused(path or keeping.record):
+            keeping.restore(program.parameters)
         if path is not None:
             text = f"fsw: parameters from {path}, {keeping.restored} of them not the default"
             self._events.report("parameters", text)
-        return keeping
 
     def _fly(
         self,
@@ -279,6 +292,17 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         link_length=vehicle.link_length,
         profile=round(program.parameters.values["LOG_PROFILE"]),
     )
+
+
+@contextmanager
+def _refused(where: Path) -> Iterator[None]:
+    """Where parameters of no use end the start, in a sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise CouldNotStart(f"cannot keep parameters in {where}: {error.strerror}") from None
+    except ValueError as error:
+        raise CouldNotStart(f"parameters in {where} contradict each other: {error}") from None
 
 
 def _output_directory(wanted: Path | None) -> Path:

@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types
+from command_line.kernel_types import compile_for_types, types_of
 
 # The shapes' kernels are called by a table of functions (fsw/shapes/zones.py), which numba has had
 # for years and still calls new.
@@ -104,8 +104,7 @@ def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
         return kernel
 
     def compile_for(arguments: tuple[Any, ...]) -> Callable[..., R]:
-        types = tuple(dispatcher.typeof_pyval(argument) for argument in arguments)
-        return cast(Callable[..., R], dispatcher.compile(types))
+        return cast(Callable[..., R], dispatcher.compile(types_of(dispatcher, arguments)))
 
     if example:
         return compile_for(example)

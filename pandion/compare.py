@@ -73,6 +73,7 @@ def main(argv: list[str]) -> int:
         Case(
             "compare",
             one.name,
+            one.took_s,
             failure=f"{one.worse}: {_sentence(one, options.confidence)}" if one.worse else "",
         )
         for one in found

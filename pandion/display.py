@@ -61,27 +61,37 @@ class Display:
             return
         from rich import progress
         from rich.console import Console
+        from rich.text import Text
+
+        class TimeLeft(progress.TimeRemainingColumn):
+            def render(self, task: progress.Task) -> Text:
+                return Text() if task.fields["timed"] else super().render(task)
 
         bar = progress.Progress(
             "{task.description}",
             progress.BarColumn(),
             "{task.fields[state]}",
-            progress.TimeRemainingColumn(),
+            TimeLeft(),
             console=Console(file=self._stream),
             transient=True,
             auto_refresh=self._threaded,
             refresh_per_second=4,
         )
         with bar:
-            bar.add_task("starting", total=None, state="")
+            bar.add_task("starting", total=None, state="", timed=False)
             self._bar = bar
             try:
                 yield
             finally:
                 self._bar = None
 
-    def report(self, what: str, done: float, total: float, state: str = "") -> None:
-        """Show how much of one thing is done, ``done`` of ``total`` [any unit]."""
+    def report(
+        self, what: str, done: float, total: float, state: str = "", *, timed: bool = False
+    ) -> None:
+        """Show how much of one thing is done, ``done`` of ``total`` [any unit].
+
+        A ``state`` that is ``timed`` tells the time left itself.
+        """
         counted, state = not state, state or f"{done} of {total}"
         if self._bar is not None:
             self._bar.update(
@@ -90,6 +100,7 @@ class Display:
                 completed=done,
                 total=None if math.isinf(total) else total,
                 state=state,
+                timed=timed,
                 refresh=not self._threaded,
             )
             return

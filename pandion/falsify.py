@@ -12,11 +12,12 @@ from command_line.bounded_json import JsonError, json_object
 from command_line.options import group, json_file, option, read
 from command_line.output import complain, console_beside, json_text, write_text
 from command_line.parser import COULD_NOT_START
-from command_line.values import number, whole
+from command_line.values import known, number, whole
 from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions
 from pandion.display import Display
+from sitl.scenario_file import scenario_names
 
 if TYPE_CHECKING:
     from fsw.parameters.flight_config import FlightConfig
@@ -34,7 +35,9 @@ _STEPS_A_SECOND: Final = 500
 class FalsifyOptions:
     """One search, or one disturbance of an earlier one."""
 
-    scenario: str = option("SCENARIO", "name or path of a .toml file", default="walls")
+    scenario: str = option(
+        "SCENARIO", "name or path of a .toml file", known(*scenario_names()), default="walls"
+    )
     evaluations: int = option(
         "--evaluations N",
         "stretches of 5 s to fly, a tenth of them with the whole stack; with --over whole flights",

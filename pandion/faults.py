@@ -191,7 +191,7 @@ def _case(row: Judged) -> Case:
     name = f"{row.cell.expected.name}, seed {row.cell.seed}"
     broke = row.flight.problem if row.flight.error else ""
     failure = "" if broke else "; ".join(row.differs)
-    return Case(row.cell.mode, name, failure=failure, error=broke)
+    return Case(row.cell.mode, name, row.flight.took_s, failure=failure, error=broke)
 
 
 def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[Judged]:

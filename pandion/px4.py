@@ -11,11 +11,18 @@ from command_line.actions import read_action
 from command_line.options import option
 from command_line.output import complain, unwritten
 from command_line.parser import COULD_NOT_START
-from command_line.values import one_of, place
+from command_line.values import known, one_of, place
 from messages.addresses import LinkError, parse_link_address
 from sitl.arguments import rate
 from sitl.earth import DEFAULT_ORIGIN, Place
-from sitl.scenario_file import PERFECT, SUITE_NAMES, ScenarioError, load_scenario, suite_of
+from sitl.scenario_file import (
+    PERFECT,
+    SUITE_NAMES,
+    ScenarioError,
+    load_scenario,
+    scenario_names,
+    suite_of,
+)
 
 DONE: Final = 0  # exit codes
 FAILED: Final = 1
@@ -26,7 +33,9 @@ NOISY: Final = "mocap"
 class _Plant:
     """The plant that PX4 is to fly."""
 
-    scenario: str = option("SCENARIO", "name or path of a .toml file", default="ground")
+    scenario: str = option(
+        "SCENARIO", "name or path of a .toml file", known(*scenario_names()), default="ground"
+    )
     sensors: str | None = option(
         "--sensors SUITE",
         "sensors of the vehicle (default the scenario's, mocap where they have no noise)",

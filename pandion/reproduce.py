@@ -216,10 +216,9 @@ def _show(report: Report, stream: TextIO) -> None:
     terminal = Console(file=stream).width if stream.isatty() else WIDTH
     console = Console(file=stream, highlight=False, width=min(terminal, WIDTH))
     for table in report.tables:
-        title: str | None = table.caption
+        console.print(table.caption, markup=False)  # as a title it is as narrow as the table
         for block in blocks([table.headers, *table.rows], console.width):
-            drawn = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
-            drawn.show_edge, title = False, None
+            drawn = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
             headers, *rows = block
             widths = _widths(block, console.width)
             for k, (name, width) in enumerate(zip(headers, widths, strict=True)):

@@ -141,7 +141,7 @@ class Supervisor:
                     self._handle(child, event)
             self._faults.go_on()
             if (seen := self._compiling.look()) is not None:
-                self._display.report("compiling", *seen)
+                self._display.report("compiling", *seen, timed=True)
             for child in self._children:
                 child.escalate()
 

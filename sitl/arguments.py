@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from command_line.options import ContradictionError, events, json_file, option, switch
-from command_line.values import number, one_of, place, seconds, whole
+from command_line.values import known, number, one_of, place, seconds, whole
 from sitl.earth import DEFAULT_ORIGIN, Place
-from sitl.scenario_file import PERFECT, SUITE_NAMES
+from sitl.scenario_file import PERFECT, SUITE_NAMES, scenario_names
 
 SLOWEST: Final = 0.05  # below it a step in lockstep would take longer than the stall time allows
 _FASTEST: Final = 1e6
@@ -39,7 +39,9 @@ def rate(text: str) -> int:
 class RunOptions:
     """Options shared by every way to start a simulated flight."""
 
-    scenario: str = option("SCENARIO", "name or path of a .toml file", default="walls")
+    scenario: str = option(
+        "SCENARIO", "name or path of a .toml file", known(*scenario_names()), default="walls"
+    )
     seed: int = option("--seed N", "root of all randomness", whole(), default=0)
     duration_s: float | None = option(
         "--duration S", "seconds to fly (default the scenario's)", seconds

@@ -12,7 +12,7 @@ from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types
+from command_line.kernel_types import compile_for_types, types_of
 
 # The shapes' kernels are called by a table of functions (sitl/distance.py), which numba has had for
 # years and still calls new.
@@ -60,7 +60,7 @@ def machine_code(function: Callable[P, R], *example: Any) -> Callable[P, R]:
     """
     dispatcher = cast(Any, function)
     dispatcher(*example)
-    types = tuple(dispatcher.typeof_pyval(argument) for argument in example)
+    types = types_of(dispatcher, example)
     return cast(Callable[P, R], dispatcher.overloads[types].entry_point)
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
@@ -71,6 +72,7 @@ class Brake:
         )
 
 
+@lru_cache(maxsize=64)
 def _gains(airframe: Airframe, input_weight: float) -> tuple[float, float, float, float]:
     """On velocity, acceleration, jerk and snap of one horizontal axis."""
     if airframe.attitude_lag.at_once:

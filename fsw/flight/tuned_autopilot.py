@@ -10,7 +10,7 @@ from fsw.flight.autopilot import Autopilot, Controlled
 from fsw.flight.state import FlightState
 from fsw.frozen import replace
 from fsw.parameters.consistency import Finding, refusals
-from fsw.parameters.contradictions import contradictions
+from fsw.parameters.contradictions import agreed
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import FlightSnapshot, SafeSet, Severity, StatusText, TickInputs, TickOutputs
 from fsw.tuning import Tuning, part, tuned
@@ -34,11 +34,7 @@ class TunedAutopilot:
         Raises:
             ValueError: The numbers contradict each other.
         """
-        config = tuned(self._config, tuning)
-        against = contradictions(config)
-        if against:
-            raise ValueError("; ".join(against))
-        self._prepared = (tuning, Autopilot(config))
+        self._prepared = (tuning, Autopilot(agreed(self._config, tuning)))
 
     @property
     def config(self) -> FlightConfig:

@@ -20,6 +20,7 @@ Source: docs/equations.md E15b, E16, E17; docs/decisions/0002-prediction-knows-t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,12 +85,18 @@ def _add_lag(airframe: Airframe, a: Array, b: Array) -> None:
 
 def discretise(airframe: Airframe, period: float) -> tuple[Array, Array]:
     """Exact zero-order-hold A (19, 19) and B (19, 6) over one ``period`` [s]."""
+    exponential = _exponential(airframe, period)
+    return exponential[:STATES, :STATES].copy(), exponential[:STATES, STATES:].copy()
+
+
+@lru_cache(maxsize=64)
+def _exponential(airframe: Airframe, period: float) -> Array:
     a, b = continuous_model(airframe)
     block = np.zeros((STATES + INPUTS, STATES + INPUTS))
     block[:STATES, :STATES] = a * period
     block[:STATES, STATES:] = b * period
-    exponential = expm(block)
-    return exponential[:STATES, :STATES].copy(), exponential[:STATES, STATES:].copy()
+    exponential: Array = expm(block)
+    return exponential
 
 
 def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:

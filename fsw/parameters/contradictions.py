@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.registry import BY_NAME
+from fsw.tuning import Tuning, tuned
 
 # Pairs of parameters: the first is to be below the second, or at most equal to it.
 _BELOW: tuple[tuple[str, str], ...] = (
@@ -23,6 +24,19 @@ _AT_MOST: tuple[tuple[str, str], ...] = (
 _FAILURES: tuple[str, ...] = ("FD_FAIL_R", "FD_FAIL_P")
 # deg above what the vehicle tilts by itself: gusts and a late estimate push it further for a while.
 _RESERVE = 15.0
+
+
+def agreed(config: FlightConfig, tuning: Tuning) -> FlightConfig:
+    """The configuration with a tuning in it.
+
+    Raises:
+        ValueError: The numbers contradict each other.
+    """
+    config = tuned(config, tuning)
+    against = contradictions(config)
+    if against:
+        raise ValueError("; ".join(against))
+    return config
 
 
 def contradictions(config: FlightConfig) -> tuple[str, ...]:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import tempfile
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
+from fsw.parameters.contradictions import agreed
+from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.storage import Loaded, load, save
 from fsw.parameters.store import ParameterStore
 
@@ -18,19 +23,35 @@ class ParameterFile:
     a vehicle on which it was never changed; the record holds everything, to say what flew.
     """
 
-    def __init__(self, store: ParameterStore, path: Path | None, record: Path) -> None:
-        """Take over what was kept in the vehicle's file; without one changes end with the flight.
+    def __init__(self, path: Path | None, record: Path, config: FlightConfig) -> None:
+        """Read the vehicle's file; without one changes end with the flight.
+
+        Nothing is made of it yet: what is of no use is refused before a minute of compiling.
 
         Raises:
-            ValueError: What was kept contradicts itself.
+            ValueError: What was kept contradicts itself, in this ``config`` of the start.
             OSError: It cannot be read or written.
         """
         loaded = load(path) if path is not None and path.exists() else Loaded({}, ())
         self.complaints = loaded.complaints  # about lines of the file
-        self.restored = store.restore(loaded.values)  # values that are not the default
-        self._store, self._path, self._record = store, path, record
+        self.restored = 0  # values that are not the default
+        self._kept, self._path, self.record = loaded.values, path, record
         self._spoilt = bool(loaded.complaints)  # whether part of the file was of no use
+        self._store = ParameterStore(config, partial(agreed, config))
+        self._store.restore(self._kept)
+        if path is not None:
+            with tempfile.TemporaryFile(dir=Path(os.path.realpath(path)).parent):
+                pass  # as it is written
         self._executor: ThreadPoolExecutor | None = None
+
+    def restore(self, store: ParameterStore) -> None:
+        """Let a store that has not flown yet take over what was kept.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        self._store = store
+        self.restored = store.restore(self._kept)
         self._save(store.values)
 
     def start(self) -> None:
@@ -55,4 +76,4 @@ class ParameterFile:
                 self._spoilt = False
             defaults = self._store.defaults
             save(self._path, {n: v for n, v in values.items() if v != defaults[n]})
-        save(self._record, values)
+        save(self.record, values)

@@ -18,7 +18,7 @@ from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.registry import BY_NAME, PARAMETERS
 from fsw.tuning import Tuning
 
-Prepare = Callable[[Tuning], None]
+Prepare = Callable[[Tuning], object]
 """Makes ready what a tuning needs; raises ValueError where its numbers contradict each other."""
 
 Save = Callable[[Mapping[str, float]], None]
@@ -63,7 +63,7 @@ class ParameterStore:
         self._listeners: list[Listener] = []
         self._waiting: deque[_Change] = deque()
         self._change: _Change | None = None  # the one under way
-        self._job: Future[None] | None = None  # what is being done about it
+        self._job: Future[object] | None = None  # what is being done about it
         self._offered: Tuning | None = None  # to the tick
         self._saving = False
         self._rest = 0  # ticks until the next change may begin

@@ -30,16 +30,7 @@ def flight_software(
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    # flight_config refuses unknown names of inner loops and solvers.
-    config = flight_config(
-        choice.controller,
-        cast(Inner, choice.inner),
-        choice.lambda_,
-        solver=choice.solver,
-        body=choice.body or FULL,
-        soft=choice.allow_inconsistent,
-    )
-    config = replace(config, origin=origin)
+    config = configured(choice, origin)
     planner = Planner(config.planner, config.airframe, clock.stopwatch_us)
     flight = TunedAutopilot(config)
     if to_plan:
@@ -66,6 +57,24 @@ def flight_software(
         missions=missions,
         numbers=flat(config),
     )
+
+
+def configured(choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN) -> FlightConfig:
+    """The configuration of the start.
+
+    Raises:
+        ValueError: For an unknown name, listing the known ones.
+    """
+    # flight_config refuses unknown names of inner loops and solvers.
+    config = flight_config(
+        choice.controller,
+        cast(Inner, choice.inner),
+        choice.lambda_,
+        solver=choice.solver,
+        body=choice.body or FULL,
+        soft=choice.allow_inconsistent,
+    )
+    return replace(config, origin=origin)
 
 
 def vehicle_facts(config: FlightConfig) -> VehicleFacts:

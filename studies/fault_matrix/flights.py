@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
 from fsw.flight.autopilot import Autopilot
@@ -219,6 +219,7 @@ class FaultFlight:
     away_m: float | None = None  # from the start at the end
     problem: str = ""  # the flight was none: refused, or not in the mode when the fault began
     error: bool = False  # it could not be flown at all
+    took_s: float = field(default=0.0, compare=False)  # by the wall's clock
 
     @property
     def warning(self) -> Said | None:

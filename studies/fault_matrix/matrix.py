@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -37,10 +38,12 @@ class Cell:
 
     def row(self) -> FaultFlight:
         """See :class:`studies.campaign.campaign.Flight`."""
+        began_s = time.monotonic()
         try:
-            return self._flown()
+            flight = self._flown()
         except Exception as error:
-            return self.broken(f"{type(error).__name__}: {error}")
+            flight = self.broken(f"{type(error).__name__}: {error}")
+        return replace(flight, took_s=time.monotonic() - began_s)
 
     def _flown(self) -> FaultFlight:
         faults, suite = self.expected.faults, self.expected.suite

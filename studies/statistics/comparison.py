@@ -36,6 +36,7 @@ class Difference:
     margin_interval_m: tuple[float, float] | None
     violations: tuple[int, int]
     violation_interval: tuple[float, float]  # of the difference of the probabilities [1]
+    took_s: float  # processor time of the flights of both
 
     @property
     def worse(self) -> str:
@@ -143,6 +144,7 @@ def _difference(
         margin_interval_m=interval,
         violations=(counts[0], counts[1]),
         violation_interval=newcombe((counts[0], len(ours)), (counts[1], len(theirs)), confidence),
+        took_s=sum(row.took_s for row in (*ours, *theirs)),
     )
 
 

@@ -42,6 +42,9 @@ def completed(line: str) -> list[str]:
         ("pandion ", set(VERBS), {"bench"}),
         ("pandion fly --se", {"--sensors", "--seed"}, {"--suite"}),
         ("pandion fly walls --sensors m", {"mocap"}, {"rtk"}),
+        ("pandion fly wo", {"workspace", "workspace-calm"}, {"walls"}),
+        ("pandion param ", {"get", "set", "export"}, {"--file"}),
+        ("pandion param set --fi", {"--file"}, {"set"}),
     ],
 )
 def test_a_shell_is_offered_what_there_is(

@@ -38,3 +38,18 @@ def test_a_short_one_says_each_tenth_only() -> None:
         display.report("flown", done, 100, f"{done} flights")
     said = [int(line.split()[1]) for line in stream.getvalue().splitlines()]
     assert said == list(range(10, 101, 10))
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_the_time_left_is_told_once() -> None:
+    for timed, state in ((False, "3 of 4 flights"), (True, "3 of 4 kernels, about 9 s left")):
+        stream = Terminal()
+        display = Display(stream, threaded=False)
+        with display.progress():
+            display.report("done", 3, 4, state, timed=timed)
+        assert state in stream.getvalue()
+        assert ("-:--:--" in stream.getvalue()) is not timed

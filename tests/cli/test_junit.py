@@ -67,14 +67,15 @@ def test_a_cell_of_the_fault_matrix_fails_or_breaks() -> None:
         expected = SimpleNamespace(name="motor-off")
         return SimpleNamespace(
             cell=SimpleNamespace(mode="hold", expected=expected, seed=4), differs=differs,
-            flight=SimpleNamespace(problem=problem, error=error),
+            flight=SimpleNamespace(problem=problem, error=error, took_s=1.5),
         )  # fmt: skip
 
     good, differs = of_fault(cell()), of_fault(cell(differs=("silent", "contact")))
     broke = of_fault(cell("ValueError: x", error=True, differs=("broke",)))
-    assert (good.group, good.name, good.failure, good.error) == (
+    assert (good.group, good.name, good.seconds, good.failure, good.error) == (
         "hold",
         "motor-off, seed 4",
+        1.5,
         "",
         "",
     )

@@ -19,6 +19,7 @@ from benchmarks.loop import LoopOptions
 from benchmarks.mpc import MpcOptions
 from benchmarks.values import several
 from command_line.options import as_words, option, read, switch
+from command_line.parser import unknown_name
 from command_line.values import number, one_of, output_file, seconds, whole
 from fsw.arguments import FswOptions
 from fsw.link.link_choice import LinkChoice
@@ -225,3 +226,10 @@ def test_names_of_the_last_release_still_work(
     said = capsys.readouterr().err
     assert f"{old.partition('=')[0]} is now {new.partition('=')[0]};" in said
     assert len(said.splitlines()) == 1
+
+
+def test_of_many_names_none_is_listed_where_none_is_like_it() -> None:
+    many = [f"PID_{k:03}" for k in range(200)]
+    assert unknown_name("parameter", "PID007", many).endswith("did you mean PID_007?")
+    assert len(unknown_name("parameter", "nothing", many)) < 100
+    assert unknown_name("verb", "nothing", ["fly", "view"]).endswith("known: fly, view")

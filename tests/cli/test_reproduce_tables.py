@@ -30,6 +30,12 @@ def test_the_widest_table_fits_and_is_whole() -> None:
     assert wanted <= words, wanted - words
 
 
+def test_the_caption_of_a_narrow_table_stays_one_line() -> None:
+    stream, caption = io.StringIO(), "Minimum TE of any safe controller [m], in brackets"
+    _show(Report("Table IV", [], (Table(caption, ("case", "TE m"), (("I", "0.1"),)),)), stream)
+    assert stream.getvalue().splitlines()[0].rstrip() == caption
+
+
 WORDS = st.text(st.characters(categories=["L", "N"]), min_size=0, max_size=20)
 
 

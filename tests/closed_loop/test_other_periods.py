@@ -27,9 +27,9 @@ TICK = {"fsw.periods.TICK_US": 1_000, "sitl.periods.STEP_US": 1_000}
     ("periods", "planning_us"),
     [
         pytest.param({}, 100_000, id="as it is", marks=pytest.mark.long),
-        pytest.param(PLANNING, 50_000, id="planner at 20 Hz"),
-        pytest.param(TICK, 100_000, id="tick at 1 kHz"),
-        pytest.param(PLANNING | TICK, 50_000, id="both", marks=pytest.mark.long),
+        pytest.param(PLANNING, 50_000, id="planner at 20 Hz", marks=pytest.mark.long),
+        pytest.param(TICK, 100_000, id="tick at 1 kHz", marks=pytest.mark.long),
+        pytest.param(PLANNING | TICK, 50_000, id="both"),
     ],
 )
 def test_other_periods_are_a_line_each_and_fly(

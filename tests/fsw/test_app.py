@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,3 +128,32 @@ def test_a_place_where_parameters_cannot_be_kept_is_one_sentence(
     assert capsys.readouterr().err == (
         f"fsw: cannot keep parameters in {nowhere}: No such file or directory\n"
     )
+
+
+def _contradiction(path: Path) -> None:
+    path.write_text("BAT_CRIT_THR 0.3\nBAT_LOW_THR 0.25\n")
+
+
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (os.mkfifo, "it is not a regular file"),
+        (Path.mkdir, "Is a directory|not a regular file"),
+        (lambda path: path.symlink_to(path.with_name("nowhere") / "there"), "No such file"),
+        (_contradiction, "contradict each other: BAT_CRIT_THR 0.3 is to be below BAT_LOW_THR"),
+    ],
+)
+def test_parameters_of_no_use_are_refused_before_anything_is_compiled(
+    make: Callable[[Path], None],
+    why: str,
+    options: FswOptions,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def compiling(options: FswOptions) -> FlightProgram[int]:
+        raise AssertionError("it was to be refused before")
+
+    make(tmp_path / "vehicle.params")
+    given = replace(options, params=tmp_path / "vehicle.params")
+    assert app.run(given, compiling) == COULD_NOT_START
+    assert re.search(why, capsys.readouterr().err)

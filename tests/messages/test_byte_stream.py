@@ -38,6 +38,17 @@ def wait_until(done: Callable[[], object], patience_s: float = 5.0) -> bool:
     return False
 
 
+def comes(stream: ByteStream, expected: bytes) -> bool:
+    """Whether this comes, in pieces as on a line."""
+    came = bytearray()
+
+    def all_there() -> bool:
+        came.extend(stream.read(64))
+        return came == expected
+
+    return wait_until(all_there)
+
+
 @contextmanager
 def line_at(baud: int, error_rate: float = 0.0) -> Iterator[tuple[Line, ByteStream]]:
     with (
@@ -63,6 +74,7 @@ def read_until_quiet(stream: ByteStream, quiet_s: float = 0.35) -> tuple[bytes, 
     return came, found
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.parametrize("baud", [57_600, 115_200, 460_800, 921_600])
 @pytest.mark.parametrize("error_rate", [0.0, 1e-4, 1e-3])
 def test_every_intact_frame_is_read_from_a_noisy_line(baud: int, error_rate: float) -> None:
@@ -102,7 +114,7 @@ def test_a_device_that_comes_late_vanishes_and_comes_back_is_used_again() -> Non
             stream.read(64)
             assert stream.connected
             line.send(b"hello")
-            assert wait_until(lambda: stream.read(64) == b"hello")
+            assert comes(stream, b"hello")
             line.unplug()
             assert wait_until(lambda: stream.read(64) == b"" and not stream.connected)
             stream.send(b"nobody hears this")
@@ -110,7 +122,7 @@ def test_a_device_that_comes_late_vanishes_and_comes_back_is_used_again() -> Non
             stream.address = SerialLine(line.device, 921_600)
             now_us += 1_000_000
             line.send(b"again")
-            assert wait_until(lambda: stream.read(64) == b"again")
+            assert comes(stream, b"again")
             assert stream.connections == 2
             stream.send(b"answer")
             assert wait_until(lambda: bytes(line.got) == b"answer")
@@ -178,7 +190,7 @@ def test_a_listening_end_serves_the_client_that_came_last() -> None:
         second = socket.create_connection(("127.0.0.1", port))
         with closing(first), closing(second):
             second.sendall(b"from the second")
-            assert wait_until(lambda: stream.read(64) == b"from the second")
+            assert comes(stream, b"from the second")
             assert first.recv(64) == b""
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -20,6 +22,7 @@ from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
 
 STATES = 1000
+_in_long = partial(pytest.param, marks=pytest.mark.long)
 TOLERANCE = 1e-9  # relative to the largest acceleration of the state
 
 
@@ -88,7 +91,7 @@ def pinocchio_acceleration(
 
 
 # Each number of joints is a recursion compiled anew; two are what flies.
-@pytest.mark.parametrize("joints", [pytest.param(1, marks=pytest.mark.long), 2, 3])
+@pytest.mark.parametrize("joints", [_in_long(1), 2, _in_long(3)])
 def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> None:
     random = np.random.default_rng(joints)
     work = empty_workspace(joints)

@@ -189,7 +189,8 @@ def test_a_write_that_fails_leaves_the_old_file_whole(
 
 def keeping(path: Path | None, tmp_path: Path) -> tuple[ParameterStore, ParameterFile]:
     store = ParameterStore(FlightConfig(), lambda tuning: None)
-    kept = ParameterFile(store, path, tmp_path / "record.params")
+    kept = ParameterFile(path, tmp_path / "record.params", FlightConfig())
+    kept.restore(store)
     kept.start()
     return store, kept
 

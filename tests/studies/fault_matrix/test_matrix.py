@@ -235,6 +235,7 @@ def test_a_cell_is_flown_judged_and_written_down() -> None:
     judged = judge(cell, cell.row())
     warning = judged.flight.warning
     assert judged.flight.problem == ""
+    assert judged.flight.took_s > 0.0
     assert warning is not None
     assert warning.after_s < 0.5
     row = json.loads(json.dumps(judged.as_json(), allow_nan=False))

@@ -46,7 +46,7 @@ def campaign(
     rows = [
         replace(
             CampaignFlight(plan, k).broken(""), error=False, completed=k >= contacts,
-            contact=k < contacts, margin_m=0.1 + noise[k] + shift_m + own[k],
+            contact=k < contacts, margin_m=0.1 + noise[k] + shift_m + own[k], took_s=0.25,
         )
         for k in range(flights)
     ]  # fmt: skip
@@ -118,7 +118,10 @@ def test_a_campaign_of_other_code_is_compared_all_the_same(
     assert "code: aaaaaaaaaaaa -> " in said
     assert said.splitlines()[-1] == "FAIL 1 of 1 configurations worse"
     assert json.loads(report.read_text(encoding="utf-8"))["worse"] is True
-    assert ET.parse(junit).find("testsuite/testcase/failure") is not None
+    (case,) = ET.parse(junit).findall("testsuite/testcase")
+    assert case.find("failure") is not None
+    took_s = sum(row.took_s for one in (before, after) for row in read_rows(one).rows)
+    assert float(case.attrib["time"]) == pytest.approx(took_s, abs=5e-4)
 
 
 def test_what_is_no_campaign_is_refused_in_a_sentence(
