@@ -68,7 +68,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 # Each row compiles the kernels of one half first, because rows that compile the same kernels at once
 # take twice the time. Then comes what only reads the code in the row of the tests that often wait
 # for clocks: meanwhile the other row is done with the kernels that take longer.
-OF_PROCESSES := tests/benchmarks tests/cli tests/conversations tests/docs tests/interop tests/messages \
+OF_PROCESSES := tests/benchmarks tests/cli tests/conversations tests/docs tests/interop tests/library tests/messages \
 	tests/processes tests/replay tests/studies tests/timing tests/view
 code-checks: sitl-kernels
 	$(call check,lint,$(BIN)/ruff check .)

@@ -20,7 +20,7 @@ from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
 GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "fly": {
         "fly": (
-            "pandion.fly",
+            "pandion.fly_verb",
             "fly a scenario with both processes, print the result",
         ),
         "sitl": ("sitl.__main__", "run the simulator alone"),

@@ -112,6 +112,7 @@ class Simulation:
         self._pushed: tuple[V3, V3] = (_NONE, _NONE)  # N, NED; N·m, B
         self._pushed_until = 0.0  # step
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
+        self.trim = trim  # that holds it there
         self._thrust, self._torque = trim.thrust, trim.torque
         step_s = 1e-6 * STEP_US
         self._drives: Drives | None = None
