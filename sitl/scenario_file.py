@@ -157,7 +157,8 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
 def _with_points(curve: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     """A table of points with the numbers of the file that it names."""
     named = curve["file"]
-    if not isinstance(named, str) or folder is None:
+    inside = isinstance(named, str) and not ({"..", "/"} & set(Path(named).parts))
+    if not inside or folder is None:
         raise ScenarioError(
             f"trajectory.file = {_shown(named)}: must be a file beside the scenario's"
         )

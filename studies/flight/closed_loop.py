@@ -20,7 +20,6 @@ from fsw.flight.calm_tick import CalmTick
 from fsw.flight.state import FlightState
 from fsw.measurements import Sample, Vec2, Vec4
 from fsw.model.airframe import Airframe
-from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.ports import PlanningCycle, PlanService
 from fsw.signals import (
@@ -44,13 +43,12 @@ from sitl.scenario_file import ScenarioError
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from studies.flight.collector import collector_off
 from studies.flight.mission import announced, moves, target
-from studies.flight.own_parts import OURS, OwnParts
+from studies.flight.own_parts import OURS, OwnParts, planner_of
 from studies.flight.result import (
     TRACE_STEPS,
     FlightRecorder,
     FlightResult,
     TracePoint,
-    processor_time_us,
     touched,
 )
 from studies.flight.samples import only_the_time, sample
@@ -253,10 +251,7 @@ class ScenarioFlight:
         """
         check_body(simulation.scenario, config)
         self.recorder = FlightRecorder()
-        planning = parts.planning(config) or Planner(
-            config.planner, config.airframe, processor_time_us
-        )
-        self.planner = InlinePlanner(planning)
+        self.planner = InlinePlanner(planner_of(config, parts))
         self.autopilot = Autopilot(config)
         law = parts.law(self.autopilot, simulation.clock, self.recorder)
         tick = self.autopilot.tick if law is None else law.tick

@@ -12,6 +12,7 @@ the trajectory's, ours does, for at least ``HANDOVER_S``.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import importlib
 import inspect
@@ -35,6 +36,7 @@ from fsw.frozen import replace
 from fsw.measurements import Sample
 from fsw.model.airframe import GRAVITY
 from fsw.model.kinematics import point_in_flight
+from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.ports import PlanningCycle
 from fsw.signals import (
@@ -152,6 +154,29 @@ class OwnParts:
 
 
 OURS: Final = OwnParts()
+
+
+def planner_of(config: FlightConfig, parts: OwnParts = OURS) -> PlanningCycle:
+    """The planner of a flight: that of the parts, the one that the configuration names, or ours.
+
+    Raises:
+        OwnPartError: It cannot be used.
+    """
+    own = parts.planning(config)
+    return own or Planner(config.planner, config.airframe, processor_time_us)
+
+
+def with_parts(config: FlightConfig, planner: str, controller: str) -> FlightConfig:
+    """A configuration that is flown with parts by their names, ``module:Name``; empty: ours.
+
+    Raises:
+        OwnPartError: There is no such part.
+    """
+    return dataclasses.replace(
+        config,
+        own_planner=named_part(planner) if planner else "",
+        own_controller=named_part(controller) if controller else "",
+    )
 
 
 def named_part(path: str) -> str:

@@ -193,9 +193,10 @@ def test_scenario_keys_are_checked() -> None:
     ):
         with pytest.raises(pandion.ScenarioError, match=sentence):
             pandion.load_scenario(replace(walls, trajectory=curve))
-    text = '[trajectory]\nkind = "points"\nfile = "../up.csv"\ntime_s = [0.0]\n'
+    text = '[trajectory]\nkind = "points"\nfile = "up.csv"\ntime_s = [0.0]\n'
     with pytest.raises(pandion.ScenarioError, match="together with file"):
         parse_scenario(text, "x", None, Path())
-    with pytest.raises(pandion.ScenarioError, match="beside the scenario's"):
-        parse_scenario('[trajectory]\nkind = "points"\nfile = 3\n', "x", None, Path())
+    for named in ("3", '"../up.csv"', '"/up.csv"'):
+        with pytest.raises(pandion.ScenarioError, match="beside the scenario's"):
+            parse_scenario(f'[trajectory]\nkind = "points"\nfile = {named}\n', "x", None, Path())
     assert len(list(itertools.pairwise(curve_row(CURVES["points"])))) > 14
