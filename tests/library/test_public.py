@@ -9,10 +9,12 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import pandion
+from tests.cli.command import environment
 
 NAMES = """
 AIRFRAME Autopilot Log Observation OwnPartError Plan PlanFailure PlanRequest Result Scenario
@@ -45,6 +47,41 @@ def test_the_public_names_are_these() -> None:
     assert set(pandion.__all__) <= set(dir(pandion))
     with pytest.raises(AttributeError, match="flie"):
         pandion.flie  # noqa: B018
+
+
+def test_its_types_are_for_users_as_well() -> None:
+    root = Path(pandion.__file__).parents[1]
+    for package in ("pandion", "fsw", "sitl", "studies", "command_line", "messages", "view"):
+        assert (root / package / "py.typed").exists()
+
+
+@pytest.mark.parametrize(
+    ("package", "words"),
+    [
+        ("cmaes", ["tune", "x.toml"]),
+        pytest.param("cmaes", ["falsify", "walls"], marks=pytest.mark.long),
+        pytest.param(
+            "distributed",
+            ["reproduce", "table4", "--seeds=100:102", "--duration=1", "--workers=2"],
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_what_an_extra_is_missing_for_says_so(
+    package: str, words: list[str], tmp_path: Path
+) -> None:
+    code = f"import sys; sys.modules[{package!r}] = None; from pandion.__main__ import main"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; sys.exit(main({words}))"],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert f"pip install {package}" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_importing_it_loads_nothing_that_takes_time() -> None:
