@@ -13,6 +13,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, Literal
 
+import numpy as np
+
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.revision import revision
 from fsw.model.airframe import AIRFRAME
@@ -105,7 +107,9 @@ def fly(
             f'scenario "{flown.name}" starts on the ground or without a trajectory, which '
             "pandion.fly does not fly; `pandion fly` does"
         )
-    if not (isinstance(seed, int) and seed >= 0):
+    if math.isinf(flown.duration_s):
+        raise ScenarioError(f'scenario "{flown.name}" has no end of its own: give duration_s')
+    if not isinstance(seed, int | np.integer) or seed < 0:
         raise ScenarioError(f"seed = {seed}: must be a whole number, 0 or more")
     own = not (isinstance(controller, str) and controller in CONTROLLERS)
     if isinstance(controller, str) and own and ":" not in controller:
@@ -117,7 +121,7 @@ def fly(
     if not safety_filter:
         config = replace(config, safety_filter=replace(config.safety_filter, enabled=0))
     parts = OwnParts(planner, controller if own else None, disturbance, allow_slow)
-    job = Job("full", flown, config, seed)
+    job = Job("full", flown, config, int(seed))
     if not processes:
         return _in_this_process(job, parts, log=log)
     if parts != OwnParts(allow_slow=allow_slow) or not safety_filter:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -253,7 +252,7 @@ def load_tables(
         for key, part in (("own_planner", own.planner), ("own_controller", own.controller)):
             if part and table.setdefault(key, part) != part:
                 raise CampaignError(f'{key} = "{table[key]}": not flown with "{part}"')
-            head += f"{key} = {json.dumps(part)}\n" if part and key not in content.decode() else ""
+            head += f'{key} = "{part}"\n' if part and key not in content.decode() else ""
         plan = plan_of(table, path.stem, path.parent)
         return replace(plan, head=head), found
     except UnicodeDecodeError:

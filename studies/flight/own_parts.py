@@ -54,7 +54,7 @@ from fsw.signals import (
     TickOutputs,
 )
 from sitl.mission_clock import MissionClock
-from sitl.simulation import START_US
+from sitl.simulation import START_US, STEP_US
 from studies.flight.mission import target
 from studies.flight.own_filter import passes
 from studies.flight.result import FlightRecorder, processor_time_us
@@ -460,7 +460,7 @@ class _OwnPush:
     torque = False
 
     def __init__(self, law: PushLaw) -> None:
-        self._law, self._step_s = law, 1e-6 * 2000
+        self._law, self._step_s = law, 1e-6 * STEP_US
 
     def sample(self, step: int) -> tuple[float, float, float]:
         """The acceleration over a step [m/s², NED]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -131,6 +132,8 @@ def test_parameters_change_the_flight_and_their_ranges_hold(tmp_path: Path) -> N
         ({"duration_s": -1.0}, "duration_s = -1.0"),
         ({"duration_s": float("nan")}, "duration_s"),
         ({"seed": -1}, "seed = -1"),
+        ({"seed": 1.5}, "whole number"),
+        ({"duration_s": math.inf}, "give duration_s"),
         ({"planner": "none", "processes": True}, "processes=True"),
     ],
 )
