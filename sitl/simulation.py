@@ -82,6 +82,7 @@ class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
     ``more`` pushes come on top of the scenario's disturbances. The local frame is at ``origin``.
+    ``like`` is one of the same scenario whose machine code serves, which takes time to look up.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
@@ -94,6 +95,7 @@ class Simulation:
         more: Sequence[Push] = (),
         *,
         origin: Place = DEFAULT_ORIGIN,
+        like: Simulation | None = None,
     ) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
@@ -146,10 +148,12 @@ class Simulation:
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._held = held(len(self.vehicle.links))
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
+        self._evaluator = FlightEvaluator(
+            scenario, self.clock, self._places_now(), like=None if like is None else like._evaluator
+        )
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
-        self._step = machine_code(watched_step, *example)
+        self._step = machine_code(watched_step, *example) if like is None else like._step
         _, self._felt, _ = self._step(*example)
 
     @property
