@@ -84,20 +84,21 @@ class Arbitration:
         found: StateEstimate,
         *,
         aloft: bool,
+        flies: bool,
         damaged: bool,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory, and the state ``found`` at ``now`` [s], after what is due.
 
-        Nothing is, unless the vehicle is ``aloft``: else the ground may hold it. Of a ``damaged``
+        Nothing is, unless the vehicle ``flies``, and is ``aloft``: else the ground may hold it. Of a ``damaged``
         one a rotor or a joint is known to have failed.
         """
         evidence = memory.verdict.evidence
         if evidence is None:
             return begun(memory), found
         if not aloft:
-            # What is in doubt is so all the way down: else its bias would be the one of before.
-            turned = memory.numbers[0]["witness"][redundancy.SAID : redundancy.FELT]
-            if memory.verdict.is_on and turned.any():  # the rotors turn: ``redundancy.witness``
+            # What is in doubt is so until the rotors stand, on the ground too: else its bias would
+            # be the one of before.
+            if memory.verdict.is_on and flies:
                 return memory, found
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)

@@ -248,6 +248,7 @@ class SensorFusion:
         estimate: StateEstimate | None,
         *,
         aloft: bool = True,
+        flies: bool = True,
         damaged: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
@@ -262,7 +263,7 @@ class SensorFusion:
             return memory, found
         if found is None:
             return begun(memory), None
-        return self._arbitration.step(memory, now, found, aloft=aloft, damaged=damaged)
+        return self._arbitration.step(memory, now, found, aloft=aloft, flies=flies, damaged=damaged)
 
     def _again(
         self, memory: FusionMemory, tick: TickInputs

@@ -129,7 +129,13 @@ class SensedState:
             memory, estimate = self._fusion.take_in(memory, one.samples, now)
             aloft = is_aloft(state, now, self._legs, self._stale)
             memory, found = self._fusion.catch_up(
-                memory, one.samples, now, estimate, aloft=aloft, damaged=_is_damaged(state)
+                memory,
+                one.samples,
+                now,
+                estimate,
+                aloft=aloft,
+                flies=state.vehicle.flies,
+                damaged=_is_damaged(state),
             )
             state, known = replace(state, fusion=memory), found or estimate
             if known is not None:
@@ -156,7 +162,13 @@ class SensedState:
         known = None if state.invalid_ticks else estimate
         aloft = is_aloft(state, now, self._legs, self._stale)
         memory, found = self._fusion.catch_up(
-            memory, inputs.samples, now, known, aloft=aloft, damaged=_is_damaged(state)
+            memory,
+            inputs.samples,
+            now,
+            known,
+            aloft=aloft,
+            flies=state.vehicle.flies,
+            damaged=_is_damaged(state),
         )
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
