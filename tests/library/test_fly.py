@@ -23,7 +23,10 @@ from tests.library.conftest import BRIEF_S
 
 Flown = Callable[[str], pandion.Result]
 # The suite gnss knows its height too badly to fly between these walls, and refuses to.
-each_suite = pytest.mark.parametrize("suite", ["perfect", "mocap", "vio", "rtk"])
+each_suite = pytest.mark.parametrize(
+    "suite",
+    ["perfect", "mocap", *(pytest.param(one, marks=pytest.mark.long) for one in ("vio", "rtk"))],
+)
 OF_THE_MACHINE = {"took_s", "tc_p50_us", "tc_p99_us"}
 
 
