@@ -30,46 +30,19 @@ if TYPE_CHECKING:
 
     __version__: str
 
-# Where each public name is.
-_PUBLIC: Final = {
-    "AIRFRAME": "fsw.model.airframe",
-    "Autopilot": "pandion.simulator",
-    "Log": "pandion.flown",
-    "Observation": "studies.flight.own_parts",
-    "OwnPartError": "studies.flight.own_parts",
-    "Plan": "fsw.signals",
-    "PlanFailure": "fsw.signals",
-    "PlanRequest": "fsw.signals",
-    "Result": "pandion.flown",
-    "Scenario": "sitl.scenario",
-    "ScenarioError": "sitl.scenario_file",
-    "Simulator": "pandion.simulator",
-    "fly": "pandion.flying",
-    "load_log": "pandion.flown",
-    "load_scenario": "pandion.scenarios",
-    "save_scenario": "pandion.scenarios",
-    "scenario_names": "sitl.scenario_file",
+_PLACES: Final = {
+    "fsw.model.airframe": ("AIRFRAME",),
+    "fsw.signals": ("Plan", "PlanFailure", "PlanRequest"),
+    "pandion.flown": ("Log", "Result", "load_log"),
+    "pandion.flying": ("fly",),
+    "pandion.scenarios": ("load_scenario", "save_scenario"),
+    "pandion.simulator": ("Autopilot", "Simulator"),
+    "sitl.scenario": ("Scenario",),
+    "sitl.scenario_file": ("ScenarioError", "scenario_names"),
+    "studies.flight.own_parts": ("Observation", "OwnPartError"),
 }
-__all__ = [
-    "AIRFRAME",
-    "Autopilot",
-    "Log",
-    "Observation",
-    "OwnPartError",
-    "Plan",
-    "PlanFailure",
-    "PlanRequest",
-    "Result",
-    "Scenario",
-    "ScenarioError",
-    "Simulator",
-    "__version__",
-    "fly",
-    "load_log",
-    "load_scenario",
-    "save_scenario",
-    "scenario_names",
-]
+_PUBLIC: Final = {name: module for module, names in _PLACES.items() for name in names}
+__all__ = sorted([*_PUBLIC, "__version__"])
 
 
 def __getattr__(name: str) -> Any:

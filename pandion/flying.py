@@ -24,6 +24,7 @@ from fsw.parameters.registry import BY_NAME
 from fsw.parameters.storage import load, save
 from fsw.signals import TickInputs, TickOutputs
 from fsw.tuning import flat, tuned
+from pandion.first_time import compiling
 from pandion.flown import Result, Verdict, write_json
 from pandion.join_truth import join_truth
 from pandion.references import AnyReference, trajectory
@@ -123,7 +124,8 @@ def fly(
     parts = OwnParts(planner, controller if own else None, disturbance, allow_slow)
     job = Job("full", flown, config, int(seed))
     if not processes:
-        return _in_this_process(job, parts, log=log)
+        with compiling():
+            return _in_this_process(job, parts, log=log)
     if parts != OwnParts(allow_slow=allow_slow) or not safety_filter:
         raise ValueError("processes=True flies no own planner, controller or disturbance")
     given = str(scenario) if isinstance(scenario, str) and reference is None else None

@@ -15,6 +15,7 @@ from fsw.estimation.estimator import estimate_state
 from fsw.model.airframe import AIRFRAME
 from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.signals import StateEstimate, TickOutputs
+from pandion.first_time import compiling
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.plant.aerial_manipulator import plant
 from sitl.plant.integrator import held, step
@@ -65,7 +66,8 @@ class Simulator:
         self.seed = seed
         self._parts = OwnParts(disturbance=disturbance)
         self._pilot: Autopilot | None = None
-        self.reset()
+        with compiling():
+            self.reset()
 
     def reset(self, seed: int | None = None) -> Observation:
         """Begin the flight anew, with another ``seed`` if one is given; what is observed first."""

@@ -87,7 +87,7 @@ def test_a_planner_that_fails_is_braked_for_as_ours_is() -> None:
 
 
 def test_an_lqr_flies_the_workspace_and_is_judged_by_our_referee() -> None:
-    result = pandion.fly("workspace-calm", duration_s=4.0, controller=Lqr())
+    result = pandion.fly("workspace-calm", duration_s=2.0, controller=Lqr())
     assert result.completed, result.reason
     assert result.overridden_s == 0.0
     assert result.min_margin is not None
@@ -100,7 +100,7 @@ def test_an_lqr_flies_the_workspace_and_is_judged_by_our_referee() -> None:
 @pytest.mark.parametrize("sensors", ["mocap"])
 def test_an_own_controller_flies_on_our_estimate(sensors: str) -> None:
     result = pandion.fly(
-        "workspace-calm", duration_s=2.0, sensors=sensors, controller=Lqr, log=False
+        "workspace-calm", duration_s=1.0, sensors=sensors, controller=Lqr, log=False
     )
     assert result.completed, result.reason
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import pandion
+from command_line.kernel_cache import KernelCache
 from tests.cli.command import environment
 
 NAMES = """
@@ -58,7 +59,7 @@ def test_its_types_are_for_users_as_well() -> None:
 @pytest.mark.parametrize(
     ("package", "words"),
     [
-        ("cmaes", ["tune", "x.toml"]),
+        pytest.param("cmaes", ["tune", "x.toml"], marks=pytest.mark.long),
         pytest.param("cmaes", ["falsify", "walls"], marks=pytest.mark.long),
         pytest.param(
             "distributed",
@@ -82,6 +83,17 @@ def test_what_an_extra_is_missing_for_says_so(
     assert done.returncode == 2, done.stderr
     assert f"pip install {package}" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_first_flight_says_that_it_compiles(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept: list[str] = []
+    monkeypatch.setattr(KernelCache, "is_due", lambda *_: "library" not in kept)
+    monkeypatch.setattr(KernelCache, "note", lambda _, what: kept.append(what))
+    for expected in (1, 0):
+        pandion.fly("walls", duration_s=0.1, log=False)
+        assert capsys.readouterr().err.count("compiles its kernels") == expected
 
 
 def test_importing_it_loads_nothing_that_takes_time() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pandion
@@ -44,6 +44,9 @@ def _compiled(row: Any, t: float) -> Any:
 
 
 @each_curve
+@settings(
+    max_examples=20 if settings.default.max_examples == 100 else settings.default.max_examples
+)
 @given(t=st.floats(-5.0, 40.0))
 def test_velocity_and_acceleration_are_the_derivatives_and_kernels_see_the_same(
     name: str, t: float
