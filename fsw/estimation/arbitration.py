@@ -89,8 +89,8 @@ class Arbitration:
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory, and the state ``found`` at ``now`` [s], after what is due.
 
-        Nothing is, unless the vehicle ``flies``, and is ``aloft``: else the ground may hold it. Of a ``damaged``
-        one a rotor or a joint is known to have failed.
+        Nothing is, unless the vehicle ``flies``, and is ``aloft``: else the ground may hold it. Of
+        a ``damaged`` one a rotor or a joint is known to have failed.
         """
         evidence = memory.verdict.evidence
         if evidence is None:
