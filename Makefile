@@ -75,7 +75,7 @@ OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages
 OF_CLIENTS := tests/conversations tests/interop
 OF_PROCESSES := tests/benchmarks tests/cli tests/processes tests/timing
 OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
-OF_STUDIES := tests/docs tests/fsw/control tests/fsw/estimation tests/replay tests/studies tests/view
+OF_STUDIES := tests/docs tests/fsw/control tests/fsw/estimation tests/library tests/replay tests/studies tests/view
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)

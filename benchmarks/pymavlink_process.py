@@ -89,10 +89,10 @@ def _swap_fsw() -> None:
         hil = (h.time_usec, h.xacc, h.yacc, h.zacc, h.xgyro, h.ygyro, h.zgyro)
         return self._new(odometry, arm, hil)
 
-    def controls_of(self: Any, stamp_us: int, answer: Any) -> bytes:
+    def controls_of(self: Any, stamp_us: int, outputs: Any) -> bytes:
         scales = self._thrust_scale, self._torque_scale
-        t_us, flags, *used = hil_actuator_controls(stamp_us, answer.actuators, *scales)
-        *rest, mode = end_of_controls(armed=answer.armed)
+        t_us, flags, *used = hil_actuator_controls(stamp_us, outputs.actuators, *scales)
+        *rest, mode = end_of_controls(armed=outputs.armed)
         message = sender.hil_actuator_controls_encode(t_us, [*used, *rest], mode, flags)
         return _packed(sender, message)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import site
 import sys
@@ -114,9 +115,21 @@ def write_api_pages(app: Sphinx) -> None:
             (folder / f"{package}.md").write_text(page, encoding="utf-8")
 
 
+def write_notebook_pages(app: Sphinx) -> None:
+    """One page a notebook: its text, and its code as blocks."""
+    folder = Path(app.srcdir) / "tutorials" / "notebooks"
+    for notebook in folder.glob("*.ipynb"):
+        parts = []
+        for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+            text = "".join(cell["source"])
+            parts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+        notebook.with_suffix(".md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
 def setup(app: Sphinx) -> None:
     """Hooks of this project."""
     app.connect("builder-inited", write_api_pages)
+    app.connect("builder-inited", write_notebook_pages)
     app.connect("source-read", plain_math)
     app.connect("autodoc-process-docstring", absolute_values)
     app.add_html_math_renderer("mathml", (inline_formula, None), (displayed_formula, None))

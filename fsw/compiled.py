@@ -93,31 +93,32 @@ def forget_bitcode() -> None:
 def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
     """The machine code of a kernel for arguments of the types of an example, called directly.
 
-    numba looks at the type of every number in every call, which for the nested tuples of a tick
-    costs as much as the arithmetic. Here numbers become what they are in the example and tuples
-    may be named or not; an array must be of the example's type: it is not checked. With
-    NUMBA_DISABLE_JIT there is none, and the kernel is plain Python.
+    Without an example those of the first call, which all later ones must equal; so it decorates.
+    numba looks at the type of every number in every call, and of every entry of a record, which for
+    those of a tick costs as much as the arithmetic. Here numbers become what they are in the
+    example and tuples may be named or not; an array must be of the example's type: it is not
+    checked. With NUMBA_DISABLE_JIT there is none, and the kernel is plain Python.
     """
     dispatcher = cast(Any, kernel)
     if not hasattr(dispatcher, "typeof_pyval"):
         return kernel
-    types = types_of(dispatcher, example)
-    return cast(Callable[P, R], dispatcher.compile(types))
 
+    def compile_for(arguments: tuple[Any, ...]) -> Callable[..., R]:
+        return cast(Callable[..., R], dispatcher.compile(types_of(dispatcher, arguments)))
 
-def of_fixed_types(kernel: Callable[..., R]) -> Callable[..., R]:
-    """``machine_code`` of the types of the first call, which those of all later calls must equal.
-
-    For kernels that take records: looking up the type of a record costs 0.1 us for each entry.
-    """
+    if example:
+        return compile_for(example)
     known: list[Callable[..., R]] = []
 
     def call(*args: Any) -> R:
         if not known:
-            known.append(machine_code(kernel, *args))
+            known.append(compile_for(args))
         return known[0](*args)
 
-    return call
+    return cast(Callable[P, R], call)
+
+
+of_fixed_types: Callable[[Callable[..., Any]], Callable[..., Any]] = machine_code
 
 
 def compilable(function: Callable[P, R]) -> Callable[P, R]:

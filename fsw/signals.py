@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import field
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
 
@@ -925,10 +924,9 @@ class TickInputs:
 
     @property
     def has_only_sensors(self) -> bool:
-        """Whether nothing came but a frame of exact states, and that in time."""
+        """Whether nothing came but what sensors have measured, and that in time."""
         return self.tuning is None and not (
-            self.samples
-            or self.stale_us
+            self.stale_us
             or self.plan
             or self.targets
             or self.commands
@@ -947,34 +945,21 @@ class TickInputs:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """What of a tick goes to the actuators, and at once with it."""
-
-    actuators: ActuatorCommand
-    armed: bool
-    mode: Mode
-    acks: tuple[CommandAck, ...] = ()
-    texts: tuple[StatusText, ...] = ()
-    tuning_taken: bool | None = (
-        None  # whether the requested one is in use; None: none was requested
-    )
-
-
-@dataclass(frozen=True, slots=True)
 class TickOutputs:
-    """Everything one tick says."""
+    """Everything one tick says; before it is concluded, what goes out at once."""
 
     actuators: ActuatorCommand
     mode: Mode
-    shown: FlightSnapshot | Callable[[], FlightSnapshot]  # made when it is asked for
+    armed: bool
+    # Made when it is asked for; None: the tick is not concluded.
+    shown: FlightSnapshot | Callable[[], FlightSnapshot] | None = None
     plan_request: PlanRequest | None = None
     acks: tuple[CommandAck, ...] = ()
-    texts: tuple[StatusText, ...] = field(default=())
-    tuning_taken: bool | None = (
-        None  # whether the requested one is in use; None: none was requested
-    )
+    texts: tuple[StatusText, ...] = ()
+    tuning_taken: bool | None = None  # whether the requested one is in use; None: none was
 
     @property
     def snapshot(self) -> FlightSnapshot:
         """The vehicle as telemetry shows it."""
+        assert self.shown is not None, "the tick is not concluded"
         return self.shown if isinstance(self.shown, FlightSnapshot) else self.shown()

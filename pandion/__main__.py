@@ -13,14 +13,14 @@ from pandion.own_modules import put_first
 
 put_first()
 
-from command_line.output import complain, print_anything  # noqa: E402
+from command_line.output import complain, print_anything, without  # noqa: E402
 from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
 
 # Module, and what the verb does, by what it is for.
 GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "fly": {
         "fly": (
-            "pandion.fly",
+            "pandion.fly_verb",
             "fly a scenario with both processes, print the result",
         ),
         "sitl": ("sitl.__main__", "run the simulator alone"),
@@ -68,6 +68,8 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     },
 }
 VERBS: Final = {name: verb for group in GROUPS.values() for name, verb in group.items()}
+# Which extra a package is of that not everyone installs.
+EXTRAS: Final = {"distributed": "campaign", "dask": "campaign", "cmaes": "search"}
 _MOVED: Final = {"bench": "pandion.moved_bench"}  # which is a verb no more
 
 
@@ -111,6 +113,11 @@ def main(argv: list[str] | None = None) -> int:
             sys.stdout.flush()  # here, where a reader that has left or a full disk has its answer
     except BrokenPipeError:
         _silence_stdout()  # the reader of the output has left
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        complain("pandion", without(error, EXTRAS[error.name]))
+        return COULD_NOT_START
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise

@@ -17,6 +17,7 @@ from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from pandion.gate_options import junit, required
+from pandion.own_options import OwnOptions
 
 if TYPE_CHECKING:
     from studies.campaign.plan import CampaignPlan
@@ -41,6 +42,7 @@ class CampaignOptions:
         whole(0, 10_000_000),
     )
     cluster: ClusterOptions = group(ClusterOptions)
+    own: OwnOptions = group(OwnOptions)
     out: Path | None = option(
         "--out DIR",
         "where journal, rows and page go; a directory with a journal of the same campaign is "
@@ -69,7 +71,7 @@ def main(argv: list[str]) -> int:
     try:
         if options.file is None:
             raise CampaignError("give a campaign file; `pandion campaign --example` prints one")
-        plan = load_plan(options.file)
+        plan = load_plan(options.file, options.own.names)
         if options.flight is not None:
             if options.require or options.junit:
                 raise CampaignError("--require and --junit are of all flights: leave out --flight")

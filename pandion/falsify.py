@@ -17,6 +17,7 @@ from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions
 from pandion.display import Display
+from pandion.own_options import OwnOptions
 from sitl.scenario_file import scenario_names
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ class FalsifyOptions:
         "--params FILE", "parameters that differ from the defaults, without --over", Path
     )
     cluster: ClusterOptions = group(ClusterOptions)
+    own: OwnOptions = group(OwnOptions)
     replay: Path | None = option(
         "--replay FILE", "fly a worst.json of an earlier search with planner and referee", Path
     )
@@ -95,6 +97,7 @@ def main(argv: list[str]) -> int:
         return search_over(options, options.over)
     from sitl.scenario_file import ScenarioError, load_scenario
     from studies.flight.closed_loop import RefusedError
+    from studies.flight.own_parts import OwnPartError
     from studies.search.falsify import TooShortError
 
     try:
@@ -103,7 +106,14 @@ def main(argv: list[str]) -> int:
         if options.replay is not None:
             return _replay(options, scenario, options.replay)
         return _search(options, scenario)
-    except (ScenarioError, RefusedError, TooShortError, UnusableError, OSError) as error:
+    except (
+        ScenarioError,
+        RefusedError,
+        TooShortError,
+        UnusableError,
+        OwnPartError,
+        OSError,
+    ) as error:
         complain("pandion falsify", error)
         return COULD_NOT_START
 
@@ -120,6 +130,14 @@ def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
     from fsw.parameters.flight_config import flight_config
 
     config = flight_config(body=scenario.body)  # as pandion fly
+    if options.own.controller:
+        raise UnusableError(
+            "--controller flies no plan that it could be pushed off: search with --over"
+        )
+    if options.own.planner:
+        from studies.flight.own_parts import with_parts
+
+        config = with_parts(config, options.own.planner, "")
     if options.params is None:
         return config
     from fsw.parameters.contradictions import contradictions

@@ -33,7 +33,7 @@ def _search(options: FalsifyOptions, file: Path) -> int:
         raise CampaignError("--replay flies a worst.json; what --over finds flies with pandion fly")
     if options.params is not None:
         raise CampaignError("with --over parameters are set by [parameters] of the file")
-    plan = load_plan(file)
+    plan = load_plan(file, options.own.names)
     run = begin("falsify", options, plan, f"{options.evaluations} flights")
     folder, display = run.folder, run.display
 

@@ -20,6 +20,7 @@ from fsw.parameters.control_choice import KNOWN
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from pandion.gate_options import junit
+from pandion.own_options import OwnOptions
 from sitl.scenario_file import SUITE_NAMES
 from studies.paper.catalogue import STUDIES, study
 
@@ -97,6 +98,7 @@ class ReproduceOptions:
         "--only TEXT", "robustness: only the rows with this in their section, case or name"
     )
     cluster: ClusterOptions = group(ClusterOptions)
+    own: OwnOptions = group(OwnOptions)
     junit: str | None = junit()
     json: str | None = json_file("the rows")
     out: Path | None = option(
@@ -117,6 +119,7 @@ def main(argv: list[str]) -> int:
     from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
     from studies.drawing import NoMatplotlibError
+    from studies.flight.own_parts import OwnPartError
     from studies.paper.settings import NoCellError
 
     try:
@@ -124,8 +127,20 @@ def main(argv: list[str]) -> int:
             raise NoCellError(f"{options.what} has no rows to choose by --sensors or --only")
         if options.scenario != "walls" and options.what not in ("table4", "rivals"):
             raise NoCellError(f"{options.what} is of one pair of scenarios, without --scenario")
+        own = options.own
+        if (own.planner or own.controller) and options.what != "table4":
+            raise NoCellError(f"{options.what} flies no --planner or --controller; table4 does")
+        if own.controller and options.plant != "full":
+            raise NoCellError("--controller flies rotors and joints: it needs --plant full")
         return _run(options)
-    except (NoMatplotlibError, NoCellError, CampaignError, SchedulerGoneError, OSError) as error:
+    except (
+        OwnPartError,
+        NoMatplotlibError,
+        NoCellError,
+        CampaignError,
+        SchedulerGoneError,
+        OSError,
+    ) as error:
         complain("pandion reproduce", error)
         return COULD_NOT_START
 
@@ -172,6 +187,8 @@ def _settings(options: ReproduceOptions) -> Settings:
         family="dash" if options.scenario == "dash" else "walls",
         suite=options.suite,
         only=options.only,
+        own_planner=options.own.planner,
+        own_controller=options.own.controller,
     )
 
 
@@ -190,6 +207,9 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
         command += f" --only '{options.only}'"
     if options.tracking != "lqr":
         command += f" --tracking {options.tracking}"
+    for name in ("planner", "controller"):
+        part = getattr(options.own, name)
+        command += f" --{name} {part}" if part else ""
     return (f"Command: {command}", f"Pandion {version()}, code {sources()[:12]}")
 
 

@@ -11,6 +11,7 @@ from command_line.options import group, json_file, option, read, switch
 from command_line.values import whole
 from pandion.campaign_run import exit_code
 from pandion.cluster_options import ClusterOptions
+from pandion.own_options import OwnOptions
 
 _PRINTED: Final = 0  # exit code
 
@@ -23,6 +24,7 @@ class SearchTaskOptions:
     example: bool = switch("--example", "print such a file to begin with")
     seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
     cluster: ClusterOptions = group(ClusterOptions)
+    own: OwnOptions = group(OwnOptions)
     out: Path | None = option(
         "--out DIR",
         "where what is found and the journal go; the same command goes on with a journal that is "

@@ -31,7 +31,7 @@ def _example() -> Path:
 def _tune(options: SearchTaskOptions, file: Path) -> int:
     from studies.search.tune import as_json, load_task, sentences, tune
 
-    task = load_task(file)
+    task = load_task(file, options.own.names)
     work = f"{task.candidates} candidates of {task.plan.count} flights"
     run = begin("tune", options, task.plan, work)
 

@@ -48,10 +48,18 @@ class FlightEvaluator:
         ScenarioError: The start is outside the safe set.
     """
 
-    def __init__(self, scenario: Scenario, clock: MissionClock, places: Array) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        clock: MissionClock,
+        places: Array,
+        *,
+        like: FlightEvaluator | None = None,
+    ) -> None:
         """Begin with places (rows, 3) [m, NED]: base, joint 1, joint 2, end-effector.
 
-        For the full body the base's axes [1, NED] follow.
+        For the full body the base's axes [1, NED] follow. The machine code may be that of ``like``,
+        an evaluator of the same scenario.
         """
         self.world = World(scenario)
         self.limits = LimitRecord(flown_vehicle(scenario))
@@ -71,7 +79,11 @@ class FlightEvaluator:
         self.free = self._nowhere  # in which there can be no incident
         self._flown: Flown | None = None
         none = (np.empty((0, *places.shape)), np.empty((0, 0)), (0.0, 0.0), NO_AIM, (0.0, 0.0))
-        self._judge_steps = machine_code(judge_steps, self.quick, *none, False)
+        self._judge_steps = (
+            machine_code(judge_steps, self.quick, *none, False)
+            if like is None
+            else like._judge_steps
+        )
         margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)

@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from sitl.scenario import V3, Scenario, ScenarioWall
+import numpy as np
+
+from sitl.scenario import V3, Points, Scenario, ScenarioWall
 from sitl.trajectory import Reference
 
 _NEAR_M: Final = 0.05  # this much farther away, a wall counts 1/e of the nearer one
@@ -22,13 +24,19 @@ class Heading:
 
     def __init__(self, scenario: Scenario, reference: Reference) -> None:
         upright = tuple(wall for wall in scenario.walls if math.hypot(*wall.normal[:2]) > 0.5)
-        turns = scenario.trajectory.kind == "lissajous" and scenario.trajectory.heading == "walls"
-        self._walls = upright if turns else ()
+        curve = scenario.trajectory
+        self._walls = upright if getattr(curve, "heading", "start") == "walls" else ()
+        self._times: tuple[float, ...] = ()
+        self._yaws = [math.radians(yaw) for yaw in getattr(curve, "yaw_deg", ())]
+        if isinstance(curve, Points) and self._yaws:
+            self._times = curve.time_s
         self._fixed = math.radians(scenario.start.yaw_deg)
         self._reference = reference
 
     def at(self, t: float) -> float:
         """Yaw [rad, NED] at t [s] after the start of the trajectory."""
+        if self._times:
+            return math.remainder(float(np.interp(t, self._times, self._yaws)), 2.0 * math.pi)
         if not self._walls:
             return self._fixed
         yaws = [facing(self._walls, self._reference.place(t + around)) for around in _AROUND_S]

@@ -61,7 +61,45 @@ class Hold:
     kind: Literal["hold"] = "hold"
 
 
-Trajectory: TypeAlias = Lissajous | Hold
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Places at times, with a spline through them; held before the first and after the last."""
+
+    time_s: tuple[Annotated[float, Range(0.0, 86400.0)], ...]  # since the trajectory's start
+    position_m: tuple[Annotated[V3, Range(-WORLD_M, WORLD_M)], ...]
+    yaw_deg: tuple[Annotated[float, Range(-36000.0, 36000.0)], ...] = ()  # none: that of the start
+    ends: Literal["rest", "free"] = "rest"  # "free": the spline's own speed at both ends
+    kind: Literal["points"] = "points"
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A level circle, started and stopped smoothly."""
+
+    centre_m: Annotated[V3, Range(-WORLD_M, WORLD_M)]
+    radius_m: Annotated[float, Range(0.0, WORLD_M)]
+    period_s: Annotated[float, Range(1.0, 3600.0)]
+    ramp_s: Annotated[float, Range(0.1, 600.0)]
+    duration_s: Annotated[float, Range(1.0, 86400.0)]
+    start_deg: Annotated[float, Range(-360.0, 360.0)] = 0.0  # from north, seen from the centre
+    clockwise: bool = True  # seen from above
+    heading: Literal["start", "walls"] = "start"
+    kind: Literal["circle"] = "circle"
+
+
+@dataclass(frozen=True, slots=True)
+class Polynomial:
+    """Polynomials of the time, c0 + c1 t + c2 t^2 + …, held after their end."""
+
+    north: tuple[Annotated[float, Range(-WORLD_M, WORLD_M)], ...]  # c0 [m], c1 [m/s], …
+    east: tuple[Annotated[float, Range(-WORLD_M, WORLD_M)], ...]
+    down: tuple[Annotated[float, Range(-WORLD_M, WORLD_M)], ...]
+    duration_s: Annotated[float, Range(1.0, 86400.0)]
+    heading: Literal["start", "walls"] = "start"
+    kind: Literal["polynomial"] = "polynomial"
+
+
+Trajectory: TypeAlias = Lissajous | Hold | Points | Circle | Polynomial
 
 
 @dataclass(frozen=True, slots=True)

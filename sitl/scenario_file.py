@@ -21,7 +21,9 @@ from sitl.scenario import V3, Range, Scenario, ScenarioWall, ScenarioZone, Senso
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
-_MOST_BYTES = 256 * 1024  # of a file: 64 zones with their way points are a tenth of it
+_MOST_BYTES = 2 * 1024 * 1024  # of a file: a reference of 20,000 points; zones are a hundredth
+_MOST_CSV = 2 * 1024 * 1024  # of a table of points
+COLUMNS = ["time_s", "north_m", "east_m", "down_m", "yaw_deg"]  # of one, the last if there is yaw
 _SHOWN = 80  # characters of a value in a sentence
 _UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
@@ -50,7 +52,7 @@ def load_scenario(name_or_path: str, suite: str | None = None) -> Scenario:
     """
     path = _path(name_or_path)
     try:
-        return parse_scenario(_content(path).decode("utf-8"), path.stem, suite)
+        return parse_scenario(_content(path).decode("utf-8"), path.stem, suite, path.parent)
     except UnicodeDecodeError as error:
         raise ScenarioError(f"scenario {path} is not TOML: it is not UTF-8") from error
 
@@ -78,7 +80,21 @@ def scenario_digest(name_or_path: str) -> str:
     Raises:
         ScenarioError: Unknown name or unreadable file.
     """
-    return hashlib.sha256(_content(_path(name_or_path))).hexdigest()[:_DIGITS]
+    path = _path(name_or_path)
+    digest = hashlib.sha256(_content(path))
+    beside = points_file(path)
+    if beside is not None:
+        digest.update(read_points(beside)[1])
+    return digest.hexdigest()[:_DIGITS]
+
+
+def points_file(path: Path) -> Path | None:
+    """The table of points that a scenario file names, beside it; None: it names none."""
+    try:
+        named = tomllib.loads(_content(path).decode("utf-8")).get("trajectory", {}).get("file")
+    except (ValueError, AttributeError, RecursionError):
+        return None  # whoever reads it as a scenario says what is wrong
+    return path.parent / named if isinstance(named, str) else None
 
 
 def _path(name_or_path: str) -> Path:
@@ -100,21 +116,24 @@ def _content(path: Path) -> bytes:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
 
 
-def parse_scenario(text: str, name: str, suite: str | None = None) -> Scenario:
+def parse_scenario(
+    text: str, name: str, suite: str | None = None, folder: Path | None = None
+) -> Scenario:
     """The scenario that a TOML text describes, flown with a ``suite`` of sensors if one is named.
 
-    What the text says about sensors then counts only if it is about the same suite.
+    What the text says about sensors then counts only if it is about the same suite. Files that it
+    names are in ``folder``.
 
     Raises:
         ScenarioError: Not TOML, unknown key or impossible value.
     """
     try:
-        return _parsed(text, name, suite)
+        return _parsed(text, name, suite, folder)
     except RecursionError:
         raise ScenarioError(f"scenario {name} is nested too deeply") from None
 
 
-def _parsed(text: str, name: str, suite: str | None) -> Scenario:
+def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Scenario:
     try:
         table = toml_table(text)
     except TomlError as error:
@@ -125,12 +144,69 @@ def _parsed(text: str, name: str, suite: str | None) -> Scenario:
         given = table.get("sensors", {})
         same = isinstance(given, dict) and given.get("suite", PERFECT) == suite
         table["sensors"] = {**(given if same else {}), "suite": suite}
+    curve = table.get("trajectory")
+    if isinstance(curve, dict) and curve.get("kind") == "points" and "file" in curve:
+        table["trajectory"] = _with_points(curve, folder)
     scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
     return dataclasses.replace(
         scenario,
         walls=tuple(map(_with_unit_normal, scenario.walls)),
         zones=tuple(map(_with_unit_normal, scenario.zones)),
     )
+
+
+def _with_points(curve: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """A table of points with the numbers of the file that it names."""
+    named = curve["file"]
+    inside = isinstance(named, str) and not ({"..", "/"} & set(Path(named).parts))
+    if not inside or folder is None:
+        raise ScenarioError(
+            f"trajectory.file = {_shown(named)}: must be a file beside the scenario's"
+        )
+    for key in ("time_s", "position_m", "yaw_deg"):
+        if key in curve:
+            raise ScenarioError(f"trajectory.{key}: cannot be given together with file")
+    columns, _ = read_points(folder / named)
+    return {key: value for key, value in curve.items() if key != "file"} | columns
+
+
+def read_points(path: Path) -> tuple[dict[str, list[Any]], bytes]:
+    """The points of a CSV file, as keys of a scenario's trajectory, and its bytes.
+
+    Raises:
+        ScenarioError: It cannot be read, or a line of it is not what the first one says.
+    """
+    try:
+        data = read_bounded(path, _MOST_CSV)
+        lines = data.decode("utf-8-sig").splitlines()
+    except OSError as error:
+        raise ScenarioError(f"cannot read points {path}: {error.strerror}") from error
+    except UnicodeDecodeError:
+        raise ScenarioError(f"points {path} are not CSV: they are not UTF-8") from None
+    rows = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and line[0] != "#"]
+    head = [word.strip() for word in rows[0][1].split(",")] if rows else []
+    if head not in (COLUMNS[:-1], COLUMNS):
+        raise ScenarioError(
+            f'points {path}: the first line must be "{",".join(COLUMNS[:-1])}", with '
+            f'",{COLUMNS[-1]}" if there is yaw'
+        )
+    found: list[list[float]] = []
+    for number, line in rows[1:]:
+        try:
+            values = [float(word) for word in line.split(",")]
+        except ValueError:
+            values = []
+        if len(values) != len(head) or not all(map(math.isfinite, values)):
+            raise ScenarioError(
+                f"points {path}, line {number}: must be {len(head)} finite numbers, is "
+                f"{_shown(line)}"
+            )
+        found.append(values)
+    columns: dict[str, list[Any]] = {"time_s": [row[0] for row in found]}
+    columns["position_m"] = [row[1:4] for row in found]
+    if len(head) == len(COLUMNS):
+        columns["yaw_deg"] = [row[4] for row in found]
+    return columns, data
 
 
 def _with_unit_normal(zone: Plane) -> Plane:
@@ -222,7 +298,8 @@ def _value(hint: Any, value: Any, path: str) -> Any:
 def _entries(hint: Any, path: str) -> str:
     """What an array consists of, as a sentence says it."""
     if get_origin(hint) is Annotated:
-        return f"arrays of {len(get_args(get_args(hint)[0]))} numbers"
+        size = len(get_args(get_args(hint)[0]))
+        return f"arrays of {size} numbers" if size else f"numbers ({get_args(hint)[1]})"
     if dataclasses.is_dataclass(hint) or get_origin(hint) is types.UnionType:
         return f"tables ([[{path}]])"
     return 'texts, such as ["a", "b"]'

@@ -62,7 +62,7 @@ def _word(value: Any) -> str:
         # DEL is the one character that JSON writes as it is and TOML does not allow.
         return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
     if isinstance(value, tuple):
-        if value and isinstance(value[0], tuple):
+        if value and isinstance(value[0], tuple):  # a row a line, which people read
             return "[\n" + "".join(f"  {_word(one)},\n" for one in value) + "]"
         return "[" + ", ".join(_word(one) for one in value) + "]"
     return repr(float(value))

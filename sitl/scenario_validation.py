@@ -7,10 +7,22 @@ import math
 
 from sitl.faults.keys import EXACT, Fault, problem
 from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
-from sitl.scenario import ActuatorKeys, Lissajous, Scenario, Start
+from sitl.scenario import (
+    ActuatorKeys,
+    Circle,
+    Lissajous,
+    Points,
+    Polynomial,
+    Scenario,
+    Start,
+    Trajectory,
+)
 from sitl.scenario_file import ScenarioError
 from sitl.sensors.keys import MeasuredSensors
 
+MOST_POINTS = 20_000  # of a trajectory
+_LEAST_APART_S = 0.002  # two points of a trajectory
+_MOST_POWERS = 12  # coefficients of a polynomial
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
 _LEAST_INERTIA = 1e-4  # kg·m²; a lighter motor crosses its gap within a step of the plant
 
@@ -27,18 +39,51 @@ def check(scenario: Scenario) -> None:
     _check_names(scenario)
     _check_gears(scenario.actuators)
     _check_faults(scenario)
-    curve = scenario.trajectory
-    if isinstance(curve, Lissajous) and not (2.0 * curve.ramp_s <= curve.duration_s):
-        raise ScenarioError(
-            f"trajectory.ramp_s = {curve.ramp_s:g}: must be at most half of "
-            f"trajectory.duration_s = {curve.duration_s:g}"
-        )
+    check_trajectory(scenario.trajectory)
     hop, ground = scenario.pilot.plan == "hop", scenario.start.kind == "ground"
     if hop != ground and scenario.pilot.plan != "none":
         raise ScenarioError(
             f'pilot.plan = "{scenario.pilot.plan}": start.kind = "{scenario.start.kind}" needs '
             f'"{"hop" if ground else "trajectory"}" or "none"'
         )
+
+
+def check_trajectory(curve: Trajectory) -> None:
+    """Refuse a reference whose numbers contradict each other.
+
+    Raises:
+        ScenarioError: With the key, the value and what is allowed.
+    """
+    if isinstance(curve, Lissajous | Circle) and not (2.0 * curve.ramp_s <= curve.duration_s):
+        raise ScenarioError(
+            f"trajectory.ramp_s = {curve.ramp_s:g}: must be at most half of "
+            f"trajectory.duration_s = {curve.duration_s:g}"
+        )
+    if isinstance(curve, Polynomial):
+        for name in ("north", "east", "down"):
+            if not 0 < len(getattr(curve, name)) <= _MOST_POWERS:
+                raise ScenarioError(
+                    f"trajectory.{name}: must have 1 to {_MOST_POWERS} coefficients, has "
+                    f"{len(getattr(curve, name))}"
+                )
+    if isinstance(curve, Points):
+        _check_points(curve)
+
+
+def _check_points(curve: Points) -> None:
+    count = len(curve.time_s)
+    if not 2 <= count <= MOST_POINTS:
+        raise ScenarioError(f"trajectory.time_s: must have 2 to {MOST_POINTS} times, has {count}")
+    for name in ("position_m", "yaw_deg"):
+        given = len(getattr(curve, name))
+        if given != count and not (name == "yaw_deg" and given == 0):
+            raise ScenarioError(f"trajectory.{name}: {given} entries for {count} times")
+    for k, (time_s, next_s) in enumerate(itertools.pairwise(curve.time_s), start=1):
+        if not next_s - time_s >= _LEAST_APART_S:
+            raise ScenarioError(
+                f"trajectory.time_s[{k}] = {next_s:g}: must be at least {_LEAST_APART_S:g} s after "
+                f"{time_s:g}, the one before"
+            )
 
 
 def _check_start(start: Start) -> None:

@@ -39,6 +39,7 @@ from sitl.sensors.measurements import Measurement
 from sitl.sensors.suite import SensorSuite
 from sitl.start import first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
+from sitl.world import World
 
 START_US = 1_000_000  # so that no stamp is 0
 # For which the vehicle's sensors have run when the flight begins.
@@ -81,6 +82,7 @@ class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
     ``more`` pushes come on top of the scenario's disturbances. The local frame is at ``origin``.
+    ``like`` is one of the same scenario whose machine code serves, which takes time to look up.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
@@ -93,6 +95,7 @@ class Simulation:
         more: Sequence[Push] = (),
         *,
         origin: Place = DEFAULT_ORIGIN,
+        like: Simulation | None = None,
     ) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
@@ -112,6 +115,7 @@ class Simulation:
         self._pushed: tuple[V3, V3] = (_NONE, _NONE)  # N, NED; N·m, B
         self._pushed_until = 0.0  # step
         self._state, trim = first_state(self.vehicle, scenario, self.clock.target_at(0.0).p)
+        self.trim = trim  # that holds it there
         self._thrust, self._torque = trim.thrust, trim.torque
         step_s = 1e-6 * STEP_US
         self._drives: Drives | None = None
@@ -138,15 +142,18 @@ class Simulation:
         axes = 3 if scenario.body == "full" else 0
         self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
         self._states = np.empty((SUBSTEPS, len(self._state)))
+        self._leaps: dict[int, tuple[Array, Array]] = {}  # the same of leaps, by their plant steps
         self._reading: SensorReadings | None = None  # of this step, once it has been asked for
         self._turning: V4 = (0.0, 0.0, 0.0, 0.0)  # N, of the rotors at that reading
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._held = held(len(self.vehicle.links))
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
+        self._evaluator = FlightEvaluator(
+            scenario, self.clock, self._places_now(), like=None if like is None else like._evaluator
+        )
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
-        self._step = machine_code(watched_step, *example)
+        self._step = machine_code(watched_step, *example) if like is None else like._step
         _, self._felt, _ = self._step(*example)
 
     @property
@@ -328,6 +335,53 @@ class Simulation:
         evaluator.judge_landing(speed, time_s)
         evaluator.judge_time(time_s)
 
+    def leap(self, controls: Controls, steps: int, plant_s: float = STEP_S) -> Array:
+        """Integrate ``steps`` with ``controls`` held in as few calls as can be, or up to the end.
+
+        For a vehicle whose sensors say the exact state, with nothing that changes by the step but
+        disturbances. A plant step takes ``plant_s`` [s], 1 or 2 ms; each is judged. Returns the
+        places (rows, 3) [m, NED] of the last one, as :meth:`places`.
+
+        Raises:
+            ValueError: A control is not finite or their number is wrong, or it is no such vehicle.
+        """
+        if not (self.tells_its_state and self._drives is None and self._wind is None):
+            raise ValueError("only with exact sensors and actuators, in still air, without faults")
+        evaluator, left = self._evaluator, steps
+        now: Array = self._places[-1]
+        self._command(controls)
+        while left and evaluator.ended is None:
+            evaluator.catch_up()
+            before_s = self.time_s
+            if self.step >= self._pushed_until:
+                self._push()
+            n = min(left, SAMPLE_STEPS - self.step % SAMPLE_STEPS)
+            n = int(min(n, self._pushed_until - self.step))
+            rows = round(1e-6 * STEP_US * n / plant_s)
+            places, states = self._leaps.get(rows) or self._room(rows)
+            plants, blocks, state, thrust, torque, push, turn, *_ = self._arguments(places, states)
+            motion = (thrust, torque, push, turn, plant_s)
+            speed, self._felt, clear = self._step(
+                plants, blocks, state, *motion, places, states, evaluator.free
+            )
+            self.step += n
+            self._reading = None
+            most = self._full if controls.armed else _OFF
+            flown = Flown(places, states, *controls[:2], most, controls.armed, before_s, plant_s)
+            evaluator.judge_flown(flown, clear)
+            if self.step % SAMPLE_STEPS == 0:
+                evaluator.sample_error(critical(places[-1]), self.time_s)
+            evaluator.judge_landing(speed, self.time_s)
+            evaluator.judge_time(self.time_s)
+            left, now = left - n, places[-1]
+        return now
+
+    def _room(self, rows: int) -> tuple[Array, Array]:
+        """Memory for so many plant steps."""
+        found = np.empty((rows, *self._places.shape[1:])), np.empty((rows, len(self._state)))
+        self._leaps[rows] = found
+        return found
+
     def catch_up(self) -> None:
         """Do what :meth:`advance` has left for a time in which nobody waits; else it is done later.
 
@@ -355,6 +409,20 @@ class Simulation:
             target=self.clock.target_at(self.time_s),
             margins_m=self._evaluator.margins(places, self.time_s),
         )
+
+    @property
+    def state(self) -> Array:
+        """The true state (17 + 2j,) [SI] now, see ``sitl.plant.state``; not to be changed."""
+        return self._state
+
+    def places(self) -> Array:
+        """Base, frames of the arm, and of the full body the base's axes (rows, 3) [m, NED] now."""
+        return self._places_now()
+
+    @property
+    def world(self) -> World:
+        """Zones and ground, and what is kept clear of them."""
+        return self._evaluator.world
 
     def state_bytes(self) -> bytes:
         """The true state now, for the log: position, velocity, attitude, rates, thrusts, arm."""

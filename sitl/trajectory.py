@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from sitl.compiled import compilable
 from sitl.plant.vector import Array
-from sitl.scenario import V3, Hold, Trajectory
+from sitl.scenario import V3, Circle, Hold, Lissajous, Points, Trajectory
+
+_LISSAJOUS: Final = 14  # numbers of a curve of sinusoids; polynomials have others
 
 
 class TrajectoryPoint(NamedTuple):
@@ -82,27 +86,102 @@ class Reference:
         )
 
 
+class PiecewiseReference(Reference):
+    """A curve of polynomials, one after the other; it stands still before and after them."""
+
+    def at(self, t: float) -> TrajectoryPoint:
+        """The reference at time t [s] after the start; at rest before and after."""
+        p, v, a = _on_pieces(self.row, t)
+        return TrajectoryPoint(p, v, a)
+
+
 def reference(trajectory: Trajectory) -> Reference:
     """The reference that a scenario describes."""
-    return Reference(curve_row(trajectory))
+    row = curve_row(trajectory)
+    return Reference(row) if len(row) == _LISSAJOUS else PiecewiseReference(row)
 
 
 def curve_row(trajectory: Trajectory) -> tuple[float, ...]:
-    """Numbers of a curve for ``place_on_curve``: centre, amplitude, period, phase, warp."""
-    if isinstance(trajectory, Hold):
-        still = (0.0,) * 3
-        return (*trajectory.position_m, *still, *(1.0,) * 3, *still, 1.0, 2.0)
+    """Numbers of a curve for ``place_on_curve``.
+
+    Of sinusoids centre, amplitude, period, phase and warp; of polynomials how many there are, the
+    coefficients of each, the times [s] between them, and the coefficients, the highest power first.
+    """
     curve = trajectory
-    shape = (*curve.centre_m, *curve.amplitude_m, *curve.period_s, *curve.phase_deg)
-    return (*shape, curve.ramp_s, curve.duration_s)
+    if isinstance(curve, Hold):
+        still = (0.0,) * 3
+        return (*curve.position_m, *still, *(1.0,) * 3, *still, 1.0, 2.0)
+    if isinstance(curve, Circle):
+        # North is the cosine of the bearing from the centre, east its sine; clockwise it grows.
+        size, begin = curve.radius_m, curve.start_deg
+        north, east = (begin + 90.0, begin) if curve.clockwise else (90.0 - begin, 180.0 - begin)
+        shape = (*curve.centre_m, size, size, 0.0, *(curve.period_s,) * 3, north, east, 0.0)
+        return (*shape, curve.ramp_s, curve.duration_s)
+    if isinstance(curve, Lissajous):
+        shape = (*curve.centre_m, *curve.amplitude_m, *curve.period_s, *curve.phase_deg)
+        return (*shape, curve.ramp_s, curve.duration_s)
+    if isinstance(curve, Points):
+        return _spline_row(curve)
+    order = max(len(curve.north), len(curve.east), len(curve.down))
+    axes = (curve.north, curve.east, curve.down)
+    rows = [part for axis in axes for part in (*(0.0,) * (order - len(axis)), *reversed(axis))]
+    return (1.0, float(order), 0.0, curve.duration_s, *rows)
+
+
+def _spline_row(curve: Points) -> tuple[float, ...]:
+    """The cubic spline through points, with a continuous acceleration."""
+    from scipy.interpolate import CubicSpline  # here: it takes a third of a second to load
+
+    times, places = np.array(curve.time_s), np.array(curve.position_m)
+    ends = "clamped" if curve.ends == "rest" else "not-a-knot"
+    found = CubicSpline(times, places, axis=0, bc_type=ends).c  # (4, pieces, 3)
+    pieces = found.transpose(1, 2, 0).reshape(-1)
+    return (float(len(times) - 1), 4.0, *curve.time_s, *pieces.tolist())
 
 
 @compilable
 def place_on_curve(row: Sequence[float] | Array, t: float) -> V3:
-    """``Reference.at(t).p`` [m, NED] of the curve with the ``curve_row`` row (14,) [SI]; t [s]."""
+    """``Reference.at(t).p`` [m, NED] of the curve with the ``curve_row`` row (n,) [SI]; t [s]."""
+    if len(row) != _LISSAJOUS:
+        return _on_pieces(row, t)[0]
     s = warped(t, row[12], row[13])[0]
     return (
         lissajous_at(row[0], row[3], row[6], row[9], s),
         lissajous_at(row[1], row[4], row[7], row[10], s),
         lissajous_at(row[2], row[5], row[8], row[11], s),
     )
+
+
+@compilable
+def _on_pieces(row: Sequence[float] | Array, t: float) -> tuple[V3, V3, V3]:
+    """Position [m, NED], velocity [m/s] and acceleration [m/s²] on polynomials (n,) at t [s]."""
+    pieces, order = int(row[0]), int(row[1])
+    at = min(max(t, row[2]), row[2 + pieces])
+    low, high = 0, pieces - 1
+    while low < high:  # the last piece that has begun
+        middle = (low + high + 1) // 2
+        if row[2 + middle] <= at:
+            low = middle
+        else:
+            high = middle - 1
+    s, first = at - row[2 + low], 3 + pieces + 3 * order * low
+    x = _horner(row, first, order, s)
+    y = _horner(row, first + order, order, s)
+    z = _horner(row, first + 2 * order, order, s)
+    p = (x[0], y[0], z[0])
+    if t != at:
+        return p, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    return p, (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+
+@compilable
+def _horner(
+    row: Sequence[float] | Array, first: int, order: int, s: float
+) -> tuple[float, float, float]:
+    """A polynomial and its two derivatives at s [s], from its coefficients (order,) in ``row``."""
+    p = v = a = 0.0
+    for k in range(first, first + order):
+        a = a * s + 2.0 * v
+        v = v * s + p
+        p = p * s + row[k]
+    return p, v, a

@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from fsw.signals import Answer, TickInputs, TickOutputs
+from fsw.signals import TickInputs, TickOutputs
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
 
 
 class _Begun(NamedTuple):
-    answer: Answer
+    outputs: TickOutputs
     result: tuple[Any, TickOutputs]
-
-
-def answer_of(outputs: TickOutputs) -> Answer:
-    """What of the outputs goes to the actuators."""
-    snapshot = outputs.snapshot
-    about = outputs.acks, outputs.texts, outputs.tuning_taken
-    return Answer(outputs.actuators, snapshot.armed, snapshot.mode, *about)
 
 
 def parts_of(
@@ -29,7 +22,7 @@ def parts_of(
 
     def control(state: Any, inputs: TickInputs) -> _Begun:
         result = tick(state, inputs)
-        return _Begun(answer_of(result[1]), result)
+        return _Begun(result[1], result)
 
     def conclude(begun: _Begun) -> tuple[Any, TickOutputs]:
         return begun.result

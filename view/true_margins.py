@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,13 +43,14 @@ class TrueMargins:
 
 def scenario_of(flight: FlightData) -> Scenario | None:
     """The scenario that was flown, None where it is not among those of this build."""
-    name = str(flight.information.get("scenario", ""))
-    try:
-        if scenario_digest(name) != flight.information.get("scenario_digest"):
-            return None
-        return load_scenario(name)
-    except ScenarioError:
-        return None
+    digest = flight.information.get("scenario_digest")
+    # A flight from Python has its scenario beside the log.
+    beside = str(flight.path.with_name("scenario.toml"))
+    for name in (beside, str(flight.information.get("scenario", ""))):
+        with contextlib.suppress(ScenarioError):
+            if scenario_digest(name) == digest:
+                return load_scenario(name)
+    return None
 
 
 def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fsw.barriers.safe_approach import BarrierTuning
 from fsw.barriers.zone_rows import fill_starts, settings
-from fsw.compiled import kernel, machine_code, of_fixed_types
+from fsw.compiled import kernel, machine_code
 from fsw.model.body import Body
 from fsw.model.linearisation import FRAME, put_arm, put_pose, put_turning
 from fsw.model.prediction import Array
@@ -54,7 +54,7 @@ class Margins:
         self._probes, self._links = body.probes, links
         self._settings = settings(tunings, period)
         self._known = _known(SafeSet(), 0)
-        self._fill = of_fixed_types(fill_starts)
+        self._fill = machine_code(fill_starts)
         level, arm = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0)
         vehicle = np.zeros(FRAME), links, _REST, _REST, level, _REST, arm, arm
         self._put_vehicle = machine_code(_put_vehicle, *vehicle)

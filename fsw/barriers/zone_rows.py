@@ -26,7 +26,7 @@ from fsw.barriers.cbf_row import barrier_value, cbf_lower_bound
 from fsw.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.barriers.nearest_place import nearest_place
 from fsw.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
-from fsw.compiled import kernel, of_fixed_types
+from fsw.compiled import kernel, machine_code
 from fsw.geometry.vectors import dot
 from fsw.model.body import ON, PART, RADIUS, Body
 from fsw.model.linearisation import (
@@ -123,7 +123,7 @@ class ZoneRows:
         parts = len(body.parts)
         starts = sum(1 if follows else parts for follows in following)
         self.rows = block(tuple(per_zone.astype(int).tolist()), first_node, model.horizon, starts)
-        self._rows, self._fill = self.rows.rows, of_fixed_types(_fill)
+        self._rows, self._fill = self.rows.rows, machine_code(_fill)
 
     def update(self, safe_set: SafeSet) -> None:
         """See ``fsw.barriers.constraint_block.Barrier``."""

@@ -30,7 +30,7 @@ from fsw.estimation.error_state import (
     watch_biases,
 )
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
-from fsw.estimation.imu import IMU_TOO_OLD, is_stuck
+from fsw.estimation.imu import IMU_SILENT, is_stuck
 from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.estimation.measurement_update import MeasurementUpdate
 from fsw.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
@@ -117,12 +117,12 @@ class Arbitration:
         for sample, last in zip(newest, before.seen, strict=True):
             aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
             seen.append(sample)
-        verdict = before.hearing_nothing_of(_silent(memory, now) | _stuck(memory), now)
-        lost = verdict.lost(now)
+        silent = _silent(memory, now) | _stuck(memory)
+        lost = redundancy.hear_nothing_of(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
         redundancy.look(evidence, memory.numbers, now, *aids, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
-        verdict = verdict._replace(evidence=evidence, seen=tuple(seen))
+        verdict = before._replace(evidence=evidence, seen=tuple(seen))
         if before.is_on or before.wrong or max(ratios) > 1.0:
             held = Source.ATTITUDE in self._aided(memory, now)
             verdict = redundancy.judged(
@@ -177,6 +177,10 @@ class Arbitration:
         # A half that has jumped is believed where the rotors are named for it, and where it agrees.
         agrees = back or (before.is_on and not verdict.is_on and not verdict.wrong)
         believes = bool(x["doubted"][0].any() and (agrees or verdict.named is Source.MODEL))
+        # So is what has jumped and come back meanwhile: an arm that hits its stop is a blow.
+        unit = memory.of(Sensor.IMU)
+        jumped = unit.fault is SensorFault.JUMP and now - unit.fault_at < _TRAIL
+        believes = believes or (jumped and verdict.explained and not before.explained)
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
@@ -235,7 +239,7 @@ class Arbitration:
 
 def begun(memory: FusionMemory) -> FusionMemory:
     """The memory of a filter that has just begun: what sensors say is compared from now on."""
-    verdict = memory.verdict._replace(evidence=np.zeros(1, EVIDENCE))
+    verdict = memory.verdict._replace(evidence=redundancy.started())
     return memory._replace(verdict=verdict, trail=None, trail_before=None)
 
 
@@ -275,7 +279,7 @@ def _silent(memory: FusionMemory, now: float) -> Source:
 
     Rotors explain it only where it is known how the arm moves.
     """
-    unit = now - memory.imu_came > IMU_TOO_OLD
+    unit = now - memory.imu_came > IMU_SILENT
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
     wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault not in _FOLLOWED
     arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD

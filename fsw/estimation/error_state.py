@@ -44,6 +44,8 @@ TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
+FORCE_MADE = 16  # of LOST: and of the force it is so
+MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 28  # integrals: see redundancy.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
@@ -126,6 +128,7 @@ FILTER: Final = np.dtype(
     align=True,
 )
 Filter = NDArray[Any]  # (1,) of FILTER
+Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
 
 
 @compilable
@@ -293,12 +296,35 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
             carry(x.shared, blocks, dt)
         if x.compass:
             carry(x.with_offset, blocks, dt)
+    if lost & FORCE_MADE:
+        _fade(x, M, math.exp(-gap / MADE_LASTS))
     for i in range(3):
         x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
         x.rate[i] = row[RATE + i] - x.gyro_bias[i]
     for i in range(4):
         x.q[i] = q[i]
     x.time = max(row[TIME], x.time)
+
+
+@compilable
+def _fade(x: Any, M: Array, left: float) -> None:
+    """Of what a modelled force is off a share [1] is ``left``: gusts do not last.
+
+    Else a tilt could not be told from it where satellites alone measure how the vehicle moves.
+    ``M`` (17, 17) [SI] is the covariance.
+    """
+    for i in range(BA, BA + 3):
+        x.accel_bias[i - BA] = x.kept_bias[i - BA] + left * (
+            x.accel_bias[i - BA] - x.kept_bias[i - BA]
+        )
+        for j in range(ERRORS):
+            M[i, j] *= left
+        for j in range(ERRORS):
+            M[j, i] *= left
+        for j in range(FRAME):
+            x.shared[i, j] *= left
+        for j in range(FIELD):
+            x.with_offset[i, j] *= left
 
 
 @compilable

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fsw.estimation import kernels
+from fsw.estimation import fusion, kernels
 from fsw.estimation.confirmation import Confirmation
 from fsw.estimation.drift import FrameDrift, least
 from fsw.estimation.error_state import IMU_CAPACITY, Filter
@@ -89,7 +89,7 @@ class FilterStart:
         kernels.couple_level(x, self._law)
         # The heading was made of this field: what it does not know of it, with all of the tilt that
         # it comes through, is what it does not know of the field.
-        kernels.fuse_heading(x, self._law, float(x["time"][0]), field, True)
+        fusion.fuse_heading(x, self._law, float(x["time"][0]), field, True)
 
     def _begin(
         self,

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fsw.compiled import compilable
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.estimation.error_state import (
     BA,
@@ -21,6 +21,8 @@ from fsw.estimation.error_state import (
     DELAY,
     ERRORS,
     TH,
+    Filter,
+    Law,
     P,
     V,
     correct,
@@ -127,11 +129,11 @@ def attitude_rows(x: Any, z: Vec4, variance: Vec3, dt: float, delayed: float) ->
     x.H[2, TH + 0], x.H[2, TH + 1] = dt * w[1], -dt * w[0]
 
 
-@compilable
+@machine_code
+@kernel
 def fuse_pose(
-    x: Any,
-    law: Any,
-    gates: Any,
+    filters: Filter,
+    laws: Law,
     time: float,
     position: Vec3,
     attitude: Vec4,
@@ -143,6 +145,7 @@ def fuse_pose(
     ``position`` [m, NED], ``attitude`` [1], ``position_variance`` [m^2, NED] and
     ``attitude_variance`` [rad^2, FRD]. An attitude of infinite variance says nothing: infinite.
     """
+    x, law, gates = filters[0], laws[0].tuning, laws[0].gates
     delayed = 1.0 if law.pose_delay_sigma > 0.0 else 0.0
     for i in range(V, V + 3):
         # A delay is seen by the velocity that it is multiplied with. While that is not known, the
@@ -171,11 +174,11 @@ def velocity_rows(x: Any, z: Vec3, variance: Vec3, dt: float) -> None:
         x.variance[i] = variance[i]
 
 
-@compilable
+@machine_code
+@kernel
 def fuse_gnss(
-    x: Any,
-    law: Any,
-    gates: Any,
+    filters: Filter,
+    laws: Law,
     time: float,
     position: Vec3,
     velocity: Vec3,
@@ -187,6 +190,7 @@ def fuse_gnss(
     ``position`` [m, NED], ``velocity`` [m/s, NED], ``position_variance`` [m^2, NED],
     ``velocity_variance`` [m^2/s^2, NED].
     """
+    x, gates = filters[0], laws[0].gates
     dt = time - x.time
     position_rows(x, position, position_variance, dt, 0.0)
     first = _judged(x, 3, gates.gnss_position, 0, GNSS)
@@ -205,11 +209,13 @@ def pressure_rows(x: Any, altitude: float, variance: float, dt: float) -> None:
     x.variance[0] = variance
 
 
-@compilable
+@machine_code
+@kernel
 def fuse_pressure(
-    x: Any, law: Any, gates: Any, time: float, altitude: float, variance: float
+    filters: Filter, laws: Law, time: float, altitude: float, variance: float
 ) -> float:
     """Fuse an ``altitude`` [m, up] of ``time`` [s] with ``variance`` [m^2]."""
+    x, gates = filters[0], laws[0].gates
     pressure_rows(x, altitude, variance, time - x.time)
     return _judged(x, 1, gates.pressure)
 
@@ -239,12 +245,14 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
     return True
 
 
-@compilable
-def fuse_heading(x: Any, law: Any, gates: Any, time: float, field: Vec3, believed: bool) -> float:
+@machine_code
+@kernel
+def fuse_heading(filters: Filter, laws: Law, time: float, field: Vec3, believed: bool) -> float:
     """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s].
 
     One that is not ``believed``, though it is within its gate, says nothing: infinite.
     """
+    x, law, gates = filters[0], laws[0].tuning, laws[0].gates
     if not heading_rows(x, law, field, time - x.time):
         x.innovation[0, 0] = 0.0
         return math.inf
@@ -281,11 +289,11 @@ def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) ->
     return True
 
 
-@compilable
-def fuse_range(
-    x: Any, law: Any, gates: Any, time: float, measured: float, variance: float
-) -> float:
+@machine_code
+@kernel
+def fuse_range(filters: Filter, laws: Law, time: float, measured: float, variance: float) -> float:
     """Fuse a ``measured`` [m] distance to level ground of ``time`` [s] and ``variance`` [m^2]."""
+    x, law, gates = filters[0], laws[0].tuning, laws[0].gates
     if not range_rows(x, law, measured, variance, time - x.time):
         x.innovation[0, 0] = 0.0
         return math.inf
@@ -299,14 +307,15 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
         reset_covariance(x, x.covariance, first + i, variance[i])
 
 
-@compilable
-def doubt(x: Any, place: float, turn: float) -> None:
+@machine_code
+@kernel
+def doubt(filters: Filter, place: float, turn: float) -> None:
     """Know little more of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad].
 
     Either the pose's frame has moved, or the inertial unit leads the filter astray: its biases may
     be anything, and velocity and attitude are what they have made of them.
     """
-    M = x.covariance
+    M = filters[0].covariance
     for i in range(3):
         M[P + i, P + i] += place * place
         M[V + i, V + i] += _DOUBTED_SPEED * _DOUBTED_SPEED

@@ -15,6 +15,7 @@ from fsw.compiled import compilable
 from fsw.estimation.error_state import (
     COLUMNS,
     FORCE,
+    FORCE_MADE,
     IMU_CAPACITY,
     LOST,
     MODELLED,
@@ -29,6 +30,7 @@ from fsw.signals import Vec3, Vec4
 
 TIME_TOLERANCE: Final = 0.002  # s, by which a reading may be ahead of the tick
 IMU_TOO_OLD: Final = 0.03  # s; what the vehicle did so long ago says nothing about its rates now
+IMU_SILENT: Final = 0.008  # s, longer than jitter: from then on the rotors' model stands in
 # Equal to the last bit, in a row: noise of three axes never is, that of one by chance for a while.
 STUCK_READINGS: Final = 5
 _STUCK_AXIS: Final = 50
@@ -74,12 +76,14 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
     modelled = flies and x.end > 0
     # Of what may be wrong the reading is used, and the bias may be anything.
     doubtful = lost | (x.suspect & NOTHING)
-    row[TIME], row[LOST] = time, float(doubtful | MODELLED if modelled and doubtful else doubtful)
+    if modelled and doubtful:
+        doubtful |= MODELLED | (FORCE_MADE if lost & NO_FORCE else 0)
+    row[TIME], row[LOST] = time, float(doubtful)
     for i in range(3):
         row[FORCE + i] = f[i] if keep_force else last[FORCE + i]
         row[RATE + i] = w[i] if keep_rate else last[RATE + i]
     if modelled and lost:
-        _model_what_is_lost(row, last, lost, model)
+        _model_what_is_lost(x, row, last, lost, model)
     if x.end == 0:
         _keep_as(last, row)  # what goes before the first reading
     x.end += 1
@@ -95,10 +99,14 @@ def _keep_as(row: Any, other: Any) -> None:
 
 
 @compilable
-def _model_what_is_lost(row: Any, last: Any, lost: int, model: Vec4) -> None:
-    """What rotors make of the reading before, in place of those halves that are ``lost``."""
+def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> None:
+    """What rotors make of the reading before, in place of those halves that are ``lost``.
+
+    With the force that has lately been felt beside theirs: wind, and the accelerometer's bias.
+    """
     if lost & NO_FORCE:
-        row[FORCE], row[FORCE + 1], row[FORCE + 2] = 0.0, 0.0, -model[3]
+        for i in range(3):
+            row[FORCE + i] = x.baseline[6 + i] - (model[3] if i == 2 else 0.0)
     if lost & NO_RATE:
         dt = row[TIME] - last[TIME]
         for i in range(3):

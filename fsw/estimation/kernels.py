@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, kernel, of_fixed_types
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.estimation import fusion, imu, joint_filter, redundancy
 from fsw.estimation.error_state import (
     BA,
@@ -25,6 +25,7 @@ from fsw.estimation.error_state import (
     TIME,
     Array,
     Filter,
+    Law,
     P,
     V,
     add_noise,
@@ -44,7 +45,6 @@ from fsw.record import Four, Record, Three, Two
 from fsw.signals import Mat3, Vec2, Vec3, Vec4
 from fsw.tick_record import Estimate
 
-Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
 # What ``tick`` does, in this order.
 PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
 # What came of it.
@@ -147,14 +147,16 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
     return finite and varies(x), R
 
 
+@machine_code
 @kernel
-def _set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
-    """Start from an arm that stands still."""
+def set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
+    """Start from an arm that stands still at ``angles`` [rad] at a ``time`` [s]."""
     joint_filter.begin(x[0], law[0].tuning, time, angles)
 
 
+@machine_code
 @kernel
-def _begin(
+def begin(
     x: Filter,
     law: Law,
     time: float,
@@ -165,7 +167,10 @@ def _begin(
     v_variance: Vec3,
     q_variance: Vec3,
 ) -> None:
-    """Start the filter from a known state; readings of the IMU before it are passed over.
+    """Start the filter from a known state of ``time`` [s]; earlier readings are passed over.
+
+    ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1]; ``p_variance`` [m^2, NED], ``v_variance``
+    [m^2/s^2, NED], ``q_variance`` [rad^2, FRD].
 
     Where the first reading came later than the state, the filter begins with that reading: until
     then the vehicle moved as it did, but for what is not known of its velocity and its turning. To
@@ -209,8 +214,9 @@ def _begin(
             M[TH + i, TH + i] += turned * turned
 
 
+@machine_code
 @kernel
-def _couple_level(x: Filter, law: Law) -> None:
+def couple_level(x: Filter, law: Law) -> None:
     """What is wrong with an attitude that the accelerometer gave is what is wrong with it.
 
     With d the vertical in body axes, a bias b turns it by -(d x b) / g.
@@ -230,9 +236,10 @@ def _couple_level(x: Filter, law: Law) -> None:
             M[TH + i, TH + j] += total * variance
 
 
+@machine_code
 @kernel
-def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec3:
-    """Take a position as it is; returns by how much the state has jumped."""
+def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
+    """Take ``p`` [m, NED] of ``time`` [s] as it is, ``variance`` [m^2, NED]; how far it jumped."""
     s = x[0]
     dt = time - s.time
     jump = (
@@ -246,9 +253,10 @@ def _set_place(x: Filter, law: Law, time: float, p: Vec3, variance: Vec3) -> Vec
     return jump
 
 
+@machine_code
 @kernel
-def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
-    """Take a velocity as it is; returns by how much the state's has jumped."""
+def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
+    """Take ``v`` [m/s, NED] as it is, ``variance`` [m^2/s^2, NED]; by how much it has jumped."""
     s = x[0]
     jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
     for i in range(3):
@@ -257,18 +265,20 @@ def _set_velocity(x: Filter, law: Law, v: Vec3, variance: Vec3) -> Vec3:
     return jump
 
 
+@machine_code
 @kernel
-def _set_attitude(x: Filter, law: Law, q: Vec4, variance: Vec3) -> None:
-    """Take an attitude as it is."""
+def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
+    """Take an attitude ``q`` [1] of ``variance`` [rad^2, FRD] as it is."""
     s = x[0]
     for i in range(4):
         s.q[i] = q[i]
     fusion.forget(s, TH, variance)
 
 
+@machine_code
 @kernel
-def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> None:
-    """Take the barometer's bias from an altitude as it is."""
+def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> None:
+    """Explain an ``altitude`` [m, up] of ``time`` [s], ``variance`` [m^2], by the bias."""
     s = x[0]
     s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
     for j in range(FRAME):
@@ -281,56 +291,10 @@ def _set_pressure(x: Filter, law: Law, time: float, altitude: float, variance: f
     s.covariance[BARO, BARO] = s.covariance[P + 2, P + 2] + variance
 
 
+@machine_code
 @kernel
-def _doubt(x: Filter, law: Law, place: float, turn: float) -> None:
-    """Of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad] know little more."""
-    fusion.doubt(x[0], place, turn)
-
-
-@kernel
-def _fuse_pose(
-    x: Filter,
-    law: Law,
-    time: float,
-    p: Vec3,
-    q: Vec4,
-    p_variance: Vec3,
-    q_variance: Vec3,
-) -> tuple[float, float]:
-    return fusion.fuse_pose(x[0], law[0].tuning, law[0].gates, time, p, q, p_variance, q_variance)
-
-
-@kernel
-def _fuse_gnss(
-    x: Filter,
-    law: Law,
-    time: float,
-    p: Vec3,
-    v: Vec3,
-    p_variance: Vec3,
-    v_variance: Vec3,
-) -> tuple[float, float]:
-    return fusion.fuse_gnss(x[0], law[0].tuning, law[0].gates, time, p, v, p_variance, v_variance)
-
-
-@kernel
-def _fuse_pressure(x: Filter, law: Law, time: float, altitude: float, variance: float) -> float:
-    return fusion.fuse_pressure(x[0], law[0].tuning, law[0].gates, time, altitude, variance)
-
-
-@kernel
-def _fuse_heading(x: Filter, law: Law, time: float, field: Vec3, believed: bool) -> float:
-    return fusion.fuse_heading(x[0], law[0].tuning, law[0].gates, time, field, believed)
-
-
-@kernel
-def _fuse_range(x: Filter, law: Law, time: float, measured: float, variance: float) -> float:
-    return fusion.fuse_range(x[0], law[0].tuning, law[0].gates, time, measured, variance)
-
-
-@kernel
-def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
-    """The covariance (17, 17) of what ``tick`` returned, and that with the frame (17, 4)."""
+def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
+    """Write the covariance ``M`` (17, 17) [SI] at ``now`` [s] and a frame's ``X`` (17, 4) [SI]."""
     s, t = x[0], law[0].tuning
     for i in range(ERRORS):
         for j in range(ERRORS):
@@ -356,19 +320,3 @@ def _present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> 
             add_noise(M, t, dt, int(row[LOST]), s.model_walk)
             p, v, q, _ = integrated(p, v, q, f, w, dt)
             time = end
-
-
-set_joints = of_fixed_types(_set_joints)
-begin = of_fixed_types(_begin)
-couple_level = of_fixed_types(_couple_level)
-set_place = of_fixed_types(_set_place)
-set_velocity = of_fixed_types(_set_velocity)
-set_attitude = of_fixed_types(_set_attitude)
-set_pressure = of_fixed_types(_set_pressure)
-doubt = of_fixed_types(_doubt)
-fuse_pose = of_fixed_types(_fuse_pose)
-fuse_gnss = of_fixed_types(_fuse_gnss)
-fuse_pressure = of_fixed_types(_fuse_pressure)
-fuse_heading = of_fixed_types(_fuse_heading)
-fuse_range = of_fixed_types(_fuse_range)
-present_covariance = of_fixed_types(_present_covariance)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from fsw.estimation import kernels
+from fsw.estimation import fusion, kernels
 from fsw.estimation.fusion_memory import NO_TURN, FusionMemory, Waiting
 from fsw.estimation.sensor_checks import Aiding
 from fsw.estimation.stated_variance import StatedVariance
@@ -54,7 +54,7 @@ class MeasurementUpdate:
     ) -> tuple[float, ...]:
         """The same of a pose: position, attitude. Of ``half`` a pose the place is fused alone."""
         place, about = self.noise(memory, sample)
-        return kernels.fuse_pose(
+        return fusion.fuse_pose(
             memory.numbers,
             self._law,
             sample.time,
@@ -79,23 +79,23 @@ class MeasurementUpdate:
 
     def take(self, memory: FusionMemory, one: Waiting, ratio: tuple[float, ...]) -> FusionMemory:
         """The memory after parts that the gate refused for long, by ``ratio``, are as measured."""
-        x, law, sample = memory.numbers, self._law, one.sample
+        x, sample = memory.numbers, one.sample
         place, velocity, turn = _REST, _REST, NO_TURN
         if isinstance(sample, PoseSample):
             about_place, about = self.noise(memory, sample)
             if ratio[0] > 1.0:
-                place = kernels.set_place(x, law, one.time, sample.position, about_place)
+                place = kernels.set_place(x, one.time, sample.position, about_place)
             if 1.0 < ratio[1] < math.inf:
                 before = attitude(x[0])
                 after = normalised(sample.attitude)
-                kernels.set_attitude(x, law, after, about)
+                kernels.set_attitude(x, after, about)
                 turn = multiply(after, conjugate(before))
         elif isinstance(sample, GnssSample):
             about_place, about_speed = self._stated.of_gnss(sample)
             if ratio[0] > 1.0:
-                place = kernels.set_place(x, law, one.time, sample.position, about_place)
+                place = kernels.set_place(x, one.time, sample.position, about_place)
             if ratio[1] > 1.0:
-                velocity = kernels.set_velocity(x, law, sample.velocity, about_speed)
+                velocity = kernels.set_velocity(x, sample.velocity, about_speed)
         else:
             if isinstance(sample, PressureSample):
                 self.take_pressure(memory, one.time, sample)
@@ -105,10 +105,10 @@ class MeasurementUpdate:
     def take_pressure(self, memory: FusionMemory, time: float, sample: PressureSample) -> None:
         """Explain an altitude of ``time`` [s] by the weather: the vehicle has not moved."""
         variance = self._stated.of_pressure(sample)
-        kernels.set_pressure(memory.numbers, self._law, time, sample.altitude, variance)
+        kernels.set_pressure(memory.numbers, time, sample.altitude, variance)
 
     def _fuse_gnss(self, memory: FusionMemory, sample: GnssSample) -> tuple[float, ...]:
-        return kernels.fuse_gnss(
+        return fusion.fuse_gnss(
             memory.numbers,
             self._law,
             sample.time - self._gnss_delay,
@@ -119,7 +119,7 @@ class MeasurementUpdate:
 
     def _fuse_pressure(self, memory: FusionMemory, sample: PressureSample) -> tuple[float, ...]:
         x, variance = memory.numbers, self._stated.of_pressure(sample)
-        return (kernels.fuse_pressure(x, self._law, sample.time, sample.altitude, variance),)
+        return (fusion.fuse_pressure(x, self._law, sample.time, sample.altitude, variance),)
 
     def _fuse_heading(self, memory: FusionMemory, sample: MagneticSample) -> tuple[float, ...]:
         # Garbage is within the gate now and then.
@@ -127,11 +127,11 @@ class MeasurementUpdate:
             one.kind is MagneticSample and sample.time - one.last < _STEADY for one in memory.runs
         )
         x, law = memory.numbers, self._law
-        return (kernels.fuse_heading(x, law, sample.time, sample.field, believed),)
+        return (fusion.fuse_heading(x, law, sample.time, sample.field, believed),)
 
     def _fuse_range(self, memory: FusionMemory, sample: RangeSample) -> tuple[float, ...]:
         x, variance = memory.numbers, self._stated.of_range(sample)
-        return (kernels.fuse_range(x, self._law, sample.time, sample.distance, variance),)
+        return (fusion.fuse_range(x, self._law, sample.time, sample.distance, variance),)
 
 
 def attitude(x: Any) -> Vec4:

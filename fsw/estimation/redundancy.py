@@ -77,6 +77,9 @@ GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB, AA, GG = range(13)
 _PQ: Final = P | Q
 OF: Final = (G | M, G | _PQ, G | B, A | M, A | P, M | _PQ, M | P, A | N, M | N, N, M | B, A, G)
 COUNT: Final = len(OF)
+# What of them says nothing, if one of these does: attitudes turn what is felt.
+_MASKS: Final = tuple(int(one | (G | B if k in (AN, MN) else 0)) for k, one in enumerate(OF))
+_KINDS: Final = tuple(0 if one & P else 1 if one & N else 2 if one & B else -1 for one in OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
 # makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], and what
@@ -84,9 +87,10 @@ COUNT: Final = len(OF)
 SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
 WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
 EVERY: Final = 0.02  # s, between looks
-CONTAINED: Final = 2.0 * WINDOWS[-1]  # s, for which a reading is in some of them, or before one
 _LONG: Final = 3.0  # s, over which means of half a second are compared
 _MEAN: Final = 0.5  # s
+# For so long [s] a reading is in a window, or in the one before it.
+_CONTAINED: Final = (*(2.0 * window for window in WINDOWS), _LONG + 2.0 * _MEAN)
 _ROWS: Final = 256  # looks: 5 s
 _AIDS: Final = 256  # measurements of a kind, at most one a look
 _MEASURED: Final = 1  # column of what is measured, after the time: place and attitude, for example
@@ -138,6 +142,7 @@ UNDECIDED: Final = 2.0  # s, after which suspects are not told apart any more
 EVIDENCE: Final = np.dtype(
     [
         ("looked", float),  # s, when last
+        ("silent", float, (len(Source),)),  # s, when each of them said nothing of use last
         ("began", float),  # s, when the vehicle began to fly; -1: it does not
         ("rows", float, (_ROWS, 1 + WITNESS)),  # ring: time [s] and integrals
         ("count", np.int64),
@@ -256,8 +261,15 @@ def _note_largest(s: Any, now: float, k: int) -> None:
     s.ratio[k], s.size[k] = 0.0, 0.0
     if not now - s.came[k] < _LATEST:
         return
+    kind, heard = _KINDS[k], now
+    if kind >= 0:  # a measurement is of a time before
+        heard = s.aids[kind, (s.aid_count[kind] - 1) % _AIDS, 0]
+    silent = -math.inf
+    for i in range(len(s.silent)):
+        if _MASKS[k] & (1 << i):
+            silent = max(silent, s.silent[i])
     for i in range(5):
-        if s.both[k, i] > s.ratio[k]:
+        if heard - silent >= _CONTAINED[i] and s.both[k, i] > s.ratio[k]:
             s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
 
 
@@ -654,8 +666,6 @@ class Verdict(NamedTuple):
     wrong: Source = NOBODY  # not used
     agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
     named: Source = NOBODY  # by the last look
-    # How long windows contain times in which each of them said nothing.
-    lost_until: tuple[float, ...] = (-math.inf,) * len(Source)
     seen: tuple[object, ...] = (None, None, None)  # the last samples of pose, satellites, compass
 
     @property
@@ -686,22 +696,6 @@ class Verdict(NamedTuple):
             if now - since >= _AGREES:
                 wrong &= ~one
         return self._replace(wrong=wrong, agreed=agreed)
-
-    def hearing_nothing_of(self, silent: Source, now: float) -> Verdict:
-        """The verdict with what says nothing at ``now`` [s]."""
-        if not silent:
-            return self
-        over = now + CONTAINED
-        until = zip(Source, self.lost_until, strict=True)
-        return self._replace(lost_until=tuple([over if one & silent else t for one, t in until]))
-
-    def lost(self, now: float) -> Source:
-        """What has said nothing for some of the time that is compared at ``now`` [s]."""
-        found = NOBODY
-        for one, until in zip(Source, self.lost_until, strict=True):
-            if now < until:
-                found |= one
-        return found
 
     @property
     def contradicts(self) -> bool:
@@ -808,6 +802,25 @@ def _not_shown(
     threshold = sizes[at_once] / ratios[at_once]
     unseen = max(max(fired) - sizes[at_once], 0.0)
     return min((unseen / threshold) ** 2, _MOST)
+
+
+def started() -> Evidence:
+    """What is known before anything was compared."""
+    evidence = np.zeros(1, EVIDENCE)
+    evidence["silent"] = -math.inf
+    return evidence
+
+
+def hear_nothing_of(evidence: Evidence, silent: Source, now: float) -> Source:
+    """Note what says nothing of use at ``now`` [s]; what has not for the shortest window."""
+    for place, one in enumerate(Source):
+        if one & silent:
+            evidence[0]["silent"][place] = now
+    lost = NOBODY
+    for one, at in zip(Source, evidence[0]["silent"].tolist(), strict=True):
+        if now - at < _CONTAINED[0]:
+            lost |= one
+    return lost
 
 
 def size_of(evidence: Evidence, source: Source) -> float:

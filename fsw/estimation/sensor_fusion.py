@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from fsw.compiled import machine_code, packed
-from fsw.estimation import kernels, redundancy
+from fsw.estimation import fusion, kernels, redundancy
 from fsw.estimation.arbitration import Arbitration, begun
 from fsw.estimation.confirmation import Confirmation, Run
 from fsw.estimation.error_state import (
@@ -128,7 +128,7 @@ class SensorFusion:
         for sample in _at_rest(t):
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
-        kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
+        fusion.doubt(memory.numbers, 0.0, 0.0)
         redundancy.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
@@ -438,7 +438,7 @@ class SensorFusion:
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)
             if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
-                kernels.doubt(memory.numbers, self.law, _SMALL_STEP, _SMALL_TURN)
+                fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN)
                 ratio = self._update.fuse_pose(memory, sample, half=one.half)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
@@ -456,7 +456,7 @@ class SensorFusion:
             memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
-                kernels.doubt(memory.numbers, self.law, 0.0, 0.0)
+                fusion.doubt(memory.numbers, 0.0, 0.0)
             taken = zip(fused, ratio, strict=True)
             fused = tuple([now if r < math.inf else before for before, r in taken])
             memory = memory.noting(health._replace(fused=fused))
@@ -537,6 +537,8 @@ def _as_judged(
 
     Of a pose whose attitude repeats itself, or is named, the place is used alone.
     """
+    if not (verdict.wrong or verdict.suspects):
+        return health, True, half
     source = _SOURCES.get(type(sample), NOBODY)
     wrong = verdict.wrong & source
     if wrong:

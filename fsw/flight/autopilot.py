@@ -59,7 +59,6 @@ from fsw.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.signals import (
     STOPPED,
     ActuatorCommand,
-    Answer,
     BatteryState,
     CommandAck,
     ConstraintKind,
@@ -98,7 +97,7 @@ _DESCEND = Mode.DESCEND  # found in a tenth of the time
 class Controlled(NamedTuple):
     """A tick whose command is decided; ``Autopilot.conclude`` does the rest."""
 
-    answer: Answer
+    outputs: TickOutputs  # so far
     inputs: TickInputs
     state: FlightState  # with what was received, commanded and decided
     memory: Tick  # for the next tick
@@ -109,7 +108,7 @@ class Controlled(NamedTuple):
     ticks: int = 1  # since the last one
     replaced: bool = False  # the command, by the safety gate
     caught: CaughtUp | None = None  # what else is known, where that had to be known at once
-    calm: bool = False  # nothing happened, and ``memory`` is all that is new
+    calm: bool = False  # nothing happened; ``memory`` and ``fusion`` are all that is new
 
 
 class Autopilot:
@@ -134,7 +133,8 @@ class Autopilot:
         self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
         self._watches = bool(config.limits.watches_actuators)
         self.calm = CalmTick(
-            config, self._cascade, self._plans.model, self._damage, self._watch, self.zones_now
+            *(config, self._cascade, self._plans.model, self._damage),
+            *(self._watch, self._sensed, self.zones_now),
         )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
@@ -182,8 +182,11 @@ class Autopilot:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
         calm = self.calm.fly(state, inputs)
         if calm is not None:
-            answer = Answer(calm.commanded, True, state.vehicle.mode)
-            return Controlled(answer, inputs, state, calm, calm=True)
+            r, fusion, estimate = calm
+            outputs = TickOutputs(r.commanded, state.vehicle.mode, True)
+            return Controlled(
+                outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
+            )
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         if state.vehicle.restarts:
@@ -219,9 +222,9 @@ class Autopilot:
         else:
             r.input = REST_INPUT
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
-        answer = Answer(sent, armed, vehicle.mode, tuple(acks), tuple(texts))
+        outputs = TickOutputs(sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts))
         return Controlled(
-            answer, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
+            outputs, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
         )
 
     def _estimate(
@@ -243,11 +246,8 @@ class Autopilot:
         What it finds out is acted upon in the next tick.
         """
         c = controlled
-        answer, inputs, state, r, estimate, fusion, flown = c[:7]
-        if c.calm:
-            state = self.calm.after(state, r)
-            return state, TickOutputs(answer.actuators, answer.mode, Shown(state, inputs.sensors))
-        plan, texts, safety = c.plan, answer.texts, state.safety
+        outputs, inputs, state, r, estimate, fusion, flown = c[:7]
+        plan, texts, safety, reset = c.plan, outputs.texts, state.safety, None
         flags = r.flags if flown else 0
         if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
             safety = self._watch.off_plan(
@@ -260,16 +260,22 @@ class Autopilot:
         if fusion is not None:
             caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
             fusion, found, reset, said = caught
-            texts += said
+            texts = (*texts, *said) if said else texts
             if reset is not None:
                 r = moved_along(r, reset)
             if found is not None and found is not estimate:
                 r.known = found
             estimate = found
+        if c.calm and texts is outputs.texts and reset is None:
+            damage = state.damage if fusion is None else self._see_damage(state, r, c)
+            state = self.calm.after(state, r, fusion)
+            if damage is not state.damage:
+                state = replace(state, damage=damage)
+            return state, replace(outputs, shown=Shown(state, inputs.sensors))
         if c.estimate is None or estimate is None:
             # Ticks are counted from the first estimate on; what looks now and then goes by time.
             t_us = inputs.sensors.t_us
-            unknown = nothing_known(answer, state, t_us, texts)
+            unknown = nothing_known(outputs, state, t_us, texts)
             return replace(state, t_us=t_us, fusion=fusion), unknown
         now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
         index = state.index + c.ticks
@@ -279,10 +285,6 @@ class Autopilot:
             state = replace(state, plan=plan, safety=safety, fusion=fusion)
             state, request, news = self._each_period(state, estimate, nominal, now_us)
             plan, safety, texts = state.plan, state.safety, (*texts, *news)
-        if flags & FILTER_ACTED or safety.filter_us >= 0:
-            safety = self._watch.filtered(safety, now_us, pushed=bool(flags & FILTER_ACTED))
-        if flags & BREACH:
-            safety = self._breached(state, safety, estimate, r.margin)
         state = replace(
             state,
             index=index,
@@ -290,14 +292,12 @@ class Autopilot:
             output_replaced=c.replaced,
             cascade=r,
             plan=plan,
-            safety=safety,
+            safety=self._filtered(state, safety, estimate, r.margin, flags),
             fusion=fusion,
             damage=self._see_damage(state, r, c),
         )
         shown = Shown(state, inputs.sensors)
-        return state, TickOutputs(
-            answer.actuators, answer.mode, shown, request, answer.acks, texts, answer.tuning_taken
-        )
+        return state, replace(outputs, shown=shown, plan_request=request, texts=texts)
 
     def _each_period(
         self,
@@ -336,8 +336,8 @@ class Autopilot:
             state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
         )
         texts += told(state, self._tick_us)
-        answer = Answer(STOPPED, False, Mode.DISARMED, tuple(acks), tuple(texts))
-        return Controlled(answer, inputs, state, r)
+        outputs = TickOutputs(STOPPED, Mode.DISARMED, False, acks=tuple(acks), texts=tuple(texts))
+        return Controlled(outputs, inputs, state, r)
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """What the failsafe table looks at and what is not kept up to date elsewhere."""
@@ -371,10 +371,20 @@ class Autopilot:
             freeze_arm(r, estimate, state.damage.report.joints)
         return plan
 
-    def _breached(
-        self, state: FlightState, safety: SafetyMemory, estimate: StateEstimate, margin: float
+    def _filtered(
+        self,
+        state: FlightState,
+        safety: SafetyMemory,
+        estimate: StateEstimate,
+        margin: float,
+        flags: int,
     ) -> SafetyMemory:
-        """The memory of a breach with the negative ``margin`` [m] that the safety filter sees."""
+        """The memory with what the safety filter has done, and the negative ``margin`` [m] seen."""
+        if flags & FILTER_ACTED or safety.filter_us >= 0:
+            pushed = bool(flags & FILTER_ACTED)
+            safety = self._watch.filtered(safety, estimate.t_us, pushed=pushed)
+        if not flags & BREACH:
+            return safety
         report = self._safe_sets.margins(state.kept, estimate, state.reference)
         announced = len(state.mission.announced.zones)
         return self._watch.breach(safety, estimate, report, announced, flies=True, seen=margin)

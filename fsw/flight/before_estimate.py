@@ -12,8 +12,8 @@ from fsw.flight.estimator_report import AIDS_PLACE
 from fsw.flight.failsafe import ROWS
 from fsw.flight.modes.offboard import report
 from fsw.flight.state import FlightState
+from fsw.frozen import replace
 from fsw.signals import (
-    Answer,
     ArmingReport,
     FailsafeEvent,
     FlightSnapshot,
@@ -77,22 +77,22 @@ def nowhere(t_us: int) -> StateEstimate:
 
 
 def nothing_known(
-    answer: Answer, state: FlightState, t_us: int, texts: tuple[StatusText, ...]
+    so_far: TickOutputs, state: FlightState, t_us: int, texts: tuple[StatusText, ...]
 ) -> TickOutputs:
-    """The outputs at ``t_us``, with the ``texts`` of the whole tick.
+    """The outputs at ``t_us``, ``so_far`` and with the ``texts`` of the whole tick.
 
     Telemetry goes on, and shows what is known all the same.
     """
     empty = FlightState()
     snapshot = FlightSnapshot(
         t_us=t_us,
-        mode=answer.mode,
-        armed=answer.armed,
+        mode=so_far.mode,
+        armed=so_far.armed,
         estimate=nowhere(t_us),
         reference=None,
         plan_state=None,
         plan_input=None,
-        actuators=answer.actuators,
+        actuators=so_far.actuators,
         plan=None,
         plan_status=empty.plan.status,
         counters=state.plan.counters,
@@ -107,5 +107,4 @@ def nothing_known(
         arming=_REPORT,
         safe_set=state.mission.safe_set,
     )
-    taken = answer.tuning_taken
-    return TickOutputs(answer.actuators, answer.mode, snapshot, None, answer.acks, texts, taken)
+    return replace(so_far, shown=snapshot, texts=texts)

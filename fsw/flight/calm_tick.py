@@ -1,11 +1,13 @@
-"""Ticks with exact states in which nothing but sensors has to be looked at: three compiled calls.
+"""Ticks in which nothing but sensors has to be looked at: three compiled calls.
 
 Between two events most ticks believe the sensors, move the plan's state on, close the loops and
 watch the actuators. No command comes, no limit is met, no failsafe acts. What happens all the same
 the record says by its flags: then the tick is flown whole, from the record before it. Either way
 gives the same state to the last bit.
 
-Suites of sensors have to be looked at one by one.
+Exact states are read and believed by the first call. Suites of sensors have their filter in its
+place; what they measure beside inertial unit and encoders waits for ``Autopilot.conclude``, and the
+watch with it.
 
 Source: docs/decisions/0037-quiet-ticks.md.
 """
@@ -21,20 +23,23 @@ from numpy.typing import NDArray
 from fsw.compiled import kernel, machine_code
 from fsw.control.cascade import Cascade
 from fsw.estimation.estimator import READINGS, read_into, reading_of
+from fsw.estimation.fusion_memory import FusionMemory
 from fsw.flight.active_failsafes import surely_none
 from fsw.flight.damage_watch import DamageWatch
 from fsw.flight.failsafe import SLOW_US
 from fsw.flight.failsafe_evidence import PLAN_STALE_PERIODS
 from fsw.flight.plan_exchange import planned_input
 from fsw.flight.safety_watch import SafetyWatch
+from fsw.flight.sensed_state import SensedState
 from fsw.flight.state import AIDED, FlightState
 from fsw.frozen import replace
+from fsw.measurements import RangeSample, Sample
 from fsw.model.actuator_health import HEALTHY
 from fsw.model.nominal import NominalModel, next_state, put_plan
 from fsw.parameters.flight_config import FlightConfig
 from fsw.record import Floats
 from fsw.shapes.zones import NO_ZONES
-from fsw.signals import Mode, TickInputs
+from fsw.signals import Mode, StateEstimate, TickInputs
 from fsw.tick_record import IMPAIRED, Tick
 
 
@@ -63,27 +68,48 @@ class CalmTick:
         model: NominalModel,
         damage: DamageWatch,
         watch: SafetyWatch,
+        sensed: SensedState,
         zones_now: Callable[[FlightState], Floats],
     ) -> None:
         """Of the laws that whole ticks of this configuration have."""
         self._config, self._tick_us = config, config.tick_period_us
         self._per_plan = config.mpc_period_us // config.tick_period_us
-        self._cascade, self._model, self._damage = cascade, model.packed, damage
-        self._watch, self._zones_now = watch, zones_now
-        example = self._model, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0, 1.0
+        self._cascade, self._model, self._damage = cascade, model, damage
+        self._watch, self._sensed, self._zones_now = watch, sensed, zones_now
+        example = model.packed, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0, 1.0
         self._sense = machine_code(_sense, *example)
         # What was found out about the newest state; another one is looked at anew.
         self._state = FlightState()
         self._until_us, self._zones, self._tube = -1, NO_ZONES, watch.tube(self._state)
 
-    def fly(self, state: FlightState, inputs: TickInputs) -> Tick | None:
-        """The record after a calm tick; None: the tick is to be flown whole."""
-        frame = inputs.sensors
+    def fly(
+        self, state: FlightState, inputs: TickInputs
+    ) -> tuple[Tick, FusionMemory | None, StateEstimate | None] | None:
+        """The record after a calm tick; None: the tick is to be flown whole.
+
+        Of a suite also what its filter has made of inertial unit and encoders.
+        """
+        frame, before = inputs.sensors, state.cascade
         now_us = frame.t_us
-        next_one = state.fusion is None and now_us == state.t_us + self._tick_us
+        next_one = now_us == state.t_us + self._tick_us
         if not (next_one and self.ticks(state) and inputs.has_only_sensors):
             return None
-        return self.step(state.cascade, reading_of(frame), now_us)
+        if state.fusion is None:
+            if inputs.samples:
+                return None
+            exact = self.step(before, reading_of(frame), now_us)
+            return None if exact is None else (exact, None, None)
+        if any(map(_is_range, inputs.samples)):
+            return None  # the land detector looks at it
+        after, fusion, estimate, caught = self._sensed.estimate(state, inputs)
+        news = after is not state or caught is not None
+        if news or estimate is None or not estimate.R_WB[8] > self._watch.upright:
+            return None
+        r = before.copy()
+        r.known = estimate
+        self._model.move(r, 1)
+        self._close_loops(r)
+        return None if r.flags else (r, fusion, estimate)
 
     def ticks(self, state: FlightState) -> int:
         """How many ticks after a state may be calm, if nothing but sensors comes."""
@@ -97,15 +123,20 @@ class CalmTick:
         None: it is not. Of the state that was looked at last, or a calm tick after it.
         """
         r = before.copy()
-        if not self._sense(self._model, r.array, reading, now_us, self._watch.upright):
+        if not self._sense(self._model.packed, r.array, reading, now_us, self._watch.upright):
             return None
-        self._cascade.step(r, 1, self._zones, HEALTHY, self._tube)
+        self._close_loops(r)
         return None if r.flags or self._damage.finds(before, r) else r
 
-    def after(self, state: FlightState, r: Tick, ticks: int = 1) -> FlightState:
+    def _close_loops(self, r: Tick) -> None:
+        self._cascade.step(r, 1, self._zones, HEALTHY, self._tube)
+
+    def after(
+        self, state: FlightState, r: Tick, fusion: FusionMemory | None = None, ticks: int = 1
+    ) -> FlightState:
         """The state after calm ``ticks``, with the record that they have left: calm as before."""
-        t_us = state.t_us + ticks * self._tick_us
-        self._state = replace(state, index=state.index + ticks, t_us=t_us, cascade=r)
+        index, t_us = state.index + ticks, state.t_us + ticks * self._tick_us
+        self._state = replace(state, index=index, t_us=t_us, cascade=r, fusion=fusion)
         return self._state
 
     def _look_at(self, state: FlightState) -> None:
@@ -138,13 +169,16 @@ class CalmTick:
         return min(ends_us)
 
 
+def _is_range(sample: Sample) -> bool:
+    return type(sample) is RangeSample
+
+
 def _is_calm(state: FlightState, config: FlightConfig) -> bool:
     """Whether nothing goes on that a calm tick does not know of."""
     vehicle, plan, r = state.vehicle, state.plan, state.cascade
     estimate = r.known
     return (
-        state.fusion is None
-        and vehicle.mode is Mode.TRAJECTORY
+        vehicle.mode is Mode.TRAJECTORY
         and vehicle.flies
         and not vehicle.restarts
         and vehicle.unloaded is None
@@ -154,7 +188,7 @@ def _is_calm(state: FlightState, config: FlightConfig) -> bool:
         and estimate.t_us == state.t_us
         and state.index >= 0
         and state.invalid_ticks == 0
-        and state.aiding is AIDED
+        and (state.fusion is not None or state.aiding is AIDED)
         and not (state.damage.rotor or state.damage.joint)
         and state.damage.health is HEALTHY
         and not r.flags & IMPAIRED

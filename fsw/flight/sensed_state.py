@@ -8,10 +8,9 @@ from typing import NamedTuple
 from fsw.control.cascade import Cascade, in_hover
 from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
-from fsw.estimation.error_state import Array, P
+from fsw.estimation.error_state import Array, Law, P
 from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start, copied
-from fsw.estimation.imu import IMU_TOO_OLD
-from fsw.estimation.kernels import Law
+from fsw.estimation.imu import IMU_SILENT, IMU_TOO_OLD
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
 from fsw.estimation.redundancy import NOBODY, Source, names
@@ -32,7 +31,6 @@ from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, Ti
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
 _EVERY_TICK = (_IMU, Sensor.ENCODERS)
-_IMU_SILENT = 0.008  # s; longer than the filter takes for jitter
 # rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
 # most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
 _HELD = (35.0, 70.0)
@@ -102,14 +100,12 @@ class SensedState:
                 model = UNKNOWN
         law = self._fusion.law
         started, watch, samples = _without_stuck(state, before, inputs.samples, law)
-        came = 0.0
-        if 0.0 <= before.imu_came < now - _IMU_SILENT:
-            came, samples = _without_late_imu(before, now, samples)
-        memory, estimate = self._fusion.take_in(
-            started, samples, now, pushed, watch, model, silent=came > 0.0
+        silent = 0.0 <= before.imu_came < now - IMU_SILENT and not any(
+            isinstance(one, ImuSample) and one.time >= now - IMU_TOO_OLD for one in samples
         )
-        if came:
-            memory = memory._replace(imu_came=came)
+        memory, estimate = self._fusion.take_in(
+            started, samples, now, pushed, watch, model, silent=silent
+        )
         caught = None
         if estimate is None and not state.cascade.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
@@ -276,21 +272,6 @@ def _report_noise(memory: FusionMemory, now: float, texts: list[StatusText]) -> 
             if health.is_news():
                 texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.NOISY)))
     return memory
-
-
-def _without_late_imu(
-    memory: FusionMemory, now: float, samples: tuple[Sample, ...]
-) -> tuple[float, tuple[Sample, ...]]:
-    """When an IMU that has been silent came last [s], and the samples without its new readings.
-
-    0 and the samples as they are if it comes again soon. After long the first new one is not used:
-    an IMU that says something now and then would be taken for one that is back each time.
-    """
-    new = [one for one in samples if isinstance(one, ImuSample) and one.time >= now - IMU_TOO_OLD]
-    if new and memory.imu_came >= now - _LATELY:
-        return 0.0, samples
-    others = tuple([one for one in samples if one not in new])
-    return now if new else memory.imu_came, others
 
 
 def _without_stuck(

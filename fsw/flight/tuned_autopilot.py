@@ -64,8 +64,9 @@ class TunedAutopilot:
             return self._loop(state.tuning).control(state, inputs)
         state, taken, texts = self._retune(state, inputs.tuning)
         begun = self._loop(state.tuning).control(state, inputs)
-        answer = replace(begun.answer, texts=(*texts, *begun.answer.texts), tuning_taken=taken)
-        return begun._replace(answer=answer)
+        so_far = begun.outputs
+        outputs = replace(so_far, texts=(*texts, *so_far.texts), tuning_taken=taken)
+        return begun._replace(outputs=outputs)
 
     def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
         """The rest of the tick; see Autopilot."""

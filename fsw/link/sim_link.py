@@ -39,7 +39,6 @@ from fsw.link.wire.px4_mode import custom_mode
 from fsw.measurements import ImuSample, Sample
 from fsw.ports import Clock, VehicleFacts
 from fsw.signals import (
-    Answer,
     CommandAck,
     CommandRequest,
     MessageSource,
@@ -47,6 +46,7 @@ from fsw.signals import (
     SensorFrame,
     Severity,
     StatusText,
+    TickOutputs,
 )
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
@@ -179,16 +179,16 @@ class SimLink:
         """Send texts with the next answer."""
         self._texts += texts
 
-    def send_actuators(self, t_us: int, answer: Answer) -> None:
+    def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Send the actuator command that belongs to the step of ``t_us``."""
         stamp_us = t_us + self._steps.ahead_us
-        controls = self._controls(stamp_us, answer)
+        controls = self._controls(stamp_us, outputs)
         due = t_us - self._reported_us >= _REPORT_US
-        changed = due or answer.mode is not self._reported_mode
-        texts = (*self._texts, *answer.texts) if self._texts else answer.texts
+        changed = due or outputs.mode is not self._reported_mode
+        texts = (*self._texts, *outputs.texts) if self._texts else outputs.texts
         routed = self._due(t_us) if self._routed else b""
         if self._acks or texts or changed or routed:
-            mode = self._mode(t_us, answer)
+            mode = self._mode(t_us, outputs)
             # Last, in the datagram of the controls: texts without room in it are of no use there.
             self._send((stamp_us, packed([mode, *self._replies(texts), routed + controls])))
         else:
@@ -352,19 +352,19 @@ class SimLink:
                 frames.append(self._writer.frame(message_ids.STATUSTEXT, *values))
         return frames
 
-    def _controls(self, stamp_us: int, answer: Answer) -> bytes:
+    def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
         values = encode_replies.hil_actuator_controls(
-            stamp_us, answer.actuators, self._thrust_scale, self._torque_scale
+            stamp_us, outputs.actuators, self._thrust_scale, self._torque_scale
         )
-        return self._controls_frames[answer.armed](*values)
+        return self._controls_frames[outputs.armed](*values)
 
-    def _mode(self, t_us: int, answer: Answer) -> bytes:
+    def _mode(self, t_us: int, outputs: TickOutputs) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
-        self._reported_us, self._reported_mode = t_us, answer.mode
-        base_mode = _CUSTOM_MODE | (_ARMED if answer.armed else 0)
-        status = _ACTIVE if answer.armed else _STANDBY
-        values = (custom_mode(answer.mode), _QUADROTOR, _PX4, base_mode, status, 3)
+        self._reported_us, self._reported_mode = t_us, outputs.mode
+        base_mode = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
+        status = _ACTIVE if outputs.armed else _STANDBY
+        values = (custom_mode(outputs.mode), _QUADROTOR, _PX4, base_mode, status, 3)
         return self._writer.frame(message_ids.HEARTBEAT, *values)
 
     def _ack_frame(self, ack: CommandAck) -> bytes:

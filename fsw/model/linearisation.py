@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsw.compiled import compiled, kernel, of_fixed_types
+from fsw.compiled import compiled, kernel, machine_code
 from fsw.model.body import ON_BASE, ON_LINK1, ON_LINK2
 from fsw.model.kinematics import body_axes, links
 from fsw.model.prediction import (
@@ -421,4 +421,4 @@ def _fill_arm_com(horizon: Horizon, i: int, com: Vec2, tracked: Tracked) -> None
         tracked.d_arm_com[i, at + 5] = c12 * gain
 
 
-_refill = of_fixed_types(_refilled)
+_refill = machine_code(_refilled)

@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from fsw.barriers.constraint_block import TargetPoints
-from fsw.compiled import compiled, of_fixed_types
+from fsw.compiled import compiled, machine_code
 from fsw.model.linearisation import Linearisation, Tracked
 from fsw.model.prediction import INPUTS, Q_ARM, Array
 from fsw.signals import Vec4
@@ -97,7 +97,7 @@ class TrackingCost:
             yaw_lead=weights.yaw_lead,
             target_velocity=1.0 if weights.relative_velocity else 0.0,
         )
-        self._add_tracking = of_fixed_types(_add_tracking)
+        self._add_tracking = machine_code(_add_tracking)
 
     def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.barriers.constraint_block import block
-from fsw.compiled import kernel, of_fixed_types
+from fsw.compiled import kernel, machine_code
 from fsw.model.linearisation import Linearisation
 from fsw.model.prediction import Q_ARM, QD_ARM, Array, CondensedModel
 from fsw.mpc.qp_data import InputLimits
@@ -51,4 +51,4 @@ def _fill_values(states: Array, value: Array) -> None:
             value[row + 4 + 2 * joint], value[row + 5 + 2 * joint] = -rate, rate
 
 
-_fill = of_fixed_types(_fill_values)
+_fill = machine_code(_fill_values)

@@ -153,6 +153,9 @@ class FlightConfig:
     # Farther from the plan than this, plan from the measurement.
     upset_distance: float = 0.15  # m
     upset_yaw: float = 0.35  # rad
+    # module:Name of what a study flies in place of ours; a vehicle flies its own.
+    own_planner: str = ""
+    own_controller: str = ""
 
     @property
     def mpc_period_us(self) -> int:

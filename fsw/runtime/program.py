@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 from fsw.link.events.event_log import EventLog
 from fsw.link.services.mission_store import MissionStore
 from fsw.ports import PlanningCycle, VehicleFacts
-from fsw.signals import Answer, TickInputs, TickOutputs
+from fsw.signals import TickInputs, TickOutputs
 
 if TYPE_CHECKING:
     # Its table of parameters imports everything that flies; a refusal need not wait for that.
@@ -22,8 +22,8 @@ class Answered(Protocol):
     """A tick whose command is decided."""
 
     @property
-    def answer(self) -> Answer:
-        """What the actuators get."""
+    def outputs(self) -> TickOutputs:
+        """What the actuators get, and what goes out with it."""
         ...
 
 

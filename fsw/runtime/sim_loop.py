@@ -33,7 +33,6 @@ from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
 from fsw.runtime.tick_runner import TickRunner
 from fsw.runtime.timing import GroupTimer, Histogram
 from fsw.signals import (
-    Answer,
     Command,
     CommandAck,
     CommandRequest,
@@ -128,8 +127,7 @@ class Cycle:
     release: Release
     planner: PlanService
     inputs: TickInputs = field(init=False)  # from RECEIVE on
-    answer: Answer = field(init=False)  # from TICK on
-    outputs: TickOutputs = field(init=False)  # from CONCLUDE on
+    outputs: TickOutputs = field(init=False)  # from TICK on; whole from CONCLUDE on
 
 
 class SimLoop(Generic[State]):
@@ -275,17 +273,17 @@ class SimLoop(Generic[State]):
         self._host_news = None
 
     def _control(self, cycle: Cycle) -> None:
-        cycle.answer = self._tick.control(cycle.inputs)
+        cycle.outputs = self._tick.control(cycle.inputs)
 
     def _actuate(self, cycle: Cycle) -> None:
-        t_us, answer = cycle.release.sensors.t_us, cycle.answer
+        t_us, outputs = cycle.release.sensors.t_us, cycle.outputs
         if self._sim.routed_acks:
             for ack in self._sim.routed_acks:
                 self._ground.acknowledge(t_us, ack)
             self._sim.routed_acks.clear()
-        if answer.acks:
-            self._acknowledge(t_us, cycle.inputs.commands, answer.acks)
-        self._sim.send_actuators(t_us, answer)
+        if outputs.acks:
+            self._acknowledge(t_us, cycle.inputs.commands, outputs.acks)
+        self._sim.send_actuators(t_us, outputs)
 
     def _acknowledge(
         self, t_us: int, commands: tuple[Command, ...], acks: tuple[CommandAck, ...]
@@ -301,10 +299,11 @@ class SimLoop(Generic[State]):
                 self._ground.acknowledge(t_us, ack)
 
     def _conclude(self, cycle: Cycle) -> None:
-        outputs = cycle.outputs = self._tick.conclude()
+        sent, outputs = cycle.outputs.texts, self._tick.conclude()
+        cycle.outputs = outputs
         self._vibration.add(cycle.release.sensors.gyro_B, cycle.release.sensors.accel_B)
-        if outputs.texts is not cycle.answer.texts:
-            self._sim.queue_texts(outputs.texts[len(cycle.answer.texts) :])
+        if outputs.texts is not sent:
+            self._sim.queue_texts(outputs.texts[len(sent) :])
         self._missions.observe(outputs.snapshot)
         self._happened.observe(cycle.inputs, outputs)
         if cycle.inputs.tuning is not None:

@@ -9,7 +9,7 @@ from typing import Final, Generic
 
 from fsw.periods import TICK_US
 from fsw.runtime.program import Answered, Conclude, Control, State
-from fsw.signals import Answer, Severity, StatusText, TickInputs, TickOutputs
+from fsw.signals import Severity, StatusText, TickInputs, TickOutputs
 
 MAX_FAILED_TICKS: Final = 10_000 // TICK_US  # as long as the estimate may be missing
 
@@ -47,7 +47,7 @@ class TickRunner(Generic[State]):
         self.control(inputs)
         return self.conclude()
 
-    def control(self, inputs: TickInputs) -> Answer:
+    def control(self, inputs: TickInputs) -> TickOutputs:
         """Run a tick up to its answer.
 
         Raises:
@@ -58,9 +58,9 @@ class TickRunner(Generic[State]):
             begun = self._control(self._state, inputs)
         except Exception as error:
             failed = self._begun = self._survived(error)
-            return _repeated(failed)
+            return failed
         self._begun = begun
-        return begun.answer
+        return begun.outputs
 
     def conclude(self) -> TickOutputs:
         """Run the rest of the tick.
@@ -94,8 +94,3 @@ class TickRunner(Generic[State]):
             texts=(StatusText(Severity.CRITICAL, text),),
             tuning_taken=None,
         )
-
-
-def _repeated(outputs: TickOutputs) -> Answer:
-    snapshot = outputs.snapshot
-    return Answer(outputs.actuators, snapshot.armed, snapshot.mode, texts=outputs.texts)

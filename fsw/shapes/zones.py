@@ -8,7 +8,7 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, kernel, of_fixed_types
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.geometry.vectors import add_scaled
 from fsw.shapes import BY_NAME, KINDS
 from fsw.shapes.kind import NUMBERS, Surface
@@ -160,7 +160,7 @@ def _shifts(
                 velocities[i, k, axis] = v_target[i, axis] if follows else velocity[axis]
 
 
-_surface_at, _fill_shifts = of_fixed_types(surface_at), of_fixed_types(_shifts)
+_surface_at, _fill_shifts = machine_code(surface_at), machine_code(_shifts)
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _NO_TARGET = EndEffectorTarget(0, _REST, _REST, _REST)
 

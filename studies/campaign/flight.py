@@ -11,7 +11,7 @@ from typing import Any
 
 from studies.campaign import keys, plan, values
 from studies.campaign.plan import CampaignPlan
-from studies.flight import closed_loop, job, mission, samples, sensor_faults
+from studies.flight import closed_loop, job, mission, own_parts, samples, sensor_faults
 from studies.flight.closed_loop import RefusedError
 from studies.flight.job import Outcome, fly_job, score, sources
 from studies.flight.kept_row import kept_row
@@ -20,7 +20,7 @@ from studies.flight.result import FlightResult
 
 def code() -> str:
     """Digest of everything but the packages that decides how a flight of a plan goes."""
-    shells = (keys, plan, values, closed_loop, sensor_faults, job, mission, samples)
+    shells = (keys, plan, values, closed_loop, own_parts, sensor_faults, job, mission, samples)
     return sources(*shells)
 
 

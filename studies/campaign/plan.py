@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, TypeAlias, cast
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias, cast
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
@@ -20,7 +20,13 @@ from fsw.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
 from sitl.ranges import Range
 from sitl.scenario import Scenario
-from sitl.scenario_file import ScenarioError, build_table, load_scenario, suite_of
+from sitl.scenario_file import (
+    ScenarioError,
+    build_table,
+    load_scenario,
+    points_file,
+    suite_of,
+)
 from sitl.scenario_validation import check
 from sitl.sensors.keys import SuiteName
 from studies.campaign.keys import (
@@ -51,6 +57,7 @@ from studies.campaign.values import (
     seed_of,
 )
 from studies.flight.job import Job
+from studies.flight.own_parts import OwnPartError, with_parts
 
 EXAMPLE: Final = Path(__file__).parent / "example.toml"
 Values: TypeAlias = tuple[tuple[str, float], ...]  # of the varied keys, in their order
@@ -62,6 +69,16 @@ _FAILING: Final = (*SENSORS, "motor", "joint")
 _MOST_BYTES: Final = 256 * 1024
 _DISTRIBUTIONS: Final = ("uniform", "normal", "choice")
 _DIGEST_DIGITS: Final = 32
+
+
+class OwnNames(NamedTuple):
+    """Parts of the user's, ``module:Name``; empty: ours."""
+
+    planner: str = ""
+    controller: str = ""
+
+
+OURS: Final = OwnNames()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +96,9 @@ class _Keys:
     allow_inconsistent: bool = False
     without_fault: bool = True  # beside those with the faults
     time_limit_s: Annotated[float, Range(1.0, 86400.0)] = 0.0  # of the machine; 0: by duration
+    # module:Name of a planner and a control law in place of ours; empty: ours.
+    own_planner: str = ""
+    own_controller: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +156,8 @@ class CampaignPlan:
     bases: tuple[Flown, ...]  # of the cases, before anything varies
     varied: tuple[Varied, ...]
     time_limit_s: float  # that a flight may take on its machine
-    files: tuple[str, ...] = field(default=(), compare=False)  # scenarios beside the file
+    files: tuple[str, ...] = field(default=(), compare=False)  # scenarios and points beside it
+    head: str = field(default="", compare=False)  # lines that were flown as if the file had them
 
     @cached_property
     def digest(self) -> str:
@@ -201,17 +222,21 @@ class CampaignPlan:
         )
 
 
-def load_plan(path: Path) -> CampaignPlan:
+def load_plan(path: Path, own: OwnNames = OURS) -> CampaignPlan:
     """Read a campaign file; scenarios by path are looked for beside it.
+
+    ``own`` parts are flown as if the file named them.
 
     Raises:
         CampaignError: It cannot be read, an unknown key, or an impossible value.
     """
-    return load_tables(path, ())[0]
+    return load_tables(path, (), own)[0]
 
 
-def load_tables(path: Path, own: tuple[str, ...]) -> tuple[CampaignPlan, dict[str, Any]]:
-    """Read a campaign file that has tables of its reader's ``own`` beside the campaign.
+def load_tables(
+    path: Path, more: tuple[str, ...], own: OwnNames = OURS
+) -> tuple[CampaignPlan, dict[str, Any]]:
+    """Read a campaign file that has ``more`` tables, of its reader's, beside the campaign.
 
     Raises:
         CampaignError: As of ``load_plan``.
@@ -222,8 +247,14 @@ def load_tables(path: Path, own: tuple[str, ...]) -> tuple[CampaignPlan, dict[st
         raise CampaignError(f"cannot read campaign {path}: {error.strerror}") from None
     try:
         table = _table(content.decode("utf-8"))
-        found = {key: table.pop(key) for key in own if key in table}
-        return plan_of(table, path.stem, path.parent), found
+        found = {key: table.pop(key) for key in more if key in table}
+        head = ""
+        for key, part in (("own_planner", own.planner), ("own_controller", own.controller)):
+            if part and table.setdefault(key, part) != part:
+                raise CampaignError(f'{key} = "{table[key]}": not flown with "{part}"')
+            head += f'{key} = "{part}"\n' if part and key not in content.decode() else ""
+        plan = plan_of(table, path.stem, path.parent)
+        return replace(plan, head=head), found
     except UnicodeDecodeError:
         raise CampaignError(f"campaign {path} is not TOML: it is not UTF-8") from None
     except CampaignError as error:
@@ -273,7 +304,8 @@ def _plan(
     ):
         found = _scenario(scenario, suite, folder, keys.duration_s, named.get(fate))
         config = _config(controller, keys, found, fixed)
-        cases.append(Case(scenario, suite_of(found), controller, fate))
+        flown_by = keys.own_controller or keys.own_planner or controller
+        cases.append(Case(scenario, suite_of(found), flown_by, fate))
         bases.append(Flown(found, config))
     if len(set(cases)) < len(cases):
         raise CampaignError("a scenario, suite, controller or fault is named twice")
@@ -300,8 +332,15 @@ def _plan(
         bases=tuple(bases),
         varied=varied,
         time_limit_s=keys.time_limit_s or 900.0 + 10.0 * longest,
-        files=tuple(one for one in keys.scenarios if one.endswith(".toml")),
+        files=_files(keys.scenarios, folder),
     )
+
+
+def _files(scenarios: tuple[str, ...], folder: Path) -> tuple[str, ...]:
+    """Scenarios beside the campaign file, and the points that they name beside themselves."""
+    found = [name for name in scenarios if name.endswith(".toml")]
+    points = [points_file(folder / name) for name in found]
+    return (*found, *(str(one.relative_to(folder)) for one in points if one is not None))
 
 
 def _scenario(
@@ -343,7 +382,10 @@ def _config(
     config = tuned(config, fixed)
     for sentence in contradictions(config):
         raise CampaignError(f"{PARAMETERS}: {sentence}")
-    return config
+    try:
+        return with_parts(config, keys.own_planner, keys.own_controller)
+    except OwnPartError as error:
+        raise CampaignError(str(error)) from None
 
 
 def _parameters(table: Any) -> tuple[tuple[str, float], ...]:

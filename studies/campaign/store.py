@@ -175,7 +175,8 @@ def begin(directory: Path, source: Path, plan: CampaignPlan, flights: int | None
                 (directory / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source.parent / name, directory / name)
         if source.resolve() != (directory / PLAN).resolve():
-            shutil.copyfile(source, directory / PLAN)
+            text = source.read_text(encoding="utf-8")
+            (directory / PLAN).write_text(plan.head + text, encoding="utf-8")
         write_facts(directory, plan, asked, journal.seal)
     return asked
 

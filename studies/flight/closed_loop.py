@@ -9,8 +9,8 @@ mode commands of the scenario's pilot come on the first two ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from fsw.flight.calm_tick import CalmTick
 from fsw.flight.state import FlightState
 from fsw.measurements import Sample, Vec2, Vec4
 from fsw.model.airframe import Airframe
-from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.ports import PlanningCycle, PlanService
 from fsw.signals import (
@@ -40,15 +39,16 @@ from fsw.signals import (
     TickOutputs,
 )
 from sitl.scenario import Scenario
+from sitl.scenario_file import ScenarioError
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from studies.flight.collector import collector_off
 from studies.flight.mission import announced, moves, target
+from studies.flight.own_parts import OURS, OwnParts, planner_of
 from studies.flight.result import (
     TRACE_STEPS,
     FlightRecorder,
     FlightResult,
     TracePoint,
-    processor_time_us,
     touched,
 )
 from studies.flight.samples import only_the_time, sample
@@ -65,6 +65,8 @@ _FOLLOW = Command(
 FIRST_COMMANDS = ((_ARM,), (_FOLLOW,))  # of the first ticks
 
 State = TypeVar("State")
+Seen: TypeAlias = Callable[[Simulation, TickInputs, TickOutputs], None]
+"""Looks at a tick before the plant moves on."""
 
 
 @dataclass
@@ -78,22 +80,8 @@ class ClosedLoop(Generic[State]):
     airframe: Airframe
 
     def observe(self) -> tuple[SensorFrame, tuple[Sample, ...]]:
-        """Sensor readings of this step, and what arrived from a suite of sensors.
-
-        With a suite the readings are little more than the time.
-        """
-        simulation = self.simulation
-        arrived = simulation.measurements()
-        if arrived is not None:
-            samples = tuple([sample(one) for one in arrived])
-            return only_the_time(simulation.sensor_time_us, samples), samples
-        now = simulation.sense()
-        (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
-        # By position: keywords take a third longer, in every step.
-        frame = SensorFrame(
-            now.t_us, now.p_WB, now.v_WB, now.q_WB, now.gyro_B, now.accel_B, (q1, q2), (qd1, qd2)
-        )
-        return frame, ()
+        """See :func:`readings`."""
+        return readings(self.simulation)
 
     def sense(self) -> SensorFrame:
         """The first part of :meth:`observe`."""
@@ -133,21 +121,49 @@ class ClosedLoop(Generic[State]):
         self, inputs: TickInputs, before_advancing: Callable[[TickOutputs], None] | None = None
     ) -> TickOutputs:
         """Tick, plan, advance; ``before_advancing`` may set what pushes the plant meanwhile."""
-        self.state, outputs = self.tick(self.state, inputs)
-        if outputs.plan_request is not None:
-            self.planner.submit(outputs.plan_request)
+        outputs = self.respond(inputs)
         if before_advancing is not None:
             before_advancing(outputs)
         self.simulation.advance(self.controls(outputs.actuators, armed=outputs.mode.armed))
         return outputs
 
+    def respond(self, inputs: TickInputs) -> TickOutputs:
+        """Tick and plan: all of :meth:`step` but the plant's part."""
+        self.state, outputs = self.tick(self.state, inputs)
+        if outputs.plan_request is not None:
+            self.planner.submit(outputs.plan_request)
+        return outputs
+
     def controls(self, command: tuple[Vec4, Vec2], *, armed: bool) -> Controls:
-        """The shares of full thrust and torque that a ``command`` [N, N m] is."""
-        # Written out: each generator would take longer than all of this.
-        (f1, f2, f3, f4), (t1, t2) = command
-        force, torque = self.airframe.rotor_thrust_max, self.airframe.joint_torque_max
-        thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
-        return Controls(thrust, (t1 / torque, t2 / torque), armed)
+        """See :func:`controls`."""
+        return controls(self.airframe, command, armed=armed)
+
+
+def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
+    """Sensor readings of this step, and what arrived from a suite of sensors.
+
+    With a suite the readings are little more than the time.
+    """
+    arrived = simulation.measurements()
+    if arrived is not None:
+        samples = tuple([sample(one) for one in arrived])
+        return only_the_time(simulation.sensor_time_us, samples), samples
+    now = simulation.sense()
+    (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
+    # By position: keywords take a third longer, in every step.
+    frame = SensorFrame(
+        now.t_us, now.p_WB, now.v_WB, now.q_WB, now.gyro_B, now.accel_B, (q1, q2), (qd1, qd2)
+    )
+    return frame, ()
+
+
+def controls(airframe: Airframe, command: tuple[Vec4, Vec2], *, armed: bool) -> Controls:
+    """The shares of full thrust and torque that a ``command`` [N, N m] is."""
+    # Written out: each generator would take longer than all of this.
+    (f1, f2, f3, f4), (t1, t2) = command
+    force, torque = airframe.rotor_thrust_max, airframe.joint_torque_max
+    thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
+    return Controls(thrust, (t1 / torque, t2 / torque), armed)
 
 
 class CalmStretch:
@@ -178,7 +194,7 @@ class CalmStretch:
             if simulation.ended is not None:
                 break
         if flown:
-            loop.state = calm.after(before, r, flown)
+            loop.state = calm.after(before, r, ticks=flown)
         return simulation.ended is None
 
 
@@ -208,40 +224,62 @@ class InlinePlanner:
         """Nothing to stop."""
 
 
-@collector_off()
-def simulate(
-    scenario: Scenario,
-    seed: int,
-    config: FlightConfig,
-    *,
-    fault: Fault | None = None,
-    traced: bool = False,
-    asked: Callable[[PlanRequest], None] | None = None,
-) -> FlightResult:
-    """Fly a scenario that starts in the air, with a trajectory plan, to its end.
+class ScenarioFlight:
+    """A scenario that starts in the air, with a trajectory plan, and what flies it, step by step.
 
-    A ``fault`` is one of a sensor; ``traced`` keeps the truth every TRACE_STEPS steps; ``asked``
-    receives every request to the planner.
-
-    Raises:
-        RefusedError: The vehicle refused to arm or to follow.
+    Of a step, :meth:`respond` is the flight software's part, then the plant moves, and
+    :meth:`conclude` writes down what happened.
     """
-    simulation, recorder = Simulation(scenario, seed), FlightRecorder()
-    planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
-    autopilot = Autopilot(config)
-    loop = ClosedLoop(simulation, autopilot.tick, FlightState(), planner, config.airframe)
-    # A trace is of every so many ticks, and a fault of a sensor may be in each.
-    stretch = CalmStretch(loop, autopilot.calm, allowed=fault is None and not traced)
-    steps_per_plan = config.mpc_period_us // config.tick_period_us
-    faulty, mode = FaultySensors(fault, seed), Mode.TRAJECTORY
-    while stretch.fly():
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        config: FlightConfig,
+        seed: int = 0,
+        *,
+        parts: OwnParts = OURS,
+        fault: Fault | None = None,
+        traced: bool = False,
+        asked: Callable[[PlanRequest], None] | None = None,
+        seen: Seen | None = None,
+    ) -> None:
+        """The arguments are those of :func:`simulate`.
+
+        Raises:
+            ScenarioError: The body of the configuration starts outside the safe set.
+            OwnPartError: A part cannot be used.
+        """
+        check_body(simulation.scenario, config)
+        self.recorder = FlightRecorder()
+        self.planner = InlinePlanner(planner_of(config, parts))
+        self.autopilot = Autopilot(config)
+        law = parts.law(self.autopilot, simulation.clock, self.recorder)
+        tick = self.autopilot.tick if law is None else law.tick
+        self.loop = ClosedLoop(simulation, tick, FlightState(), self.planner, config.airframe)
+        # Somebody looks at each tick, or has a part in it; a fault of a sensor may be in each.
+        self.may_be_calm = law is None and seen is None and fault is None and not traced
+        self._steps_per_plan = config.mpc_period_us // config.tick_period_us
+        self._fault, self._faulty = fault, FaultySensors(fault, seed)
+        self._traced, self._asked, self._seen = traced, asked, seen
+        self._mode, self._stamp_us = Mode.TRAJECTORY, START_US
+
+    def step(self) -> None:
+        """All of one step."""
+        outputs, loop = self.respond(), self.loop
+        loop.simulation.advance(loop.controls(outputs.actuators, armed=outputs.mode.armed))
+        self.conclude(outputs)
+
+    def respond(self) -> TickOutputs:
+        """Sense, tick and plan."""
+        loop, recorder, simulation = self.loop, self.recorder, self.loop.simulation
         step = simulation.step
         sensors, samples = loop.observe()
-        if fault is not None:
-            samples = faulty.samples(samples)
+        if self._fault is not None:
+            samples = self._faulty.samples(samples)
             exact = simulation.measurements() is None
-            sensors = faulty.frame(sensors) if exact else only_the_time(sensors.t_us, samples)
-        answer = planner.take(sensors.t_us)
+            sensors = self._faulty.frame(sensors) if exact else only_the_time(sensors.t_us, samples)
+        self._stamp_us = sensors.t_us
+        answer = self.planner.take(sensors.t_us)
         if answer is not None:
             recorder.planned(answer)
         inputs = TickInputs(
@@ -252,37 +290,92 @@ def simulate(
             announced=loop.announced(),
             samples=samples,
         )
-        if traced and step % TRACE_STEPS == 0:
+        if self._traced and step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
-        outputs = loop.step(inputs)
+        outputs = loop.respond(inputs)
+        if self._seen is not None:
+            self._seen(simulation, inputs, outputs)
+        return outputs
+
+    def conclude(self, outputs: TickOutputs) -> None:
+        """Write down what a step has brought; see :meth:`respond`.
+
+        Raises:
+            RefusedError: The vehicle refused to arm or to follow.
+        """
+        recorder, simulation = self.recorder, self.loop.simulation
+        step, t_us = simulation.step - 1, self._stamp_us
         if outputs.acks:
             _insist(outputs)
         if outputs.texts:
-            time_s = 1e-6 * (sensors.t_us - START_US)
+            time_s = 1e-6 * (t_us - START_US)
             recorder.texts += [(time_s, one.text) for one in outputs.texts]
-        if outputs.mode is not mode and step >= len(FIRST_COMMANDS):
-            mode = outputs.mode
-            recorder.modes.append(mode.value)
+        if outputs.mode is not self._mode and step >= len(FIRST_COMMANDS):
+            self._mode = outputs.mode
+            recorder.modes.append(self._mode.value)
             # As the scenario's pilot would, who looks on.
-            why = f"the vehicle left the trajectory for {mode.value}"
-            why += _other_body(scenario, config)
-            simulation.leave_trajectory(sensors.t_us, why)
-        if step % steps_per_plan == 0 and outputs.snapshot.plan_input is not None:
+            simulation.leave_trajectory(
+                t_us, f"the vehicle left the trajectory for {self._mode.value}"
+            )
+        if step % self._steps_per_plan == 0 and outputs.snapshot.plan_input is not None:
             recorder.metrics.add(outputs.snapshot.plan_input)
-        if outputs.plan_request is not None and asked is not None:
-            asked(outputs.plan_request)
-    return FlightResult(simulation.result(), recorder, touched(simulation.ended))
+        if outputs.plan_request is not None and self._asked is not None:
+            self._asked(outputs.plan_request)
+
+    def result(self) -> FlightResult:
+        """What the flight leaves."""
+        simulation = self.loop.simulation
+        return FlightResult(simulation.result(), self.recorder, touched(simulation.ended))
 
 
-def _other_body(scenario: Scenario, config: FlightConfig) -> str:
-    """What may be the reason where another body keeps clear than the scenario is made for."""
+@collector_off()
+def simulate(
+    scenario: Scenario,
+    seed: int,
+    config: FlightConfig,
+    *,
+    fault: Fault | None = None,
+    traced: bool = False,
+    asked: Callable[[PlanRequest], None] | None = None,
+    parts: OwnParts = OURS,
+    seen: Seen | None = None,
+) -> FlightResult:
+    """Fly a scenario that starts in the air, with a trajectory plan, to its end.
+
+    A ``fault`` is one of a sensor; ``traced`` keeps the truth every TRACE_STEPS steps; ``asked``
+    receives every request to the planner, and ``seen`` every tick before the plant moves on.
+    ``parts`` take the place of ours.
+
+    Raises:
+        RefusedError: The vehicle refused to arm or to follow.
+        ScenarioError: The body of the configuration starts outside the safe set.
+        OwnPartError: A part cannot be used.
+    """
+    simulation = Simulation(scenario, seed, parts.pushes())
+    more: Any = {"fault": fault, "traced": traced, "asked": asked, "seen": seen}
+    flight = ScenarioFlight(simulation, config, seed, parts=parts, **more)
+    stretch = CalmStretch(flight.loop, flight.autopilot.calm, allowed=flight.may_be_calm)
+    while stretch.fly():
+        flight.step()
+    return flight.result()
+
+
+def check_body(scenario: Scenario, config: FlightConfig) -> None:
+    """Refuse a configuration whose body is outside of the safe set where the scenario begins.
+
+    Raises:
+        ScenarioError: With the constraint, its margin and what to do.
+    """
     body = config.planner.body
     if body == scenario.body:
-        return ""
-    return (
-        f" (body {body!r} keeps clear, the scenario is for {scenario.body!r}: "
-        f"flight_config(body={scenario.body!r}))"
-    )
+        return
+    try:
+        Simulation(replace(scenario, body=body), 0)
+    except ScenarioError as error:
+        raise ScenarioError(
+            f"body {body!r} keeps clear, the scenario is for {scenario.body!r}: {error}; use "
+            f"flight_config(body={scenario.body!r})"
+        ) from None
 
 
 def _trace_point(simulation: Simulation) -> TracePoint:

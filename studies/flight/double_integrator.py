@@ -19,7 +19,6 @@ from fsw.geometry.vectors import add_scaled, subtract
 from fsw.model.airframe import AIRFRAME
 from fsw.model.kinematics import end_effector_when_level
 from fsw.model.nominal import REST_STATE
-from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState
 from sitl.disturbances.items import push
@@ -32,12 +31,12 @@ from sitl.scenario_validation import check
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
 from studies.flight.collector import collector_off
 from studies.flight.mission import safe_set, target
+from studies.flight.own_parts import planner_of
 from studies.flight.result import (
     TRACE_STEPS,
     FlightRecorder,
     FlightResult,
     TracePoint,
-    processor_time_us,
     touched,
 )
 
@@ -142,7 +141,7 @@ def simulate(
     ``AttitudeLag(at_once=True)``. ``traced`` keeps the truth for figures.
     """
     plant = DoubleIntegrator(scenario, seed)
-    planner = Planner(config.planner, config.airframe, processor_time_us)
+    planner = planner_of(config)
     brake = Brake(config.airframe, config.planner.limits.tilt)
     recorder = FlightRecorder()
     held, running = safe_set(scenario), None

@@ -35,6 +35,14 @@ def fly_command(
     program: str, job: Job, controller: str, scenario: Path, params: Path | None
 ) -> str:
     """The command that flies the same over the link: equal but for what the link rounds."""
+    config = job.config
+    if config.own_planner or config.own_controller:
+        given = [repr(str(scenario)), str(job.seed)]
+        given += [f"params={str(params)!r}"] if params is not None else []
+        for name in ("planner", "controller"):
+            part = getattr(config, f"own_{name}").partition("@")[0]
+            given += [f"{name}={part!r}"] if part else []
+        return f'python -c "import pandion; print(pandion.fly({", ".join(given)}))"'
     words = [program, "fly", str(scenario), f"--seed={job.seed}"]
     if params is not None:
         words.append(f"--params={params}")

@@ -19,7 +19,14 @@ from fsw.parameters.flight_config import FlightConfig
 from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from sitl.sensors.keys import MeasuredSensors
-from studies.flight import closed_loop, double_integrator, mission, samples, sensor_faults
+from studies.flight import (
+    closed_loop,
+    double_integrator,
+    mission,
+    own_parts,
+    samples,
+    sensor_faults,
+)
 from studies.flight.kept_row import kept_row
 from studies.flight.result import FlightResult
 from studies.flight.sensor_faults import Fault
@@ -170,4 +177,4 @@ def sources(*shells: ModuleType) -> str:
     return digest.hexdigest()
 
 
-_SHELLS: Final = (closed_loop, double_integrator, sensor_faults, mission, samples)
+_SHELLS: Final = (closed_loop, double_integrator, sensor_faults, mission, samples, own_parts)

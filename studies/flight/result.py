@@ -46,6 +46,7 @@ class FlightRecorder:
     trace: list[TracePoint] = field(default_factory=list)  # empty unless asked for
     texts: list[tuple[float, str]] = field(default_factory=list)  # s, what an operator reads
     modes: list[str] = field(default_factory=list)  # that the vehicle changed to by itself
+    overridden_s: float = 0.0  # for which our autopilot flew in place of an own controller
 
     def planned(self, answer: Plan | PlanFailure) -> None:
         """Account for one planning step."""

@@ -19,6 +19,7 @@ from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from studies.flight.job import PlantName
+from studies.flight.own_parts import with_parts
 
 Case = Literal["I", "II"]
 Family = Literal["walls", "dash"]
@@ -157,6 +158,21 @@ def entrants(
         [Entrant("paper", name, config) for name, config in paper]
         + [Entrant("like-for-like", name, config) for name, config in fair]
     )
+
+
+def own_entrant(
+    plant: PlantName, inner: Inner, planner: str, controller: str
+) -> tuple[Entrant, ...]:
+    """Parts of the user's, ``module:Name``, as one more of those that have what ``blf`` has.
+
+    Raises:
+        OwnPartError: There is no such part.
+    """
+    if not (planner or controller):
+        return ()
+    name = (controller or planner).partition(":")[2]
+    config = with_parts(configuration(plant, "blf", inner), planner, controller)
+    return (Entrant("like-for-like", name, config),)
 
 
 def softened(hc: FlightConfig) -> FlightConfig:

@@ -26,6 +26,9 @@ class Settings:
     # Cells of the study of robustness; None: all.
     suite: str | None = None  # flown with this one
     only: str | None = None  # with this in their name
+    # module:Name of the user's, flown as one more controller of Table IV; empty: none.
+    own_planner: str = ""
+    own_controller: str = ""
 
     @property
     def tuned_on(self) -> tuple[int, ...]:

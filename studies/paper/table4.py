@@ -9,7 +9,16 @@ from sitl.scenario import Scenario
 from studies.campaign.campaign import Campaign
 from studies.flight.job import Outcome
 from studies.paper import published, summary
-from studies.paper.cases import CASES, Case, Entrant, Family, entrants, reference_floor_m, scenario
+from studies.paper.cases import (
+    CASES,
+    Case,
+    Entrant,
+    Family,
+    entrants,
+    own_entrant,
+    reference_floor_m,
+    scenario,
+)
 from studies.paper.deviations import deviations
 from studies.paper.settings import Report, Settings, Table
 from studies.paper.summary import Summary, fly_cells
@@ -42,7 +51,12 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
         )
         for disturbed in (False, True)
         for case in CASES
-        for entrant in entrants(case, settings.plant, settings.inner, settings.family)
+        for entrant in (
+            *entrants(case, settings.plant, settings.inner, settings.family),
+            *own_entrant(
+                settings.plant, settings.inner, settings.own_planner, settings.own_controller
+            ),
+        )
     ]
     cells = [(entry.flown, entry.entrant.config) for entry in entries]
     summaries, errors = fly_cells(campaign, settings, cells)

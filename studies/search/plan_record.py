@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.model.prediction import Array
-from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.shapes.zones import NO_ZONES, moving_zones
 from fsw.signals import PlanInput, PredictionState, TickInputs, TickOutputs
@@ -26,7 +25,7 @@ from sitl.disturbances.items import Push
 from sitl.scenario import Scenario
 from sitl.simulation import Simulation
 from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
-from studies.flight.result import processor_time_us
+from studies.flight.own_parts import planner_of
 
 STATE, INPUT = 19, 6  # numbers of a plan's state and input in a row
 EVERY = 50  # ticks between two starts
@@ -133,7 +132,7 @@ def fly(
     """
     config = replace(config, limits=replace(config.limits, breach_action=_WARN))
     simulation = Simulation(scenario, 0, more)
-    planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
+    planner = InlinePlanner(planner_of(config))
     loop = ClosedLoop(simulation, Autopilot(config).tick, FlightState(), planner, config.airframe)
     while simulation.ended is None and (last_step is None or simulation.step <= last_step):
         step, sensors = simulation.step, loop.sense()

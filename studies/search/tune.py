@@ -26,7 +26,7 @@ from sitl.scenario_file import ScenarioError, build_table
 from studies.campaign.campaign import Campaign
 from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.keys import PARAMETERS, CampaignError, Flown, nearest
-from studies.campaign.plan import CampaignPlan, load_tables
+from studies.campaign.plan import OURS, CampaignPlan, OwnNames, load_tables
 from studies.campaign.randomness import seeded, spread
 from studies.statistics.binomial import bounds, flights_for
 
@@ -170,13 +170,13 @@ class Outcome:
         return self.judged is not None and self.judged.better
 
 
-def load_task(path: Path) -> Task:
-    """Read a campaign file with a table ``tune``.
+def load_task(path: Path, parts: OwnNames = OURS) -> Task:
+    """Read a campaign file with a table ``tune``, flown with ``parts`` of the user's.
 
     Raises:
         CampaignError: As a campaign file, or what is to be tuned makes no sense.
     """
-    plan, own = load_tables(path, (TABLE,))
+    plan, own = load_tables(path, (TABLE,), parts)
     try:
         return _task(plan, own.get(TABLE))
     except (CampaignError, ScenarioError) as error:

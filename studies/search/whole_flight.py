@@ -20,7 +20,6 @@ import numpy as np
 from fsw.flight.autopilot import Autopilot
 from fsw.flight.state import FlightState
 from fsw.model.prediction import Array
-from fsw.mpc.planner import Planner
 from fsw.parameters.flight_config import FlightConfig
 from fsw.signals import Mode, PredictionState, TickInputs, TickOutputs
 from sitl.disturbances.sequence import Steered
@@ -28,7 +27,7 @@ from sitl.result import EndKind
 from sitl.scenario import V3, Scenario
 from sitl.simulation import STEP_US, Simulation, Truth
 from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
-from studies.flight.result import processor_time_us
+from studies.flight.own_parts import planner_of
 from studies.search.tracked_flight import Disturbance
 
 _GRAVITY = np.array([0.0, 0.0, 9.81])  # m/s², NED
@@ -53,7 +52,7 @@ class WholeFlight:
         self._push = Steered()
         calm = replace(scenario, disturbances=())
         self._simulation = Simulation(calm, 0, (self._push,))
-        self._planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
+        self._planner = InlinePlanner(planner_of(config))
         tick = Autopilot(config).tick
         self._loop = ClosedLoop(
             self._simulation, tick, FlightState(), self._planner, config.airframe

@@ -29,7 +29,7 @@ from pandion.certify import CertifyOptions
 from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions
 from pandion.falsify import FalsifyOptions
-from pandion.fly import FlyOptions
+from pandion.fly_verb import FlyOptions
 from pandion.replay import ReplayOptions
 from pandion.report import ReportOptions
 from pandion.reproduce import ReproduceOptions

@@ -15,6 +15,7 @@ from studies.fault_matrix.flights import beside_the_wall_text, fly
 from tests.closed_loop.harness import ARM, Flight, command
 
 SECONDS = 9.0  # from the fault on; a landing takes five
+LOW = 0.42  # m: rotors do not explain what legs feel that are below 0.1 m
 
 in_long = pytest.mark.long
 
@@ -22,15 +23,15 @@ in_long = pytest.mark.long
 def begun(scenario: Scenario, seed: int, seconds: float) -> Flight:
     """A flight to the fault; satellites alone are off by as much as it is high and from the wall.
 
-    Where their first position is on the ground or behind the wall, it is over before anything has
-    failed, and is drawn again.
+    Where their first position is behind the wall, it is over before anything has failed, and is
+    drawn again; so it is where the legs are so low that nobody is compared (docs/decisions/0041).
     """
     for draw in range(9 if scenario.sensors.suite == "gnss" else 1):
         flight = Flight(scenario, seed=seed + 100 * draw)
         flight.step(command(ARM, 1.0, 21196.0))
         while flight.sim.ended is None and flight.sim.step * STEP_US < 1e6 * seconds:
             flight.step()
-        if flight.sim.ended is None:
+        if flight.sim.ended is None and -flight.sim.truth().p_WB[2] > LOW:
             break
     assert flight.sim.ended is None, f"before the fault: {flight.sim.ended}"
     return flight

@@ -20,8 +20,8 @@ PAGES = (
     ROOT / "README.md",
     ROOT / "CHANGELOG.md",
     ROOT / "messages" / "README.md",
-    # docs/reference/api is written by Sphinx.
-    *sorted(page for page in DOCS.rglob("*.md") if page.parent != DOCS / "reference" / "api"),
+    # docs/reference/api and the pages of notebooks are written by Sphinx.
+    *sorted(page for page in DOCS.rglob("*.md") if page.parent.name not in ("api", "notebooks")),
 )
 MARKS = ("long", "not run", "run in", "added to")
 _OPEN = re.compile(r"^(`{3,})\s*(\S*)")

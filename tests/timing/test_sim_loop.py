@@ -31,7 +31,6 @@ from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEM
 from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from fsw.signals import (
-    Answer,
     CommandAck,
     CommandRequest,
     CommandResult,
@@ -61,7 +60,7 @@ class Sim(VirtualSensors):
 
     pacing: Pacing = Pacing.REALTIME
     done: list[str] = field(default_factory=list)  # shared by all parts
-    answers: list[tuple[int, Answer]] = field(default_factory=list)  # at, what
+    answers: list[tuple[int, TickOutputs]] = field(default_factory=list)  # at, what
     notices: list[StatusText] = field(default_factory=list)
     routed_acks: list[CommandAck] = field(default_factory=list)
     routed: list[CommandRequest] = field(default_factory=list)
@@ -76,7 +75,7 @@ class Sim(VirtualSensors):
         self.done.append("sensors")
         return super().newest()
 
-    def send_actuators(self, t_us: int, answer: Answer) -> None:
+    def send_actuators(self, t_us: int, answer: TickOutputs) -> None:
         self.done.append("actuators")
         self.answers.append((self.time.now_us, answer))
 

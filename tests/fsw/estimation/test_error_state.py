@@ -13,17 +13,25 @@ from numpy.typing import NDArray
 from fsw.compiled import packed
 from fsw.estimation import fusion
 from fsw.estimation.error_state import (
+    BA,
     BARO,
     BG,
     DELAY,
     ERRORS,
     FILTER,
+    FORCE_MADE,
+    LOST,
+    MADE_LASTS,
+    MODELLED,
+    NO_FORCE,
     TH,
+    TIME,
     correct,
     distance,
     inject,
     integrated,
     propagate,
+    step_to,
     transition,
 )
 from fsw.estimation.tuning import EstimatorTuning
@@ -215,3 +223,24 @@ def test_integrating_exact_readings_follows_the_flight() -> None:
     np.testing.assert_allclose(p, truth.p[-1], atol=2e-5)
     np.testing.assert_allclose(v, truth.v[-1], atol=2e-5)
     assert abs(np.dot(q, truth.q[-1])) > 1.0 - 1e-10
+
+
+@pytest.mark.parametrize(("made", "most"), [(FORCE_MADE, 1.2), (0, math.inf)])
+def test_what_rotors_do_not_know_of_a_force_does_not_grow_without_bound(
+    made: int, most: float
+) -> None:
+    """Else satellites tell no tilt from it: one vehicle in twenty without its unit fell over."""
+    x = some_state()[0]
+    x["model_walk"] = 3.0, 0.15
+    rows = np.zeros((2, 8))
+    rows[:, LOST] = NO_FORCE | MODELLED | made
+    walked = 0.0
+    for _ in range(1500):
+        rows[1, TIME] = x["time"] + TICK
+        step_to(x, LAW, rows[1], rows[0], x["covariance"])
+        walked += 9.0 * TICK
+    stays = 9.0 * 0.5 * MADE_LASTS
+    variance = x["covariance"][BA, BA]
+    assert variance <= most * stays
+    assert math.isfinite(most) or variance > 0.9 * walked
+    assert np.all(np.linalg.eigvalsh(x["covariance"]) > -1e-9)

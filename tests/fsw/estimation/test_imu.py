@@ -11,6 +11,7 @@ from fsw.compiled import packed
 from fsw.estimation.error_state import (
     FILTER,
     FORCE,
+    FORCE_MADE,
     LOST,
     MODELLED,
     NO_FORCE,
@@ -166,7 +167,8 @@ def test_what_stays_where_it_jumped_to_in_flight_is_believed_when_others_say_so(
     unit = Unit()
     for _ in range(200):
         assert unit.read(**{name: said()}, model=FLIES) is SensorFault.JUMP  # type: ignore[arg-type]
-    assert unit.last[LOST] == half | MODELLED
+    made = FORCE_MADE if half == NO_FORCE else 0
+    assert unit.last[LOST] == half | MODELLED | made
     unit.x.believed = half
     assert unit.read(**{name: said()}, model=FLIES) is SensorFault.NONE  # type: ignore[arg-type]
     unit.x.believed = 0
@@ -185,7 +187,7 @@ def test_a_half_that_is_out_is_replaced_and_of_a_suspect_only_the_bias_is_unknow
     np.testing.assert_array_equal(unit.last[FORCE : FORCE + 6], (1.0, 2.0, -9.0, 0.1, 0.2, 0.3))
     unit.x.suspect, unit.x.out = 0, half
     unit.read(force=(3.0, 2.0, -9.0), rate=(0.3, 0.2, 0.3), model=FLIES)
-    assert unit.last[LOST] == half | MODELLED
+    assert unit.last[LOST] == half | MODELLED | (FORCE_MADE if half == NO_FORCE else 0)
     assert unit.last[at] != (3.0 if half == NO_FORCE else 0.3)
     other = FORCE if half == NO_RATE else RATE
     assert unit.last[other] == (3.0 if half == NO_RATE else 0.3), "the other half is used"

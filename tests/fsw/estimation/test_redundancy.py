@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,6 @@ from fsw.estimation import redundancy
 from fsw.estimation.error_state import FILTER
 from fsw.estimation.redundancy import (
     EVERY,
-    EVIDENCE,
     NO_AID,
     UNDECIDED,
     Aid,
@@ -57,7 +57,7 @@ def flown(
     """
     random = np.random.default_rng(seed)
     x: Any = np.zeros(1, FILTER)
-    evidence, verdict, found = np.zeros(1, EVIDENCE), Verdict(), []
+    evidence, verdict, found = redundancy.started(), Verdict(), []
     evidence["began"] = -1.0
     p, v, q, spun = np.array([0.0, 0.0, -1.2]), np.zeros(3), (1.0, 0.0, 0.0, 0.0), np.zeros(3)
     place_off, turn_off, field_off = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -271,7 +271,7 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     found_with = judged(found_with, tuple(ratios), 1.0, holds_attitude=False)
     assert not found_with.is_on, "it was found with an attitude that is wrong"
     x: Any = np.zeros(1, FILTER)
-    evidence = np.zeros(1, EVIDENCE)
+    evidence = redundancy.started()
     x["witness"][0, 0] = 1.0
     x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
     for look_ in range(60):
@@ -328,17 +328,34 @@ def test_who_is_named_has_fired_and_nobody_is_while_nothing_does(ratios: list[fl
     assert bool(verdict.is_on or verdict.wrong) == (max(ratios) > 1.0)
 
 
-@given(st.sampled_from(list(Source)), st.floats(0.0, 3.9), st.floats(1.1, 20.0))
+@pytest.mark.parametrize(
+    ("since", "kept"), [(0.1, 0.0), (0.3, 1.5), (1.2, 2.0), (3.9, 3.0), (4.1, 4.0)]
+)
+def test_a_comparison_counts_as_soon_as_its_window_is_without_silence(
+    since: float, kept: float
+) -> None:
+    """Of a gyro that is garbage a second after a gap in its readings, nothing was heard for 4 s."""
+    e = redundancy.started()
+    redundancy.hear_nothing_of(e, Source.GYRO, 10.0)
+    s = SimpleNamespace(**{name: e[0][name] for name in redundancy.EVIDENCE.fields or ()})
+    s.came[redundancy.GM] = 10.0 + since
+    s.both[redundancy.GM] = 1.5, 2.0, 3.0, 4.0, 0.0
+    redundancy._note_largest(s, 10.0 + since, redundancy.GM)
+    assert s.ratio[redundancy.GM] == kept
+
+
+@given(st.sampled_from(list(Source)), st.floats(0.0, 0.19), st.floats(1.1, 20.0))
 def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
     silent: Source, later: float, ratio: float
 ) -> None:
     """Encoders that send garbage leave the rotors' model without its arm, and no gyro is wrong."""
-    verdict = Verdict().hearing_nothing_of(silent, 5.0)
-    lost = verdict.lost(5.0 + later)
+    evidence = redundancy.started()
+    redundancy.hear_nothing_of(evidence, silent, 5.0)
+    lost = redundancy.hear_nothing_of(evidence, Source(0), 5.0 + later)
     assert lost == silent
-    assert not verdict.lost(5.0 + redundancy.CONTAINED)
+    assert not redundancy.hear_nothing_of(evidence, Source(0), 5.0 + 2.0 * redundancy.WINDOWS[0])
     fires = tuple([ratio if of & silent else 0.0 for of in redundancy.OF])
-    verdict = judged(verdict, fires, 5.0 + later, holds_attitude=True, lost=lost)
+    verdict = judged(Verdict(), fires, 5.0 + later, holds_attitude=True, lost=lost)
     assert not verdict.is_on
     assert not verdict.wrong
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fsw.estimation.error_state import LOST, RATE, TIME
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.flight.state import FlightState
 from fsw.link.wire.encode_health import estimator_status
-from fsw.measurements import GnssSample, JointSample, PoseSample
+from fsw.measurements import GnssSample, ImuSample, JointSample, PoseSample
 from fsw.signals import FlightSnapshot
 from messages.frames import wire_fields
 from tests.fsw.estimation.sensor_runs import MOCAP, RTK, TICK, run
@@ -36,6 +37,25 @@ def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
     k = flown.truth.at(now)
     assert state.estimate.p_WB == pytest.approx(flown.truth.p[k], abs=0.02)
     assert 0.0 <= now - state.fusion.imu_came <= TICK
+
+
+@pytest.mark.parametrize("every", [8, 16, 50])
+def test_a_unit_that_is_slow_is_used_whenever_it_says_something(every: int) -> None:
+    """Of one at 32 Hz no reading was, and a vehicle with satellites fell from 1.5 m."""
+    state, read, flown = FlightState(), 0, run(MOCAP, 1, 1.2)
+    for k, (now, samples) in enumerate(flown):
+        heard = [one for one in samples if k < 300 or k % every == 0 or type(one) is not ImuSample]
+        state, _ = tick(state, round(1e6 * now), samples=tuple(heard))
+        units = [one for one in heard if type(one) is ImuSample]
+        if k < 300 + every or not units:
+            continue
+        assert state.fusion is not None
+        rows = state.fusion.numbers["imu"][0]
+        (row,) = rows[rows[:, TIME] == units[0].time]
+        assert row[RATE : RATE + 3].tolist() == list(units[0].rate)
+        assert not row[LOST]
+        read += 1
+    assert read > 300 // every - 3
 
 
 @pytest.mark.parametrize("back", [0.0034, 0.017, 0.05])

@@ -44,7 +44,6 @@ from sitl.sensors.measurements import (
 )
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.sitl.sensors.readings import HOVER, reading
-from tests.whole_tick import answer_of
 
 NOW = 1_200_000
 HIGH = earth.Place(47.397742, 8.545594, 488.0)
@@ -268,7 +267,7 @@ def test_a_fields_of_a_compass_are_not_read_as_an_inertial_units(wire: Wire) -> 
 
 def test_a_repeated_step_brings_its_samples_once_and_gets_the_same_answer(wire: Wire) -> None:
     assert wire.step(NOW, POSE, JOINTS, IMU) is not None
-    wire.link.send_actuators(NOW, answer_of(outputs_at(NOW)))
+    wire.link.send_actuators(NOW, outputs_at(NOW))
     answer = wire.socket.recv(2048)
     assert wire.step(NOW, POSE, JOINTS, IMU) is None
     assert wire.socket.recv(2048) == answer

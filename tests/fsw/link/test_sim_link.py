@@ -47,7 +47,6 @@ from sitl.simulation import Controls, Simulation
 from studies.flight.mission import safe_set as safe_set_of
 from tests.fsw.link.ground import ManualClock
 from tests.fsw.link.snapshots import FACTS, outputs_at
-from tests.whole_tick import answer_of
 
 NAN = float("nan")
 SHUTDOWN = SendCommand(246, (0.0, 2.0, NAN, NAN, NAN, NAN, NAN))
@@ -165,7 +164,7 @@ def test_a_repeated_step_gets_the_same_answer_and_no_tick(wire: Wire) -> None:
     step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
     wire.send(step)
     assert wire.link.wait_for_step() is not None
-    wire.link.send_actuators(1_002_000, answer_of(outputs_at(1_002_000)))
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
     answer = wire.hear()
     wire.send(step)
     assert wire.link.wait_for_step() is None
@@ -178,7 +177,7 @@ def test_an_older_step_is_ignored(wire: Wire) -> None:
     for t_us in (1_002_000, 1_004_000):
         wire.send(encoder.datagram(readings(t_us), ()))
         assert wire.link.wait_for_step() is not None
-        wire.link.send_actuators(t_us, answer_of(outputs_at(t_us)))
+        wire.link.send_actuators(t_us, outputs_at(t_us))
         wire.hear()
     wire.send(encoder.datagram(readings(1_002_000), ()))
     assert wire.link.wait_for_step() is None
@@ -245,7 +244,7 @@ class Flight:
         sensors = link.newest() if in_real_time else link.wait_for_step()
         if sensors is None:
             return None
-        link.send_actuators(sensors.t_us, answer_of(outputs_at(sensors.t_us)))
+        link.send_actuators(sensors.t_us, outputs_at(sensors.t_us))
         return sensors.t_us
 
     def step(self, *stamps: int) -> int | None:
@@ -408,7 +407,7 @@ def test_acknowledgements_come_before_the_actuators_and_are_repeated_with_them(w
     wire.send(step)
     wire.link.wait_for_step()
     wire.link.queue_ack(CommandAck(400, 0, 1, 195))
-    wire.link.send_actuators(1_002_000, answer_of(outputs_at(1_002_000)))
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
     answer = wire.hear()
     order = [frame.message_id for frame in split(answer)]
     assert order == [ids.HEARTBEAT, ids.COMMAND_ACK, ids.HIL_ACTUATOR_CONTROLS]
@@ -424,7 +423,7 @@ def test_texts_without_room_in_the_answer_come_ahead_of_it_and_again_when_it_is_
     step = StepEncoder(lockstep=True).datagram(readings(1_002_000), ())
     wire.send(step)
     wire.link.wait_for_step()
-    wire.link.send_actuators(1_002_000, replace(answer_of(outputs_at(1_002_000)), texts=texts))
+    wire.link.send_actuators(1_002_000, replace(outputs_at(1_002_000), texts=texts))
 
     def answer() -> list[bytes]:
         datagrams = [wire.hear()]
@@ -449,7 +448,7 @@ def test_what_a_tick_says_behind_its_answer_comes_with_the_next_one_and_once(wir
     late, own = (StatusText(Severity.WARNING, text) for text in ("late", "own"))
 
     def said(t_us: int, *texts: StatusText) -> tuple[str, ...]:
-        wire.link.send_actuators(t_us, replace(answer_of(outputs_at(t_us)), texts=texts))
+        wire.link.send_actuators(t_us, replace(outputs_at(t_us), texts=texts))
         return status_text.joined(list(split(wire.hear())))
 
     assert said(1_002_000) == ()
@@ -464,8 +463,8 @@ def test_the_simulator_is_told_the_mode_when_it_changes_and_once_a_second(wire: 
         t_us = 1_000_000 + 2_000 * step
         outputs = outputs_at(t_us)
         if step >= 700:
-            outputs = replace(outputs, shown=replace(outputs.snapshot, mode=Mode.HOLD))
-        wire.link.send_actuators(t_us, answer_of(outputs))
+            outputs = replace(outputs, mode=Mode.HOLD)
+        wire.link.send_actuators(t_us, outputs)
         for frame in split(wire.hear()):
             if frame.message_id == ids.HEARTBEAT:
                 reported.append((step, frame.payload_values[0]))
@@ -542,7 +541,7 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
     encoder = StepEncoder(lockstep=True)
     simulation = Simulation(load_scenario("walls-calm"), 0)
     wire.link.route(INJECT)
-    wire.link.send_actuators(1_002_000, answer_of(outputs_at(1_002_000)))
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
     reply = read_reply(wire.hear(), 2)
     assert reply is not None
     (asked,) = reply.injections
@@ -612,7 +611,7 @@ def test_a_command_to_the_simulator_is_answered_however_often_it_is_lost(
     heard: list[int] = []  # ticks in which the command was sent
     for k in range(400):
         t_us = 1_002_000 + 2_000 * k
-        wire.link.send_actuators(t_us, answer_of(outputs_at(t_us)))
+        wire.link.send_actuators(t_us, outputs_at(t_us))
         if wire.link.routed_acks:
             break
         reply = read_reply(wire.hear(), 2)
@@ -646,7 +645,7 @@ def test_the_simulator_passes_over_a_fault_of_no_number(
     params = [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     params[place] = number
     wire.link.route(replace(INJECT, params=tuple(params)))
-    wire.link.send_actuators(1_002_000, answer_of(outputs_at(1_002_000)))
+    wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
     reply = read_reply(wire.hear(), 2)
     assert reply is not None
     assert reply.injections == ()

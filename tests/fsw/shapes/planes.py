@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fsw.compiled import of_fixed_types
+from fsw.compiled import machine_code
 from fsw.shapes import kind_of
 from fsw.shapes.kind import Surface
 from fsw.shapes.zones import surface_at, zone_arrays
 from fsw.signals import SafeSet, Shape, Vec3, Zone
 
-_surface_at = of_fixed_types(surface_at)
+_surface_at = machine_code(surface_at)
 
 
 def outside(shape: Shape, p: Vec3) -> Surface:

@@ -148,7 +148,8 @@ def test_two_faults_are_flown_and_each_begins_at_its_time() -> None:
     [(611, 331), (611, 386), (611, 65), (611, 216)]
     + [(91, 3), (91, 9), (91, 14), (91, 64), (91, 100), (91, 120), (91, 126)]
     + [(137, 15), (211, 65), (307, 36), (307, 86), (611, 73), (611, 139), (611, 191)]
-    + [(503, k) for k in (32, 178, 365, 560, 611, 655)],
+    + [(503, k) for k in (32, 178, 365, 560, 611, 655)]
+    + [(823, k) for k in (118, 301, 351, 392, 444)],
 )
 def test_pairs_that_touched_something_once_touch_nothing(seed: int, number: int) -> None:
     drawn = draw(seed, number, not_flown())

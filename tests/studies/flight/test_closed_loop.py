@@ -10,7 +10,7 @@ import pytest
 from fsw.control.control_metrics import ControlMetrics
 from fsw.parameters.flight_config import flight_config
 from fsw.signals import PlanInput
-from sitl.scenario_file import load_scenario
+from sitl.scenario_file import ScenarioError, load_scenario
 from studies.flight import closed_loop
 from studies.flight.job import Job, fly_job
 from studies.paper.cases import configuration, scenario
@@ -95,10 +95,11 @@ def test_a_flight_that_cannot_start_is_a_row() -> None:
     assert "workspace" in row.reason
 
 
-def test_a_body_that_a_scenario_is_not_made_for_is_named() -> None:
-    """Its flights begin outside the safe set, and are thrown out at the first tick."""
+def test_a_body_that_starts_outside_the_safe_set_is_refused() -> None:
+    """It would be thrown out at the first tick."""
     flown = replace(load_scenario("walls-calm"), duration_s=0.1)
-    other = closed_loop.simulate(flown, 0, flight_config(body="full"))
-    assert "flight_config(body='points')" in other.truth.end_reason
-    same = closed_loop.simulate(flown, 0, flight_config(body="points"))
-    assert "body" not in same.truth.end_reason
+    with pytest.raises(ScenarioError, match=r"flight_config\(body='points'\)") as found:
+        closed_loop.simulate(flown, 0, flight_config())
+    assert "starts outside its safe set: margin" in str(found.value)
+    assert Job("full", flown, flight_config(), 0).row().error
+    assert closed_loop.simulate(flown, 0, flight_config(body="points")).truth.completed

@@ -1,0 +1,215 @@
+"""The simulator and the autopilot, stepped by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from fsw.estimation.estimator import estimate_state
+from fsw.model.airframe import AIRFRAME
+from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.signals import StateEstimate, TickOutputs
+from pandion.scenarios import AnyScenario, load_scenario
+from sitl.plant.aerial_manipulator import plant
+from sitl.plant.integrator import held, step
+from sitl.result import TruthResult
+from sitl.scenario import Scenario
+from sitl.simulation import Simulation, Truth
+from sitl.start import first_state, flown_vehicle
+from studies.flight.closed_loop import ScenarioFlight, controls, readings
+from studies.flight.mission import target
+from studies.flight.own_parts import Observation, OwnParts, PushLaw, numbers, observed
+from studies.flight.result import FlightResult
+
+Array = NDArray[np.float64]
+Floats = Array | Sequence[float]
+_NAN3 = (math.nan,) * 3
+_UNKNOWN = StateEstimate(0, _NAN3, _NAN3, (math.nan,) * 9, _NAN3, math.nan, _NAN3[:2], _NAN3[:2])
+
+
+class Simulator:
+    """The vehicle in its scenario; a step is 2 ms, in which the plant takes two of its own.
+
+    The referee looks at every one of these: it ends the flight at a collision, and keeps margins
+    and the tracking error as it does for ``pandion fly``.
+    """
+
+    def __init__(
+        self,
+        scenario: AnyScenario = "walls",
+        seed: int = 0,
+        *,
+        sensors: str | None = None,
+        duration_s: float | None = None,
+        disturbance: PushLaw | None = None,
+    ) -> None:
+        """Load the scenario; :meth:`reset` begins a flight.
+
+        Args:
+            scenario: As of ``pandion.load_scenario``.
+            seed: Root of all randomness of the flight, 0 or more.
+            sensors: As of ``pandion.load_scenario``.
+            duration_s: The same.
+            disturbance: Acceleration (3,) [m/s², NED] of the base at a time [s], on top.
+
+        Raises:
+            ScenarioError: The scenario cannot be flown.
+        """
+        self.scenario: Scenario = load_scenario(scenario, sensors=sensors, duration_s=duration_s)
+        self.seed = seed
+        self._parts = OwnParts(disturbance=disturbance)
+        self._pilot: Autopilot | None = None
+        self.reset()
+
+    def reset(self, seed: int | None = None) -> Observation:
+        """Begin the flight anew, with another ``seed`` if one is given; what is observed first."""
+        self.seed = self.seed if seed is None else seed
+        self.simulation = Simulation(self.scenario, self.seed, self._parts.pushes())
+        self._pilot = None
+        return self.observe()
+
+    def observe(self) -> Observation:
+        """What the sensors say in this step; with a suite only ``samples``, all else is NaN."""
+        frame, samples = readings(self.simulation)
+        estimate = None if samples else estimate_state(frame)
+        aim = target(self.simulation.clock, self.simulation.t_us)
+        seen = observed(estimate or _UNKNOWN, aim, AIRFRAME.link_length)
+        return replace(seen, samples=samples) if samples else seen
+
+    def step(self, thrust: Floats, torque: Floats, armed: bool = True) -> Observation:
+        """Let rotors and joints do this for 2 ms; what is observed then.
+
+        Args:
+            thrust: Of the rear, left, front and right rotor (4,) [N], 0 to 17.2 each.
+            torque: Of the two joints (2,) [N m], ±2 each.
+            armed: Of a vehicle that is not, rotors and joints are off.
+
+        Raises:
+            OwnPartError: They have another shape or are not finite.
+            RuntimeError: The flight is over.
+        """
+        if self.over:
+            raise RuntimeError(f"the flight is over: {self.end_reason}; reset() begins another")
+        f = numbers("thrust", thrust, (4,)).tolist()
+        t = numbers("torque", torque, (2,)).tolist()
+        self.simulation.advance(
+            controls(AIRFRAME, ((f[0], f[1], f[2], f[3]), (t[0], t[1])), armed=armed)
+        )
+        if self._pilot is not None:
+            self._pilot.conclude()
+        return self.observe()
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has ended."""
+        return self.simulation.ended is not None
+
+    @property
+    def end_reason(self) -> str:
+        """Why, in a sentence; empty while it goes on."""
+        return "" if self.simulation.ended is None else self.simulation.ended.sentence
+
+    @property
+    def time_s(self) -> float:
+        """Since the start [s]."""
+        return self.simulation.time_s
+
+    @property
+    def truth(self) -> Truth:
+        """The true state now, with the margin of every part from every zone."""
+        return self.simulation.truth()
+
+    @property
+    def hover(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Thrusts (4,) [N] and torques (2,) [N m] that hold the vehicle as it starts."""
+        trim = self.simulation.trim
+        return np.array(trim.thrust), np.array(trim.torque)
+
+    @property
+    def result(self) -> TruthResult:
+        """The referee's verdict so far."""
+        return self.simulation.result()
+
+    def linear_model(self) -> tuple[Array, Array]:
+        """A (16, 16) and B (16, 6) [SI] of a step of 2 ms about the hover that a flight begins in.
+
+        Of ``Observation.state``, and of thrusts and joint torques; rotors without their lag.
+        """
+        vehicle, trim = flown_vehicle(self.scenario), self.simulation.trim
+        model, blocks = plant(vehicle), held(2)
+        plants: Any = np.array([model])
+        rest, _ = first_state(vehicle, self.scenario, self.simulation.clock.target_at(0.0).p)
+        places, states = np.empty((2, 4, 3)), np.empty((2, len(rest)))
+        out: list[Array] = []
+        hover = np.array([*trim.thrust, *trim.torque])
+
+        def moved(x: Array, u: Array) -> Array:
+            state = rest.copy()
+            state[:6] += x[:6]
+            turn = Rotation.from_rotvec(x[6:9]) * Rotation.from_quat(rest[6:10], scalar_first=True)
+            state[6:10] = turn.as_quat(scalar_first=True)
+            state[10:13] += x[9:12]
+            state[13:17] = f = (hover + u)[:4]
+            state[17:] += x[12:]
+            torque = tuple((hover + u)[4:].tolist())
+            none = (0.0, 0.0, 0.0)
+            push = tuple(f.tolist()), torque, none, none, 0.001
+            step(plants, blocks, state, *push, places, states)
+            back = Rotation.from_quat(state[6:10], scalar_first=True)
+            return np.concatenate([state[:6], back.as_rotvec(), state[10:13], state[17:]])
+
+        for k in range(22):
+            by = np.zeros(22)
+            by[k] = 1e-5
+            more, less = moved(by[:16], by[16:]), moved(-by[:16], -by[16:])
+            out.append((more - less) / 2e-5)
+        both = np.array(out).T
+        return both[:, :16], both[:, 16:]
+
+
+class Autopilot:
+    """Our autopilot for a simulator that is stepped by hand: ``sim.step(*autopilot())``.
+
+    It reads the simulator's sensors itself, and plans when it is time to.
+    """
+
+    def __init__(self, simulator: Simulator, config: FlightConfig | None = None) -> None:
+        """Take over a flight that has just begun.
+
+        Args:
+            simulator: After its ``reset``; the scenario starts in the air with a trajectory.
+            config: Configuration of the flight software; None: the scenario's.
+
+        Raises:
+            ScenarioError: The body of the configuration starts outside the safe set.
+            RuntimeError: The flight has begun already.
+        """
+        if simulator.simulation.step:
+            raise RuntimeError("the flight has begun: reset() the simulator first")
+        config = config or flight_config(body=simulator.scenario.body)
+        self._flight = ScenarioFlight(simulator.simulation, config, simulator.seed)
+        self._outputs: TickOutputs | None = None
+        simulator._pilot = self
+
+    def __call__(self, seen: Observation | None = None) -> tuple[Any, Any, bool]:
+        """Thrusts (4,) [N], joint torques (2,) [N m] and whether the vehicle is armed."""
+        self._outputs = self._flight.respond()
+        (thrust, torque), mode = self._outputs.actuators, self._outputs.mode
+        return thrust, torque, mode.armed
+
+    def conclude(self) -> None:
+        """Note what a step has brought; the simulator calls it."""
+        if self._outputs is not None:
+            outputs, self._outputs = self._outputs, None
+            self._flight.conclude(outputs)
+
+    @property
+    def result(self) -> FlightResult:
+        """The verdict, and what the planner did."""
+        return self._flight.result()
