@@ -118,9 +118,6 @@ def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
     return cast(Callable[P, R], call)
 
 
-of_fixed_types: Callable[[Callable[..., Any]], Callable[..., Any]] = machine_code
-
-
 def compilable(function: Callable[P, R]) -> Callable[P, R]:
     """Let kernels compile a pure law into themselves; called from Python it stays Python.
 

@@ -1,4 +1,4 @@
-"""``dataclass``, ``replace`` and ``made`` for values made in every tick: frozen for mypy, cheap.
+"""``dataclass`` and ``replace`` for values made in every tick: frozen for mypy, cheap.
 
 A frozen dataclass sets each field through ``object.__setattr__``: 2.6 us for fourteen of them,
 against 0.16 us here. Such values must not be changed all the same; mypy, which sees the ordinary
@@ -7,26 +7,14 @@ against 0.16 us here. Such values must not be changed all the same; mypy, which 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, TypeVar
-
-Kind = TypeVar("Kind")
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as dataclass
     from dataclasses import replace as replace
-
-    def made(kind: type[Kind], values: Iterable[Any]) -> Kind:
-        """The NamedTuple of a ``kind`` with all of its ``values``, in half the time.
-
-        For those that come as a tuple, which are not counted: neither here nor by the type checker.
-        """
-        ...
 else:
     import dataclasses
     from operator import attrgetter
-
-    made = tuple.__new__
 
     def dataclass(*, frozen, slots):
         """What ``dataclasses.dataclass`` makes, frozen by the type checker alone."""

@@ -111,18 +111,19 @@ class Arbitration:
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory after a look at whether all sensors agree, and the state with it."""
         before = memory.verdict
-        evidence, aids, seen = np.empty(1, EVIDENCE), [], []
+        evidence = np.empty(1, EVIDENCE)
         evidence[:] = before.evidence
         newest = memory.newest_pose, memory.gnss, memory.newest_field
-        for sample, last in zip(newest, before.seen, strict=True):
-            aids.append(NO_AID if sample is None or sample is last else self._aid(memory, sample))
-            seen.append(sample)
+        pose, fix, field = [
+            NO_AID if sample is None or sample is last else self._aid(memory, sample)
+            for sample, last in zip(newest, before.seen, strict=True)
+        ]
         silent = _silent(memory, now) | _stuck(memory)
         lost = redundancy.hear_nothing_of(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
-        redundancy.look(evidence, memory.numbers, now, *aids, learns)
+        redundancy.look(evidence, memory.numbers, now, pose, fix, field, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
-        verdict = before._replace(evidence=evidence, seen=tuple(seen))
+        verdict = before._replace(evidence=evidence, seen=newest)
         if before.is_on or before.wrong or max(ratios) > 1.0:
             held = Source.ATTITUDE in self._aided(memory, now)
             verdict = redundancy.judged(

@@ -264,6 +264,27 @@ def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: Array) -> No
 
 
 @compilable
+def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
+    """Mean force [m/s^2, FRD] and rate [rad/s, FRD] of two readings, without the biases.
+
+    The readings are ``row`` (8,) [SI] and the one ``before`` (8,) [SI], or the same.
+    """
+    b, g = x.accel_bias, x.gyro_bias
+    return (
+        (
+            0.5 * (row[1] + before[1]) - b[0],
+            0.5 * (row[2] + before[2]) - b[1],
+            0.5 * (row[3] + before[3]) - b[2],
+        ),
+        (
+            0.5 * (row[4] + before[4]) - g[0],
+            0.5 * (row[5] + before[5]) - g[1],
+            0.5 * (row[6] + before[6]) - g[2],
+        ),
+    )
+
+
+@compilable
 def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     """Predict to the time of the reading ``row`` (8,) [SI], which follows ``before`` (8,) [SI].
 
@@ -272,16 +293,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     gap = max(row[TIME] - x.time, 0.0)
     lost = NOTHING if gap > law.imu_gap else int(row[LOST])
     watch_biases(x, M, lost)
-    f = (
-        0.5 * (row[1] + before[1]) - x.accel_bias[0],
-        0.5 * (row[2] + before[2]) - x.accel_bias[1],
-        0.5 * (row[3] + before[3]) - x.accel_bias[2],
-    )
-    w = (
-        0.5 * (row[4] + before[4]) - x.gyro_bias[0],
-        0.5 * (row[5] + before[5]) - x.gyro_bias[1],
-        0.5 * (row[6] + before[6]) - x.gyro_bias[2],
-    )
+    f, w = mean_of(x, row, before)
     steps = max(1, math.ceil(gap / law.imu_gap - 1e-6))
     dt = gap / steps
     p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
@@ -392,24 +404,12 @@ def present(x: Any, now: float) -> tuple[Vec3, Vec3, Vec4, Vec3, Vec3]:
     """
     p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
     t, last = x.time, x.imu[(x.first - 1) % IMU_CAPACITY]
-    b0, b1, b2 = x.accel_bias[0], x.accel_bias[1], x.accel_bias[2]
-    g0, g1, g2 = x.gyro_bias[0], x.gyro_bias[1], x.gyro_bias[2]
     for k in range(x.first, x.end):
         row = x.imu[k % IMU_CAPACITY]
-        f = (
-            0.5 * (row[1] + last[1]) - b0,
-            0.5 * (row[2] + last[2]) - b1,
-            0.5 * (row[3] + last[3]) - b2,
-        )
-        w = (
-            0.5 * (row[4] + last[4]) - g0,
-            0.5 * (row[5] + last[5]) - g1,
-            0.5 * (row[6] + last[6]) - g2,
-        )
+        f, w = mean_of(x, row, last)
         p, v, q, _ = integrated(p, v, q, f, w, row[TIME] - t)
         t, last = row[TIME], row
-    f = (last[1] - b0, last[2] - b1, last[3] - b2)
-    w = (last[4] - g0, last[5] - g1, last[6] - g2)
+    f, w = mean_of(x, last, last)
     if now > t:
         p, v, q, _ = integrated(p, v, q, f, w, now - t)
     return p, v, q, w, f

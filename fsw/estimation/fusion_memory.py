@@ -78,8 +78,6 @@ class Trail(NamedTuple):
 class FusionMemory(NamedTuple):
     """What the estimator carries from tick to tick."""
 
-    # What every tick renews, what a sample does, what fusing one does, and the rest: in this order,
-    # because they are renewed by position. Names cost two microseconds.
     numbers: Filter
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
@@ -162,9 +160,10 @@ class FusionMemory(NamedTuple):
         sample, pose, counter = one.sample, self.pose, self.reset_counter
         if isinstance(sample, PoseSample):
             pose, counter = sample, sample.reset_counter
-        known = self.waiting[1:], (*self.without(health.sensor), health)
-        seen = pose, counter, runs
-        return FusionMemory._make((*self[:6], *known, *self[8:11], *seen, *self[14:]))
+        known, waiting = (*self.without(health.sensor), health), self.waiting[1:]
+        return self._replace(
+            waiting=waiting, health=known, pose=pose, reset_counter=counter, runs=runs
+        )
 
     def without(self, sensor: Sensor) -> list[Health]:
         """What is known of the other sensors."""

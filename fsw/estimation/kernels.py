@@ -32,6 +32,7 @@ from fsw.estimation.error_state import (
     advance,
     carry,
     integrated,
+    mean_of,
     present,
     propagate,
     transition,
@@ -306,12 +307,7 @@ def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> N
     for k in range(s.first - 1, s.end):
         row = s.imu[k % IMU_CAPACITY]
         end = s.imu[(k + 1) % IMU_CAPACITY, TIME] if k + 1 < s.end else now
-        f = (
-            row[1] - s.accel_bias[0],
-            row[2] - s.accel_bias[1],
-            row[3] - s.accel_bias[2],
-        )
-        w = (row[4] - s.gyro_bias[0], row[5] - s.gyro_bias[1], row[6] - s.gyro_bias[2])
+        f, w = mean_of(s, row, row)
         dt = end - time
         if dt > 0.0:
             blocks = transition(matrix_from_quaternion(q), f, w, dt)

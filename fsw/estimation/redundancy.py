@@ -29,7 +29,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.compiled import compilable, kernel, of_fixed_types
+from fsw.compiled import compilable, kernel, machine_code
 from fsw.estimation.error_state import BA, WITNESS, vec3
 from fsw.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
@@ -216,8 +216,9 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
             b[6 + i] += share * (beside - b[6 + i])
 
 
+@machine_code
 @kernel
-def _look(
+def look(
     e: Evidence, numbers: Any, now: float, pose: Aid, fix: Aid, field: Aid, learns: bool
 ) -> None:
     """Take in the newest measurements at ``now`` [s], and compute all residuals."""
@@ -646,9 +647,6 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
         b = s.aids[kind, last % _AIDS]
         iron = _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
         _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron / over)
-
-
-look = of_fixed_types(_look)
 
 
 class Verdict(NamedTuple):

@@ -100,8 +100,7 @@ class Health(NamedTuple):
         self, fused: tuple[float, ...], ratio: tuple[float, ...], innovation: tuple[float, ...]
     ) -> Health:
         """The same sensor after a sample, of which each part was ``fused`` [s] last so."""
-        # By position: the names of all fields cost as much as the rest.
-        return Health._make((*self[:7], fused, ratio, innovation, *self[10:]))
+        return self._replace(fused=fused, ratio=ratio, innovation=innovation)
 
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
@@ -149,9 +148,14 @@ def arrived(
     else:
         fault = SensorFault.NONE
     apart = min(sample.time - health.time, _LONGEST_APART)
-    # By position: the names of all fields cost as much as the checks.
-    sensor, seen, rest = health.sensor, health.seen + 1, health[7:]
-    health = Health(sensor, sample.time, now, apart, seen, numbers, repeats, *rest)
+    health = health._replace(
+        time=sample.time,
+        came=now,
+        apart=apart,
+        seen=health.seen + 1,
+        numbers=numbers,
+        repeats=repeats,
+    )
     return (health.with_fault(fault, now) if fault else health), fault
 
 

@@ -63,7 +63,6 @@ from fsw.estimation.sensor_checks import (
 from fsw.estimation.sensor_fault import Sensor, SensorFault
 from fsw.estimation.stated_variance import StatedVariance
 from fsw.estimation.tuning import EstimatorLaw, EstimatorTuning
-from fsw.frozen import made
 from fsw.geometry.quaternion import conjugate, multiply
 from fsw.geometry.rotation import matrix_from_quaternion, rotate_back
 from fsw.geometry.vectors import add_scaled, norm
@@ -190,13 +189,18 @@ class SensorFusion:
         found = self._tick(x, self.law, self._requests, parts, now, 0.0)
         if found & FAULT:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
-        # By position, because it is done in every tick: what every tick renews, and the rest.
-        watched = memory.encoders if watch is None else watch
         trail = memory.trail
         if trail is not None:
             tick = samples, now, joint_acceleration, model, silent
-            trail = made(Trail, (trail.start, trail.began, (tick, trail.ticks)))
-        memory = made(FusionMemory, (x, now, imu_came, joints_came, watched, trail, *memory[6:]))
+            trail = Trail(trail.start, trail.began, (tick, trail.ticks))
+        memory = memory._replace(
+            numbers=x,
+            now=now,
+            imu_came=imu_came,
+            joints_came=joints_came,
+            encoders=memory.encoders if watch is None else watch,
+            trail=trail,
+        )
         if found & FINITE:
             return memory, estimate_in(asked, PRESENT_AT)
         return (_anew(memory) if ready else memory), None
@@ -280,7 +284,7 @@ class SensorFusion:
         if estimate is not None and _rests(memory, now):
             return memory, estimate
         x = copied(memory.numbers)
-        memory = made(FusionMemory, (x, *memory[1:]))
+        memory = memory._replace(numbers=x)
         self._asked.begin(now, 0.0, (0.0, 0.0), UNKNOWN)
         if not memory.started:
             memory = self._start(memory)
@@ -342,8 +346,8 @@ class SensorFusion:
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample, half))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
-        known = (waiting, (*others, health), memory.arrivals + 1, delay)
-        return FusionMemory._make((*memory[:6], *known, *memory[10:]))
+        arrivals, known = memory.arrivals + 1, (*others, health)
+        return memory._replace(waiting=waiting, health=known, arrivals=arrivals, delay=delay)
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""

@@ -24,7 +24,7 @@ from fsw.flight.jump import on_return, told
 from fsw.flight.land_detector import is_aloft
 from fsw.flight.missed_ticks import missed_inputs
 from fsw.flight.state import Aiding, FlightState, LostSensor
-from fsw.frozen import made, replace
+from fsw.frozen import replace
 from fsw.measurements import ImuSample, JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
 
@@ -300,9 +300,9 @@ def _watched(
     """
     asked = state.cascade.joint_reference
     if angles != watch.angles or not state.vehicle.flies:
-        return made(EncoderWatch, (angles, asked, 0, False))
+        return EncoderWatch(angles, asked)
     stuck = watch.stuck
-    watch = made(EncoderWatch, (angles, watch.asked, watch.repeats + 1, stuck))
+    watch = EncoderWatch(angles, watch.asked, watch.repeats + 1, stuck)
     if watch.repeating and not stuck:
         first, second = memory.numbers["joints"][0][:, 2].tolist()
         held = abs(first) > _HELD[0] or abs(second) > _HELD[1]

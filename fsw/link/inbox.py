@@ -175,25 +175,21 @@ class Inbox:
 
         The sensors' readings are ``stale_us`` older than their stamp says.
         """
-        if not self._is_news:  # as in most ticks: there are samples alone
-            samples, self._received.samples = tuple(self._received.samples), []
-            return TickInputs(
-                sensors,
-                plan,
-                mission=mission,
-                tuning=tuning,
-                stale_us=stale_us,
-                samples=samples,
-                host=host,
-            )
-        came = self.take()
-        return TickInputs(
+        inputs = TickInputs(
             sensors,
             plan,
             mission=mission,
             tuning=tuning,
             stale_us=stale_us,
+            samples=tuple(self._received.samples),
             host=host,
+        )
+        if not self._is_news:  # as in most ticks: there are samples alone
+            self._received.samples = []
+            return inputs
+        came = self.take()
+        return replace(
+            inputs,
             commands=tuple(came.commands),
             targets=tuple(came.targets),
             announced=tuple([_begun(one, sensors.t_us) for one in came.announced]),
@@ -202,7 +198,6 @@ class Inbox:
             joints=came.joints,
             refused_setpoints=came.refused_setpoints,
             ground_station_heard=came.station_heard,
-            samples=tuple(came.samples),
             battery=came.battery,
             sensor_clock_jump_us=came.sensor_clock_jump_us,
             refused=tuple(came.refused),

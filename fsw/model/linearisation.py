@@ -297,28 +297,22 @@ def position(frame: Array, on: int, local: Vec3) -> Vec3:
 @kernel
 def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
     """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
-    (x, y, z), (vx, _, vz) = in_body(frame, on, local)
-    r, t = _AT_R, _AT_TURNING
+    place, along = in_body(frame, on, local)
     return (
-        frame[3]
-        + frame[t] * x
-        + frame[t + 1] * y
-        + frame[t + 2] * z
-        + frame[r] * vx
-        + frame[r + 2] * vz,
-        frame[4]
-        + frame[t + 3] * x
-        + frame[t + 4] * y
-        + frame[t + 5] * z
-        + frame[r + 3] * vx
-        + frame[r + 5] * vz,
-        frame[5]
-        + frame[t + 6] * x
-        + frame[t + 7] * y
-        + frame[t + 8] * z
-        + frame[r + 6] * vx
-        + frame[r + 8] * vz,
+        _velocity(frame, 0, place, along),
+        _velocity(frame, 1, place, along),
+        _velocity(frame, 2, place, along),
     )
+
+
+@kernel
+def _velocity(frame: Array, axis: int, place: Vec3, along: Vec3) -> float:
+    """One axis of the velocity of a place that moves along in the body."""
+    r, t = _AT_R + 3 * axis, _AT_TURNING + 3 * axis
+    turning = (
+        frame[3 + axis] + frame[t] * place[0] + frame[t + 1] * place[1] + frame[t + 2] * place[2]
+    )
+    return float(turning + frame[r] * along[0] + frame[r + 2] * along[2])
 
 
 @kernel

@@ -38,9 +38,6 @@ def machine_code(kernel: Callable[..., Any], *example: Any) -> Callable[..., Any
     return kernel
 
 
-of_fixed_types = machine_code
-
-
 class _Record(list[Any]):
     """An array of one record, whose fields are those of the numbers themselves."""
 
