@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -79,7 +80,7 @@ class FlightEvaluator:
         self.free = self._nowhere  # in which there can be no incident
         self._flown: Flown | None = None
         none = (np.empty((0, *places.shape)), np.empty((0, 0)), (0.0, 0.0), NO_AIM, (0.0, 0.0))
-        self._judge_steps = (
+        self._judge_steps: Callable[..., float] = (
             machine_code(judge_steps, self.quick, *none, False)
             if like is None
             else like._judge_steps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
@@ -148,12 +148,14 @@ class Simulation:
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._held = held(len(self.vehicle.links))
-        self._evaluator = FlightEvaluator(
+        self._evaluator: FlightEvaluator = FlightEvaluator(
             scenario, self.clock, self._places_now(), like=None if like is None else like._evaluator
         )
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
-        self._step = machine_code(watched_step, *example) if like is None else like._step
+        self._step: Callable[..., tuple[float, V3, bool]] = (
+            machine_code(watched_step, *example) if like is None else like._step
+        )
         _, self._felt, _ = self._step(*example)
 
     @property
