@@ -53,7 +53,7 @@ def test_files_named_in_the_text_exist(page: Path) -> None:
         r"`((?:fsw|sitl|messages|pandion|tests|docs)/[\w./-]*)`", without_fences(page)
     )
     generated = {"messages/dialect.py"}
-    files = [name for name in names if not re.search(r"-v\d+$", name)]  # an environment has a version
+    files = [name for name in names if not re.search(r"-v\d+$", name)]  # no environments
     assert [name for name in files if name not in generated and not (ROOT / name).exists()] == []
 
 
