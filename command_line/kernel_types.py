@@ -43,7 +43,7 @@ def types_of(dispatcher: Any, arguments: Sequence[Any]) -> tuple[Any, ...]:
 
 
 def _type_of(dispatcher: Any, argument: Any) -> Any:
-    if type(argument).__name__ != "ndarray":
+    if type(argument).__name__ != "ndarray":  # options, declared beside this, load no NumPy
         return dispatcher.typeof_pyval(argument)
     dtype, flags = argument.dtype, argument.flags
     order = flags.c_contiguous, flags.f_contiguous

@@ -121,6 +121,8 @@ def test_a_device_that_comes_late_vanishes_and_comes_back_is_used_again() -> Non
             line.plug_in()
             stream.address = SerialLine(line.device, 921_600)
             now_us += 1_000_000
+            stream.read(64)
+            assert stream.connected  # what came before it opened the line is lost
             line.send(b"again")
             assert comes(stream, b"again")
             assert stream.connections == 2
