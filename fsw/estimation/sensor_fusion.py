@@ -563,8 +563,10 @@ def _tilts(memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...], 
     x, evidence = memory.numbers[0], memory.verdict.evidence
     if not isinstance(sample, PoseSample) or evidence is None or evidence[0]["began"] < 0.0:
         return False
-    used = max(memory.of(Sensor.POSE).fused[1], evidence[0]["began"])
-    room = (now - used) * redundancy.size_of(evidence, Source.GYRO)
+    verdict, room = memory.verdict, 0.0
+    if verdict.is_on:  # what fires by chance has turned nothing so far
+        used = max(memory.of(Sensor.POSE).fused[1], verdict.since)
+        room = (now - used) * redundancy.size_of(evidence, Source.GYRO)
     rx, ry, rz = innovation[3:]
     down = rotate_back(matrix_from_quaternion(attitude(x)), (0.0, 0.0, 1.0))
     along = rx * down[0] + ry * down[1] + rz * down[2]

@@ -81,3 +81,23 @@ def test_a_sound_gyro_is_not_tilted_by_what_it_is_suspected_for(
     assert flight.contact == "", flight.ended
     assert flight.away_m is not None
     assert flight.away_m < 5.0
+
+
+@pytest.mark.long
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("mode", "suite", "faults"),
+    [
+        # A comparison that fired by chance excused the tilt of a pose that had jumped 4 s before.
+        (
+            "trajectory",
+            "mocap",
+            [Fault("vio", "wrong", size=2.0), Fault("encoder", "delayed", start_s=0.5)],
+        ),
+        # Doubts ended where the ground was felt, and the wrong force lifted the vehicle again.
+        ("land", "gnss", [Fault("accel", "wrong")]),
+    ],
+)
+def test_flights_that_hit_a_wall_once_do_not(mode: str, suite: str, faults: list[Fault]) -> None:
+    flight = fly(mode, tuple(faults), suite, 0)
+    assert flight.contact == "", flight.ended
