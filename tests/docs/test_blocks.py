@@ -80,6 +80,7 @@ def workplace(flight: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     write_capture(tmp_path / "link.pcap")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", f"{BIN}:{os.environ['PATH']}")
+    monkeypatch.setenv("LC_ALL", "C.UTF-8")  # bash warns of a locale that is not there
     monkeypatch.setenv("MPLBACKEND", "Agg")
     return tmp_path
 
