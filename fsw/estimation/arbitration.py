@@ -120,7 +120,7 @@ class Arbitration:
             for sample, last in zip(newest, before.seen, strict=True)
         ]
         silent = _silent(memory, now) | _stuck(memory)
-        lost = redundancy.hear_nothing_of(evidence, silent, now)
+        lost = redundancy.note_silence(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
         redundancy.look(evidence, memory.numbers, now, pose, fix, field, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
@@ -241,7 +241,7 @@ class Arbitration:
 
 def begun(memory: FusionMemory) -> FusionMemory:
     """The memory of a filter that has just begun: what sensors say is compared from now on."""
-    verdict = memory.verdict._replace(evidence=redundancy.started())
+    verdict = memory.verdict._replace(evidence=redundancy.at_start())
     return memory._replace(verdict=verdict, trail=None, trail_before=None)
 
 

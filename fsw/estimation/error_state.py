@@ -44,7 +44,7 @@ TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
-FORCE_MADE = 16  # of LOST: and of the force it is so
+FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 28  # integrals: see redundancy.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
@@ -331,7 +331,6 @@ def _fade(x: Any, M: Array, left: float) -> None:
         )
         for j in range(ERRORS):
             M[i, j] *= left
-        for j in range(ERRORS):
             M[j, i] *= left
         for j in range(FRAME):
             x.shared[i, j] *= left

@@ -55,8 +55,8 @@ class EncoderWatch(NamedTuple):
         return self.repeats >= _REPEATS
 
 
-TickInputs = tuple[Sequence[Sample], float, Vec2, Vec4, bool]
-"""Samples, now [s], the joints' acceleration, the rotors' model, and whether the IMU was silent."""
+TickInputs = tuple[Sequence[Sample], float, Vec2, Vec4]
+"""Samples, now [s], the joints' acceleration and the rotors' model."""
 
 
 class Trail(NamedTuple):

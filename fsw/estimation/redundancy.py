@@ -79,6 +79,7 @@ OF: Final = (G | M, G | _PQ, G | B, A | M, A | P, M | _PQ, M | P, A | N, M | N, 
 COUNT: Final = len(OF)
 # What of them says nothing, if one of these does: attitudes turn what is felt.
 _MASKS: Final = tuple(int(one | (G | B if k in (AN, MN) else 0)) for k, one in enumerate(OF))
+# Whose measurements each of them is read at, as ``EVIDENCE.aids``; -1: at each look.
 _KINDS: Final = tuple(0 if one & P else 1 if one & N else 2 if one & B else -1 for one in OF)
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
@@ -802,14 +803,14 @@ def _not_shown(
     return min((unseen / threshold) ** 2, _MOST)
 
 
-def started() -> Evidence:
+def at_start() -> Evidence:
     """What is known before anything was compared."""
     evidence = np.zeros(1, EVIDENCE)
     evidence["silent"] = -math.inf
     return evidence
 
 
-def hear_nothing_of(evidence: Evidence, silent: Source, now: float) -> Source:
+def note_silence(evidence: Evidence, silent: Source, now: float) -> Source:
     """Note what says nothing of use at ``now`` [s]; what has not for the shortest window."""
     for place, one in enumerate(Source):
         if one & silent:

@@ -38,7 +38,7 @@ from fsw.estimation.fusion_memory import (
     at_start,
     copied,
 )
-from fsw.estimation.imu import IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
+from fsw.estimation.imu import IMU_SILENT, IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
 from fsw.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.estimation.kernels import (
     ADVANCE,
@@ -140,16 +140,12 @@ class SensorFusion:
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
-        *,
-        silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """``take_in`` and ``catch_up``; the state at ``now`` [s] after both.
 
         ``joint_acceleration`` [rad/s^2, joints] and ``model`` [SI, FRD] are theirs.
         """
-        memory, estimate = self.take_in(
-            memory, samples, now, joint_acceleration, watch, model, silent=silent
-        )
+        memory, estimate = self.take_in(memory, samples, now, joint_acceleration, watch, model)
         return self.catch_up(memory, samples, now, estimate)
 
     def take_in(
@@ -160,27 +156,23 @@ class SensorFusion:
         joint_acceleration: Vec2 = (0.0, 0.0),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
-        *,
-        silent: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in what IMU and encoders measured since the last tick; the state at ``now`` [s].
 
         Of the other ``samples`` it knows what ``catch_up`` has fused so far.
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. Where the IMU is of no use, a ``model`` [SI, FRD] tells
-        what the rotors make of the vehicle (``imu.add_imu``); it is ``silent`` if it has no reading
-        to go by. None before there was a pose, or a position and a heading, to start from, and a
-        reading of the arm.
+        its encoders is kept in the memory. Where the IMU is silent or of no use, a ``model`` [SI,
+        FRD] tells what the rotors make of the vehicle (``imu.add_imu``). None before there was a
+        pose, or a position and a heading, to start from, and a reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = copied(memory.numbers)
         asked = self._asked
         asked.begin(now, dt, joint_acceleration, model)
         memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
+        silent = 0.0 <= imu_came < now - IMU_SILENT
         if silent:
             # In place of a reading what the model makes of the last one; it is no fault.
-            if parts & READING:
-                memory, parts = self._done(memory, x, parts, now), 0
             asked.read(now, _LOST, _LOST)
             parts |= READING
         ready = memory.started and joints_came >= 0.0
@@ -191,7 +183,7 @@ class SensorFusion:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         trail = memory.trail
         if trail is not None:
-            tick = samples, now, joint_acceleration, model, silent
+            tick = samples, now, joint_acceleration, model
             trail = Trail(trail.start, trail.began, (tick, trail.ticks))
         memory = memory._replace(
             numbers=x,
@@ -268,8 +260,8 @@ class SensorFusion:
     def _again(
         self, memory: FusionMemory, tick: TickInputs
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        samples, now, u, model, silent = tick
-        memory, found = self.take_in(memory, samples, now, u, None, model, silent=silent)
+        samples, now, u, model = tick
+        memory, found = self.take_in(memory, samples, now, u, None, model)
         return self._caught_up(memory, samples, now, found)
 
     def _caught_up(

@@ -10,7 +10,6 @@ from fsw.estimation import kernels
 from fsw.estimation.dead_reckoning import moved_on
 from fsw.estimation.error_state import Array, Law, P
 from fsw.estimation.fusion_memory import EncoderWatch, FusionMemory, Reset, at_start, copied
-from fsw.estimation.imu import IMU_SILENT, IMU_TOO_OLD
 from fsw.estimation.lasting_error import lasting_error
 from fsw.estimation.pace import looked
 from fsw.estimation.redundancy import NOBODY, Source, names
@@ -25,7 +24,7 @@ from fsw.flight.land_detector import is_aloft
 from fsw.flight.missed_ticks import missed_inputs
 from fsw.flight.state import Aiding, FlightState, LostSensor
 from fsw.frozen import replace
-from fsw.measurements import ImuSample, JointSample, Sample
+from fsw.measurements import JointSample, Sample
 from fsw.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs, Vec2
 
 _CHECKED_US = 100_000  # between checks for silent sensors
@@ -100,12 +99,7 @@ class SensedState:
                 model = UNKNOWN
         law = self._fusion.law
         started, watch, samples = _without_stuck(state, before, inputs.samples, law)
-        silent = 0.0 <= before.imu_came < now - IMU_SILENT and not any(
-            isinstance(one, ImuSample) and one.time >= now - IMU_TOO_OLD for one in samples
-        )
-        memory, estimate = self._fusion.take_in(
-            started, samples, now, pushed, watch, model, silent=silent
-        )
+        memory, estimate = self._fusion.take_in(started, samples, now, pushed, watch, model)
         caught = None
         if estimate is None and not state.cascade.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
@@ -127,16 +121,7 @@ class SensedState:
             now = 1e-6 * one.sensors.t_us
             memory = _memory(state, now)
             memory, estimate = self._fusion.take_in(memory, one.samples, now)
-            aloft = is_aloft(state, now, self._legs, self._stale)
-            memory, found = self._fusion.catch_up(
-                memory,
-                one.samples,
-                now,
-                estimate,
-                aloft=aloft,
-                flies=state.vehicle.flies,
-                damaged=_is_damaged(state),
-            )
+            memory, found = self._fused(state, memory, one.samples, estimate)
             state, known = replace(state, fusion=memory), found or estimate
             if known is not None:
                 r = state.cascade.copy()
@@ -160,16 +145,7 @@ class SensedState:
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
-        aloft = is_aloft(state, now, self._legs, self._stale)
-        memory, found = self._fusion.catch_up(
-            memory,
-            inputs.samples,
-            now,
-            known,
-            aloft=aloft,
-            flies=state.vehicle.flies,
-            damaged=_is_damaged(state),
-        )
+        memory, found = self._fused(state, memory, inputs.samples, known)
         # By the filter's own clock: the state has none before the first estimate.
         due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
         news = memory.health is not before.health
@@ -185,6 +161,25 @@ class SensedState:
             reset, said = on_return(found, estimate)
             texts += said
         return CaughtUp(memory, found or estimate, reset, tuple(texts))
+
+    def _fused(
+        self,
+        state: FlightState,
+        memory: FusionMemory,
+        samples: tuple[Sample, ...],
+        estimate: StateEstimate | None,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """See ``SensorFusion.catch_up``, of a vehicle in a ``state``."""
+        now = memory.now
+        return self._fusion.catch_up(
+            memory,
+            samples,
+            now,
+            estimate,
+            aloft=is_aloft(state, now, self._legs, self._stale),
+            flies=state.vehicle.flies,
+            damaged=bool(state.damage.rotor or state.damage.joint),
+        )
 
     def reported(
         self,
@@ -373,10 +368,6 @@ def _recently(aid: Health) -> float:
     A fault that its last reading had, that is: a sensor that has fallen silent is silent.
     """
     return max(_LATELY, 1.5 * aid.apart) if aid.fault_at >= aid.came else _LATELY
-
-
-def _is_damaged(state: FlightState) -> bool:
-    return bool(state.damage.rotor or state.damage.joint)
 
 
 def _memory(state: FlightState, now: float) -> FusionMemory:

@@ -85,7 +85,7 @@ def hovered(
 def of_no_use(memory: FusionMemory) -> Source:
     evidence = memory.verdict.evidence
     assert evidence is not None
-    return redundancy.hear_nothing_of(evidence, NOBODY, memory.now)
+    return redundancy.note_silence(evidence, NOBODY, memory.now)
 
 
 @pytest.mark.requirement("REQ-EST-13")

@@ -57,7 +57,7 @@ def flown(
     """
     random = np.random.default_rng(seed)
     x: Any = np.zeros(1, FILTER)
-    evidence, verdict, found = redundancy.started(), Verdict(), []
+    evidence, verdict, found = redundancy.at_start(), Verdict(), []
     evidence["began"] = -1.0
     p, v, q, spun = np.array([0.0, 0.0, -1.2]), np.zeros(3), (1.0, 0.0, 0.0, 0.0), np.zeros(3)
     place_off, turn_off, field_off = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -271,7 +271,7 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     found_with = judged(found_with, tuple(ratios), 1.0, holds_attitude=False)
     assert not found_with.is_on, "it was found with an attitude that is wrong"
     x: Any = np.zeros(1, FILTER)
-    evidence = redundancy.started()
+    evidence = redundancy.at_start()
     x["witness"][0, 0] = 1.0
     x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
     for look_ in range(60):
@@ -335,8 +335,8 @@ def test_a_comparison_counts_as_soon_as_its_window_is_without_silence(
     since: float, kept: float
 ) -> None:
     """Of a gyro that is garbage a second after a gap in its readings, nothing was heard for 4 s."""
-    e = redundancy.started()
-    redundancy.hear_nothing_of(e, Source.GYRO, 10.0)
+    e = redundancy.at_start()
+    redundancy.note_silence(e, Source.GYRO, 10.0)
     s = SimpleNamespace(**{name: e[0][name] for name in redundancy.EVIDENCE.fields or ()})
     s.came[redundancy.GM] = 10.0 + since
     s.both[redundancy.GM] = 1.5, 2.0, 3.0, 4.0, 0.0
@@ -349,11 +349,11 @@ def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
     silent: Source, later: float, ratio: float
 ) -> None:
     """Encoders that send garbage leave the rotors' model without its arm, and no gyro is wrong."""
-    evidence = redundancy.started()
-    redundancy.hear_nothing_of(evidence, silent, 5.0)
-    lost = redundancy.hear_nothing_of(evidence, Source(0), 5.0 + later)
+    evidence = redundancy.at_start()
+    redundancy.note_silence(evidence, silent, 5.0)
+    lost = redundancy.note_silence(evidence, Source(0), 5.0 + later)
     assert lost == silent
-    assert not redundancy.hear_nothing_of(evidence, Source(0), 5.0 + 2.0 * redundancy.WINDOWS[0])
+    assert not redundancy.note_silence(evidence, Source(0), 5.0 + 2.0 * redundancy.WINDOWS[0])
     fires = tuple([ratio if of & silent else 0.0 for of in redundancy.OF])
     verdict = judged(Verdict(), fires, 5.0 + later, holds_attitude=True, lost=lost)
     assert not verdict.is_on

@@ -746,15 +746,13 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
     before, memory, now = flown.estimate, flown.memory, flown.now
     for _ in range(50):  # 0.1 s
         now += TICK
-        memory, estimate = flown.fusion.step(
-            memory, (), now, model=(1.0, -2.0, 0.5, 9.9), silent=True
-        )
+        memory, estimate = flown.fusion.step(memory, (), now, model=(1.0, -2.0, 0.5, 9.9))
     assert estimate is not None
     turned = [after - rate for after, rate in zip(estimate.w_WB_B, before.w_WB_B, strict=True)]
     assert turned == pytest.approx([0.1, -0.2, 0.05], abs=0.03)
     assert estimate.specific_force == pytest.approx(9.9, abs=0.2)
     assert not memory.of(Sensor.IMU).fault, "it is silent, and says nothing wrong"
-    _, held = flown.fusion.step(flown.memory, (), now, silent=True)
+    _, held = flown.fusion.step(flown.memory, (), now)
     assert held is not None
     assert held.w_WB_B == pytest.approx(before.w_WB_B, abs=0.03), "not known: as it was"
 
