@@ -94,7 +94,7 @@ class PandionEnv(gymnasium.Env[Floats, Floats]):
         """Begin an episode; its randomness is of ``seed``, or goes on from the last one."""
         super().reset(seed=seed)
         root = int(self.np_random.integers(2**31))
-        self._simulation = Simulation(self._scenario, root, like=self._simulation)
+        self._simulation = Simulation(self._scenario, root)
         seen, error, margin = self._observe(self._simulation.places())
         return seen, {"error_m": error, "margin_m": margin, "seed": root}
 

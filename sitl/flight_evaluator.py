@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -49,18 +48,10 @@ class FlightEvaluator:
         ScenarioError: The start is outside the safe set.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        clock: MissionClock,
-        places: Array,
-        *,
-        like: FlightEvaluator | None = None,
-    ) -> None:
+    def __init__(self, scenario: Scenario, clock: MissionClock, places: Array) -> None:
         """Begin with places (rows, 3) [m, NED]: base, joint 1, joint 2, end-effector.
 
-        For the full body the base's axes [1, NED] follow. The machine code may be that of ``like``,
-        an evaluator of the same scenario.
+        For the full body the base's axes [1, NED] follow.
         """
         self.world = World(scenario)
         self.limits = LimitRecord(flown_vehicle(scenario))
@@ -80,11 +71,7 @@ class FlightEvaluator:
         self.free = self._nowhere  # in which there can be no incident
         self._flown: Flown | None = None
         none = (np.empty((0, *places.shape)), np.empty((0, 0)), (0.0, 0.0), NO_AIM, (0.0, 0.0))
-        self._judge_steps: Callable[..., float] = (
-            machine_code(judge_steps, self.quick, *none, False)
-            if like is None
-            else like._judge_steps
-        )
+        self._judge_steps = machine_code(judge_steps, self.quick, *none, False)
         margins = self.margins(places, 0.0)
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
@@ -82,7 +82,6 @@ class Simulation:
     """The plant in its scenario; ``seed``, 0 or more, is the root of all randomness of the run.
 
     ``more`` pushes come on top of the scenario's disturbances. The local frame is at ``origin``.
-    ``like`` is one of the same scenario whose machine code serves, which takes time to look up.
 
     Raises:
         ScenarioError: The scenario contradicts itself or starts outside its safe set.
@@ -95,7 +94,6 @@ class Simulation:
         more: Sequence[Push] = (),
         *,
         origin: Place = DEFAULT_ORIGIN,
-        like: Simulation | None = None,
     ) -> None:
         if not (seed >= 0):
             raise ScenarioError(f"seed = {seed}: must be 0 or more")
@@ -148,14 +146,10 @@ class Simulation:
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._held = held(len(self.vehicle.links))
-        self._evaluator: FlightEvaluator = FlightEvaluator(
-            scenario, self.clock, self._places_now(), like=None if like is None else like._evaluator
-        )
+        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
-        self._step: Callable[..., tuple[float, V3, bool]] = (
-            machine_code(watched_step, *example) if like is None else like._step
-        )
+        self._step = machine_code(watched_step, *example)
         _, self._felt, _ = self._step(*example)
 
     @property
