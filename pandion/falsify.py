@@ -141,13 +141,12 @@ def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
     if options.params is None:
         return config
     from fsw.parameters.contradictions import contradictions
-    from fsw.parameters.registry import BY_NAME
+    from fsw.parameters.registry import tuning_of
     from fsw.parameters.storage import load
     from fsw.tuning import tuned
 
     loaded = load(options.params)
-    changed = [(BY_NAME[name], value) for name, value in loaded.values.items()]
-    config = tuned(config, tuple((one.path, one.scale * value) for one, value in changed))
+    config = tuned(config, tuning_of(loaded.values))
     for sentence in (*loaded.complaints, *contradictions(config)):
         raise UnusableError(f"{options.params}: {sentence}")
     return config

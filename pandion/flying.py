@@ -18,12 +18,12 @@ import numpy as np
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.revision import revision
 from fsw.model.airframe import AIRFRAME
-from fsw.parameters.contradictions import contradictions
+from fsw.parameters.contradictions import agreed
 from fsw.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
-from fsw.parameters.registry import BY_NAME
+from fsw.parameters.registry import BY_NAME, tuning_of
 from fsw.parameters.storage import load, save
 from fsw.signals import TickInputs, TickOutputs
-from fsw.tuning import flat, tuned
+from fsw.tuning import flat
 from pandion.first_time import compiling
 from pandion.flown import Result, Verdict, write_json
 from pandion.join_truth import join_truth
@@ -34,10 +34,10 @@ from sitl.limits import LimitUse
 from sitl.result import TruthResult
 from sitl.scenario import Points
 from sitl.scenario_file import ScenarioError, scenario_digest, suite_of
-from sitl.simulation import Simulation
+from sitl.simulation import STEP_US, Simulation
 from sitl.truth_log import TruthLog
 from studies.flight.closed_loop import simulate
-from studies.flight.fly_again import changed_parameters
+from studies.flight.fly_again import changed_parameters, fly_words
 from studies.flight.job import Job, score
 from studies.flight.own_parts import OwnLaw, OwnParts, PushLaw
 from studies.flight.result import FlightResult
@@ -147,7 +147,7 @@ def with_parameters(
         if loaded.complaints:
             raise ValueError(f"{params}: {loaded.complaints[0]}")
         params = loaded.values
-    numbers = []
+    values = {}
     for name, value in params.items():
         parameter = BY_NAME.get(name)
         if parameter is None:
@@ -155,11 +155,8 @@ def with_parameters(
         refusal = parameter.refusal(float(value))
         if refusal is not None:
             raise ValueError(refusal)
-        numbers.append((parameter.path, parameter.scale * parameter.kept(float(value))))
-    config = tuned(config, tuple(numbers))
-    for sentence in contradictions(config):
-        raise ValueError(sentence)
-    return config
+        values[name] = parameter.kept(float(value))
+    return agreed(config, tuning_of(values))
 
 
 class _Recording:
@@ -254,7 +251,7 @@ def _reports(
         "sensors": suite_of(job.scenario),
         **asdict(truth),
         "real_time_factor": truth.duration_s / max(took_s, 1e-9),
-        "steps": round(truth.duration_s / 0.002),
+        "steps": round(1e6 * truth.duration_s / STEP_US),
         "wall_s": took_s,
     }
     mpc = {
@@ -279,21 +276,19 @@ def _in_two_processes(
 ) -> Result:
     folder = TemporaryDirectory(prefix="pandion-")
     out = Path(folder.name) / "flight"
-    words = ["--api=none", f"--seed={job.seed}", f"--out={out}"]
+    words = ["--api=none", f"--out={out}"]
     if given is None:
         given = str(save_scenario(job.scenario, Path(folder.name) / f"{job.scenario.name}.toml"))
     else:
         words += [f"--sensors={sensors}"] if sensors is not None else []
         words += [f"--duration={duration_s!r}"] if duration_s is not None else []
-    changed = changed_parameters(job)
+    changed, params = changed_parameters(job), None
     if changed:
-        save(Path(folder.name) / "own.params", changed)
-        words.append(f"--params={Path(folder.name) / 'own.params'}")
-    words.append(f"--controller={job.config.controller}")
-    words += ["--tracking=pid"] if job.config.inner == "pid" else []
-    words += ["--allow-inconsistent"] if job.config.soft else []
+        params = Path(folder.name) / "own.params"
+        save(params, changed)
+    command = fly_words(job, job.config.controller, given, params)
     ran = subprocess.run(
-        [sys.executable, "-m", "pandion", "fly", given, *words],
+        [sys.executable, "-m", "pandion", *command, *words],
         capture_output=True,
         text=True,
         check=False,

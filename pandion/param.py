@@ -92,7 +92,7 @@ class FileValues:
         """
         from fsw.parameters.facts import ALIASES
         from fsw.parameters.flight_config import FlightConfig
-        from fsw.parameters.registry import BY_NAME
+        from fsw.parameters.registry import BY_NAME, tuning_of
         from fsw.parameters.storage import save
         from fsw.tuning import tuned
         from pandion.param_vehicle import ParameterRefused
@@ -105,10 +105,7 @@ class FileValues:
             raise ParameterRefused(refusal)
         kept = self._kept() | {parameter.name: parameter.kept(value)}
         try:
-            tuned(
-                FlightConfig(),
-                tuple((BY_NAME[n].path, v * BY_NAME[n].scale) for n, v in kept.items()),
-            )
+            tuned(FlightConfig(), tuning_of(kept))
         except ValueError as error:
             raise ParameterRefused(f"{name} is left as it is: {error}") from None
         save(self._path, kept)

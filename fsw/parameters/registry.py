@@ -11,13 +11,14 @@ Defaults are not in the table: they are those of the dataclasses.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
 from fsw.parameters.float32 import nearest_decimal
-from fsw.tuning import number_at
+from fsw.tuning import Tuning, number_at
 
 ACCEL_RANGE: Final = "EST_ACC_RANGE"
 _DEGREE: Final = math.pi / 180.0
@@ -600,4 +601,11 @@ PARAMETERS: Final[tuple[Parameter, ...]] = tuple(
     )
 )
 BY_NAME: Final[dict[str, Parameter]] = {parameter.name: parameter for parameter in PARAMETERS}
+
+
+def tuning_of(values: Mapping[str, float]) -> Tuning:
+    """The numbers of a configuration that are parameters' ``values`` [their units] by name."""
+    return tuple((BY_NAME[name].path, BY_NAME[name].scale * one) for name, one in values.items())
+
+
 GROUPS: Final[tuple[str, ...]] = tuple(_ROWS)

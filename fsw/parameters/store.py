@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.registry import BY_NAME, PARAMETERS
+from fsw.parameters.registry import BY_NAME, PARAMETERS, tuning_of
 from fsw.tuning import Tuning
 
 Prepare = Callable[[Tuning], object]
@@ -193,8 +193,5 @@ class ParameterStore:
 
     def _tuning(self, values: Mapping[str, float]) -> Tuning:
         """What differs from the configuration of the start."""
-        return tuple(
-            (p.path, values[p.name] * p.scale)
-            for p in PARAMETERS
-            if values[p.name] != self.defaults[p.name]
-        )
+        defaults = self.defaults
+        return tuning_of({name: values[name] for name in BY_NAME if values[name] != defaults[name]})

@@ -15,7 +15,7 @@ from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from fsw.parameters.contradictions import contradictions
 from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.parameters.registry import BY_NAME
+from fsw.parameters.registry import BY_NAME, tuning_of
 from fsw.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
 from sitl.ranges import Range
@@ -391,7 +391,7 @@ def _config(
 def _parameters(table: Any) -> tuple[tuple[str, float], ...]:
     if not isinstance(table, dict):
         raise CampaignError(f"{PARAMETERS}: must be a table, such as [{PARAMETERS}]")
-    found = []
+    found = {}
     for name, value in table.items():
         if name not in BY_NAME:
             raise CampaignError(f'unknown parameter "{name}"{nearest(name, BY_NAME)}')
@@ -399,8 +399,8 @@ def _parameters(table: Any) -> tuple[tuple[str, float], ...]:
         refusal = parameter.refusal(_number(value, f"{PARAMETERS}.{name}"))
         if refusal is not None:
             raise CampaignError(f"{PARAMETERS}: {refusal}")
-        found.append((parameter.path, parameter.scale * parameter.kept(float(value))))
-    return tuple(found)
+        found[name] = parameter.kept(float(value))
+    return tuning_of(found)
 
 
 def _faults(tables: Any) -> dict[str, Fault]:

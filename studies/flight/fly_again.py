@@ -43,7 +43,12 @@ def fly_command(
             part = getattr(config, f"own_{name}").partition("@")[0]
             given += [f"{name}={part!r}"] if part else []
         return f'python -c "import pandion; print(pandion.fly({", ".join(given)}))"'
-    words = [program, "fly", str(scenario), f"--seed={job.seed}"]
+    return " ".join([program, *fly_words(job, controller, str(scenario), params)])
+
+
+def fly_words(job: Job, controller: str, scenario: str, params: Path | None) -> list[str]:
+    """The same with our own parts, in words."""
+    words = ["fly", scenario, f"--seed={job.seed}"]
     if params is not None:
         words.append(f"--params={params}")
     if controller != "blf":
@@ -52,7 +57,7 @@ def fly_command(
         words.append("--tracking=pid")
     if job.config.soft:
         words.append("--allow-inconsistent")
-    return " ".join(words)
+    return words
 
 
 def flown_again(job: Job, stem: Path) -> Outcome:
