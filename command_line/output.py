@@ -127,6 +127,20 @@ def unwritable(error: Exception) -> str:
     return f"cannot write {error.filename}: {error.strerror}" if named else str(error)  # type: ignore[attr-defined]
 
 
+# Which extra a package is of that not everyone installs.
+EXTRAS: Final = {
+    "distributed": "campaign",
+    "cmaes": "search",
+    "matplotlib": "report",
+    "plotly": "report",
+    "mcap": "mcap",
+    "textual": "top",
+    "viser": "view",
+    "gymnasium": "gym",
+    "dask": "campaign",
+}
+
+
 def without(error: ModuleNotFoundError, extra: str) -> str:
     """What to install where an optional package is missing."""
     return f"the package {error.name} is missing; pip install {error.name} (of the extra {extra})"

@@ -13,7 +13,7 @@ from pandion.own_modules import put_first
 
 put_first()
 
-from command_line.output import complain, print_anything, without  # noqa: E402
+from command_line.output import EXTRAS, complain, print_anything, without  # noqa: E402
 from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
 
 # Module, and what the verb does, by what it is for.
@@ -68,8 +68,6 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     },
 }
 VERBS: Final = {name: verb for group in GROUPS.values() for name, verb in group.items()}
-# Which extra a package is of that not everyone installs.
-EXTRAS: Final = {"distributed": "campaign", "dask": "campaign", "cmaes": "search"}
 _MOVED: Final = {"bench": "pandion.moved_bench"}  # which is a verb no more
 
 

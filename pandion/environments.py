@@ -7,7 +7,7 @@
 
 ``pandion/Walls-v0`` and ``pandion/Workspace-v0`` are the two cases of the paper with exact sensors:
 the end-effector follows its reference, and margins, limits and collisions are judged by the referee
-of every flight. An extra: ``pip install 'pandion[gym]'``.
+of every flight. Of the extra ``gym``: ``pip install gymnasium``.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ class Log:
         """Write the flight as one HTML page, beside the log or to ``path``; returns where.
 
         Raises:
-            ModuleNotFoundError: plotly is not installed: ``pip install 'pandion[report]'``.
+            ModuleNotFoundError: plotly is not installed: ``pip install plotly``.
         """
         from pandion.report import write_report
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from command_line.output import EXTRAS
 from fsw.parameters.control_choice import ControlChoice
 from pandion.own_modules import our_modules
 
@@ -35,9 +36,6 @@ _PORTS: Final = (  # number, who binds it, and what to do where it is taken
     (14580, "the vehicle, for programs", _OTHER_PORT),
     (18570, "the vehicle, for ground stations", _OTHER_PORT),
 )
-_EXTRAS: Final = {
-    "matplotlib": "report", "plotly": "report", "mcap": "mcap", "textual": "top", "viser": "view",
-}  # fmt: skip
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)\s*>=\s*([\d.]+)$")
 # In a process of its own, because what it asks for changes the process.
 _CLAIM: Final = (
@@ -182,10 +180,11 @@ def extras() -> Check:
     """Packages that only some verbs need."""
     from importlib.util import find_spec
 
-    lacking = [name for name in _EXTRAS if find_spec(name) is None]
-    missing = sorted({_EXTRAS[name] for name in lacking})
+    lacking = [name for name in EXTRAS if find_spec(name) is None]
+    missing = sorted({EXTRAS[name] for name in lacking})
     if not missing:
-        return Check("extras", OK, "view, report, top and mcap can be used")
+        known = ", ".join(sorted(set(EXTRAS.values())))
+        return Check("extras", OK, f"{known} can be used")
     remedy = f"pip install {' '.join(lacking)} where they are wanted"
     return Check("extras", OK, f"not installed: {', '.join(missing)}", remedy)
 
