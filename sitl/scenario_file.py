@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import math
 import tomllib
-import types
-import typing
-from collections.abc import Iterable
-from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+from typing import Any, Final, TypeVar, get_args
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
+from command_line.toml_tables import TableReader, nearest, shown
 from sitl.ranges import ROUNDED
-from sitl.scenario import V3, Range, Scenario, ScenarioWall, ScenarioZone, Sensors
+from sitl.scenario import V3, Scenario, ScenarioWall, ScenarioZone, Sensors
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
 _MOST_BYTES = 2 * 1024 * 1024  # of a file: a reference of 20,000 points; zones are a hundredth
 _MOST_CSV = 2 * 1024 * 1024  # of a table of points
 COLUMNS = ["time_s", "north_m", "east_m", "down_m", "yaw_deg"]  # of one, the last if there is yaw
-_SHOWN = 80  # characters of a value in a sentence
 _UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
@@ -103,7 +98,7 @@ def _path(name_or_path: str) -> Path:
         return PACKAGED / f"{name_or_path}.toml"
     if path.suffix != ".toml":
         raise ScenarioError(
-            f'unknown scenario "{name_or_path}"{_nearest(name_or_path, scenario_names())}; '
+            f'unknown scenario "{name_or_path}"{nearest(name_or_path, scenario_names())}; '
             f"known: {', '.join(scenario_names())}, or the path of a .toml file"
         )
     return path
@@ -161,7 +156,7 @@ def _with_points(curve: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     inside = isinstance(named, str) and not ({"..", "/"} & set(Path(named).parts))
     if not inside or folder is None:
         raise ScenarioError(
-            f"trajectory.file = {_shown(named)}: must be a file beside the scenario's"
+            f"trajectory.file = {shown(named)}: must be a file beside the scenario's"
         )
     for key in ("time_s", "position_m", "yaw_deg"):
         if key in curve:
@@ -199,7 +194,7 @@ def read_points(path: Path) -> tuple[dict[str, list[Any]], bytes]:
         if len(values) != len(head) or not all(map(math.isfinite, values)):
             raise ScenarioError(
                 f"points {path}, line {number}: must be {len(head)} finite numbers, is "
-                f"{_shown(line)}"
+                f"{shown(line)}"
             )
         found.append(values)
     columns: dict[str, list[Any]] = {"time_s": [row[0] for row in found]}
@@ -223,94 +218,12 @@ def _with_unit_normal(zone: Plane) -> Plane:
     return dataclasses.replace(changed, normal=unit)  # type: ignore[no-any-return]
 
 
-def _nearest(word: object, known: Iterable[str]) -> str:
-    match = difflib.get_close_matches(str(word)[:_SHOWN], list(known), n=1, cutoff=0.4)
-    return f', did you mean "{match[0]}"?' if match else ""
-
-
-def _shown(value: object) -> str:
-    """A value as sentences quote it, in part if it is long."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of thousands of digits
-        return "a number too long to show"
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
-
-
-@cache
-def _hints(kind: Any) -> dict[str, Any]:
-    """The annotations of a dataclass, which Python evaluates anew each time, for 0.3 ms."""
-    return typing.get_type_hints(kind, include_extras=True)
-
-
-def build_table(kind: Any, table: Any, path: str) -> Any:
-    """An instance of the dataclass ``kind`` from a TOML ``table`` that stands at ``path``.
-
-    Raises:
-        ScenarioError: An unknown or missing key, or an impossible value.
-    """
-    if not isinstance(table, dict):
-        raise ScenarioError(f"{path} = {_shown(table)}: must be a table")
-    hints = _hints(kind)
-    prefix = f"{path}." if path else ""
-    for key in table:
-        if key not in hints:
-            raise ScenarioError(
-                f'unknown key "{prefix}{key[:_SHOWN]}" = {_shown(table[key])}{_nearest(key, hints)}'
-                f" (known here: {', '.join(name for name in hints if name != 'name' or path)})"
-            )
-    for field in dataclasses.fields(kind):
-        if field.default is dataclasses.MISSING and field.name not in table:
-            allowed = _allowed(hints[field.name])
-            raise ScenarioError(f'missing key "{prefix}{field.name}"{allowed}')
-    return kind(**{key: _value(hints[key], table[key], f"{prefix}{key}") for key in table})
-
-
-def _value(hint: Any, value: Any, path: str) -> Any:
-    """One value, checked against its annotation."""
-    origin, parts = get_origin(hint), get_args(hint)
-    if origin is Annotated:
-        return _numbers(parts[0], parts[1], value, path)
-    if hint == Sensors | MeasuredSensors:
-        return _sensors(value, path)
-    if origin is types.UnionType:
-        return _table_of_a_kind([part for part in parts if part is not types.NoneType], value, path)
-    if hint is ScenarioZone:
-        # Loads numba, for which a scenario without zones need not wait.
-        from sitl.shapes import TABLES
-
-        return _table_of_a_kind(list(TABLES), value, path, "shape")
-    if dataclasses.is_dataclass(hint):
-        return build_table(hint, value, path)
-    if origin is tuple:
-        if not isinstance(value, list):
-            raise ScenarioError(
-                f"{path} = {_shown(value)}: must be an array of {_entries(parts[0], path)}"
-            )
-        return tuple(_value(parts[0], item, f"{path}[{i}]") for i, item in enumerate(value))
-    if hint is bool:
-        if not isinstance(value, bool):
-            raise ScenarioError(f"{path} = {_shown(value)}: must be true or false")
-        return value
-    return _word(hint, value, path)
-
-
-def _entries(hint: Any, path: str) -> str:
-    """What an array consists of, as a sentence says it."""
-    if get_origin(hint) is Annotated:
-        size = len(get_args(get_args(hint)[0]))
-        return f"arrays of {size} numbers" if size else f"numbers ({get_args(hint)[1]})"
-    if dataclasses.is_dataclass(hint) or get_origin(hint) is types.UnionType:
-        return f"tables ([[{path}]])"
-    return 'texts, such as ["a", "b"]'
-
-
 def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
     """The numbers of a suite, with those of the scenario in their place where it has any."""
     if not isinstance(value, dict):
-        raise ScenarioError(f"{path} = {_shown(value)}: must be a table")
+        raise ScenarioError(f"{path} = {shown(value)}: must be a table")
     own = {key: part for key, part in value.items() if key != "suite"}
-    suite = _word(SuiteName, value.get("suite", PERFECT), f"{path}.suite")
+    suite = _READER.word(SuiteName, value.get("suite", PERFECT), f"{path}.suite")
     if suite == PERFECT:
         exact: Sensors = build_table(Sensors, own, path)
         return exact
@@ -319,73 +232,24 @@ def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
         if key not in tables:
             raise ScenarioError(
                 f'unknown key "{path}.{key}": the suite "{suite}" has no such sensor'
-                f"{_nearest(key, tables)} (known here: suite, {', '.join(tables)})"
+                f"{nearest(key, tables)} (known here: suite, {', '.join(tables)})"
             )
         if not isinstance(part, dict):
-            raise ScenarioError(f"{path}.{key} = {_shown(part)}: must be a table")
+            raise ScenarioError(f"{path}.{key} = {shown(part)}: must be a table")
         tables[key] = {**tables[key], **part}
     measured: MeasuredSensors = build_table(MeasuredSensors, {**tables, "suite": suite}, path)
     return measured
 
 
-def _word(hint: Any, value: Any, path: str) -> str:
-    """A text, or one of several."""
-    parts = get_args(hint)
-    if not isinstance(value, str):
-        raise ScenarioError(f"{path} = {_shown(value)}: must be a text{_allowed(hint)}")
-    if get_origin(hint) is Literal and value not in parts:
-        hint = _nearest(value, parts)
-        raise ScenarioError(f'{path} = "{value[:_SHOWN]}": must be {_words(parts)}{hint}')
-    return value
+def _zone(value: Any, path: str) -> Any:
+    """A zone of the shape that its table names."""
+    # Loads numba, for which a scenario without zones need not wait.
+    from sitl.shapes import TABLES
+
+    return _READER.table_of_a_kind(list(TABLES), value, path, "shape")
 
 
-def _table_of_a_kind(kinds: list[Any], value: Any, path: str, key: str = "kind") -> Any:
-    """A table with a ``key`` that names its type, where there are several."""
-    if len(kinds) == 1:
-        return build_table(kinds[0], value, path)
-    words = {get_args(_hints(kind)[key])[0]: kind for kind in kinds}
-    if not isinstance(value, dict):
-        raise ScenarioError(f"{path} = {_shown(value)}: must be a table")
-    if key not in value:
-        raise ScenarioError(f'missing key "{path}.{key}": must be {_words(words)}')
-    word = value[key]
-    if not isinstance(word, str) or word not in words:
-        raise ScenarioError(
-            f"{path}.{key} = {_shown(word)}: must be {_words(words)}{_nearest(word, words)}"
-        )
-    return build_table(words[word], value, path)
-
-
-def _numbers(hint: Any, allowed: Range, value: Any, path: str) -> float | tuple[float, ...]:
-    """A number or a vector of numbers within its range."""
-    if hint is not float:
-        size = len(get_args(hint))
-        if not isinstance(value, list) or len(value) != size:
-            raise ScenarioError(
-                f"{path} = {_shown(value)}: must be an array of {size} numbers ({allowed})"
-            )
-        return tuple(_number(item, allowed, f"{path}[{i}]") for i, item in enumerate(value))
-    return _number(value, allowed, path)
-
-
-def _number(value: Any, allowed: Range, path: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"{path} = {_shown(value)}: must be a number ({allowed})")
-    try:
-        number = float(value)
-    except OverflowError:  # an integer beyond all floats; infinity may be allowed, and is not meant
-        number = math.nan
-    if not allowed.contains(number):
-        raise ScenarioError(f"{path} = {_shown(value)}: must be {allowed}")
-    return number
-
-
-def _words(words: Iterable[str]) -> str:
-    return "one of " + ", ".join(f'"{word}"' for word in words)
-
-
-def _allowed(hint: Any) -> str:
-    """What a sentence about a key says in brackets."""
-    if get_origin(hint) is Annotated:
-        return f" ({get_args(hint)[1]})"
-    return f" ({_words(get_args(hint))})" if get_origin(hint) is Literal else ""
+_READER: Final = TableReader(
+    ScenarioError, {Sensors | MeasuredSensors: _sensors, ScenarioZone: _zone}
+)
+build_table: Final = _READER.build
