@@ -102,10 +102,11 @@ class TableReader:
         origin, parts = get_origin(hint), get_args(hint)
         if origin is Annotated:
             return self._numbers(parts[0], parts[1], value, path)
-        if origin is types.UnionType:
-            return self.table_of_a_kind(
-                [part for part in parts if part is not types.NoneType], value, path
-            )
+        if origin in (types.UnionType, typing.Union):
+            kinds = [part for part in parts if part is not types.NoneType]
+            if len(kinds) == 1:
+                return self._value(kinds[0], value, path)
+            return self.table_of_a_kind(kinds, value, path)
         if dataclasses.is_dataclass(hint):
             return self.build(hint, value, path)
         if origin is tuple:
@@ -124,8 +125,6 @@ class TableReader:
 
     def table_of_a_kind(self, kinds: list[Any], value: Any, path: str, key: str = "kind") -> Any:
         """A table with a ``key`` that names its type, where there are several."""
-        if len(kinds) == 1:
-            return self.build(kinds[0], value, path)
         words = {get_args(_hints(kind)[key])[0]: kind for kind in kinds}
         if not isinstance(value, dict):
             raise self.error(f"{path} = {shown(value)}: must be a table")

@@ -28,6 +28,7 @@ _FILES = sorted(
         "pandion",
         "sitl",
         "studies",
+        "vehicles",
         "view",
     )
     for path in (_ROOT / top).rglob("*.py")

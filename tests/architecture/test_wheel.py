@@ -9,7 +9,10 @@ from zipfile import ZipFile
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("pandion", "fsw", "sitl", "messages", "command_line", "studies", "view")
+PACKAGES = (
+    *("pandion", "fsw", "sitl", "vehicles"),
+    *("messages", "command_line", "studies", "view"),
+)
 
 
 @pytest.fixture(scope="module")

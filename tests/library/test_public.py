@@ -52,7 +52,8 @@ def test_the_public_names_are_these() -> None:
 
 def test_its_types_are_for_users_as_well() -> None:
     root = Path(pandion.__file__).parents[1]
-    for package in ("pandion", "fsw", "sitl", "studies", "command_line", "messages", "view"):
+    packages = "pandion fsw sitl vehicles studies command_line messages view"
+    for package in packages.split():
         assert (root / package / "py.typed").exists()
 
 

@@ -202,7 +202,7 @@ def test_a_scheduler_that_comes_back_gets_what_is_left(tmp_path: Path, by_hand: 
 
 def test_a_worker_with_other_code_flies_nothing(tmp_path: Path, by_hand: DaskByHand) -> None:
     other = tmp_path / "other"
-    for package in ("fsw", "sitl", "studies", "command_line", "tests", "messages"):
+    for package in ("fsw", "sitl", "vehicles", "studies", "command_line", "tests", "messages"):
         shutil.copytree(ROOT / package, other / package, ignore=shutil.ignore_patterns("*.pyc"))
     changed = other / "studies" / "paper" / "published.py"
     changed.write_text(changed.read_text() + "\n# another version\n")

@@ -1,0 +1,1 @@
+"""Vehicles as files: what the flight software and the simulator each build their physics from."""
