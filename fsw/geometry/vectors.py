@@ -37,6 +37,12 @@ def subtract(a: Vector, b: Vector) -> Vec3:
 
 
 @compilable
+def cross(a: Vector, b: Vector) -> Vec3:
+    """``a`` [any unit, any frame] cross ``b`` [any unit, the same frame]."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compilable
 def norm(a: Vec3) -> float:
     """Euclidean length of ``a`` [any unit, any frame]."""
     return math.sqrt(dot(a, a))
