@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from fsw.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME
 from sitl.plant.parameters import Vehicle as Plant
 from vehicles.vehicle_file import (
     PACKAGED,

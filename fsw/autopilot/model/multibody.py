@@ -1,0 +1,515 @@
+r"""The vehicle as rigid bodies: a base and an arm of up to ``JOINTS`` joints about any axes.
+
+Everything is written in the body frame B, about its origin, whose velocity is taken as zero: what
+the base's linear acceleration does to the arm is a uniform field. With w the base's rate and q the
+joints, the vehicle obeys
+
+.. math::
+    \begin{bmatrix} m 1 & M_{vw} & M_{vq} \\ \cdot & M_{ww} & M_{wq} \\ \cdot & \cdot & M_{qq}
+    \end{bmatrix}
+    \begin{bmatrix} \dot v \\ \dot w \\ \ddot q \end{bmatrix}
+    + \begin{bmatrix} b_v \\ b_w \\ b_q \end{bmatrix}
+    = \begin{bmatrix} F \\ \tau_B \\ \tau_q \end{bmatrix}
+
+with F all forces but weight, :math:`\dot v` the acceleration beside gravity, b of the rates. One
+elimination of linear motion and joints leaves what turns the base:
+
+.. math:: J \dot w = \tau_B - c \times F - R (\tau_q - M_{qv} F / m - b_q') - b_w'
+
+with J the effective inertia about the centre of mass c and R how joint torques react on the base.
+
+Source: R. Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 6 and 9; docs/equations.md T1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from fsw.autopilot.geometry.vectors import add_scaled, cross, dot
+from fsw.autopilot.signals import Mat3, StateEstimate, Vec2, Vec3
+from fsw.autopilot.tick_record import Estimate
+from fsw.compiled import compilable
+from fsw.record import JOINTS, Floats, Nine, PerJoint, Record, Three
+from vehicles.description import V6, Vehicle
+
+Several = tuple[float, ...]
+Vectors = Annotated[Floats, 3 * JOINTS]
+Rotations = Annotated[Floats, 9 * JOINTS]
+Matrix = Annotated[Floats, JOINTS * JOINTS]
+_SUMS: Final = 21  # numbers of a link that are summed from the tip to the base
+Sums = Annotated[Floats, _SUMS * JOINTS]
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """Numbers of the bodies, one joint after the other, with room for ``JOINTS`` of them."""
+
+    joints: int
+    base_mass: float  # kg
+    base_com: Vec3  # m, B
+    base_inertia: V6  # kg m^2, xx yy zz xy xz yz about the centre of mass
+    offset: Several  # (3,) m each, of the joint in the frame of the link before
+    turned: Several  # (9,) each, from the joint's frame at angle zero to that of the link before
+    axis: Several  # (3,) each, unit, in the joint's frame
+    mass: Several  # kg, of the link
+    com: Several  # (3,) m each, in the joint's frame, which the link moves with
+    inertia: Several  # (6,) kg m^2 each, about the link's centre of mass
+    armature: Several  # kg m^2, of the motor behind its gear
+    tip: Vec3  # m, end-effector in the frame of the last joint
+
+
+def bodies_of(vehicle: Vehicle) -> Bodies:
+    """The bodies of a vehicle."""
+    joints = vehicle.joints
+
+    def padded(rows: list[Several], size: int) -> Several:
+        numbers = [number for row in rows for number in row]
+        return (*numbers, *[0.0] * (size * JOINTS - len(numbers)))
+
+    return Bodies(
+        joints=len(joints),
+        base_mass=vehicle.base.mass,
+        base_com=vehicle.base.com,
+        base_inertia=vehicle.base.inertia,
+        offset=padded([joint.xyz for joint in joints], 3),
+        turned=padded([_fixed_axes(joint.rpy) for joint in joints], 9),
+        axis=padded([joint.axis for joint in joints], 3),
+        mass=padded([(joint.link.mass,) for joint in joints], 1),
+        com=padded([joint.link.com for joint in joints], 3),
+        inertia=padded([joint.link.inertia for joint in joints], 6),
+        armature=padded([(joint.armature,) for joint in joints], 1),
+        tip=vehicle.end_effector.position,
+    )
+
+
+def _fixed_axes(rpy: Vec3) -> Mat3:
+    """Rotation of roll, pitch and yaw about fixed axes, as in URDF."""
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
+    return (
+        *(cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        *(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        *(-sp, cp * sr, cp * cr),
+    )
+
+
+class Multibody(Record):
+    """The vehicle in one pose and motion, in B about its origin; made anew wherever it is needed.
+
+    The mass matrix's blocks are named by their rows and columns: v, w and q.
+    """
+
+    rotation: Rotations  # from the link's frame to B
+    origin: Vectors  # m, of the joint
+    axis: Vectors  # unit
+    rate: Vectors  # rad/s, of the link, inertial
+    speed: Vectors  # m/s, of the joint's origin, beside the base's
+    of_link: Sums
+    centre: Three  # m, centre of mass of the vehicle
+    vq: Vectors  # kg m, (3,) a joint
+    wq: Vectors  # kg m^2, (3,) a joint
+    qq: Matrix  # kg m^2
+    bias_v: Three  # N
+    bias_w: Three  # N m
+    bias: PerJoint  # N m
+    momentum: PerJoint  # N m s, generalised
+    drift: PerJoint  # N m, what changes it beside torques and the field
+    # After the elimination.
+    inertia: Nine  # kg m^2, J
+    inverse: Nine  # of J
+    reaction: Vectors  # (3,) N m a N m of a joint, R
+    swing: Nine  # m, velocity of the centre of mass over rate of a base with drives that are free
+    wq_free: (
+        Vectors  # kg m^2, as ``wq``, of a base that moves as it likes: about the centre of mass
+    )
+    qq_free: Matrix  # kg m^2, as ``qq``, the same
+    factor: Matrix  # Cholesky's of ``qq_free``
+    work: Vectors
+
+
+@compilable
+def _get(a: Floats | Several, k: int) -> Vec3:
+    return a[3 * k], a[3 * k + 1], a[3 * k + 2]
+
+
+@compilable
+def _put(a: Floats, k: int, v: Vec3) -> None:
+    a[3 * k], a[3 * k + 1], a[3 * k + 2] = v
+
+
+@compilable
+def _add(a: Vec3, b: Vec3) -> Vec3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compilable
+def _nine(a: Floats | Several, k: int) -> Mat3:
+    i = 9 * k
+    return (
+        *(a[i], a[i + 1], a[i + 2]),
+        *(a[i + 3], a[i + 4], a[i + 5]),
+        *(a[i + 6], a[i + 7], a[i + 8]),
+    )
+
+
+@compilable
+def _six(a: Several, k: int) -> V6:
+    i = 6 * k
+    return a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5]
+
+
+@compilable
+def _product(a: Mat3, b: Mat3) -> Mat3:
+    return (
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
+        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
+        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
+        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+    )
+
+
+@compilable
+def _times(a: Mat3 | Floats, v: Vec3) -> Vec3:
+    return (
+        a[0] * v[0] + a[1] * v[1] + a[2] * v[2],
+        a[3] * v[0] + a[4] * v[1] + a[5] * v[2],
+        a[6] * v[0] + a[7] * v[1] + a[8] * v[2],
+    )
+
+
+@compilable
+def _symmetric(s: V6, v: Vec3) -> Vec3:
+    """A symmetric matrix of the entries xx yy zz xy xz yz times a vector."""
+    return (
+        s[0] * v[0] + s[3] * v[1] + s[4] * v[2],
+        s[3] * v[0] + s[1] * v[1] + s[5] * v[2],
+        s[4] * v[0] + s[5] * v[1] + s[2] * v[2],
+    )
+
+
+@compilable
+def _rotated(R: Mat3, s: V6) -> V6:
+    """A symmetric matrix in other axes."""
+    x = _symmetric(s, (R[0], R[1], R[2]))
+    y = _symmetric(s, (R[3], R[4], R[5]))
+    z = _symmetric(s, (R[6], R[7], R[8]))
+    return (
+        R[0] * x[0] + R[1] * x[1] + R[2] * x[2],
+        R[3] * y[0] + R[4] * y[1] + R[5] * y[2],
+        R[6] * z[0] + R[7] * z[1] + R[8] * z[2],
+        R[3] * x[0] + R[4] * x[1] + R[5] * x[2],
+        R[6] * x[0] + R[7] * x[1] + R[8] * x[2],
+        R[6] * y[0] + R[7] * y[1] + R[8] * y[2],
+    )
+
+
+@compilable
+def _about(axis: Vec3, angle: float) -> Mat3:
+    """Rotation by an angle about a unit axis."""
+    x, y, z = axis
+    c, s = math.cos(angle), math.sin(angle)
+    d = 1.0 - c
+    return (
+        *(c + x * x * d, x * y * d - z * s, x * z * d + y * s),
+        *(y * x * d + z * s, c + y * y * d, y * z * d - x * s),
+        *(z * x * d - y * s, z * y * d + x * s, c + z * z * d),
+    )
+
+
+@compilable
+def place_links(m: Multibody, b: Bodies, q: Vec2 | Floats) -> None:
+    """Where joints and links are at the angles ``q`` (j,) [rad]. Writes rotation, origin, axis."""
+    R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    o: Vec3 = (0.0, 0.0, 0.0)
+    for k in range(int(b.joints)):
+        o = _add(o, _times(R, _get(b.offset, k)))
+        at_zero = _product(R, _nine(b.turned, k))
+        _put(m.axis, k, _times(at_zero, _get(b.axis, k)))
+        R = _product(at_zero, _about(_get(b.axis, k), q[k]))
+        _put(m.origin, k, o)
+        for i in range(9):
+            m.rotation[9 * k + i] = R[i]
+
+
+@compilable
+def move_bodies(
+    m: Multibody,
+    b: Bodies,
+    armature: float,
+    estimate: StateEstimate | Estimate,
+) -> None:
+    """All of ``m`` at the joints' angles and rates and the base's rate that are estimated.
+
+    Every joint has an ``armature`` [kg m^2] beside its own.
+    """
+    place_links(m, b, estimate.q_arm)
+    rate = estimate.w_WB_B
+    _move_links(m, b, estimate.qd_arm, (rate[0], rate[1], rate[2]))
+    _sum_up(m, b, armature, estimate.qd_arm, (rate[0], rate[1], rate[2]))
+    _eliminate(m, b)
+
+
+@compilable
+def _move_links(m: Multibody, b: Bodies, qd: Vec2 | Floats, rate: Vec3) -> None:
+    """Motion of each link, and what of it is summed. Writes rate, speed, of_link."""
+    w = rate
+    turning: Vec3 = (0.0, 0.0, 0.0)  # rad/s^2, of the link, without accelerations of joints
+    before: Vec3 = (0.0, 0.0, 0.0)
+    v: Vec3 = (0.0, 0.0, 0.0)
+    a: Vec3 = (0.0, 0.0, 0.0)
+    for k in range(int(b.joints)):
+        o, axis = _get(m.origin, k), _get(m.axis, k)
+        d = add_scaled(o, before, -1.0)
+        a = _add(a, _add(cross(turning, d), cross(w, cross(w, d))))
+        v = _add(v, cross(w, d))
+        turning = add_scaled(turning, cross(w, axis), qd[k])
+        w = add_scaled(w, axis, qd[k])
+        _put(m.rate, k, w)
+        _put(m.speed, k, v)
+        R = _nine(m.rotation, k)
+        inertia = _rotated(R, _six(b.inertia, k))
+        arm = _times(R, _get(b.com, k))
+        swept = cross(w, arm)
+        _note(
+            m.of_link,
+            k,
+            b.mass[k],
+            _add(o, arm),
+            inertia,
+            _add(v, swept),
+            _symmetric(inertia, w),
+            _add(a, _add(cross(turning, arm), cross(w, swept))),
+            _add(_symmetric(inertia, turning), cross(w, _symmetric(inertia, w))),
+        )
+        before = o
+
+
+@compilable
+def _note(
+    sums: Floats,
+    k: int,
+    mass: float,
+    c: Vec3,
+    inertia: V6,
+    v: Vec3,
+    spin: Vec3,
+    a: Vec3,
+    moment: Vec3,
+) -> None:
+    """What one link adds, about the origin: moments of mass, momentum, force that it takes."""
+    i = 7 * k
+    square = dot(c, c)
+    _put(sums, i, (mass * c[0], mass * c[1], mass * c[2]))
+    _put(
+        sums,
+        i + 1,
+        (
+            inertia[0] + mass * (square - c[0] * c[0]),
+            inertia[1] + mass * (square - c[1] * c[1]),
+            inertia[2] + mass * (square - c[2] * c[2]),
+        ),
+    )
+    _put(
+        sums,
+        i + 2,
+        (
+            inertia[3] - mass * c[0] * c[1],
+            inertia[4] - mass * c[0] * c[2],
+            inertia[5] - mass * c[1] * c[2],
+        ),
+    )
+    _put(sums, i + 3, (mass * v[0], mass * v[1], mass * v[2]))
+    _put(sums, i + 4, add_scaled(spin, cross(c, v), mass))
+    _put(sums, i + 5, (mass * a[0], mass * a[1], mass * a[2]))
+    _put(sums, i + 6, add_scaled(moment, cross(c, a), mass))
+
+
+@compilable
+def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Vec2 | Floats, rate: Vec3) -> None:
+    """From the tip to the base. Writes of_link, vq, wq, qq, bias, momentum, drift, bias_v, _w."""
+    n, sums, mass = int(b.joints), m.of_link, 0.0
+    for k in range(n - 1, -1, -1):
+        mass += b.mass[k]
+        if k < n - 1:
+            for i in range(_SUMS):
+                sums[_SUMS * k + i] += sums[_SUMS * (k + 1) + i]
+        i = 7 * k
+        axis, o, h = _get(m.axis, k), _get(m.origin, k), _get(sums, i)
+        s = cross(o, axis)  # velocity at B's origin of a body that turns about the joint
+        x, y = _get(sums, i + 1), _get(sums, i + 2)
+        inertia = (x[0], x[1], x[2], y[0], y[1], y[2])
+        _put(m.vq, k, add_scaled(cross(axis, h), s, mass))
+        _put(m.wq, k, _add(cross(h, s), _symmetric(inertia, axis)))
+        for j in range(k + 1):
+            along, aside = _get(m.axis, j), cross(_get(m.origin, j), _get(m.axis, j))
+            value = dot(along, _get(m.wq, k)) + dot(aside, _get(m.vq, k))
+            m.qq[JOINTS * j + k] = m.qq[JOINTS * k + j] = value
+        m.qq[JOINTS * k + k] += b.armature[k] + armature
+        p, spin = _get(sums, i + 3), _get(sums, i + 4)
+        spin = add_scaled(spin, cross(o, p), -1.0)  # about the joint
+        own = (b.armature[k] + armature) * qd[k]
+        m.momentum[k] = dot(axis, spin) + own
+        turned = cross(_get(m.rate, k), axis)
+        m.drift[k] = dot(turned, spin) - dot(axis, cross(_get(m.speed, k), p))
+        m.bias[k] = dot(axis, _get(sums, i + 6)) + dot(s, _get(sums, i + 5))
+    base, c = b.base_mass, (b.base_com[0], b.base_com[1], b.base_com[2])
+    swept = cross(rate, cross(rate, c))
+    spin = cross(rate, _symmetric(_six(b.base_inertia, 0), rate))
+    _put(m.bias_v, 0, add_scaled(_get(sums, 5), swept, base))
+    _put(m.bias_w, 0, add_scaled(_add(_get(sums, 6), spin), cross(c, swept), base))
+    whole = 1.0 / (mass + base)
+    h = add_scaled(_get(sums, 0), c, base)
+    _put(m.centre, 0, (whole * h[0], whole * h[1], whole * h[2]))
+
+
+@compilable
+def mass_of(b: Bodies) -> float:
+    """Of all bodies [kg]."""
+    mass = b.base_mass
+    for k in range(int(b.joints)):
+        mass += b.mass[k]
+    return float(mass)
+
+
+@compilable
+def _eliminate(m: Multibody, b: Bodies) -> None:
+    """Linear motion, then joints out of the mass matrix. Writes what comes after the elimination."""
+    n, mass, c = int(b.joints), mass_of(b), _get(m.centre, 0)
+    for k in range(n):
+        f = _get(m.vq, k)
+        _put(m.wq_free, k, add_scaled(_get(m.wq, k), cross(c, f), -1.0))
+        for i in range(n):
+            less = dot(f, _get(m.vq, i)) / mass
+            m.qq_free[JOINTS * k + i] = m.qq[JOINTS * k + i] - less
+    factorise(m.factor, m.qq_free, n)
+    for axis in range(3):
+        for k in range(n):
+            m.work[k] = m.wq_free[3 * k + axis]
+        solve(m.factor, m.work, n)
+        for k in range(n):
+            m.reaction[3 * k + axis] = m.work[k]
+    _begin_inertia(m, b, mass, c)
+    J, S = m.inertia, m.swing
+    S[0], S[1], S[2] = 0.0, c[2], -c[1]
+    S[3], S[4], S[5] = -c[2], 0.0, c[0]
+    S[6], S[7], S[8] = c[1], -c[0], 0.0
+    for k in range(n):
+        f, t, r = _get(m.vq, k), _get(m.wq_free, k), _get(m.reaction, k)
+        for i in range(3):
+            for j in range(3):
+                J[3 * i + j] -= t[i] * r[j]
+                S[3 * i + j] -= f[i] * r[j] / mass
+    _invert(J, m.inverse)
+
+
+@compilable
+def _begin_inertia(m: Multibody, b: Bodies, mass: float, c: Vec3) -> None:
+    """The inertia of all bodies about the centre of mass ``c``, as if no joint moved."""
+    d, base, sums, J = b.base_com, b.base_inertia, m.of_link, m.inertia
+    for i in range(3):
+        for j in range(i + 1):
+            entry = i if i == j else 2 + i + j  # of xx yy zz xy xz yz
+            J[3 * i + j] = base[entry] + sums[3 + entry]
+            J[3 * i + j] += mass * c[i] * c[j] - b.base_mass * d[i] * d[j]
+        J[4 * i] += b.base_mass * dot(d, d) - mass * dot(c, c)
+    J[1], J[2], J[5] = J[3], J[6], J[7]
+
+
+@compilable
+def _invert(a: Floats, out: Floats) -> None:
+    """The inverse of a symmetric matrix (3, 3)."""
+    p = a[4] * a[8] - a[5] * a[5]
+    q = a[2] * a[5] - a[1] * a[8]
+    r = a[1] * a[5] - a[2] * a[4]
+    scale = 1.0 / (a[0] * p + a[1] * q + a[2] * r)
+    out[0], out[1], out[2] = scale * p, scale * q, scale * r
+    out[3], out[4] = out[1], scale * (a[0] * a[8] - a[2] * a[2])
+    out[5] = scale * (a[1] * a[2] - a[0] * a[5])
+    out[6], out[7], out[8] = out[2], out[5], scale * (a[0] * a[4] - a[1] * a[1])
+
+
+@compilable
+def factorise(factor: Floats, a: Floats, n: int) -> None:
+    """Cholesky's lower factor of the leading part (n, n) of a matrix (JOINTS, JOINTS) [any]."""
+    for i in range(n):
+        for j in range(i + 1):
+            total = a[JOINTS * i + j]
+            for k in range(j):
+                total -= factor[JOINTS * i + k] * factor[JOINTS * j + k]
+            factor[JOINTS * i + j] = math.sqrt(total) if i == j else total / factor[JOINTS * j + j]
+
+
+@compilable
+def solve(factor: Floats, x: Floats, n: int) -> None:
+    """Solve A y = x (n,) [any] in place, with the ``factor`` (JOINTS, JOINTS) [any] of A."""
+    for i in range(n):
+        for k in range(i):
+            x[i] -= factor[JOINTS * i + k] * x[k]
+        x[i] /= factor[JOINTS * i + i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            x[i] -= factor[JOINTS * k + i] * x[k]
+        x[i] /= factor[JOINTS * i + i]
+
+
+@compilable
+def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Vec2 | Floats) -> Vec3:
+    """What of a rotor torque [N m, B] does not turn the base.
+
+    ``force`` [N, B] is that of the rotors, at B's origin, ``torque`` (j,) [N m] that of the joints.
+    """
+    c, mass = _get(m.centre, 0), mass_of(b)
+    push = add_scaled(force, _get(m.bias_v, 0), -1.0)
+    load = _add(cross(c, push), _get(m.bias_w, 0))
+    for k in range(int(b.joints)):
+        free = torque[k] - m.bias[k] - dot(_get(m.vq, k), push) / mass
+        load = add_scaled(load, _get(m.reaction, k), free)
+    return load
+
+
+@compilable
+def base_acceleration(
+    m: Multibody, b: Bodies, turn: Vec3, force: Vec3, torque: Vec2 | Floats
+) -> Vec3:
+    """Angular acceleration [rad/s^2, B] under a ``turn`` [N m, B] of the rotors.
+
+    ``force`` [N, B] and ``torque`` (j,) [N m] as of ``load_on_base``.
+    """
+    return _times(m.inverse, add_scaled(turn, load_on_base(m, b, force, torque), -1.0))
+
+
+@compilable
+def torque_to_turn(m: Multibody, acceleration: Vec3, load: Vec3) -> Vec3:
+    """Rotor torque [N m, B] for an ``acceleration`` [rad/s^2, B] against a ``load`` [N m, B]."""
+    return _add(_times(m.inertia, acceleration), load)
+
+
+@compilable
+def joint_load(m: Multibody, k: int, field: Vec3, turning: Vec3) -> float:
+    """Torque [N m] of joint ``k`` that does not accelerate any joint.
+
+    The ``field`` [m/s^2, B] is gravity less the acceleration of B's origin; the base has an angular
+    acceleration ``turning`` [rad/s^2, B].
+    """
+    return m.bias[k] - dot(_get(m.vq, k), field) + dot(_get(m.wq, k), turning)
+
+
+@compilable
+def joint_drift(m: Multibody, k: int, field: Vec3) -> float:
+    """What changes the momentum of joint ``k`` [N m] beside its torque, in a ``field`` [m/s^2]."""
+    return m.drift[k] + dot(_get(m.vq, k), field)
+
+
+@compilable
+def tip_in_body(m: Multibody, b: Bodies) -> tuple[Vec3, Vec3]:
+    """Position [m, B] of the end-effector, and its velocity beside the base's own [m/s, B]."""
+    last = int(b.joints) - 1
+    arm = _times(_nine(m.rotation, last), (b.tip[0], b.tip[1], b.tip[2]))
+    v = _add(_get(m.speed, last), cross(_get(m.rate, last), arm))
+    return _add(_get(m.origin, last), arm), v
