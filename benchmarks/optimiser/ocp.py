@@ -188,10 +188,10 @@ def _add_cost(
 ) -> None:
     w, airframe = config.weights, AIRFRAME
     target_v = node[3:6] if w.relative_velocity else 0.0
-    m1, m2 = airframe.link_mass
+    m1, m2 = airframe.bodies.mass[:2]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
-    moment1 = m1 * airframe.link_com[0] + m2 * airframe.link_length[0]
-    cog = (moment1 * ca.sin(th1) + m2 * airframe.link_com[1] * ca.sin(th12)) / (m1 + m2)
+    moment1 = m1 * airframe.bodies.com[2] + m2 * airframe.link_length[0]
+    cog = (moment1 * ca.sin(th1) + m2 * airframe.bodies.com[5] * ca.sin(th12)) / (m1 + m2)
     program.cost += (w.tracking_terminal if last else w.tracking) * ca.sumsqr(tip[0] - node[:3])
     program.cost += (w.velocity_terminal if last else w.velocity) * ca.sumsqr(tip[1] - target_v)
     program.cost += (w.arm_com_terminal if last else w.arm_com) * cog**2

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 from fsw.autopilot.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2
 from fsw.record import (
     JOINTS,
     ROTORS,
     Five,
+    Floats,
     Nine,
     PerJoint,
     PerRotor,
@@ -152,6 +153,44 @@ class Watched(Record):
     stood_at: PerJoint  # rad, where it was found stuck
 
 
+_Vectors = Annotated[Floats, 3 * JOINTS]
+_Rotations = Annotated[Floats, 9 * JOINTS]
+_Matrix = Annotated[Floats, JOINTS * JOINTS]
+_Sums = Annotated[Floats, 21 * JOINTS]
+
+
+class Multibody(Record):
+    """The vehicle in one pose and motion, in B about its origin; made anew wherever it is needed.
+
+    The mass matrix's blocks are named by their rows and columns: v, w and q.
+    """
+
+    rotation: _Rotations  # from the link's frame to B
+    origin: _Vectors  # m, of the joint
+    axis: _Vectors  # unit
+    rate: _Vectors  # rad/s, of the link, inertial
+    speed: _Vectors  # m/s, of the joint's origin, beside the base's
+    of_link: _Sums  # what of a link is summed from the tip to the base
+    centre: Three  # m, centre of mass of the vehicle
+    vq: _Vectors  # kg m, (3,) a joint
+    wq: _Vectors  # kg m^2, (3,) a joint
+    qq: _Matrix  # kg m^2
+    bias_v: Three  # N
+    bias_w: Three  # N m
+    bias: PerJoint  # N m
+    momentum: PerJoint  # N m s, generalised
+    drift: PerJoint  # N m, what changes it beside torques and the field
+    # After the elimination.
+    inertia: Nine  # kg m^2, J
+    inverse: Nine  # of J
+    reaction: _Vectors  # (3,) N m a N m of a joint, R
+    swing: Nine  # m, velocity of the centre of mass over rate of a base with drives that are free
+    wq_free: _Vectors  # kg m^2, as ``wq``, about the centre of mass: of a base that moves freely
+    qq_free: _Matrix  # kg m^2, as ``qq``, the same
+    factor: _Matrix  # Cholesky's of ``qq_free``
+    work: PerJoint
+
+
 class Tick(Record):
     """The whole state of the fast loop."""
 
@@ -175,6 +214,8 @@ class Tick(Record):
     # What is flown: the plan's state and input, changed by the safety filter.
     flown: PlanState
     flown_u: Accelerations
+    wanted: Sent  # what the loops ask for, until it is sent
+    bodies: Multibody  # of the estimate
 
     @property
     def commanded(self) -> ActuatorCommand:

@@ -39,7 +39,7 @@ def _passes(
     """The filter's answer to the acceleration of a total ``thrust`` [N], as the vehicle leans."""
     law, r = laws[0], ticks[0]
     R, estimate = r.estimate.R_WB, r.estimate
-    motion = motion_state(law.airframe, r.mass, estimate, r.rotors, r.sent.joint_torque[0])
+    motion = motion_state(law.airframe, r, r.rotors, r.sent.joint_torque)
     f = thrust / r.mass
     wanted = -f * R[2], -f * R[5], GRAVITY - f * R[8]
     a = add_scaled(motion.a, r.observed.d, 1.0)

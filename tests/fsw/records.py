@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -10,9 +11,12 @@ import numpy as np
 from fsw.autopilot.control import tracking
 from fsw.autopilot.control.gains import TrackingTuning
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec3
-from fsw.autopilot.tick_record import Observed, Tick
-from fsw.record import Record
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.multibody import joint_load, move_bodies
+from fsw.autopilot.model.rotors import MotionState, motion_state
+from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.tick_record import Multibody, Observed, Tick, new_tick
+from fsw.record import JOINTS, Record
 
 Kind = TypeVar("Kind", bound=Record)
 
@@ -40,6 +44,29 @@ def with_given(before: Tick, estimate: StateEstimate, plan: PredictionState, u: 
 def with_record(state: FlightState, **fields: Any) -> FlightState:
     """A state whose record has other fields, the estimate as ``known``."""
     return replace(state, cascade=changed(state.cascade, **fields))
+
+
+def placed(airframe: Airframe, estimate: StateEstimate, mass: float | None = None) -> Tick:
+    """A record whose bodies are those of an estimate."""
+    r = new_tick(airframe.mass if mass is None else mass)
+    r.known = estimate
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
+    return r
+
+
+def torques_for(m: Multibody, field: Vec3, turning: Vec3, qdd: Sequence[float]) -> list[float]:
+    """Torques [N m] of joints that get ``qdd`` [rad/s^2]."""
+    return [
+        joint_load(m, i, field, turning) + float(m.qq[JOINTS * i : JOINTS * i + len(qdd)] @ qdd)
+        for i in range(len(qdd))
+    ]
+
+
+def measured_motion(
+    airframe: Airframe, estimate: StateEstimate, rotors: Vec4, torque: Vec2 = (0.0, 0.0)
+) -> MotionState:
+    """The motion of an estimated vehicle whose rotors and joints give this."""
+    return motion_state(airframe, placed(airframe, estimate), rotors, torque)
 
 
 def observed(v: Vec3, d: Vec3, recent: float = 1.0) -> Observed:

@@ -44,12 +44,12 @@ def test_paper_is_the_vehicle_that_both_halves_know() -> None:
     paper, plant = load_vehicle("paper"), Plant()
     assert math.isclose(paper.mass, AIRFRAME.mass)
     assert math.isclose(paper.mass, plant.mass)
-    assert paper.base.inertia[:3] == AIRFRAME.inertia == plant.base_inertia
+    assert paper.base.inertia[:3] == AIRFRAME.bodies.base_inertia[:3] == plant.base_inertia
     assert [rotor.thrust_max for rotor in paper.rotors] == [AIRFRAME.rotor_thrust_max] * 4
     lengths = [paper.joints[1].xyz[2], paper.end_effector.position[2]]
     assert lengths == list(AIRFRAME.link_length) == [link.a for link in plant.links]
-    assert [joint.link.mass for joint in paper.joints] == list(AIRFRAME.link_mass)
-    assert [joint.link.inertia[1] for joint in paper.joints] == list(AIRFRAME.link_inertia)
+    assert [joint.link.mass for joint in paper.joints] == list(AIRFRAME.bodies.mass[:2])
+    assert [joint.link.inertia[1] for joint in paper.joints] == [4.256e-5, 8.321e-5]
     assert paper.joints[0].position_max == AIRFRAME.joint1_limit
     assert paper.coupled_limits[0].maximum == AIRFRAME.joint12_limit
     assert paper.limits.tilt == AIRFRAME.tilt_max

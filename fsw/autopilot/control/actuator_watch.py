@@ -30,14 +30,15 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from fsw.autopilot.control.joints import arm_dynamics
-from fsw.autopilot.geometry.vectors import clamp
+from fsw.autopilot.geometry.vectors import clamp, subtract
 from fsw.autopilot.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.rotors import hanging_arm, lag_rotors
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3, Vec4
-from fsw.autopilot.tick_record import NO_ROTOR, Watched, watch_anew
+from fsw.autopilot.model.multibody import Bodies, joint_drift, load_on_base, move_bodies
+from fsw.autopilot.model.rotors import lag_rotors, rotor_wrench
+from fsw.autopilot.signals import Vec3, Vec4
+from fsw.autopilot.tick_record import NO_ROTOR, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
+from fsw.record import Floats
 
 OBSERVER: Final = 30.0  # 1/s; the gyro's noise in a laboratory's suite is 0.5 N of a rotor then
 MEMORY: Final = 0.1  # s, of mean squares
@@ -127,17 +128,14 @@ def watch(
     airframe, sent, r = laws[0], before[0].sent, after[0]
     s, x = r.watch, r.estimate
     thrust = sent.rotor_thrust[0], sent.rotor_thrust[1], sent.rotor_thrust[2], sent.rotor_thrust[3]
-    torque = sent.joint_torque[0], sent.joint_torque[1]
-    reference = r.joints.reference[0], r.joints.reference[1]
-    rate = x.w_WB_B[0], x.w_WB_B[1], x.w_WB_B[2]
-    q_arm, qd_arm = (x.q_arm[0], x.q_arm[1]), (x.qd_arm[0], x.qd_arm[1])
-    specific_force = x.specific_force
+    joints = int(airframe.bodies.joints)
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, x)
     if s.running == 0.0:
         for i in range(4):
             s.thrust[i] = s.slow[i] = thrust[i]
-    _observe_base(s, airframe, decay, dt, thrust, torque[0], rate, q_arm, specific_force)
+    _observe_base(r, airframe, decay, dt, thrust, sent.joint_torque)
     if angles_known:
-        _observe_arm(s, airframe, dt, torque, reference, rate, q_arm, qd_arm, specific_force)
+        _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
     else:
         _forget_arm(s)
@@ -148,40 +146,34 @@ def watch(
     s.running += dt
     settled = s.running > SETTLING
     _judge_rotors(s, dt, settled)
-    for k in range(2):
-        _judge_joint(s, k, dt, settled and s.arm_seen > SETTLING, q_arm[k])
-    return bool(s.failed >= 0 or s.joint[0] != SOUND or s.joint[1] != SOUND)
+    found = s.failed >= 0
+    for k in range(joints):
+        _judge_joint(s, k, dt, settled and s.arm_seen > SETTLING, x.q_arm[k])
+        found = found or s.joint[k] != SOUND
+    return bool(found)
 
 
 @compilable
 def _observe_base(
-    s: Watched,
-    airframe: Airframe,
-    decay: float,
-    dt: float,
-    commanded: Vec4,
-    joint1_torque: float,
-    rate: Vec3,
-    q_arm: Vec2,
-    specific_force: float,
+    r: Tick, airframe: Airframe, decay: float, dt: float, commanded: Vec4, joint_torque: Floats
 ) -> None:
     """What turns and lifts the base beside the model, and the means of its products."""
+    s, rate, J = r.watch, r.estimate.w_WB_B, r.bodies.inertia
     f = (s.thrust[0], s.thrust[1], s.thrust[2], s.thrust[3])
     g = lag_rotors(f, commanded, decay)
     m = (0.5 * (f[0] + g[0]), 0.5 * (f[1] + g[1]), 0.5 * (f[2] + g[2]), 0.5 * (f[3] + g[3]))
-    arm, inertia = airframe.rotor_arm, airframe.inertia
-    roll_inertia = hanging_arm(airframe, q_arm).roll_inertia
-    wx, wy, wz = rate
-    modelled_x = arm * (m[1] - m[3]) - (inertia[2] - inertia[1]) * wy * wz
-    modelled_y = arm * (m[2] - m[0]) - joint1_torque - (inertia[0] - inertia[2]) * wz * wx
-    gained_x, gained_y = wx - s.rate[0], wy - s.rate[1]
-    if s.running == 0.0:
-        gained_x, gained_y = modelled_x * dt / roll_inertia, modelled_y * dt / inertia[1]
+    arm = airframe.rotor_arm
+    force, turn = rotor_wrench(airframe, m)
+    modelled = subtract(turn, load_on_base(r.bodies, airframe.bodies, force, joint_torque))
+    x, y, z = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
+    for i in range(2):
+        grown = J[3 * i] * x + J[3 * i + 1] * y + J[3 * i + 2] * z
+        if s.running == 0.0:
+            grown = dt * modelled[i]
+        s.torque[i] += OBSERVER * (grown - dt * (modelled[i] + s.torque[i]))
     share = min(OBSERVER * dt, 1.0)
-    s.torque[0] += OBSERVER * (roll_inertia * gained_x - dt * (modelled_x + s.torque[0]))
-    s.torque[1] += OBSERVER * (inertia[1] * gained_y - dt * (modelled_y + s.torque[1]))
     total = m[0] + m[1] + m[2] + m[3]
-    lift = airframe.mass * specific_force - (1.0 + s.lasting) * total
+    lift = airframe.mass * r.estimate.specific_force - (1.0 + s.lasting) * total
     s.lift += share * (lift - s.lift)
     x, y, z = s.torque[0] / arm, s.torque[1] / arm, s.lift
     # What the ground carries does not last.
@@ -341,47 +333,42 @@ def _follow_failed(s: Watched, dt: float) -> None:
 
 
 @compilable
-def _observe_arm(
-    s: Watched,
-    airframe: Airframe,
-    dt: float,
-    torque: Vec2,
-    reference: Vec2,
-    rate: Vec3,
-    q_arm: Vec2,
-    qd_arm: Vec2,
-    specific_force: float,
-) -> None:
+def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
     """What acts on the arm beside gravity, its own motion and the torques."""
-    none = (0.0, 0.0, 0.0)
-    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    moving = StateEstimate(0, none, none, level, rate, 0.0, q_arm, qd_arm, specific_force)
-    arm = arm_dynamics(airframe, moving, (0.0, specific_force))
+    s, m, x, joints = r.watch, r.bodies, r.estimate, int(bodies.joints)
+    field = 0.0, 0.0, x.specific_force
     share, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
-    for k in range(2):
-        gained = arm.momentum[k] - s.momentum[k]
+    for k in range(joints):
+        gained, drift = m.momentum[k] - s.momentum[k], joint_drift(m, k, field)
         if s.running == 0.0 or s.arm_seen == 0.0:
-            gained = dt * (torque[k] + arm.drift[k])
-        s.momentum[k] = arm.momentum[k]
-        s.undone[k] += OBSERVER * (gained - dt * (torque[k] + arm.drift[k] + s.undone[k]))
+            gained = dt * (torque[k] + drift)
+        s.momentum[k] = m.momentum[k]
+        s.undone[k] += OBSERVER * (gained - dt * (torque[k] + drift + s.undone[k]))
         s.asked[k] += share * (torque[k] - s.asked[k])
         s.undone2[k] += forget * (s.undone[k] * s.undone[k] - s.undone2[k])
         s.asked2[k] += forget * (s.asked[k] * s.asked[k] - s.asked2[k])
         s.undoing[k] += forget * (s.undone[k] * s.asked[k] - s.undoing[k])
-        s.rate2[k] += forget * (qd_arm[k] * qd_arm[k] - s.rate2[k])
-        behind = reference[k] - q_arm[k]
+        s.rate2[k] += forget * (x.qd_arm[k] * x.qd_arm[k] - s.rate2[k])
+        behind = r.joints.reference[k] - x.q_arm[k]
         s.behind2[k] += forget * (behind * behind - s.behind2[k])
     # What a drive does not give to the arm it does not take from the base. A contact, and a gyro
     # that is wrong, are felt on one side alone.
-    odd = s.torque[1] + s.undone[0]
-    s.odd2 += forget * (odd * odd - s.odd2)
+    odd2 = 0.0
+    for i in range(2):
+        odd, felt = s.torque[i], 0.0
+        for k in range(joints):
+            reaction = m.reaction[3 * k + i]
+            odd, felt = odd + reaction * s.undone[k], felt + abs(reaction)
+        odd *= min(felt, 1.0)  # what no joint does about an axis says nothing of joints
+        odd2 += odd * odd
+    s.odd2 += forget * (odd2 - s.odd2)
 
 
 @compilable
 def _forget_arm(s: Watched) -> None:
     """Begin anew when encoders are back."""
     s.arm_seen, s.odd2 = 0.0, 0.0
-    for k in range(2):
+    for k in range(s.undone.size):
         s.undone[k], s.asked[k], s.joint_for[k] = 0.0, 0.0, 0.0
         s.undone2[k], s.asked2[k], s.undoing[k] = 0.0, 0.0, 0.0
         s.rate2[k], s.behind2[k] = 0.0, 0.0

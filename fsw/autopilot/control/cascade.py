@@ -17,8 +17,7 @@ from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.height import height_pid
 from fsw.autopilot.control.joint_reference import joint_reference
 from fsw.autopilot.control.joints import (
-    accelerations_of,
-    arm_dynamics,
+    accelerate_joints,
     joint_torques,
     observe_disturbance,
     rest_joints,
@@ -52,10 +51,10 @@ from fsw.autopilot.model.actuator_health import (
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.body import Body, body_of
+from fsw.autopilot.model.multibody import load_on_base, move_bodies, torque_to_turn
 from fsw.autopilot.model.rotors import (
     MotionState,
     estimate_mass,
-    hanging_arm,
     lag_rotors,
     motion_state,
     rotor_decay,
@@ -69,12 +68,10 @@ from fsw.autopilot.tick_record import (
     GATE_NEEDED,
     IMPAIRED,
     OFF_PLAN,
-    Estimate,
     Tick,
     new_tick,
 )
 from fsw.compiled import compilable, compiled, kernel, machine_code, packed
-from fsw.record import Floats
 
 Inner = Literal["tracking", "pid"]
 Model = Vec4
@@ -165,13 +162,13 @@ class Cascade:
         rest = NO_ZONES, self.probes, NO_TUBE
         self._close_loops = machine_code(_close_loops, *example, 1, *rest)
         self._expected = machine_code(_expected, *example)
+        self._motion = machine_code(_motion, *example)
 
     def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
-        sent, effectiveness = r.commanded, r.health.effectiveness.tolist()
-        settling_at = given(HEALTHY._replace(effectiveness=effectiveness), sent.rotor_thrust)
-        rotors = lag_rotors(r.rotors.tolist(), settling_at, self.law.rotor_decay)
-        return motion_state(self.law.airframe, r.mass, estimate, rotors, sent.joint_torque[0])
+        now = r.copy()
+        now.known = estimate
+        return self._motion(self.packed, now.array)
 
     def expected(self, r: Tick) -> tuple[Vec2, Model]:
         """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
@@ -214,24 +211,28 @@ def close_loops(
     estimate = r.estimate
     settle_rotors(r, law, ticks)
     r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks)
-    motion = motion_state(airframe, r.mass, estimate, r.rotors, r.sent.joint_torque[0])
-    arm = hanging_arm(airframe, estimate.q_arm)
-    v = velocity_of_mass(estimate, arm.depth)
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
+    motion = motion_state(airframe, r, r.rotors, r.sent.joint_torque)
+    v = velocity_of_mass(estimate, r.bodies.swing)
     for _ in range(ticks):
         observe(r.observed, v, motion.a, tuning.tracking, dt)
     keep_off_zones(r, law, motion, zones, probes)
     if law.follows_plan:
-        turn, thrust = turn_to_plan(r, law, motion, arm.depth)
-        roll_inertia = arm.roll_inertia
+        turn, thrust = turn_to_plan(r, law, motion)
     else:
         turn, thrust = turn_by_pid(r, law)
-        roll_inertia = airframe.inertia[0]  # the paper's loop knows no arm
     turn = limited_turn(airframe, estimate, motion.turning, turn)
     refer_joints(r, law, dt * ticks)
-    torques = drive_joints(r, law, motion, ticks)
-    torque = _body_torque(airframe, roll_inertia, estimate, turn, torques[0])
+    drive_joints(r, law, motion, ticks)
+    torque = torque_to_turn(
+        r.bodies,
+        airframe.bodies,
+        turn,
+        load_on_base(r.bodies, airframe.bodies, (0.0, 0.0, -thrust), r.wanted.joint_torque),
+        knows_arm=law.follows_plan,
+    )
     thrusts = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit, r.health)
-    send(r, airframe, commanded_for(r.health, thrusts), torques)
+    send(r, airframe, commanded_for(r.health, thrusts))
 
 
 @compilable
@@ -281,13 +282,10 @@ def keep_off_zones(
 
 
 @compilable
-def turn_to_plan(r: Tick, law: CascadeLaw, motion: MotionState, depth: float) -> tuple[Vec3, float]:
-    """Angular acceleration [rad/s^2, FRD] and thrust [N] that follow the plan's state.
-
-    The centre of mass is ``depth`` [m] below the origin.
-    """
+def turn_to_plan(r: Tick, law: CascadeLaw, motion: MotionState) -> tuple[Vec3, float]:
+    """Angular acceleration [rad/s^2, FRD] and thrust [N] that follow the plan's state."""
     (x, y), thrust = follow_plan(
-        law.tracking, r.mass, depth, r.estimate, motion, r.observed, r.flown, r.flown_u
+        law.tracking, r.mass, r.bodies.swing, r.estimate, motion, r.observed, r.flown, r.flown_u
     )
     gains, plan = law.tuning.yaw, r.flown
     error = wrap_angle(plan.yaw - r.estimate.yaw)
@@ -325,31 +323,31 @@ def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
 
 
 @compilable
-def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> Vec2:
-    """Joint torques [N m] for the reference. Reads sent, mass, observed, health; writes joints."""
-    airframe, estimate = law.airframe, r.estimate
-    arm = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / r.mass, r.observed.d))
+def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> None:
+    """Torques for the joints' reference. Reads sent, mass, observed, health; writes wanted."""
+    airframe = law.airframe
+    # Gravity less the base's acceleration.
+    pushed = rotate_back(r.estimate.R_WB, r.observed.d)
+    field = -pushed[0], -pushed[1], motion.thrust / r.mass - pushed[2]
     for _ in range(ticks):
-        observe_disturbance(r.joints, arm, r.sent.joint_torque, law.dt)
+        torque = r.sent.joint_torque
+        observe_disturbance(r.joints, r.bodies, airframe.bodies, torque, field, law.dt)
     # Not what is commanded: the rotors take 40 ms to give it.
-    pitching = motion.turning[1]
-    torques = joint_torques(
-        r.joints, airframe, law.tuning.joint, estimate, r.flown_u.qdd_arm, arm, pitching, law.dt
-    )
-    if _joints_are_sound(r):
-        return torques
-    return torques_of_failed(airframe, r.health.joints, torques, arm, pitching)
+    joint_torques(r, airframe, law.tuning.joint, field, motion.turning, law.dt)
+    if not _joints_are_sound(r):
+        torques_of_failed(r, airframe, field, motion.turning)
 
 
 @compilable
-def send(r: Tick, airframe: Airframe, thrust: Vec4, torque: Vec2) -> None:
-    """The new command: ``thrust`` [N] and ``torque`` [N m]. Writes sent, flags."""
+def send(r: Tick, airframe: Airframe, thrust: Vec4) -> None:
+    """The new command: ``thrust`` [N] and the torques that are wanted. Writes sent, flags."""
+    torque = r.wanted.joint_torque
     top, most = airframe.rotor_thrust_max, airframe.joint_torque_max
     for i in range(len(thrust)):
         r.sent.rotor_thrust[i] = thrust[i]
         if not 0.0 <= thrust[i] <= top:
             r.flags |= GATE_NEEDED
-    for j in range(len(torque)):
+    for j in range(int(airframe.bodies.joints)):
         r.sent.joint_torque[j] = torque[j]
         if not -most <= torque[j] <= most:
             r.flags |= GATE_NEEDED
@@ -387,43 +385,19 @@ def _close_loops(
 @kernel
 def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
     airframe, r = laws[0].airframe, ticks[0]
-    x, torque = r.estimate, r.sent.joint_torque
-    rate, specific_force = (x.w_WB_B[0], x.w_WB_B[1], x.w_WB_B[2]), x.specific_force
-    q_arm, qd_arm = (x.q_arm[0], x.q_arm[1]), (x.qd_arm[0], x.qd_arm[1])
     f = lag_rotors(r.rotors, given(r.health, r.sent.rotor_thrust), laws[0].rotor_decay)
-    rolling = airframe.rotor_arm * (f[1] - f[3]) / hanging_arm(airframe, q_arm).roll_inertia
-    yawing = airframe.yaw_per_thrust * (f[0] - f[1] + f[2] - f[3]) / airframe.inertia[2]
-    pitching = (airframe.rotor_arm * (f[2] - f[0]) - torque[0]) / airframe.inertia[1]
-    arm = StateEstimate(0, _NONE, _NONE, _LEVEL, rate, 0.0, q_arm, qd_arm, specific_force)
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
+    motion = motion_state(airframe, r, f, r.sent.joint_torque)
     # The accelerometer knows of gusts, and of the ground.
-    dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
-    carried = airframe.joint_armature * pitching
-    first, second = accelerations_of(dynamics, (torque[0] + carried, torque[1]))
-    model = rolling, pitching, yawing, (f[0] + f[1] + f[2] + f[3]) / r.mass
-    return (first - pitching, second), model
+    field = 0.0, 0.0, r.estimate.specific_force
+    accelerate_joints(r, airframe.bodies, field, motion.turning)
+    turning, qdd = motion.turning, r.bodies.work
+    return (qdd[0], qdd[1]), (turning[0], turning[1], turning[2], motion.thrust / r.mass)
 
 
-@compilable
-def _field(estimate: Estimate, specific_thrust: float, d: Floats) -> Vec2:
-    """Gravity minus the base's acceleration [m/s^2] along body x and z."""
-    pushed_x, _, pushed_z = rotate_back(estimate.R_WB, d)
-    return -pushed_x, specific_thrust - pushed_z
-
-
-@compilable
-def _body_torque(
-    airframe: Airframe,
-    roll_inertia: float,
-    estimate: Estimate,
-    wd: Vec3,
-    joint1_torque: float,
-) -> Vec3:
-    """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
-    inertia = airframe.inertia
-    ix, iy, iz = inertia[0], inertia[1], inertia[2]
-    wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
-    return (
-        roll_inertia * wd[0] + (iz - iy) * wy * wz,
-        iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,
-        iz * wd[2] + (iy - ix) * wx * wy,
-    )
+@kernel
+def _motion(laws: NDArray[Any], ticks: NDArray[Any]) -> MotionState:
+    law, r = laws[0], ticks[0]
+    settle_rotors(r, law, 1)
+    move_bodies(r.bodies, law.airframe.bodies, law.airframe.joint_armature, r.estimate)
+    return motion_state(law.airframe, r, r.rotors, r.sent.joint_torque)

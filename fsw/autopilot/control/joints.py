@@ -20,44 +20,65 @@ Source: docs/equations.md T3b.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any
+
+from numpy.typing import NDArray
 
 from fsw.autopilot.control.pid import PidGains, pid_step
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.multibody import (
+    Bodies,
+    factorise,
+    joint_drift,
+    joint_load,
+    move_bodies,
+    solve,
+)
 from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Estimate, Joints
-from fsw.compiled import compilable
-from fsw.record import Floats
+from fsw.autopilot.tick_record import Joints, Multibody, Tick
+from fsw.compiled import compilable, kernel, machine_code, packed
+from fsw.record import JOINTS, Floats
 
 _OBSERVER = 100.0  # rad/s
 _DISTURBANCE = 0.3  # N m; more than friction and gusts make, and less than the servo has
 
 
-class ArmDynamics(NamedTuple):
-    """Of the planar two-link arm in one state; link 1 against the inertial frame, then joint 2."""
-
-    inertia: Vec3  # kg m^2, m11, m12, m22; with what the joints' motors add
-    bias: Vec2  # N m, which velocities and the field take up
-    momentum: Vec2  # N m s
-    drift: Vec2  # N m, what changes the momentum besides the torques
-
-
 def rest_joints(k: Joints, airframe: Airframe, estimate: StateEstimate) -> None:
     """Let joint loops begin."""
     k.numbers[:] = 0.0
-    momentum = arm_dynamics(airframe, estimate, (0.0, 0.0)).momentum
-    k.reference[: len(momentum)], k.momentum[: len(momentum)] = estimate.q_arm, momentum
+    still = Tick()
+    still.known = estimate
+    _place(_packed(airframe), still.array)
+    k.reference[:], k.momentum[:] = still.estimate.q_arm, still.bodies.momentum
+
+
+@lru_cache(maxsize=8)
+def _packed(airframe: Airframe) -> NDArray[Any]:
+    return packed(airframe)
+
+
+@machine_code
+@kernel
+def _place(airframes: NDArray[Any], ticks: NDArray[Any]) -> None:
+    airframe, r = airframes[0], ticks[0]
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
 
 
 @compilable
-def observe_disturbance(k: Joints, arm: ArmDynamics, torque: Vec2 | Floats, dt: float) -> None:
-    """Momentum and disturbance ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile."""
-    for i in range(len(arm.momentum)):
-        predicted = k.momentum[i] + dt * (torque[i] + arm.drift[i] + k.disturbance[i])
-        surprise = arm.momentum[i] - predicted
+def observe_disturbance(
+    k: Joints, m: Multibody, bodies: Bodies, torque: Vec2 | Floats, field: Vec3, dt: float
+) -> None:
+    """Momentum and disturbance ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile.
+
+    The ``field`` [m/s^2, B] is gravity less the base's acceleration, which is what thrust and
+    disturbance make of it, whatever the attitude.
+    """
+    for i in range(int(bodies.joints)):
+        predicted = k.momentum[i] + dt * (torque[i] + joint_drift(m, i, field) + k.disturbance[i])
+        surprise = m.momentum[i] - predicted
         k.momentum[i] = predicted + 2.0 * _OBSERVER * dt * surprise
         believed = k.disturbance[i] + _OBSERVER * _OBSERVER * dt * surprise
         k.disturbance[i] = clamp_magnitude(believed, _DISTURBANCE)
@@ -65,59 +86,44 @@ def observe_disturbance(k: Joints, arm: ArmDynamics, torque: Vec2 | Floats, dt: 
 
 @compilable
 def joint_torques(
-    k: Joints,
-    airframe: Airframe,
-    gains: PidGains,
-    estimate: StateEstimate | Estimate,
-    qdd: Vec2 | Floats,
-    arm: ArmDynamics,
-    pitch_acceleration: float,
-    dt: float,
-) -> Vec2:
-    """Torques [N m] within the servos' limit (computed torque). Writes the integrals in ``k``.
+    r: Tick, airframe: Airframe, gains: PidGains, field: Vec3, turning: Vec3, dt: float
+) -> None:
+    """Torques within the servos' limit (computed torque). Writes wanted, the integrals in joints.
 
-    ``pitch_acceleration`` [rad/s^2] is the base's about body y. Wanted are the angles and rates of
-    the reference in ``k`` and the accelerations ``qdd`` [rad/s^2]; tick length ``dt`` [s].
+    ``turning`` [rad/s^2, B] is the base's angular acceleration, ``field`` [m/s^2, B] as of
+    ``observe_disturbance``. Wanted are the reference in joints and the accelerations of what is
+    flown; tick length ``dt`` [s]. Reads estimate, bodies, flown_u.
     """
-    q, qd = estimate.q_arm, estimate.qd_arm
-    wanted1, k.integral[0] = pid_step(
-        gains, k.integral[0], k.reference[0] - q[0], k.reference_rate[0] - qd[0], dt
-    )
-    wanted2, k.integral[1] = pid_step(
-        gains, k.integral[1], k.reference[1] - q[1], k.reference_rate[1] - qd[1], dt
-    )
-    qdd1, qdd2 = limited_acceleration(airframe, q, qd, (wanted1 + qdd[0], wanted2 + qdd[1]))
-    torque1, torque2 = torques_for(arm, (qdd1 + pitch_acceleration, qdd2))
-    torque1 -= airframe.joint_armature * pitch_acceleration  # the motor turns with the base
+    k, m, n = r.joints, r.bodies, int(airframe.bodies.joints)
+    q, qd, qdd = r.estimate.q_arm, r.estimate.qd_arm, m.work
+    for i in range(n):
+        wanted, k.integral[i] = pid_step(
+            gains, k.integral[i], k.reference[i] - q[i], k.reference_rate[i] - qd[i], dt
+        )
+        qdd[i] = wanted + r.flown_u.qdd_arm[i]
+    limit_acceleration(airframe, q, qd, qdd)
     bound = airframe.joint_torque_max
-    return (
-        clamp_magnitude(torque1 - k.disturbance[0], bound),
-        clamp_magnitude(torque2 - k.disturbance[1], bound),
-    )
+    for i in range(n):
+        torque = joint_load(m, i, field, turning) - k.disturbance[i]
+        for j in range(n):
+            torque += m.qq[JOINTS * i + j] * qdd[j]
+        r.wanted.joint_torque[i] = clamp_magnitude(torque, bound)
 
 
 @compilable
-def torques_of_failed(
-    airframe: Airframe,
-    kinds: Vec2 | Floats,
-    torques: Vec2,
-    arm: ArmDynamics,
-    pitch_acceleration: float,
-) -> Vec2:
-    """``torques`` [N m] of joints of which one at least has failed in one of the ``kinds`` [1].
+def torques_of_failed(r: Tick, airframe: Airframe, field: Vec3, turning: Vec3) -> None:
+    """Other torques for joints that have failed; ``field`` and ``turning`` as of ``joint_torques``.
 
     A limp drive is asked for nothing. What keeps a stuck joint in its place acts on the base as
-    well, so that is what it is asked for. ``pitch_acceleration`` [rad/s^2] is the base's.
+    well, so that is what it is asked for. Reads health, bodies; writes wanted.
     """
-    held1, held2 = torques_for(arm, (pitch_acceleration, 0.0))
-    held1 -= airframe.joint_armature * pitch_acceleration
     bound = airframe.joint_torque_max
-    first, second = torques
-    if kinds[0] != SOUND:
-        first = clamp_magnitude(held1, bound) if kinds[0] == STUCK else 0.0
-    if kinds[1] != SOUND:
-        second = clamp_magnitude(held2, bound) if kinds[1] == STUCK else 0.0
-    return first, second
+    for i in range(int(airframe.bodies.joints)):
+        if r.health.joints[i] == STUCK:
+            held = joint_load(r.bodies, i, field, turning)
+            r.wanted.joint_torque[i] = clamp_magnitude(held, bound)
+        elif r.health.joints[i] != SOUND:
+            r.wanted.joint_torque[i] = 0.0
 
 
 # 1/s; somewhat quicker than the joint loop, which it overrules only where that would pass a limit.
@@ -126,17 +132,17 @@ _POLE = 30.0
 
 
 @compilable
-def limited_acceleration(
-    airframe: Airframe, q: Vec2 | Floats, qd: Vec2 | Floats, qdd: Vec2
-) -> Vec2:
-    """``qdd`` [rad/s^2] of the joints at ``q`` [rad] and ``qd`` [rad/s], as far as allowed."""
+def limit_acceleration(
+    airframe: Airframe, q: Vec2 | Floats, qd: Vec2 | Floats, qdd: Floats
+) -> None:
+    """``qdd`` (j,) [rad/s^2] of joints at ``q`` [rad] and ``qd`` [rad/s], as far as allowed."""
     most = airframe.joint_rate_max
     first = clamp(qdd[0], _POLE * (-most - qd[0]), _POLE * (most - qd[0]))
     second = clamp(qdd[1], _POLE * (-most - qd[1]), _POLE * (most - qd[1]))
     # Angles last: a rate can wait, an end stop cannot.
     both = _towards(q[0] + q[1], qd[0] + qd[1], first + second, airframe.joint12_limit)
     first = _towards(q[0], qd[0], first, airframe.joint1_limit)
-    return first, both - first
+    qdd[0], qdd[1] = first, both - first
 
 
 @compilable
@@ -149,61 +155,13 @@ def _towards(angle: float, rate: float, acceleration: float, limit: float) -> fl
 
 
 @compilable
-def torques_for(arm: ArmDynamics, qdd: Vec2) -> Vec2:
-    """Joint torques [N m] for ``qdd`` [rad/s^2] of link 1 in the inertial frame and of joint 2."""
-    m11, m12, m22 = arm.inertia
-    return (
-        m11 * qdd[0] + m12 * qdd[1] + arm.bias[0],
-        m12 * qdd[0] + m22 * qdd[1] + arm.bias[1],
-    )
+def accelerate_joints(r: Tick, bodies: Bodies, field: Vec3, turning: Vec3) -> None:
+    """Accelerations [rad/s^2] of the joints under the torques sent last. Writes bodies.work.
 
-
-@compilable
-def accelerations_of(arm: ArmDynamics, torque: Vec2) -> Vec2:
-    """Accelerations [rad/s^2] under a ``torque`` [N m]: the inverse of ``torques_for``.
-
-    Of link 1 in the inertial frame, and of joint 2.
+    ``field`` [m/s^2, B] and ``turning`` [rad/s^2, B] as of ``joint_torques``. Reads sent, bodies.
     """
-    m11, m12, m22 = arm.inertia
-    first, second = torque[0] - arm.bias[0], torque[1] - arm.bias[1]
-    determinant = m11 * m22 - m12 * m12
-    return (
-        (m22 * first - m12 * second) / determinant,
-        (m11 * second - m12 * first) / determinant,
-    )
-
-
-@compilable
-def arm_dynamics(
-    airframe: Airframe, estimate: StateEstimate | Estimate, field: Vec2
-) -> ArmDynamics:
-    """The planar two-link arm (Lagrange form) in a ``field`` [m/s^2] along body x and z.
-
-    The field is gravity minus the base's acceleration, which is what thrust and disturbance make of
-    it, whatever the attitude.
-    """
-    m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
-    l1, c1, c2 = airframe.link_length[0], airframe.link_com[0], airframe.link_com[1]
-    i1, i2 = airframe.link_inertia[0], airframe.link_inertia[1]
-    th1, th2 = estimate.q_arm[0], estimate.q_arm[1]
-    field_x, field_z = field
-    across1 = field_z * math.sin(th1) - field_x * math.cos(th1)
-    across12 = field_z * math.sin(th1 + th2) - field_x * math.cos(th1 + th2)
-    cos2, sin2 = math.cos(th2), math.sin(th2)
-    w1 = estimate.qd_arm[0] + estimate.w_WB_B[1]  # link 1 against the inertial frame
-    w2 = estimate.qd_arm[1]
-    coupling = m2 * l1 * c2
-    m22 = i2 + m2 * c2 * c2
-    m12 = m22 + coupling * cos2
-    m11 = i1 + m1 * c1 * c1 + m2 * l1 * l1 + m12 + coupling * cos2
-    # Motors feel how their joints turn, not how the base does.
-    spin1, spin2 = airframe.joint_armature * estimate.qd_arm[0], airframe.joint_armature * w2
-    centrifugal = coupling * sin2
-    lever2 = m2 * c2 * across12
-    lever1 = (m1 * c1 + m2 * l1) * across1 + lever2
-    return ArmDynamics(
-        (m11 + airframe.joint_armature, m12, m22 + airframe.joint_armature),
-        (lever1 - centrifugal * (2.0 * w1 + w2) * w2, lever2 + centrifugal * w1 * w1),
-        (m11 * w1 + m12 * w2 + spin1, m12 * w1 + m22 * w2 + spin2),
-        (-lever1, -lever2 - centrifugal * w1 * (w1 + w2)),
-    )
+    m, n = r.bodies, int(bodies.joints)
+    for i in range(n):
+        m.work[i] = r.sent.joint_torque[i] - joint_load(m, i, field, turning)
+    factorise(m.factor, m.qq, n)
+    solve(m.factor, m.work, n)

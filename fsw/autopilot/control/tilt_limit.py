@@ -28,11 +28,11 @@ _POLE = 12.0  # 1/s; quicker than the plan's own attitude (7), which it must not
 
 @compilable
 def limited_turn(
-    airframe: Airframe, estimate: StateEstimate | Estimate, turning: Vec2, wd: Vec3
+    airframe: Airframe, estimate: StateEstimate | Estimate, turning: Vec3, wd: Vec3
 ) -> Vec3:
     """Angular acceleration ``wd`` [rad/s^2, FRD], as far as tilt and body rates allow.
 
-    ``turning`` [rad/s^2] is the angular acceleration about body x and y that there is.
+    ``turning`` [rad/s^2, FRD] is the angular acceleration that there is.
     """
     lag, R = airframe.rotor_lag, estimate.R_WB
     wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]

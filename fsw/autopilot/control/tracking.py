@@ -29,7 +29,7 @@ from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, AttitudeLag
 from fsw.autopilot.model.rotors import MotionState
-from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
+from fsw.autopilot.signals import Mat3, PlanInput, PredictionState, StateEstimate, Vec2, Vec3
 from fsw.autopilot.tick_record import Accelerations, Estimate, Observed, PlanState
 from fsw.compiled import compilable
 from fsw.record import Floats
@@ -168,17 +168,23 @@ def wanted_accelerations(
 
 
 @compilable
-def velocity_of_mass(estimate: StateEstimate | Estimate, depth: float) -> Vec3:
-    """Velocity [m/s, NED] ``depth`` [m] below the origin, as far as rolling makes it another."""
-    R, v, swing = estimate.R_WB, estimate.v_WB, depth * estimate.w_WB_B[0]
-    return v[0] - swing * R[1], v[1] - swing * R[4], v[2]
+def velocity_of_mass(estimate: StateEstimate | Estimate, swing: Mat3 | Floats) -> Vec3:
+    """Velocity [m/s, NED] of the centre of mass, as far as turning makes it another.
+
+    ``swing`` (9,) [m] is what it gets in B of a rate of the base, while drives are free: of an arm
+    that the base pushes off as it turns, nothing.
+    """
+    R, v, w = estimate.R_WB, estimate.v_WB, estimate.w_WB_B
+    x = swing[0] * w[0] + swing[1] * w[1]
+    y = swing[3] * w[0] + swing[4] * w[1]
+    return v[0] + x * R[0] + y * R[1], v[1] + x * R[3] + y * R[4], v[2]
 
 
 @compilable
 def follow_plan(
     law: TrackingLaw,
     mass: float,
-    depth: float,
+    swing: Mat3 | Floats,
     estimate: StateEstimate | Estimate,
     motion: MotionState,
     observed: Observed,
@@ -187,17 +193,17 @@ def follow_plan(
 ) -> tuple[Vec2, float]:
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
-    ``mass`` [kg] is the whole vehicle's, as estimated in flight, its centre ``depth`` [m] below the
-    origin; the observed velocity is that of the centre, without the reading's noise.
+    ``mass`` [kg] is the whole vehicle's, as estimated in flight, its ``swing`` (9,) [m] as of
+    ``velocity_of_mass``; the observed velocity is that of the centre, without the reading's noise.
     """
     p, v, R = estimate.p_WB, observed.v, estimate.R_WB
-    north, east = -math.sin(estimate.yaw), math.cos(estimate.yaw)  # to the right, level
-    # How much further to the right than the plan's the centre of mass hangs, and goes.
-    lean = north * (R[2] + plan.a[0] / GRAVITY) + east * (R[5] + plan.a[1] / GRAVITY)
-    drift = (north * plan.j[0] + east * plan.j[1]) / GRAVITY
-    aside = (depth * lean, depth * drift)
-    wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u, aside, north)
-    wy = _horizontal_snap(law, 1, estimate, motion, observed, plan, u, aside, east)
+    c, s = math.cos(estimate.yaw), math.sin(estimate.yaw)
+    # By which the body's z axis is ahead of the plan's, and goes; how far that swings the centre.
+    lean = R[2] + plan.a[0] / GRAVITY, R[5] + plan.a[1] / GRAVITY
+    off = _swung(swing, c, s, lean)
+    going = _swung(swing, c, s, (plan.j[0] / GRAVITY, plan.j[1] / GRAVITY))
+    wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u, off[0], going[0])
+    wy = _horizontal_snap(law, 1, estimate, motion, observed, plan, u, off[1], going[1])
     f = max(motion.thrust / mass, _LEAST_SPECIFIC_THRUST)
     # -f [b1_xy, -b2_xy] [wdy; wdx] = w_xy; the determinant is -R33, far from zero in flight.
     determinant = R[0] * -R[4] + R[1] * R[3]
@@ -210,6 +216,19 @@ def follow_plan(
 
 
 @compilable
+def _swung(swing: Mat3 | Floats, c: float, s: float, lean: Vec2) -> Vec2:
+    """How far [m, NED] the centre of mass swings as the body's z axis leans by ``lean`` [1, NED].
+
+    ``c`` [1] and ``s`` [1] are cosine and sine of the yaw.
+    """
+    forward, right = c * lean[0] + s * lean[1], c * lean[1] - s * lean[0]
+    # Leaning forward is a turn about y, to the right one about -x.
+    x = swing[1] * forward - swing[0] * right
+    y = swing[4] * forward - swing[3] * right
+    return c * x - s * y, s * x + c * y
+
+
+@compilable
 def _horizontal_snap(
     law: TrackingLaw,
     axis: int,
@@ -218,12 +237,12 @@ def _horizontal_snap(
     observed: Observed,
     plan: PredictionState | PlanState,
     u: PlanInput | Accelerations,
-    aside: Vec2,
-    share: float,
+    off: float,
+    going: float,
 ) -> float:
     v, a, j, s = observed.v, motion.a, motion.j, motion.s
-    p = estimate.p_WB[axis] + share * aside[0]
-    vehicle = AxisState(p, v[axis] + share * aside[1], a[axis], j[axis], s[axis])
+    p = estimate.p_WB[axis] + off
+    vehicle = AxisState(p, v[axis] + going, a[axis], j[axis], s[axis])
     planned = AxisState(plan.p[axis], plan.v[axis], plan.a[axis], plan.j[axis], plan.s[axis])
     return snap_command(
         law, vehicle, observed.d[axis], observed.disturbance_bias[axis], planned, u.a[axis]

@@ -40,8 +40,9 @@ from scipy.linalg import expm
 
 from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.model.rotors import WEIGHING_TIME, hanging_arm
+from fsw.autopilot.model.rotors import WEIGHING_TIME
 from fsw.autopilot.signals import Vec2
 from fsw.compiled import compilable
 
@@ -258,7 +259,8 @@ def _snap_in_hover(airframe: Airframe) -> float:
     """The snap [m/s^4] that the torque about one axis gives; straight down the arm weighs most."""
     hover = airframe.mass * GRAVITY / 4.0
     headroom = min(hover, airframe.rotor_thrust_max - hover)
-    inertia = max(hanging_arm(airframe, (0.0, 0.0)).roll_inertia, airframe.inertia[1])
+    m = posture(airframe.bodies, (0.0,) * airframe.bodies.joints)
+    inertia = max(float(m.inertia[0]), float(m.inertia[4]))
     return GRAVITY * 2.0 * airframe.rotor_arm * headroom / inertia
 
 

@@ -1,11 +1,15 @@
-"""The vehicle as the controllers believe it to be (Table I of the paper and our choices)."""
+"""The vehicle as the controllers believe it to be."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 
-from fsw.autopilot.signals import Vec2, Vec3
+from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
+from fsw.autopilot.signals import Vec2
+from fsw.record import ROTORS
+from vehicles.description import Rotor, Vehicle
+from vehicles.vehicle_file import load_vehicle
 
 GRAVITY = 9.81  # m/s^2, along +z of the world
 
@@ -36,38 +40,66 @@ class BodySize:
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """'+' quadrotor with a planar two-joint arm whose first joint is at the body origin.
+    """What the controllers know of a vehicle.
 
-    Rotors are numbered rear, left, front, right, so that with thrusts f the torque is
-    ``[L (f2 - f4), L (f3 - f1), b (f1 - f2 + f3 - f4)]`` in the body (FRD).
+    Rotors of a '+' quadrotor are numbered rear, left, front, right, so that with thrusts f the
+    torque is ``[L (f2 - f4), L (f3 - f1), b (f1 - f2 + f3 - f4)]`` in the body (FRD).
     """
 
-    mass: float = 3.5  # kg, the whole vehicle
-    inertia: Vec3 = (0.3, 0.3, 0.6)  # kg m^2, base only
-    rotor_arm: float = 0.3  # m, L
-    yaw_per_thrust: float = 0.016  # m, b
-    rotor_thrust_max: float = 2.0 * 3.5 * GRAVITY / 4.0  # N; thrust-to-weight 2, our choice
-    rotor_lag: float = 0.04  # s, our choice
-    attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
-    link_length: Vec2 = (0.15, 0.15)  # m
-    link_mass: Vec2 = (0.2, 0.2)  # kg, from the laboratory's public model
-    link_com: Vec2 = (0.075, 0.075)  # m from the link's joint
-    link_inertia: Vec2 = (4.256e-5, 8.321e-5)  # kg m^2 about +y at the link's centre of mass
-    joint_torque_max: float = 2.0  # N m, our choice
-    # kg m^2 of each joint's motor, times the square of its gear's ratio; the paper has none.
+    mass: float  # kg, the whole vehicle
+    bodies: Bodies  # that it consists of
+    rotors: int
+    wrench: Several  # (6,) each: force [1] and torque [m] in B about its origin, per thrust
+    rotor_arm: float  # m, L
+    yaw_per_thrust: float  # m, b
+    rotor_thrust_max: float  # N
+    rotor_lag: float  # s
+    link_length: Vec2  # m
+    joint_torque_max: float  # N m
+    joint1_limit: float  # rad, |th1|
+    joint12_limit: float  # rad, |th1 + th2|
+    joint_rate_max: float  # rad/s, each joint
+    tilt_max: float  # rad, of the body's z axis against the vertical
+    body_rate_max: Vec2  # rad/s, of roll and pitch together, and of yaw
+    leg_length: float  # m, body origin above ground when standing
+    # kg m^2 of each joint's motor, times the square of its gear's ratio; beside the vehicle's own.
     joint_armature: float = 0.0
-    joint1_limit: float = math.pi / 3.0  # rad, |th1|
-    joint12_limit: float = math.pi / 2.0  # rad, |th1 + th2|
-    # A servo of 2.5 N m stall torque and 5.8 rad/s without load, common in this class, still turns
-    # at 5 rad/s against the arm's weight.
-    joint_rate_max: float = 5.0  # rad/s, each joint, our choice
-    # The planner's pi / 10 of Table I and what cancels 0.8 m/s^2 on both axes at once: 23.8 deg.
-    tilt_max: float = math.radians(25.0)  # rad, of the body's z axis against the vertical
-    # Roll and pitch: the fast loop's jerk of 20 m/s^3 on both axes turns a hovering body at
-    # 2.9 rad/s. Yaw: three times what a setpoint may turn.
-    body_rate_max: Vec2 = (3.0, 1.0)  # rad/s, of roll and pitch together, and of yaw
-    leg_length: float = 0.32  # m, body origin above ground when standing
+    attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
     size: BodySize = field(default_factory=BodySize)
 
 
-AIRFRAME = Airframe()
+def airframe_of(vehicle: Vehicle) -> Airframe:
+    """What the controllers know of a vehicle."""
+    rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
+    wrench = [number for rotor in rotors for number in _wrench(rotor)]
+    joint, limit = vehicle.joints[0], vehicle.coupled_limits[0]
+    return Airframe(
+        mass=vehicle.mass,
+        bodies=bodies,
+        rotors=len(rotors),
+        wrench=(*wrench, *[0.0] * (6 * ROTORS - len(wrench))),
+        rotor_arm=math.hypot(*first.position),
+        yaw_per_thrust=first.torque_per_thrust,
+        rotor_thrust_max=first.thrust_max,
+        rotor_lag=first.lag,
+        link_length=(vehicle.joints[1].xyz[2], vehicle.end_effector.position[2]),
+        joint_torque_max=joint.torque_max,
+        joint1_limit=joint.position_max,
+        joint12_limit=limit.maximum,
+        joint_rate_max=joint.rate_max,
+        tilt_max=vehicle.limits.tilt,
+        body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
+        leg_length=max(z for _, _, z in vehicle.feet.positions),
+    )
+
+
+def _wrench(rotor: Rotor) -> Several:
+    """Force [1] and torque [m] in B, about its origin, of a rotor per thrust."""
+    (px, py, pz), (x, y, z) = rotor.position, rotor.axis
+    # PX4's: a rotor that turns counter-clockwise turns the vehicle the other way about its axis.
+    drag = rotor.torque_per_thrust if rotor.spin == "ccw" else -rotor.torque_per_thrust
+    torque = (py * z - pz * y - drag * x, pz * x - px * z - drag * y, px * y - py * x - drag * z)
+    return (x, y, z, *torque)
+
+
+AIRFRAME = airframe_of(load_vehicle("paper"))

@@ -130,10 +130,10 @@ class Linearisation:
         self.horizon.inputs[:] = inputs
         np.matmul(self.model.phi, start, out=self.states)
         np.add(self.states, self.model.gamma @ inputs, out=self.states)
-        m1, m2 = airframe.link_mass
+        m1, m2 = airframe.bodies.mass[:2]
         com = (
-            (m1 * airframe.link_com[0] + m2 * airframe.link_length[0]) / (m1 + m2),
-            m2 * airframe.link_com[1] / (m1 + m2),
+            (m1 * airframe.bodies.com[2] + m2 * airframe.link_length[0]) / (m1 + m2),
+            m2 * airframe.bodies.com[5] / (m1 + m2),
         )
         _refill(self.horizon, self.tracked, airframe.link_length, com)
 

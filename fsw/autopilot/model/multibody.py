@@ -25,21 +25,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Final
+from functools import lru_cache
+from typing import Final
 
 from fsw.autopilot.geometry.vectors import add_scaled, cross, dot
-from fsw.autopilot.signals import Mat3, StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Estimate
+from fsw.autopilot.signals import Mat3, StateEstimate, Vec3
+from fsw.autopilot.tick_record import Estimate, Multibody
 from fsw.compiled import compilable
-from fsw.record import JOINTS, Floats, Nine, PerJoint, Record, Three
+from fsw.record import JOINTS, Floats
 from vehicles.description import V6, Vehicle
 
 Several = tuple[float, ...]
-Vectors = Annotated[Floats, 3 * JOINTS]
-Rotations = Annotated[Floats, 9 * JOINTS]
-Matrix = Annotated[Floats, JOINTS * JOINTS]
-_SUMS: Final = 21  # numbers of a link that are summed from the tip to the base
-Sums = Annotated[Floats, _SUMS * JOINTS]
+_SUMS: Final = len(Multibody().of_link) // JOINTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,40 +89,6 @@ def _fixed_axes(rpy: Vec3) -> Mat3:
         *(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
         *(-sp, cp * sr, cp * cr),
     )
-
-
-class Multibody(Record):
-    """The vehicle in one pose and motion, in B about its origin; made anew wherever it is needed.
-
-    The mass matrix's blocks are named by their rows and columns: v, w and q.
-    """
-
-    rotation: Rotations  # from the link's frame to B
-    origin: Vectors  # m, of the joint
-    axis: Vectors  # unit
-    rate: Vectors  # rad/s, of the link, inertial
-    speed: Vectors  # m/s, of the joint's origin, beside the base's
-    of_link: Sums
-    centre: Three  # m, centre of mass of the vehicle
-    vq: Vectors  # kg m, (3,) a joint
-    wq: Vectors  # kg m^2, (3,) a joint
-    qq: Matrix  # kg m^2
-    bias_v: Three  # N
-    bias_w: Three  # N m
-    bias: PerJoint  # N m
-    momentum: PerJoint  # N m s, generalised
-    drift: PerJoint  # N m, what changes it beside torques and the field
-    # After the elimination.
-    inertia: Nine  # kg m^2, J
-    inverse: Nine  # of J
-    reaction: Vectors  # (3,) N m a N m of a joint, R
-    swing: Nine  # m, velocity of the centre of mass over rate of a base with drives that are free
-    wq_free: (
-        Vectors  # kg m^2, as ``wq``, of a base that moves as it likes: about the centre of mass
-    )
-    qq_free: Matrix  # kg m^2, as ``qq``, the same
-    factor: Matrix  # Cholesky's of ``qq_free``
-    work: Vectors
 
 
 @compilable
@@ -223,7 +186,7 @@ def _about(axis: Vec3, angle: float) -> Mat3:
 
 
 @compilable
-def place_links(m: Multibody, b: Bodies, q: Vec2 | Floats) -> None:
+def place_links(m: Multibody, b: Bodies, q: Several | Floats) -> None:
     """Where joints and links are at the angles ``q`` (j,) [rad]. Writes rotation, origin, axis."""
     R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     o: Vec3 = (0.0, 0.0, 0.0)
@@ -239,10 +202,7 @@ def place_links(m: Multibody, b: Bodies, q: Vec2 | Floats) -> None:
 
 @compilable
 def move_bodies(
-    m: Multibody,
-    b: Bodies,
-    armature: float,
-    estimate: StateEstimate | Estimate,
+    m: Multibody, b: Bodies, armature: float, estimate: StateEstimate | Estimate
 ) -> None:
     """All of ``m`` at the joints' angles and rates and the base's rate that are estimated.
 
@@ -255,8 +215,19 @@ def move_bodies(
     _eliminate(m, b)
 
 
+@lru_cache(maxsize=64)
+def posture(b: Bodies, q: Several) -> Multibody:
+    """The vehicle at rest with its joints at ``q`` (j,) [rad]."""
+    m, still = Multibody(), (0.0, 0.0, 0.0)
+    place_links(m, b, q)
+    _move_links(m, b, (0.0,) * b.joints, still)
+    _sum_up(m, b, 0.0, (0.0,) * b.joints, still)
+    _eliminate(m, b)
+    return m
+
+
 @compilable
-def _move_links(m: Multibody, b: Bodies, qd: Vec2 | Floats, rate: Vec3) -> None:
+def _move_links(m: Multibody, b: Bodies, qd: Several | Floats, rate: Vec3) -> None:
     """Motion of each link, and what of it is summed. Writes rate, speed, of_link."""
     w = rate
     turning: Vec3 = (0.0, 0.0, 0.0)  # rad/s^2, of the link, without accelerations of joints
@@ -331,7 +302,7 @@ def _note(
 
 
 @compilable
-def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Vec2 | Floats, rate: Vec3) -> None:
+def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate: Vec3) -> None:
     """From the tip to the base. Writes of_link, vq, wq, qq, bias, momentum, drift, bias_v, _w."""
     n, sums, mass = int(b.joints), m.of_link, 0.0
     for k in range(n - 1, -1, -1):
@@ -379,7 +350,7 @@ def mass_of(b: Bodies) -> float:
 
 @compilable
 def _eliminate(m: Multibody, b: Bodies) -> None:
-    """Linear motion, then joints out of the mass matrix. Writes what comes after the elimination."""
+    """Linear motion and joints out of the mass matrix. Writes what comes after in the record."""
     n, mass, c = int(b.joints), mass_of(b), _get(m.centre, 0)
     for k in range(n):
         f = _get(m.vq, k)
@@ -459,7 +430,7 @@ def solve(factor: Floats, x: Floats, n: int) -> None:
 
 
 @compilable
-def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Vec2 | Floats) -> Vec3:
+def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Several | Floats) -> Vec3:
     """What of a rotor torque [N m, B] does not turn the base.
 
     ``force`` [N, B] is that of the rotors, at B's origin, ``torque`` (j,) [N m] that of the joints.
@@ -475,7 +446,7 @@ def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Vec2 | Floats) ->
 
 @compilable
 def base_acceleration(
-    m: Multibody, b: Bodies, turn: Vec3, force: Vec3, torque: Vec2 | Floats
+    m: Multibody, b: Bodies, turn: Vec3, force: Vec3, torque: Several | Floats
 ) -> Vec3:
     """Angular acceleration [rad/s^2, B] under a ``turn`` [N m, B] of the rotors.
 
@@ -485,9 +456,16 @@ def base_acceleration(
 
 
 @compilable
-def torque_to_turn(m: Multibody, acceleration: Vec3, load: Vec3) -> Vec3:
-    """Rotor torque [N m, B] for an ``acceleration`` [rad/s^2, B] against a ``load`` [N m, B]."""
-    return _add(_times(m.inertia, acceleration), load)
+def torque_to_turn(
+    m: Multibody, b: Bodies, acceleration: Vec3, load: Vec3, knows_arm: bool = True
+) -> Vec3:
+    """Rotor torque [N m, B] for an ``acceleration`` [rad/s^2, B] against a ``load`` [N m, B].
+
+    The paper's own loop does not know that the arm adds to the base's inertia.
+    """
+    if knows_arm:
+        return _add(_times(m.inertia, acceleration), load)
+    return _add(_symmetric(_six(b.base_inertia, 0), acceleration), load)
 
 
 @compilable
@@ -497,13 +475,13 @@ def joint_load(m: Multibody, k: int, field: Vec3, turning: Vec3) -> float:
     The ``field`` [m/s^2, B] is gravity less the acceleration of B's origin; the base has an angular
     acceleration ``turning`` [rad/s^2, B].
     """
-    return m.bias[k] - dot(_get(m.vq, k), field) + dot(_get(m.wq, k), turning)
+    return float(m.bias[k] - dot(_get(m.vq, k), field) + dot(_get(m.wq, k), turning))
 
 
 @compilable
 def joint_drift(m: Multibody, k: int, field: Vec3) -> float:
     """What changes the momentum of joint ``k`` [N m] beside its torque, in a ``field`` [m/s^2]."""
-    return m.drift[k] + dot(_get(m.vq, k), field)
+    return float(m.drift[k] + dot(_get(m.vq, k), field))
 
 
 @compilable

@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3, Vec4
-from fsw.autopilot.tick_record import Estimate
+from fsw.autopilot.model.multibody import base_acceleration
+from fsw.autopilot.signals import Vec2, Vec3, Vec4
+from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
 from fsw.record import Floats
 
@@ -29,13 +30,13 @@ _WEIGHING_THRUST = 5.0  # m/s^2
 
 
 class MotionState(NamedTuple):
-    """Derivatives of the body's position that the rotors produce right now."""
+    """Derivatives of the base's position that rotors and joints produce right now."""
 
-    thrust: float  # N, total
+    thrust: float  # N, total along -z of the body
     a: Vec3  # m/s^2, without disturbance
     j: Vec2  # m/s^3, horizontal
     s: Vec2  # m/s^4, horizontal
-    turning: Vec2 = (0.0, 0.0)  # rad/s^2, about body x and y
+    turning: Vec3 = (0.0, 0.0, 0.0)  # rad/s^2, of the base, FRD
 
 
 @compilable
@@ -72,49 +73,36 @@ def estimate_mass(
     return clamp(moved, 0.7 * airframe.mass, 1.3 * airframe.mass)
 
 
-class HangingArm(NamedTuple):
-    """What the arm adds to a roll; in pitch its drives push off the base instead."""
-
-    roll_inertia: float  # kg m^2 of the whole vehicle, about its centre of mass
-    depth: float  # m, centre of mass below the body origin
-
-
 @compilable
-def hanging_arm(airframe: Airframe, q_arm: Vec2 | Floats) -> HangingArm:
-    """The arm as a rigid pendulum across its plane, at the joint angles ``q_arm`` [rad]."""
-    upright1, upright2 = math.cos(q_arm[0]), math.cos(q_arm[0] + q_arm[1])
-    m1, m2 = airframe.link_mass[0], airframe.link_mass[1]
-    z1 = airframe.link_com[0] * upright1
-    z2 = airframe.link_length[0] * upright1 + airframe.link_com[1] * upright2
-    depth = (m1 * z1 + m2 * z2) / airframe.mass
-    inertia = airframe.inertia[0] + m1 * z1 * z1 + m2 * z2 * z2
-    return HangingArm(inertia - airframe.mass * depth * depth, depth)
+def rotor_wrench(airframe: Airframe, thrust: Vec4 | Floats) -> tuple[Vec3, Vec3]:
+    """Force [N, B] and torque [N m, B] about B's origin of rotors that give ``thrust`` [N] each."""
+    w, fx, fy, fz, tx, ty, tz = airframe.wrench, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(int(airframe.rotors)):
+        f, at = thrust[i], 6 * i
+        fx, fy, fz = fx + w[at] * f, fy + w[at + 1] * f, fz + w[at + 2] * f
+        tx, ty, tz = tx + w[at + 3] * f, ty + w[at + 4] * f, tz + w[at + 5] * f
+    return (fx, fy, fz), (tx, ty, tz)
 
 
 @compilable
 def motion_state(
-    airframe: Airframe,
-    mass: float,
-    estimate: StateEstimate | Estimate,
-    rotors: Vec4 | Floats,
-    joint1_torque: float,
+    airframe: Airframe, r: Tick, rotors: Vec4 | Floats, torque: Vec2 | Floats
 ) -> MotionState:
     """Acceleration, jerk and snap of the body origin from the rotor model.
 
-    ``mass`` [kg] of the whole vehicle, thrust of the ``rotors`` [N], ``joint1_torque`` [N m] on
-    link 1 about +y of the body; the base feels minus it.
+    Thrust of the ``rotors`` [N], ``torque`` [N m] of the joints. Reads estimate, mass, bodies.
     """
-    R = estimate.R_WB
-    wx, wy = estimate.w_WB_B[0], estimate.w_WB_B[1]
-    f1, f2, f3, f4 = rotors[0], rotors[1], rotors[2], rotors[3]
-    thrust = f1 + f2 + f3 + f4
-    f = thrust / mass
-    wdx = airframe.rotor_arm * (f2 - f4) / hanging_arm(airframe, estimate.q_arm).roll_inertia
-    wdy = (airframe.rotor_arm * (f3 - f1) - joint1_torque) / airframe.inertia[1]
+    R = r.estimate.R_WB
+    wx, wy = r.estimate.w_WB_B[0], r.estimate.w_WB_B[1]
+    force, turn = rotor_wrench(airframe, rotors)
+    thrust = -force[2]
+    f = thrust / r.mass
+    turning = base_acceleration(r.bodies, airframe.bodies, turn, force, torque)
+    wdx, wdy = turning[0], turning[1]
     return MotionState(
         thrust,
         (-f * R[2], -f * R[5], GRAVITY - f * R[8]),
         (-f * (wy * R[0] - wx * R[1]), -f * (wy * R[3] - wx * R[4])),
         (-f * (wdy * R[0] - wdx * R[1]), -f * (wdy * R[3] - wdx * R[4])),
-        (wdx, wdy),
+        turning,
     )

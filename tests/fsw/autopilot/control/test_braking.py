@@ -251,7 +251,7 @@ def test_fast_ones_are_braked_by_what_the_tuning_allows(sign: float) -> None:
     assert u.qdd_arm == (-sign * tuning.joint, sign * tuning.joint)
     assert u.yaw_acc == -sign * tuning.yaw
     # What drag of the rotors gives at most: that of the hover thrust, over inertia.
-    drag = AIRFRAME.yaw_per_thrust * AIRFRAME.mass * GRAVITY / AIRFRAME.inertia[2]
+    drag = AIRFRAME.yaw_per_thrust * AIRFRAME.mass * GRAVITY / AIRFRAME.bodies.base_inertia[2]
     assert tuning.yaw < drag
 
 

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
 from fsw.autopilot.control.cascade import Cascade, Inner, at_rest, in_hover
 from fsw.autopilot.control.gains import LoopGains
-from fsw.autopilot.control.joints import arm_dynamics
 from fsw.autopilot.control.pid import PidGains
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array
@@ -28,7 +27,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.autopilot.tick_record import Tick
 from tests.fsw.random_states import estimate_of
-from tests.fsw.records import changed, observe, observed, with_given
+from tests.fsw.records import changed, observe, observed, placed, with_given
 
 DT = 0.002
 TUNING = LoopGains()
@@ -89,7 +88,7 @@ def test_yaw_rate_follows_the_plans_and_its_acceleration_is_fed_forward() -> Non
     assert torque_of(one_step(spinning, plan_at()))[2] < -0.001
     assert torque_of(one_step(turned(0.0), plan_at(yaw_rate=0.1)))[2] > 0.001
     faster = torque_of(one_step(turned(0.0), plan_at(), PlanInput(STILL, 0.05, (0.0, 0.0))))
-    assert faster[2] == pytest.approx(AIRFRAME.inertia[2] * 0.05)
+    assert faster[2] == pytest.approx(AIRFRAME.bodies.base_inertia[2] * 0.05)
 
 
 def test_the_rotors_carry_what_the_raised_arm_does_to_the_body() -> None:
@@ -106,7 +105,7 @@ def test_body_torque_is_eulers_equation() -> None:
     command = one_step(estimate, plan_at(0.3), inner="pid")
     reference = attitude_reference(STILL, 0.3)
     wanted, _ = attitude_pid(TUNING.attitude, STILL, estimate, reference, DT)
-    inertia, spin = np.array(AIRFRAME.inertia), np.array(w)
+    inertia, spin = np.array(AIRFRAME.bodies.base_inertia[:3]), np.array(w)
     expected = inertia * np.array(wanted) + np.cross(spin, inertia * spin)
     expected[1] += command.joint_torque[0]
     np.testing.assert_allclose(torque_of(command)[:2], expected[:2], atol=1e-9)
@@ -115,8 +114,8 @@ def test_body_torque_is_eulers_equation() -> None:
 @pytest.mark.parametrize("inner", ["tracking", "pid"])
 def test_at_rest_on_its_plan_the_weight_is_carried_level(inner: Inner) -> None:
     """The arm bent so that its weight hangs below joint 1."""
-    m1, m2 = AIRFRAME.link_mass
-    c1, c2 = AIRFRAME.link_com
+    m1, m2 = AIRFRAME.bodies.mass[:2]
+    c1, c2 = AIRFRAME.bodies.com[2], AIRFRAME.bodies.com[5]
     upper, lower = m1 * c1 + m2 * AIRFRAME.link_length[0], m2 * c2
     th1 = -0.25
     th12 = math.asin(upper / lower * math.sin(-th1))
@@ -163,7 +162,8 @@ def test_a_vehicle_taken_over_carries_its_weight_and_one_at_rest_nothing() -> No
         assert not memory.attitude.any()
         assert (memory.height, memory.flags) == (0.0, 0)
         assert memory.joint_reference == moving.q_arm
-        assert tuple(memory.joints.momentum[:2]) == arm_dynamics(AIRFRAME, moving, (0, 0)).momentum
+        expected = placed(AIRFRAME, moving).bodies.momentum
+        np.testing.assert_allclose(memory.joints.momentum, expected, atol=1e-15)
         assert not memory.joints.disturbance.any()
         assert not memory.joints.integral.any()
 
@@ -191,7 +191,8 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
 
 def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
     q_arm = (0.5, -0.9)
-    (m1, m2), (c1, c2), l1 = AIRFRAME.link_mass, AIRFRAME.link_com, AIRFRAME.link_length[0]
+    (m1, m2), l1 = AIRFRAME.bodies.mass[:2], AIRFRAME.link_length[0]
+    c1, c2 = AIRFRAME.bodies.com[2], AIRFRAME.bodies.com[5]
     estimate = estimate_of(Rotation.identity(), q_arm=q_arm)
     cascade = Cascade(AIRFRAME, TUNING, "pid", DT)
     # One that weighs more than it does needs a stronger field of thrust to stand in.
@@ -219,7 +220,10 @@ def test_the_motion_is_that_of_the_rotors_one_tick_on_and_of_the_first_joints_to
         target + left * (now - target)
         for now, target in zip(memory.rotors.tolist()[:4], sent.rotor_thrust, strict=True)
     ]
-    assert got == motion_state(AIRFRAME, 3.6, estimate, (f[0], f[1], f[2], f[3]), 0.3)
+    r = placed(AIRFRAME, estimate, 3.6)
+    expected = motion_state(AIRFRAME, r, (f[0], f[1], f[2], f[3]), (0.3, -0.7))
+    for ours, theirs in zip(got, expected, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
 
 
 def test_a_large_heading_error_is_turned_away_at_a_limited_rate_either_way() -> None:
@@ -233,7 +237,8 @@ def test_a_large_heading_error_is_turned_away_at_a_limited_rate_either_way() -> 
 
 def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
     """With an unlike inertia about every axis; small enough for the rotors' drag."""
-    unlike = replace(AIRFRAME, inertia=(0.25, 0.32, 0.6))
+    bodies = replace(AIRFRAME.bodies, base_inertia=(0.25, 0.32, 0.6, 0.0, 0.0, 0.0))
+    unlike = replace(AIRFRAME, bodies=bodies)
     w: Vec3 = (0.5, -0.4, 0.3)
     estimate = estimate_of(Rotation.identity(), w)
     free = replace(TUNING, attitude=PidGains(0.0, 0.0, 0.0, 1.0))
@@ -241,6 +246,6 @@ def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
     command = after_step(
         cascade, in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT
     ).commanded
-    inertia, spin = np.array(unlike.inertia), np.array(w)
+    inertia, spin = np.array(bodies.base_inertia[:3]), np.array(w)
     expected = np.cross(spin, inertia * spin) + [0.0, command.joint_torque[0], 0.0]
     np.testing.assert_allclose(torque_of(command), expected, atol=1e-9)

@@ -72,6 +72,6 @@ def test_each_pid_of_the_paper_settles_a_double_integrator_without_ringing(loop:
 def test_the_heading_loop_is_critically_damped_and_cannot_spend_all_the_rotors_drag() -> None:
     tuning = LoopGains()
     assert np.roots([1.0, tuning.yaw.kd, tuning.yaw.kp]) == pytest.approx([-2.0, -2.0])
-    drag = 4.0 * AIRFRAME.yaw_per_thrust * tuning.yaw_thrust_limit / AIRFRAME.inertia[2]
+    drag = 4.0 * AIRFRAME.yaw_per_thrust * tuning.yaw_thrust_limit / AIRFRAME.bodies.base_inertia[2]
     assert tuning.yaw.ki == 0.0
     assert drag < 2.0 * tuning.yaw.limit

@@ -19,10 +19,10 @@ from fsw.autopilot.control.joint_reference import (
     joint_reference,
     within_limits,
 )
-from fsw.autopilot.control.joints import arm_dynamics, torques_for
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.signals import StateEstimate, Vec2
+from tests.fsw.records import placed, torques_for
 
 LIMITS = JointReferenceLimits()
 DT = 0.002
@@ -189,7 +189,8 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
     assert rate < AIRFRAME.joint_rate_max
     field = GRAVITY + planned.vertical
     first, both = bounds(AIRFRAME, LIMITS)
-    turning = 2.0 * AIRFRAME.rotor_arm * 0.5 * AIRFRAME.rotor_thrust_max / AIRFRAME.inertia[1]
+    inertia = AIRFRAME.bodies.base_inertia[1]
+    turning = 2.0 * AIRFRAME.rotor_arm * 0.5 * AIRFRAME.rotor_thrust_max / inertia
     link1 = FOLLOWING * LIMITS.acceleration + ADDED * planned.joint_acc
     link2 = FOLLOWING * LIMITS.acceleration + ADDED * 2.0 * planned.joint_acc
     most = [0.0, 0.0]
@@ -199,11 +200,13 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
                 0, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0) * 3, (0.0,) * 3, 0.0,
                 (float(th1), float(th12 - th1)), (LIMITS.rate, LIMITS.rate),
             )  # fmt: skip
+            m = placed(AIRFRAME, fast).bodies
             for falls in (-1.0, 1.0):
-                arm = arm_dynamics(AIRFRAME, fast, (0.0, falls * field))
                 for a1, a12, pitch in ((1, 1, 1), (1, -1, 1), (1, -1, -1), (1, 1, -1)):
-                    a = (a1 * link1 + pitch * turning, a12 * link2 - a1 * link1)
-                    for i, torque in enumerate(torques_for(arm, a)):
+                    a = (a1 * link1, a12 * link2 - a1 * link1)
+                    turn = (0.0, pitch * turning, 0.0)
+                    torques = torques_for(m, (0.0, 0.0, falls * field), turn, a)
+                    for i, torque in enumerate(torques):
                         most[i] = max(most[i], abs(torque))
     friction = 0.01 + 0.005 * AIRFRAME.joint_rate_max
     assert most[0] + friction < AIRFRAME.joint_torque_max

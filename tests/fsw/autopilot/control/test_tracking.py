@@ -47,6 +47,8 @@ PLAN = PredictionState(
     (0.0, 0.0, -1.0), CALM, CALM, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0), (0.0, 0.0)
 )
 
+NO_SWING = (0.0,) * 9
+
 
 def on_plan(rotation: Rotation, plan: PredictionState) -> tuple[StateEstimate, MotionState]:
     """A vehicle that is exactly where the plan wants it."""
@@ -68,7 +70,9 @@ def test_without_error_the_plans_own_snap_is_flown(yaw: float, tilt: float) -> N
     plan = PLAN._replace(a=(0.5, -0.8, 0.2), j=(1.0, -2.0), s=(10.0, 20.0))
     u = PlanInput((1.0, -1.0, 0.3), 0.0, (0.0, 0.0))
     estimate, motion = on_plan(rotation, plan)
-    wd, thrust = follow_plan(LAW, AIRFRAME.mass, 0.0, estimate, motion, calm(estimate), plan, u)
+    wd, thrust = follow_plan(
+        LAW, AIRFRAME.mass, NO_SWING, estimate, motion, calm(estimate), plan, u
+    )
     expected = [LAG.kp * (u.a[k] - plan.a[k]) - LAG.kd * plan.j[k] for k in (0, 1)]
     np.testing.assert_allclose(snap_of(estimate, wd), expected, atol=1e-9)
     upright = estimate.R_WB[8]
@@ -93,7 +97,7 @@ def test_the_vehicle_is_snapped_towards_the_plan(yaw: float, axis: int, quantity
         0.0,
         (0.0, 0.0),
     )
-    wd, _ = follow_plan(LAW, AIRFRAME.mass, 0.0, estimate, motion, calm(estimate), ahead, u)
+    wd, _ = follow_plan(LAW, AIRFRAME.mass, NO_SWING, estimate, motion, calm(estimate), ahead, u)
     snap = snap_of(estimate, wd)
     assert snap[axis] > 1.0
     assert abs(snap[1 - axis]) < 1e-9
@@ -274,10 +278,11 @@ def test_rolling_over_a_mass_that_hangs_below_is_no_deviation(yaw: float) -> Non
     swing = np.cross(turn.apply([rate, 0.0, 0.0]), down) * depth
     estimate = estimate_of(turn, (rate, 0.0, 0.0), p, vec3(-swing))
     motion = MotionState(WEIGHT, CALM, (0.0, 0.0), (0.0, 0.0))
-    v = velocity_of_mass(estimate, depth)
+    hanging = (0.0, 0.0, 0.0, -depth, *(0.0,) * 5)
+    v = velocity_of_mass(estimate, hanging)
     assert v[:2] == pytest.approx((0.0, 0.0), abs=1e-12)
     seen = observed((v[0], v[1], 0.0), CALM)
-    wd, _ = follow_plan(LAW, AIRFRAME.mass, depth, estimate, motion, seen, PLAN, REST_INPUT)
+    wd, _ = follow_plan(LAW, AIRFRAME.mass, hanging, estimate, motion, seen, PLAN, REST_INPUT)
     assert wd == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
@@ -285,7 +290,7 @@ def test_a_vertical_disturbance_is_met_by_thrust_at_once() -> None:
     estimate, motion = on_plan(Rotation.identity(), PLAN)
     for d in (-0.5, 0.5):
         seen = observed(estimate.v_WB, (0.0, 0.0, d))
-        _, thrust = follow_plan(LAW, 3.5, 0.0, estimate, motion, seen, PLAN, REST_INPUT)
+        _, thrust = follow_plan(LAW, 3.5, NO_SWING, estimate, motion, seen, PLAN, REST_INPUT)
         expected = 3.5 * (GRAVITY + LAW.gains.k_vertical_disturbance * d)
         assert thrust == pytest.approx(expected)
         assert 0.9 < LAW.gains.k_vertical_disturbance < 1.2

@@ -31,9 +31,10 @@ from fsw.autopilot.control.tube import (
     tube,
 )
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY, Airframe
+from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.nominal import REST_INPUT, REST_STATE
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.model.rotors import estimate_mass, hanging_arm
+from fsw.autopilot.model.rotors import estimate_mass
 from tests.fsw.records import observe, observed
 
 DT = 0.002
@@ -175,7 +176,8 @@ def test_every_figure_of_the_tube_is_that_of_the_loop_that_is_flown() -> None:
 
 
 def test_the_share_of_torque_is_that_of_what_the_mixer_can_give_in_hover() -> None:
-    unlike = replace(AIRFRAME, inertia=(0.25, 0.35, 0.9), rotor_thrust_max=15.0)
+    bodies = replace(AIRFRAME.bodies, base_inertia=(0.25, 0.35, 0.9, 0.0, 0.0, 0.0))
+    unlike = replace(AIRFRAME, bodies=bodies, rotor_thrust_max=15.0)
     per_unit, weight = _tube(), unlike.mass * GRAVITY
     f = allocate(unlike, (100.0, 0.0, 0.0), 4.0 * (15.0 - weight / 4.0), 0.0)
     lift = min(weight / 4.0, 15.0 - weight / 4.0)
@@ -288,7 +290,7 @@ def _worst_shortfall(airframe: Airframe, loop: Tube, disturbance: float) -> floa
     snap = (1.0 + lean * loop.vertical_acceleration) * disturbance * loop.snap
     change = disturbance * loop.vertical_acceleration / GRAVITY
     # With the arm hanging straight the roll inertia is the larger one.
-    inertia = hanging_arm(airframe, (0.0, 0.0)).roll_inertia
+    inertia = float(posture(airframe.bodies, (0.0, 0.0)).inertia[0])
     worst = 0.0
     for heading in np.linspace(0.0, np.pi / 2.0, 37):
         for lift in (1.0 - change, 1.0, 1.0 + change):

@@ -25,7 +25,7 @@ from fsw.autopilot.flight.plan_exchange import (
 from fsw.autopilot.flight.state import PlanMemory
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.nominal import NominalModel
-from fsw.autopilot.model.rotors import MotionState, motion_state
+from fsw.autopilot.model.rotors import MotionState
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import (
@@ -39,6 +39,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.autopilot.tick_record import Tick
 from tests.fsw.random_states import as_state, estimate_of, prediction_vector, random_estimate
+from tests.fsw.records import measured_motion
 
 PERIOD_US, TICK_US, START_US = 100_000, 2_000, 1_000_000
 NO_TIME = PlanTimings(0.0, 0.0, 0.0)
@@ -141,7 +142,7 @@ def test_measured_yaw_rate_is_that_of_the_zyx_angles() -> None:
     random, moment = np.random.default_rng(1), 1e-6
     for _ in range(20):
         estimate = random_estimate(random, tilt=0.8)
-        motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate, (8.0, 8.0, 8.0, 8.0), 0.0)
+        motion = measured_motion(AIRFRAME, estimate, (8.0, 8.0, 8.0, 8.0))
         R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
         turn = Rotation.from_rotvec(moment * np.array(estimate.w_WB_B))
         change = (R_WB * turn).as_euler("ZYX")[0] - (R_WB * turn.inv()).as_euler("ZYX")[0]
@@ -154,7 +155,7 @@ def test_measured_state_is_the_vehicle() -> None:
     estimate = estimate_of(
         Rotation.from_euler("Z", 1.0), STILL, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.4, 0.5)
     )
-    motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate, (9.0, 8.0, 8.0, 8.0), 0.0)
+    motion = measured_motion(AIRFRAME, estimate, (9.0, 8.0, 8.0, 8.0))
     state = measured_state(estimate, motion)
     assert (state.p, state.v, state.q_arm) == (estimate.p_WB, estimate.v_WB, estimate.q_arm)
     assert (state.a, state.j, state.s) == (motion.a, motion.j, motion.s)

@@ -98,12 +98,12 @@ def test_first_joint_turns_the_hanging_arm_forward() -> None:
 def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links() -> None:
     random = np.random.default_rng(5)
     horizon = Linearisation(condense(AIRFRAME, 0.1, 1))
-    m1, m2 = AIRFRAME.link_mass
+    m1, m2 = AIRFRAME.bodies.mass[:2]
     for _ in range(20):
         q1, q2 = (float(q) for q in random.uniform(-1.5, 1.5, 2))
         level = estimate_of(Rotation.identity(), q_arm=(q1, q2))
-        com1 = point_in_flight(level, (AIRFRAME.link_com[0], 0.0))[0][0]
-        com2 = point_in_flight(level, (AIRFRAME.link_length[0], AIRFRAME.link_com[1]))[0][0]
+        com1 = point_in_flight(level, (AIRFRAME.bodies.com[2], 0.0))[0][0]
+        com2 = point_in_flight(level, (AIRFRAME.link_length[0], AIRFRAME.bodies.com[5]))[0][0]
         mean = (m1 * com1 + m2 * com2) / (m1 + m2)
         start = np.zeros(STATES)
         start[Q_ARM : Q_ARM + 2] = q1, q2

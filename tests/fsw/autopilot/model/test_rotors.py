@@ -10,16 +10,16 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import (
     estimate_mass,
-    hanging_arm,
     lag_rotors,
-    motion_state,
     rotor_decay,
 )
 from fsw.autopilot.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
+from tests.fsw.records import measured_motion
 
 MOMENT = 1e-3  # s
 
@@ -39,17 +39,16 @@ def torque(rotors: Vec4, joint1: float) -> Array:
 
 def acceleration_at(t: float, rotation: Rotation, w: Array, rotors: Vec4, joint1: float) -> Array:
     """World acceleration after Euler's equation has turned the body for ``t`` (either sign)."""
-    # The arm hangs straight down and rolls with the body.
-    roll = hanging_arm(AIRFRAME, (0.0, 0.0)).roll_inertia
-    inertia = np.array([roll, *AIRFRAME.inertia[1:]])
+    # From rest the arm hangs straight down, and rolls with the body.
+    inertia = posture(AIRFRAME.bodies, (0.0, 0.0)).inertia.reshape(3, 3)
 
     def rates(_: float, y: Array) -> Array:
         turn, spin = y[:9].reshape(3, 3), y[9:]
         cross = np.array(
             [[0.0, -spin[2], spin[1]], [spin[2], 0.0, -spin[0]], [-spin[1], spin[0], 0.0]]
         )
-        push = torque(rotors, joint1) - np.cross(spin, inertia * spin)
-        return np.concatenate(((turn @ cross).ravel(), push / inertia))
+        push = torque(rotors, joint1) - np.cross(spin, inertia @ spin)
+        return np.concatenate(((turn @ cross).ravel(), np.linalg.solve(inertia, push)))
 
     y = np.concatenate((rotation.as_matrix().ravel(), w))
     if t:
@@ -69,7 +68,7 @@ def test_acceleration_and_jerk_are_those_of_the_simulated_motion() -> None:
         angles = random.uniform([-math.pi, -0.8, -0.8], [math.pi, 0.8, 0.8])
         rotation = Rotation.from_euler("ZYX", angles)
         w, rotors = random.uniform(-2.0, 2.0, 3), random_rotors(random)
-        motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate_of(rotation, vec3(w)), rotors, 0.1)
+        motion = measured_motion(AIRFRAME, estimate_of(rotation, vec3(w)), rotors, (0.1, 0.0))
         now = acceleration_at(0.0, rotation, w, rotors, 0.1)
         after = acceleration_at(MOMENT, rotation, w, rotors, 0.1)
         before = acceleration_at(-MOMENT, rotation, w, rotors, 0.1)
@@ -84,7 +83,7 @@ def test_snap_is_that_of_a_motion_that_starts_from_rest() -> None:
         angles = random.uniform([-math.pi, -0.8, -0.8], [math.pi, 0.8, 0.8])
         rotation = Rotation.from_euler("ZYX", angles)
         rotors, joint1 = random_rotors(random), float(random.uniform(-1.0, 1.0))
-        motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate_of(rotation), rotors, joint1)
+        motion = measured_motion(AIRFRAME, estimate_of(rotation), rotors, (joint1, 0.0))
         still = np.zeros(3)
         before, now, after = (
             acceleration_at(t, rotation, still, rotors, joint1) for t in (-MOMENT, 0.0, MOMENT)
@@ -99,15 +98,13 @@ def test_snap_is_that_of_a_motion_that_starts_from_rest() -> None:
     ids=["front lifts more: brakes", "rear lifts more: speeds up"],
 )
 def test_thrust_difference_along_the_body_decides_forward_snap(rotors: Vec4, sign: float) -> None:
-    motion = motion_state(AIRFRAME, AIRFRAME.mass, estimate_of(Rotation.identity()), rotors, 0.0)
+    motion = measured_motion(AIRFRAME, estimate_of(Rotation.identity()), rotors)
     assert sign * motion.s[0] > 1.0
     assert motion.s[1] == pytest.approx(0.0)
 
 
 def test_more_thrust_on_the_left_accelerates_to_the_right() -> None:
-    motion = motion_state(
-        AIRFRAME, AIRFRAME.mass, estimate_of(Rotation.identity()), (8.5, 8.5, 8.5, 8.0), 0.0
-    )
+    motion = measured_motion(AIRFRAME, estimate_of(Rotation.identity()), (8.5, 8.5, 8.5, 8.0))
     assert motion.s[1] > 1.0
 
 
@@ -115,7 +112,7 @@ def test_level_hover_has_no_acceleration() -> None:
     each = AIRFRAME.mass * GRAVITY / 4.0
     level = estimate_of(Rotation.from_euler("Z", 2.0))
     still: Vec3 = (0.0, 0.0, 0.0)
-    assert motion_state(AIRFRAME, AIRFRAME.mass, level, (each,) * 4, 0.0).a == pytest.approx(still)
+    assert measured_motion(AIRFRAME, level, (each,) * 4).a == pytest.approx(still)
 
 
 def test_rotors_close_63_percent_of_a_step_in_one_time_constant() -> None:
@@ -147,18 +144,3 @@ def test_the_scales_stay_near_what_is_believed() -> None:
     for _ in range(5000):
         mass = estimate_mass(AIRFRAME, mass, (10.0,) * 4, 100.0, 0.002)
     assert mass == pytest.approx(0.7 * AIRFRAME.mass)
-
-
-@pytest.mark.parametrize("q_arm", [(0.0, 0.0), (0.6, -1.2), (-0.3, 0.9)])
-def test_the_hanging_arm_is_two_point_masses_below_the_base(q_arm: tuple[float, float]) -> None:
-    """Rolling about the centre of mass of base and links, each at its own depth."""
-    arm = hanging_arm(AIRFRAME, q_arm)
-    depths = [0.0]
-    elbow = AIRFRAME.link_length[0] * math.cos(q_arm[0])
-    depths.append(AIRFRAME.link_com[0] * math.cos(q_arm[0]))
-    depths.append(elbow + AIRFRAME.link_com[1] * math.cos(sum(q_arm)))
-    masses = np.array([AIRFRAME.mass - sum(AIRFRAME.link_mass), *AIRFRAME.link_mass])
-    centre = float(masses @ depths / masses.sum())
-    about = float(masses @ (np.array(depths) - centre) ** 2)
-    assert arm.depth == pytest.approx(centre)
-    assert arm.roll_inertia == pytest.approx(AIRFRAME.inertia[0] + about)
