@@ -16,12 +16,12 @@ from fsw.autopilot.signals import ActuatorCommand, PlanInput, PredictionState, S
 from fsw.record import (
     JOINTS,
     ROTORS,
-    Five,
     Floats,
     Nine,
     PerJoint,
     PerRotor,
     Record,
+    Six,
     Three,
     Two,
 )
@@ -114,7 +114,8 @@ class Watched(Record):
     torque: Two  # N m about x and y, observed beside the model
     lift: float  # N, observed the same, beside what lasts
     lasting: float  # share of the thrust that lasts along z
-    products: Five  # means of products of what is observed, in newtons of a rotor: xx yy zz xz yz
+    # Means of products of what is observed, in newtons of a rotor: xx yy zz xy xz yz.
+    products: Six
     extra: PerRotor  # N, of each rotor beside its command, by its pattern
     by_thrust: PerRotor  # N^2, of that and the thrust
     thrust2: PerRotor  # N^2, of the thrust
@@ -191,6 +192,19 @@ class Multibody(Record):
     work: PerJoint
 
 
+class Mixer(Record):
+    """What allocation and the watch reckon with; made anew wherever it is needed."""
+
+    low: PerRotor  # N, least and most that the rotor can give
+    top: PerRotor
+    share: Annotated[Floats, 4 * ROTORS]  # N a N m of roll and pitch, a N of thrust, a N m of yaw
+    mean: PerRotor  # N
+    off: PerRotor  # N
+    gram: _Matrix
+    factor: _Matrix
+    work: PerJoint
+
+
 class Tick(Record):
     """The whole state of the fast loop."""
 
@@ -216,6 +230,7 @@ class Tick(Record):
     flown_u: Accelerations
     wanted: Sent  # what the loops ask for, until it is sent
     bodies: Multibody  # of the estimate
+    mixer: Mixer
 
     @property
     def commanded(self) -> ActuatorCommand:

@@ -9,8 +9,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fsw.autopilot.control import tracking
+from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.gains import TrackingTuning
 from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, note_health
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.multibody import joint_load, move_bodies
 from fsw.autopilot.model.rotors import MotionState, motion_state
@@ -60,6 +62,20 @@ def torques_for(m: Multibody, field: Vec3, turning: Vec3, qdd: Sequence[float]) 
         joint_load(m, i, field, turning) + float(m.qq[JOINTS * i : JOINTS * i + len(qdd)] @ qdd)
         for i in range(len(qdd))
     ]
+
+
+def allocated(
+    airframe: Airframe,
+    torque: Vec3,
+    thrust: float,
+    yaw_limit: float,
+    health: ActuatorHealth = HEALTHY,
+) -> tuple[float, ...]:
+    """Thrust [N] of each rotor for a torque [N m] and a thrust [N]."""
+    r = new_tick(airframe.mass)
+    note_health(r.health, health)
+    allocate(r, airframe, torque, thrust, yaw_limit)
+    return tuple(r.wanted.rotor_thrust[: airframe.rotors].tolist())
 
 
 def measured_motion(

@@ -30,13 +30,13 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from fsw.autopilot.geometry.vectors import clamp, subtract
+from fsw.autopilot.geometry.vectors import clamp, dot, subtract
 from fsw.autopilot.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import Bodies, joint_drift, load_on_base, move_bodies
-from fsw.autopilot.model.rotors import lag_rotors, rotor_wrench
-from fsw.autopilot.signals import Vec3, Vec4
-from fsw.autopilot.tick_record import NO_ROTOR, Tick, Watched, watch_anew
+from fsw.autopilot.model.rotors import lag_rotor, rotor_wrench
+from fsw.autopilot.signals import Vec3
+from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
 from fsw.record import Floats
 
@@ -62,6 +62,7 @@ SLOW_SHARE: Final = 0.7
 LOST: Final = 0.2  # of what is commanded; a rotor that gives less is lost
 LOST_TIME: Final = 0.15  # s
 LOST_FROM: Final = 4.0  # N commanded; with less it is not seen
+ALONG: Final = 0.3  # sine over cosine of the angle of axes that are one
 UNLIKE: Final = 0.5  # share of what a second rotor lacks that along z may differ
 QUIET: Final = 0.75  # N; a rotor below that gives what it is commanded again
 QUIET_TIME: Final = 3.0  # s
@@ -127,25 +128,23 @@ def watch(
     """
     airframe, sent, r = laws[0], before[0].sent, after[0]
     s, x = r.watch, r.estimate
-    thrust = sent.rotor_thrust[0], sent.rotor_thrust[1], sent.rotor_thrust[2], sent.rotor_thrust[3]
-    joints = int(airframe.bodies.joints)
+    joints, rotors = int(airframe.bodies.joints), int(airframe.rotors)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, x)
     if s.running == 0.0:
-        for i in range(4):
-            s.thrust[i] = s.slow[i] = thrust[i]
-    _observe_base(r, airframe, decay, dt, thrust, sent.joint_torque)
+        for i in range(rotors):
+            s.thrust[i] = s.slow[i] = sent.rotor_thrust[i]
+    _observe_base(r, airframe, decay, dt, sent)
     if angles_known:
         _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
     else:
         _forget_arm(s)
-    total = s.thrust[0] + s.thrust[1] + s.thrust[2] + s.thrust[3]
-    weight = airframe.mass * GRAVITY
-    if not total > AIRBORNE * weight or s.lift > CONTACT * airframe.mass:
+    force, _ = rotor_wrench(airframe, s.thrust)
+    if not -force[2] > AIRBORNE * airframe.mass * GRAVITY or s.lift > CONTACT * airframe.mass:
         s.running = 0.0  # on the ground, or about to be
     s.running += dt
     settled = s.running > SETTLING
-    _judge_rotors(s, dt, settled)
+    _judge_rotors(r, airframe, dt, settled)
     found = s.failed >= 0
     for k in range(joints):
         _judge_joint(s, k, dt, settled and s.arm_seen > SETTLING, x.q_arm[k])
@@ -154,125 +153,149 @@ def watch(
 
 
 @compilable
-def _observe_base(
-    r: Tick, airframe: Airframe, decay: float, dt: float, commanded: Vec4, joint_torque: Floats
-) -> None:
+def pattern_of(airframe: Airframe, rotor: int) -> Vec3:
+    """What a newton more of a rotor leaves: roll and pitch [N at the rotors' lever], lift [N]."""
+    w, lever, at = airframe.wrench, airframe.rotor_lever, 6 * rotor
+    return w[at + 3] / lever, w[at + 4] / lever, -w[at + 2]
+
+
+@compilable
+def _observe_base(r: Tick, airframe: Airframe, decay: float, dt: float, sent: Sent) -> None:
     """What turns and lifts the base beside the model, and the means of its products."""
-    s, rate, J = r.watch, r.estimate.w_WB_B, r.bodies.inertia
-    f = (s.thrust[0], s.thrust[1], s.thrust[2], s.thrust[3])
-    g = lag_rotors(f, commanded, decay)
-    m = (0.5 * (f[0] + g[0]), 0.5 * (f[1] + g[1]), 0.5 * (f[2] + g[2]), 0.5 * (f[3] + g[3]))
-    arm = airframe.rotor_arm
-    force, turn = rotor_wrench(airframe, m)
-    modelled = subtract(turn, load_on_base(r.bodies, airframe.bodies, force, joint_torque))
-    x, y, z = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
+    s, rate, J, rotors = r.watch, r.estimate.w_WB_B, r.bodies.inertia, int(airframe.rotors)
+    for i in range(rotors):
+        before = s.thrust[i]
+        s.thrust[i] = lag_rotor(before, sent.rotor_thrust[i], decay)
+        r.mixer.mean[i] = 0.5 * (before + s.thrust[i])
+    force, turn = rotor_wrench(airframe, r.mixer.mean)
+    load = load_on_base(r.bodies, airframe.bodies, force, sent.joint_torque)
+    modelled = subtract(turn, load)
+    grown = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
     for i in range(2):
-        grown = J[3 * i] * x + J[3 * i + 1] * y + J[3 * i + 2] * z
+        gained = J[3 * i] * grown[0] + J[3 * i + 1] * grown[1] + J[3 * i + 2] * grown[2]
         if s.running == 0.0:
-            grown = dt * modelled[i]
-        s.torque[i] += OBSERVER * (grown - dt * (modelled[i] + s.torque[i]))
-    share = min(OBSERVER * dt, 1.0)
-    total = m[0] + m[1] + m[2] + m[3]
+            gained = dt * modelled[i]
+        s.torque[i] += OBSERVER * (gained - dt * (modelled[i] + s.torque[i]))
+    share, total = min(OBSERVER * dt, 1.0), -force[2]
     lift = airframe.mass * r.estimate.specific_force - (1.0 + s.lasting) * total
     s.lift += share * (lift - s.lift)
-    x, y, z = s.torque[0] / arm, s.torque[1] / arm, s.lift
+    seen = s.torque[0] / airframe.rotor_lever, s.torque[1] / airframe.rotor_lever, s.lift
+    x, y, z = seen
     # What the ground carries does not last.
     flies = total > AIRBORNE * airframe.mass * GRAVITY and z <= CONTACT * airframe.mass
     if flies and s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW:
         s.lasting += dt / LEARNING * lift / total
     forget = min(dt / MEMORY, 1.0)
-    _observe_slow(s, dt, decay, commanded, m, arm, (x, y, z))
-    products = (x * x, y * y, z * z, x * z, y * z)
-    for i in range(5):
+    _observe_slow(r, airframe, dt, decay, sent, seen)
+    products = (x * x, y * y, z * z, x * y, x * z, y * z)
+    for i in range(s.products.size):
         s.products[i] += forget * (products[i] - s.products[i])
-    extra = (0.5 * (z - y), 0.5 * (z + x), 0.5 * (z + y), 0.5 * (z - x))
-    for i in range(4):
-        s.thrust[i], s.extra[i] = g[i], extra[i]
-        s.by_thrust[i] += forget * (extra[i] * g[i] - s.by_thrust[i])
-        s.thrust2[i] += forget * (g[i] * g[i] - s.thrust2[i])
+    for i in range(rotors):
+        pattern = pattern_of(airframe, i)
+        s.extra[i] = dot(pattern, seen) / dot(pattern, pattern)
+        s.by_thrust[i] += forget * (s.extra[i] * s.thrust[i] - s.by_thrust[i])
+        s.thrust2[i] += forget * (s.thrust[i] * s.thrust[i] - s.thrust2[i])
     for i in range(3):
         s.rate[i] = rate[i]
     if s.failed >= 0:
-        # Which one is known: what turns the base says how much, and pushes do not.
-        k, opposite = s.failed, (s.failed + 2) % 4
-        turns = (-y, x, y, -x)
-        off, thrust = turns[k], g[k]
-        # Of both about that axis: with what is lacking along z the opposite one turns the base.
-        lacking = min(0.5 * (z - off), 0.0)
-        more = max(off, 0.0) if lacking > -UNLIKE * off else 0.0
-        s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
-        s.failed2 += forget * (off * off - s.failed2)
-        s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
-        s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
-        s.failed_more2 += forget * (more * more - s.failed_more2)
-        # What turns beside what the failed one lacks: a battery that sags lowers all rotors alike,
-        # and looks along z like an opposite rotor that is gone.
-        turned = (s.effect - 1.0) * thrust - off
-        gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
-        s.lost_for = s.lost_for + dt if gives_nothing else 0.0
-        for i in range(4):
-            other = 0.5 * (z - off) if i == opposite else turns[i]
-            unlike = 0.0 if i == opposite else abs(z - off - other)
-            gone = g[i] > LOST_FROM and other < (LOST - 1.0) * g[i] and unlike < -UNLIKE * other
-            gone = gone and (i != opposite or turned < UNLIKE * (LOST - 1.0) * g[i])
-            s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and i != k else 0.0
+        _observe_failed(s, airframe, dt, seen)
+
+
+@compilable
+def _observe_failed(s: Watched, airframe: Airframe, dt: float, seen: Vec3) -> None:
+    """What the failed rotor gives, which is known, and whether another one is lost as well."""
+    # What turns the base says how much, and pushes do not.
+    k, forget = s.failed, min(dt / MEMORY, 1.0)
+    own = pattern_of(airframe, k)
+    x, y, z = seen
+    off, thrust = _about(own, x, y), s.thrust[k]
+    # Of both about that axis: with what is lacking along z the opposite one turns the base.
+    lacking = min(0.5 * (z - off), 0.0)
+    more = max(off, 0.0) if lacking > -UNLIKE * off else 0.0
+    s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
+    s.failed2 += forget * (off * off - s.failed2)
+    s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
+    s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
+    s.failed_more2 += forget * (more * more - s.failed_more2)
+    # What turns beside what the failed one lacks: a battery that sags lowers all rotors alike,
+    # and looks along z like an opposite rotor that is gone.
+    turned = (s.effect - 1.0) * thrust - off
+    gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
+    s.lost_for = s.lost_for + dt if gives_nothing else 0.0
+    for i in range(int(airframe.rotors)):
+        g, pattern = s.thrust[i], pattern_of(airframe, i)
+        across = own[0] * pattern[1] - own[1] * pattern[0]
+        along = own[0] * pattern[0] + own[1] * pattern[1]
+        # Of rotors that turn the base about one axis only lift tells which one gives how much.
+        opposite = abs(across) < ALONG * abs(along)
+        other = 0.5 * (z - off)
+        unlike = 0.0
+        if not opposite:
+            other = (own[0] * y - own[1] * x) / across
+            unlike = abs(z - (x * pattern[1] - y * pattern[0]) / across - other)
+        gone = g > LOST_FROM and other < (LOST - 1.0) * g and unlike < -UNLIKE * other
+        gone = gone and (not opposite or turned < UNLIKE * (LOST - 1.0) * g)
+        known = i == k or (opposite and along > 0.0)  # or beside it: both leave the same
+        s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and not known else 0.0
+
+
+@compilable
+def _about(pattern: Vec3, x: float, y: float) -> float:
+    """How much more of a rotor explains what turns the base [N]."""
+    turns = pattern[0] * pattern[0] + pattern[1] * pattern[1]
+    return (pattern[0] * x + pattern[1] * y) / turns
 
 
 @compilable
 def _observe_slow(
-    s: Watched, dt: float, decay: float, commanded: Vec4, modelled: Vec4, arm: float, seen: Vec3
+    r: Tick, airframe: Airframe, dt: float, decay: float, sent: Sent, seen: Vec3
 ) -> None:
     """What rotors twice as slow would leave, as what is ``seen`` [N], and how alike both are."""
-    f = (s.slow[0], s.slow[1], s.slow[2], s.slow[3])
-    g = lag_rotors(f, commanded, math.sqrt(decay))
-    off = (
-        0.5 * (f[0] + g[0]) - modelled[0],
-        0.5 * (f[1] + g[1]) - modelled[1],
-        0.5 * (f[2] + g[2]) - modelled[2],
-        0.5 * (f[3] + g[3]) - modelled[3],
-    )
+    s, lever = r.watch, airframe.rotor_lever
+    for i in range(int(airframe.rotors)):
+        before = s.slow[i]
+        s.slow[i] = lag_rotor(before, sent.rotor_thrust[i], math.sqrt(decay))
+        r.mixer.off[i] = 0.5 * (before + s.slow[i]) - r.mixer.mean[i]
+    force, turn = rotor_wrench(airframe, r.mixer.off)
     share, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
-    s.slow_torque[0] += share * (arm * (off[1] - off[3]) - s.slow_torque[0])
-    s.slow_torque[1] += share * (arm * (off[2] - off[0]) - s.slow_torque[1])
-    s.slow_lift += share * (off[0] + off[1] + off[2] + off[3] - s.slow_lift)
-    x, y, z = s.slow_torque[0] / arm, s.slow_torque[1] / arm, s.slow_lift
-    s.slow_by += forget * (x * seen[0] + y * seen[1] + z * seen[2] - s.slow_by)
-    s.slow2 += forget * (x * x + y * y + z * z - s.slow2)
-    for i in range(4):
-        s.slow[i] = g[i]
+    s.slow_torque[0] += share * (turn[0] - s.slow_torque[0])
+    s.slow_torque[1] += share * (turn[1] - s.slow_torque[1])
+    s.slow_lift += share * (-force[2] - s.slow_lift)
+    left = s.slow_torque[0] / lever, s.slow_torque[1] / lever, s.slow_lift
+    s.slow_by += forget * (dot(left, seen) - s.slow_by)
+    s.slow2 += forget * (dot(left, left) - s.slow2)
 
 
 @compilable
-def mean_square(s: Watched, rotor: int) -> float:
-    """Mean square [N^2] of what a rotor gives beside its command, by its pattern (0 to 3)."""
-    xx, yy, zz, xz, yz = s.products[0], s.products[1], s.products[2], s.products[3], s.products[4]
-    if rotor == 0:
-        fourfold = zz + yy - 2.0 * yz
-    elif rotor == 1:
-        fourfold = zz + xx + 2.0 * xz
-    elif rotor == 2:
-        fourfold = zz + yy + 2.0 * yz
-    else:
-        fourfold = zz + xx - 2.0 * xz
-    return 0.25 * float(fourfold)
+def mean_square(s: Watched, airframe: Airframe, rotor: int) -> float:
+    """Mean square [N^2] of what a rotor gives beside its command, by its pattern."""
+    x, y, z = pattern_of(airframe, rotor)
+    p, size = s.products, x * x + y * y + z * z
+    total = x * x * p[0] + y * y * p[1] + z * z * p[2]
+    total += 2.0 * (x * y * p[3] + x * z * p[4] + y * z * p[5])
+    return float(total / (size * size))
 
 
 @compilable
-def _judge_rotors(s: Watched, dt: float, settled: bool) -> None:
+def _judge_rotors(r: Tick, airframe: Airframe, dt: float, settled: bool) -> None:
+    s = r.watch
     if s.failed >= 0:
         _follow_failed(s, dt)
         if settled and not s.lost:
-            _judge_others(s)
+            _judge_others(s, airframe)
         return
     found, most = NO_ROTOR, 0.0
-    for i in range(4):
-        size = mean_square(s, i)
+    for i in range(int(airframe.rotors)):
+        size = mean_square(s, airframe, i)
         if size > most:
             found, most = i, size
     observed = s.products[0] + s.products[1] + s.products[2]
-    alike = most > WEAK * WEAK and 2.0 * most > EXPLAINED * observed
-    # A drive of joint 1 that is dead turns the base as well.
-    mistaken = (found == 0 or found == 2) and s.undone2[0] > UNDONE * UNDONE
+    alike = mistaken = False
+    if found >= 0:
+        pattern = pattern_of(airframe, found)
+        explained = dot(pattern, pattern) * most
+        alike = most > WEAK * WEAK and explained > EXPLAINED * observed
+        mistaken = _a_drive_does_this(r, airframe, pattern)
     slow = s.slow_by * s.slow_by > SLOW_SHARE * observed * s.slow2
     if slow and 0.0 < s.slow_by < SLOW * s.slow2:
         mistaken = True
@@ -286,6 +309,19 @@ def _judge_rotors(s: Watched, dt: float, settled: bool) -> None:
 
 
 @compilable
+def _a_drive_does_this(r: Tick, airframe: Airframe, pattern: Vec3) -> bool:
+    """Whether a joint's drive that is dead turns the base about the axis of this pattern."""
+    s, m = r.watch, r.bodies
+    for k in range(int(airframe.bodies.joints)):
+        x, y = m.reaction[3 * k], m.reaction[3 * k + 1]
+        same = abs(x * pattern[0] + y * pattern[1])
+        whole = math.sqrt((x * x + y * y) * (pattern[0] * pattern[0] + pattern[1] * pattern[1]))
+        if s.undone2[k] > UNDONE * UNDONE and same > 0.5 * whole and whole > 0.1:
+            return True
+    return False
+
+
+@compilable
 def _name(s: Watched, found: int, size: float) -> None:
     """Follow a failed rotor from now on; ``size`` [N^2] is the mean square by its pattern."""
     s.failed, s.effect, s.quiet_for = found, 1.0, 0.0
@@ -296,12 +332,12 @@ def _name(s: Watched, found: int, size: float) -> None:
 
 
 @compilable
-def _judge_others(s: Watched) -> None:
+def _judge_others(s: Watched, airframe: Airframe) -> None:
     """Whether a second rotor is lost; then it is the failed one."""
-    for i in range(4):
+    for i in range(int(airframe.rotors)):
         if s.others_lost_for[i] > LOST_TIME:
             s.suspect, s.suspected = i, s.others_lost_for[i]
-            _name(s, i, mean_square(s, i))
+            _name(s, i, mean_square(s, airframe, i))
             s.lost, s.disobeys = 1, 0
             return
 

@@ -1,57 +1,196 @@
-"""From torque and thrust to four rotors, roll and pitch first."""
+r"""From torque and thrust to rotors of any layout: roll and pitch first, then thrust, yaw last.
+
+With the rotors' effectiveness B (roll, pitch, yaw and thrust per newton of each), a wish is served
+by the pseudoinverse of B. Where that asks for more than rotors have, yaw is given up first, then
+thrust, as far as it takes and no further: with roll and pitch as they are, rotor i gives
+:math:`c_i + a_i T + b_i y`, and which thrust T leaves room for some yaw y follows from each pair of
+limits. Roll and pitch are cut only where no thrust and no yaw make room for them.
+
+Source: PX4's sequential desaturation, whose order of what is given up this is.
+"""
 
 from __future__ import annotations
 
 from typing import Final
 
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
-from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, limits_of
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import Vec3, Vec4
-from fsw.autopilot.tick_record import Health
+from fsw.autopilot.model.multibody import factorise, solve
+from fsw.autopilot.signals import Vec2, Vec3
+from fsw.autopilot.tick_record import Mixer, Tick
 from fsw.compiled import compilable
+from fsw.record import JOINTS
 
-REAR: Final = 0
-LEFT: Final = 1
-FRONT: Final = 2
-RIGHT: Final = 3
+ROLL, PITCH, THRUST, YAW = 0, 1, 2, 3  # of a rotor's share, in the order of what is kept
+_AXES: Final = 4
+_NONE: Final = 1e-9  # N a unit; a rotor with less has no share
+_FAR: Final = 1e9
 
 
 @compilable
-def allocate(
-    airframe: Airframe,
-    torque: Vec3,
-    thrust: float,
-    yaw_limit: float,
-    health: ActuatorHealth | Health = HEALTHY,
-) -> Vec4:
-    """Thrust of the rear, left, front and right rotor [N] of the '+' mixer, each within its limits.
+def allocate(r: Tick, airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) -> None:
+    """Thrust of each rotor, within what it can give. Reads health; writes wanted, mixer.
 
-    Body ``torque`` [N m, FRD], total ``thrust`` [N]; no rotor spends more than ``yaw_limit`` [N] on
-    yaw. Roll and pitch keep the vehicle upright and decide where it accelerates, so they are
-    served first. Thrust comes next: where one pair of rotors has no more room, the other one
-    lifts. Yaw, which is the difference of the pairs' lifts, takes what is left. A rotor that is
-    weak by its ``health`` has less room, and one that does not obey has none: the one opposite
-    turns the vehicle alone, and yaw is what it cannot have then.
+    Body ``torque`` [N m, FRD] about its origin and total ``thrust`` [N] along -z; no rotor spends
+    more than ``yaw_limit`` [N] on yaw. A rotor that is weak has less room; one that does not obey
+    has none, and the others do without it what they can.
     """
-    low, top = limits_of(health, airframe.rotor_thrust_max)
-    roll = clamp(
-        torque[0] / (2.0 * airframe.rotor_arm),
-        0.5 * (low[LEFT] - top[RIGHT]),
-        0.5 * (top[LEFT] - low[RIGHT]),
-    )
-    pitch = clamp(
-        torque[1] / (2.0 * airframe.rotor_arm),
-        0.5 * (low[FRONT] - top[REAR]),
-        0.5 * (top[FRONT] - low[REAR]),
-    )
-    least_along = max(low[REAR] + pitch, low[FRONT] - pitch)
-    most_along = min(top[REAR] + pitch, top[FRONT] - pitch)
-    least_across = max(low[LEFT] - roll, low[RIGHT] + roll)
-    most_across = min(top[LEFT] - roll, top[RIGHT] + roll)
-    both = 0.5 * thrust  # N, one rotor of each pair
-    yaw = clamp_magnitude(0.25 * torque[2] / airframe.yaw_per_thrust, yaw_limit)
-    along = clamp(0.5 * both + yaw, least_along, most_along)
-    across = clamp(both - along, least_across, most_across)
-    along = clamp(both - across, least_along, most_along)
-    return along - pitch, across + roll, along + pitch, across - roll
+    m, n = r.mixer, int(airframe.rotors)
+    roll, pitch, lift, yaw = _left_to_others(r, airframe, torque, thrust)
+    most = 0.0
+    for i in range(n):
+        most = max(most, abs(m.share[_AXES * i + YAW]))
+    yaw = clamp_magnitude(yaw, yaw_limit / max(most, _NONE))
+    low, high = _yaw_room(m, n, roll, pitch, lift)
+    if not low <= high:
+        for _ in range(n):
+            least, greatest = _thrust_room(m, n, roll, pitch)
+            if least <= greatest:
+                lift = clamp(lift, least, greatest)
+                break
+            roll, pitch = _cut(m, n, roll, pitch, lift)
+        low, high = _yaw_room(m, n, roll, pitch, lift)
+    yaw = clamp(yaw, low, high)
+    for i in range(n):
+        f = m.low[i]
+        if f < m.top[i]:
+            s = _AXES * i
+            f = _level(m, i, roll, pitch) + m.share[s + THRUST] * lift + m.share[s + YAW] * yaw
+            if f < m.low[i]:
+                f = m.low[i]
+            elif f > m.top[i]:
+                f = m.top[i]
+        r.wanted.rotor_thrust[i] = f
+
+
+@compilable
+def _left_to_others(
+    r: Tick, airframe: Airframe, torque: Vec3, thrust: float
+) -> tuple[float, float, float, float]:
+    """Roll, pitch, thrust, yaw beside what rotors give that do not obey. Writes mixer."""
+    m, n, w, health = r.mixer, int(airframe.rotors), airframe.wrench, r.health
+    x, y, z, lift = torque[0], torque[1], torque[2], thrust
+    all_obey = True
+    for i in range(n):
+        m.low[i] = health.least[i]
+        m.top[i] = min(airframe.rotor_thrust_max * health.effectiveness[i], health.most[i])
+        if not m.low[i] < m.top[i]:
+            f, at = m.low[i], 6 * i
+            x, y, z = x - w[at + 3] * f, y - w[at + 4] * f, z - w[at + 5] * f
+            lift, all_obey = lift + w[at + 2] * f, False
+    if all_obey:
+        for i in range(_AXES * n):
+            m.share[i] = airframe.share[i]
+    else:
+        share_out(m, airframe)
+    return x, y, lift, z
+
+
+@compilable
+def share_out(m: Mixer, airframe: Airframe) -> None:
+    """The pseudoinverse of the rotors that obey. Reads low, top of the mixer; writes share."""
+    n, w = int(airframe.rotors), airframe.wrench
+    for i in range(m.gram.size):
+        m.gram[i] = 0.0
+    for i in range(n):
+        s, at, obeys = _AXES * i, 6 * i, float(m.low[i] < m.top[i])
+        m.share[s + ROLL], m.share[s + PITCH] = obeys * w[at + 3], obeys * w[at + 4]
+        m.share[s + THRUST], m.share[s + YAW] = -obeys * w[at + 2], obeys * w[at + 5]
+        for k in range(_AXES):
+            for j in range(_AXES):
+                m.gram[JOINTS * k + j] += m.share[s + k] * m.share[s + j]
+    # What the rotors that are left cannot do independently is not asked of them: yaw first.
+    factorise(m.factor, m.gram, _AXES)
+    for i in range(n):
+        for k in range(_AXES):
+            m.work[k] = m.share[_AXES * i + k]
+        solve(m.factor, m.work, _AXES)
+        for k in range(_AXES):
+            m.share[_AXES * i + k] = m.work[k]
+
+
+@compilable
+def _level(m: Mixer, i: int, roll: float, pitch: float) -> float:
+    """What roll and pitch ask of a rotor [N]."""
+    return m.share[_AXES * i + ROLL] * roll + m.share[_AXES * i + PITCH] * pitch
+
+
+@compilable
+def _room(m: Mixer, n: int, roll: float, pitch: float, along: int, by: int, value: float) -> Vec2:
+    """Range of thrust or yaw, ``along``, within all rotors' limits at a ``value`` of the other."""
+    low, high = -_FAR, _FAR
+    for i in range(n):
+        share = m.share[_AXES * i + along]
+        if m.low[i] < m.top[i] and abs(share) > _NONE:
+            rest = _level(m, i, roll, pitch) + m.share[_AXES * i + by] * value
+            a, b = (m.low[i] - rest) / share, (m.top[i] - rest) / share
+            low, high = max(low, min(a, b)), min(high, max(a, b))
+    return low, high
+
+
+@compilable
+def _yaw_room(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
+    """Range of yaw [N m]; empty also where a rotor that does not yaw has no room."""
+    low, high = _room(m, n, roll, pitch, YAW, THRUST, lift)
+    for i in range(n):
+        if m.low[i] < m.top[i] and abs(m.share[_AXES * i + YAW]) <= _NONE:
+            f = _level(m, i, roll, pitch) + m.share[_AXES * i + THRUST] * lift
+            if not m.low[i] - _NONE <= f <= m.top[i] + _NONE:
+                return 1.0, -1.0
+    return low, high
+
+
+@compilable
+def _thrust_room(m: Mixer, n: int, roll: float, pitch: float) -> Vec2:
+    """Range of thrust [N] for which there is a yaw within every rotor's limits."""
+    low, high = -_FAR, _FAR
+    for i in range(n):
+        if m.low[i] < m.top[i]:
+            a, b = m.share[_AXES * i + THRUST], m.share[_AXES * i + YAW]
+            c = _level(m, i, roll, pitch)
+            if abs(b) <= _NONE:
+                low, high = _narrowed(low, high, a, m.low[i] - c, m.top[i] - c)
+                continue
+            # Least yaw of the one, greatest of the other: (rate, at no thrust) each.
+            at_least = ((m.low[i] if b > 0.0 else m.top[i]) - c) / b
+            for j in range(n):
+                e, d = m.share[_AXES * j + THRUST], m.share[_AXES * j + YAW]
+                if m.low[j] < m.top[j] and abs(d) > _NONE:
+                    free = (m.top[j] if d > 0.0 else m.low[j]) - _level(m, j, roll, pitch)
+                    low, high = _narrowed(low, high, a / b - e / d, at_least - free / d, _FAR)
+    return low, high
+
+
+@compilable
+def _narrowed(low: float, high: float, slope: float, least: float, most: float) -> Vec2:
+    """The range of x, as far as ``least <= slope x <= most``; (1, -1) where that is nowhere."""
+    if abs(slope) > _NONE:
+        a, b = least / slope, most / slope
+        return max(low, min(a, b)), min(high, max(a, b))
+    return (low, high) if least <= _NONE and most >= -_NONE else (_FAR, -_FAR)
+
+
+@compilable
+def _cut(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
+    """Less of roll or pitch, for the rotor that lacks most room with the best thrust and yaw."""
+    yaw = _nearest(_room(m, n, roll, pitch, YAW, THRUST, lift), 0.0)
+    lift = _nearest(_room(m, n, roll, pitch, THRUST, YAW, yaw), lift)
+    found, worst = 0, 0.0
+    for i in range(n):
+        if m.low[i] < m.top[i]:
+            s = _AXES * i
+            f = _level(m, i, roll, pitch) + m.share[s + THRUST] * lift + m.share[s + YAW] * yaw
+            lacks = max(f - m.top[i], 0.0) + min(f - m.low[i], 0.0)
+            if abs(lacks) > abs(worst):
+                found, worst = i, lacks
+    x, y = m.share[_AXES * found + ROLL], m.share[_AXES * found + PITCH]
+    if abs(x * roll) > abs(y * pitch):
+        return roll - worst / x, pitch
+    return (roll, pitch - worst / y) if abs(y) > _NONE else (roll, pitch)
+
+
+@compilable
+def _nearest(room: Vec2, value: float) -> float:
+    """The value in a range that is nearest; the middle of one that is empty."""
+    low, high = room
+    return clamp(value, low, high) if low <= high else 0.5 * (low + high)

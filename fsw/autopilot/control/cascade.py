@@ -45,8 +45,6 @@ from fsw.autopilot.model.actuator_health import (
     HEALTHY,
     SOUND,
     ActuatorHealth,
-    commanded_for,
-    given,
     note_health,
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
@@ -55,7 +53,7 @@ from fsw.autopilot.model.multibody import load_on_base, move_bodies, torque_to_t
 from fsw.autopilot.model.rotors import (
     MotionState,
     estimate_mass,
-    lag_rotors,
+    lag_rotor,
     motion_state,
     rotor_decay,
 )
@@ -64,7 +62,6 @@ from fsw.autopilot.signals import Mat3, StateEstimate, Vec2, Vec3, Vec4
 from fsw.autopilot.tick_record import (
     BREACH,
     FILTER_ACTED,
-    FLOWN_ROTORS,
     GATE_NEEDED,
     IMPAIRED,
     OFF_PLAN,
@@ -96,7 +93,8 @@ def at_rest(airframe: Airframe, estimate: StateEstimate, before: Tick | None = N
 def in_hover(airframe: Airframe, estimate: StateEstimate, before: Tick | None = None) -> Tick:
     """Record of a vehicle taken over in hover."""
     r = at_rest(airframe, estimate, before)
-    r.rotors[:FLOWN_ROTORS] = r.sent.rotor_thrust[:FLOWN_ROTORS] = 0.25 * airframe.mass * GRAVITY
+    n = airframe.rotors
+    r.rotors[:n] = r.sent.rotor_thrust[:n] = airframe.mass * GRAVITY / n
     return r
 
 
@@ -231,18 +229,17 @@ def close_loops(
         load_on_base(r.bodies, airframe.bodies, (0.0, 0.0, -thrust), r.wanted.joint_torque),
         knows_arm=law.follows_plan,
     )
-    thrusts = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit, r.health)
-    send(r, airframe, commanded_for(r.health, thrusts))
+    allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit)
+    send(r, airframe)
 
 
 @compilable
 def settle_rotors(r: Tick, law: CascadeLaw, ticks: int) -> None:
     """Where the rotors are by now. Reads sent, health; writes rotors."""
-    settling_at = given(r.health, r.sent.rotor_thrust)
-    for _ in range(ticks):
-        f = lag_rotors(r.rotors, settling_at, law.rotor_decay)
-        for i in range(FLOWN_ROTORS):
-            r.rotors[i] = f[i]
+    for i in range(int(law.airframe.rotors)):
+        settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
+        for _ in range(ticks):
+            r.rotors[i] = lag_rotor(r.rotors[i], settling_at, law.rotor_decay)
 
 
 @compilable
@@ -339,17 +336,17 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
 
 
 @compilable
-def send(r: Tick, airframe: Airframe, thrust: Vec4) -> None:
-    """The new command: ``thrust`` [N] and the torques that are wanted. Writes sent, flags."""
-    torque = r.wanted.joint_torque
+def send(r: Tick, airframe: Airframe) -> None:
+    """The new command for what is wanted. Reads health; writes sent, flags."""
+    wanted = r.wanted
     top, most = airframe.rotor_thrust_max, airframe.joint_torque_max
-    for i in range(len(thrust)):
-        r.sent.rotor_thrust[i] = thrust[i]
-        if not 0.0 <= thrust[i] <= top:
+    for i in range(int(airframe.rotors)):
+        r.sent.rotor_thrust[i] = wanted.rotor_thrust[i] / r.health.effectiveness[i]
+        if not 0.0 <= r.sent.rotor_thrust[i] <= top:
             r.flags |= GATE_NEEDED
     for j in range(int(airframe.bodies.joints)):
-        r.sent.joint_torque[j] = torque[j]
-        if not -most <= torque[j] <= most:
+        r.sent.joint_torque[j] = wanted.joint_torque[j]
+        if not -most <= wanted.joint_torque[j] <= most:
             r.flags |= GATE_NEEDED
 
 
@@ -385,9 +382,11 @@ def _close_loops(
 @kernel
 def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
     airframe, r = laws[0].airframe, ticks[0]
-    f = lag_rotors(r.rotors, given(r.health, r.sent.rotor_thrust), laws[0].rotor_decay)
+    for i in range(int(airframe.rotors)):
+        settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
+        r.mixer.mean[i] = lag_rotor(r.rotors[i], settling_at, laws[0].rotor_decay)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
-    motion = motion_state(airframe, r, f, r.sent.joint_torque)
+    motion = motion_state(airframe, r, r.mixer.mean, r.sent.joint_torque)
     # The accelerometer knows of gusts, and of the ground.
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)

@@ -7,8 +7,6 @@ from typing import Final, NamedTuple
 
 from fsw.autopilot.signals import Vec2, Vec4
 from fsw.autopilot.tick_record import Health
-from fsw.compiled import compilable
-from fsw.record import Floats
 
 SOUND: Final = 0.0
 STUCK: Final = 1.0  # the joint stands, whatever torque is asked for
@@ -34,29 +32,3 @@ def note_health(into: Health, health: ActuatorHealth) -> None:
     into.effectiveness[:rotors] = health.effectiveness
     into.least[:rotors], into.most[:rotors] = health.least, health.most
     into.joints[:joints] = health.joints
-
-
-@compilable
-def given(health: ActuatorHealth | Health, commanded: Vec4 | Floats) -> Vec4:
-    """Thrust [N] that rotors settle at when it is ``commanded`` [N]."""
-    e = health.effectiveness
-    return e[0] * commanded[0], e[1] * commanded[1], e[2] * commanded[2], e[3] * commanded[3]
-
-
-@compilable
-def commanded_for(health: ActuatorHealth | Health, thrust: Vec4) -> Vec4:
-    """What is to be commanded [N] for a ``thrust`` [N] of each rotor."""
-    e = health.effectiveness
-    return thrust[0] / e[0], thrust[1] / e[1], thrust[2] / e[2], thrust[3] / e[3]
-
-
-@compilable
-def limits_of(health: ActuatorHealth | Health, top: float) -> tuple[Vec4, Vec4]:
-    """Least and most thrust [N] of each rotor, whose command goes up to ``top`` [N]."""
-    e, least, most = health.effectiveness, health.least, health.most
-    return (least[0], least[1], least[2], least[3]), (
-        min(top * e[0], most[0]),
-        min(top * e[1], most[1]),
-        min(top * e[2], most[2]),
-        min(top * e[3], most[3]),
-    )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.signals import Vec2
 from fsw.record import ROTORS
@@ -50,10 +52,12 @@ class Airframe:
     bodies: Bodies  # that it consists of
     rotors: int
     wrench: Several  # (6,) each: force [1] and torque [m] in B about its origin, per thrust
+    share: Several  # (4,) each: of roll, pitch, thrust and yaw, the pseudoinverse of those
+    rotor_lever: float  # m, of roll and pitch, the root of the mean square over rotors
     rotor_arm: float  # m, L
     yaw_per_thrust: float  # m, b
-    rotor_thrust_max: float  # N
-    rotor_lag: float  # s
+    rotor_thrust_max: float  # N, of the weakest
+    rotor_lag: float  # s, of the slowest
     link_length: Vec2  # m
     joint_torque_max: float  # N m
     joint1_limit: float  # rad, |th1|
@@ -71,17 +75,22 @@ class Airframe:
 def airframe_of(vehicle: Vehicle) -> Airframe:
     """What the controllers know of a vehicle."""
     rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
-    wrench = [number for rotor in rotors for number in _wrench(rotor)]
+    rows = [_wrench(rotor) for rotor in rotors]
+    wrench = [number for row in rows for number in row]
+    effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
+    share = np.linalg.pinv(effect).ravel().tolist()
     joint, limit = vehicle.joints[0], vehicle.coupled_limits[0]
     return Airframe(
         mass=vehicle.mass,
         bodies=bodies,
         rotors=len(rotors),
         wrench=(*wrench, *[0.0] * (6 * ROTORS - len(wrench))),
+        share=(*share, *[0.0] * (4 * ROTORS - len(share))),
+        rotor_lever=math.sqrt(sum(row[3] ** 2 + row[4] ** 2 for row in rows) / len(rows)),
         rotor_arm=math.hypot(*first.position),
         yaw_per_thrust=first.torque_per_thrust,
-        rotor_thrust_max=first.thrust_max,
-        rotor_lag=first.lag,
+        rotor_thrust_max=min(rotor.thrust_max for rotor in rotors),
+        rotor_lag=max(rotor.lag for rotor in rotors),
         link_length=(vehicle.joints[1].xyz[2], vehicle.end_effector.position[2]),
         joint_torque_max=joint.torque_max,
         joint1_limit=joint.position_max,

@@ -36,6 +36,7 @@ from fsw.record import JOINTS, Floats
 from vehicles.description import V6, Vehicle
 
 Several = tuple[float, ...]
+_SINGULAR: Final = 1e-9  # share of a diagonal entry that is left of one that others determine
 _SUMS: Final = len(Multibody().of_link) // JOINTS
 
 
@@ -407,13 +408,20 @@ def _invert(a: Floats, out: Floats) -> None:
 
 @compilable
 def factorise(factor: Floats, a: Floats, n: int) -> None:
-    """Cholesky's lower factor of the leading part (n, n) of a matrix (JOINTS, JOINTS) [any]."""
+    """Cholesky's lower factor of the leading part (n, n) of a matrix (JOINTS, JOINTS) [any].
+
+    A row that the ones before it determine is left out: its unknown will be 0.
+    """
     for i in range(n):
         for j in range(i + 1):
             total = a[JOINTS * i + j]
             for k in range(j):
                 total -= factor[JOINTS * i + k] * factor[JOINTS * j + k]
-            factor[JOINTS * i + j] = math.sqrt(total) if i == j else total / factor[JOINTS * j + j]
+            if i == j:
+                whole = total > _SINGULAR * a[JOINTS * i + i]
+                factor[JOINTS * i + i] = math.sqrt(total) if whole else math.inf
+            else:
+                factor[JOINTS * i + j] = total / factor[JOINTS * j + j]
 
 
 @compilable

@@ -40,14 +40,9 @@ class MotionState(NamedTuple):
 
 
 @compilable
-def lag_rotors(thrust: Vec4 | Floats, command: Vec4, decay: float) -> Vec4:
-    """``thrust`` [N] of each rotor a tick later under ``command`` [N]; ``decay`` [1] per tick."""
-    return (
-        command[0] + (thrust[0] - command[0]) * decay,
-        command[1] + (thrust[1] - command[1]) * decay,
-        command[2] + (thrust[2] - command[2]) * decay,
-        command[3] + (thrust[3] - command[3]) * decay,
-    )
+def lag_rotor(thrust: float, command: float, decay: float) -> float:
+    """``thrust`` [N] of a rotor a tick later under ``command`` [N]; ``decay`` [1] per tick."""
+    return command + (thrust - command) * decay
 
 
 def rotor_decay(airframe: Airframe, dt: float) -> float:
@@ -66,7 +61,8 @@ def estimate_mass(
     within 30 % of the believed mass. ``mass`` [kg] is the last estimate, ``rotors`` [N] the thrust
     of each, ``specific_force`` [m/s^2] along -z of the body, ``seconds`` [s] the time since.
     """
-    thrust = rotors[0] + rotors[1] + rotors[2] + rotors[3]
+    force, _ = rotor_wrench(airframe, rotors)
+    thrust = -force[2]
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
         return mass  # hardly flying: a quotient of small numbers
     moved = mass + seconds / WEIGHING_TIME * (thrust / specific_force - mass)

@@ -1,20 +1,26 @@
-"""The mixer against the rotors' geometry, written out here from the drawing of the vehicle."""
+"""The mixer against the rotors' geometry, written out here from the drawing of the vehicle.
+
+Further down against any geometry, where a linear program says what can be had.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
-from fsw.autopilot.control.allocation import allocate
-from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, commanded_for
-from fsw.autopilot.model.actuator_health import given as given_by
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.actuator_health import ActuatorHealth
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.signals import Vec4
+from tests.fsw.records import allocated
+from tests.vehicles.random_vehicles import random_vehicle
+from vehicles.description import Rotor
+from vehicles.vehicle_file import load_vehicle
 
 HOVER = 3.5 * 9.81
 TOP = 2.0 * 3.5 * 9.81 / 4.0
@@ -26,7 +32,7 @@ PLACES = np.array([REAR, LEFT, FRONT, RIGHT])
 DRAG = 0.016 * np.array([1.0, -1.0, 1.0, -1.0])
 
 
-def wrench(rotors: Vec4) -> Array:
+def wrench(rotors: tuple[float, ...]) -> Array:
     """Roll, pitch and yaw torque and total thrust of thrusts that act along -z."""
     f = np.array(rotors)
     force = np.zeros((4, 3))
@@ -40,7 +46,7 @@ def wrench(rotors: Vec4) -> Array:
 def test_an_achievable_wish_is_met_exactly(
     roll: float, pitch: float, yaw: float, thrust: float
 ) -> None:
-    rotors = allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT)
+    rotors = allocated(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT)
     np.testing.assert_allclose(wrench(rotors), [roll, pitch, yaw, thrust], atol=1e-9)
 
 
@@ -51,7 +57,7 @@ wide = st.floats(-1e4, 1e4)
 def test_no_rotor_leaves_its_limits_whatever_is_asked(
     roll: float, pitch: float, yaw: float, thrust: float
 ) -> None:
-    for f in allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT):
+    for f in allocated(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT):
         assert -1e-9 <= f <= TOP + 1e-9
 
 
@@ -59,14 +65,14 @@ def test_no_rotor_leaves_its_limits_whatever_is_asked(
 def test_roll_and_pitch_are_kept_when_thrust_and_yaw_must_give_way(
     roll: float, pitch: float, yaw: float, thrust: float
 ) -> None:
-    got = wrench(allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    got = wrench(allocated(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
     np.testing.assert_allclose(got[:2], [roll, pitch], atol=1e-9)
 
 
 @given(st.floats(-3.0, 3.0), st.floats(10.0, 60.0))
 def test_yaw_spends_no_more_than_it_may(yaw: float, thrust: float) -> None:
     assume(abs(yaw) > 0.07)
-    got = wrench(allocate(AIRFRAME, (0.0, 0.0, yaw), thrust, YAW_LIMIT))
+    got = wrench(allocated(AIRFRAME, (0.0, 0.0, yaw), thrust, YAW_LIMIT))
     assert abs(got[2]) <= 4.0 * 0.016 * YAW_LIMIT + 1e-9
     assert got[2] * yaw > 0.0
     assert got[3] == pytest.approx(thrust)
@@ -86,12 +92,12 @@ def test_yaw_spends_no_more_than_it_may(yaw: float, thrust: float) -> None:
 def test_sign_of_every_rotor(
     torque: tuple[float, float, float], stronger: int, weaker: int
 ) -> None:
-    rotors = allocate(AIRFRAME, torque, HOVER, YAW_LIMIT)
+    rotors = allocated(AIRFRAME, torque, HOVER, YAW_LIMIT)
     assert rotors[stronger] > HOVER / 4.0 > rotors[weaker]
 
 
 def test_hover_is_shared_equally() -> None:
-    hover = allocate(AIRFRAME, (0.0, 0.0, 0.0), HOVER, YAW_LIMIT)
+    hover = allocated(AIRFRAME, (0.0, 0.0, 0.0), HOVER, YAW_LIMIT)
     assert hover == pytest.approx((HOVER / 4.0,) * 4)
 
 
@@ -101,7 +107,7 @@ def test_thrust_is_met_as_far_as_the_rotors_reach_whatever_yaw_asks(
 ) -> None:
     """A pair needs at least its own difference, and can give both rotors' most less that."""
     least = (abs(roll) + abs(pitch)) / 0.3
-    got = wrench(allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    got = wrench(allocated(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
     assert got[3] == pytest.approx(min(max(thrust, least), 4.0 * TOP - least), abs=1e-9)
 
 
@@ -110,7 +116,7 @@ def test_yaw_takes_the_whole_of_what_roll_pitch_and_thrust_leave(
     roll: float, pitch: float, yaw: float, thrust: float
 ) -> None:
     """No other split of the same thrust between the pairs is nearer to the yaw that is asked."""
-    got = wrench(allocate(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    got = wrench(allocated(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
     wish = max(-YAW_LIMIT, min(YAW_LIMIT, yaw / (4.0 * 0.016)))
     half, own, other = got[3] / 2.0, abs(pitch) / 0.6, abs(roll) / 0.6
     lowest, highest = max(own, half - (TOP - other)), min(TOP - own, half - other)
@@ -130,7 +136,7 @@ def test_a_weak_rotor_stays_below_what_it_can_and_roll_and_pitch_are_kept(
 ) -> None:
     effect = tuple(share if k == rotor else 1.0 for k in range(4))
     health = ActuatorHealth(effectiveness=effect)  # type: ignore[arg-type]
-    rotors = allocate(AIRFRAME, (roll, pitch, 0.0), thrust, YAW_LIMIT, health)
+    rotors = allocated(AIRFRAME, (roll, pitch, 0.0), thrust, YAW_LIMIT, health)
     assert max(np.array(rotors) / np.array(effect)) <= TOP + 1e-9
     np.testing.assert_allclose(wrench(rotors)[:2], [roll, pitch], atol=1e-9)
     assert wrench(rotors)[3] == pytest.approx(thrust)
@@ -142,17 +148,98 @@ def test_a_rotor_that_does_not_obey_is_left_where_it_is_and_yaw_is_given_up(roto
     fixed = tuple(gives if k == rotor else 0.0 for k in range(4))
     most = tuple(gives if k == rotor else math.inf for k in range(4))
     health = ActuatorHealth(least=fixed, most=most)  # type: ignore[arg-type]
-    rotors = allocate(AIRFRAME, (0.4, -0.5, 0.0), HOVER, YAW_LIMIT, health)
+    rotors = allocated(AIRFRAME, (0.4, -0.5, 0.0), HOVER, YAW_LIMIT, health)
     assert rotors[rotor] == pytest.approx(gives)
     got = wrench(rotors)
     np.testing.assert_allclose([got[0], got[1], got[3]], [0.4, -0.5, HOVER], atol=1e-9)
     assert abs(got[2]) > 0.01
 
 
-def test_of_sound_rotors_nothing_changes_to_the_last_bit() -> None:
-    random = np.random.default_rng(5)
-    for roll, pitch, yaw, thrust in random.uniform(-3.0, 40.0, (200, 4)):
-        torque = (float(roll), float(pitch), float(yaw))
-        sound = allocate(AIRFRAME, torque, float(thrust), YAW_LIMIT)
-        assert commanded_for(HEALTHY, sound) == sound
-        assert given_by(HEALTHY, sound) == sound
+def ring(random: np.random.Generator, rotors: int, tilt: float) -> tuple[Rotor, ...]:
+    return random_vehicle(random, 2, rotors, tilt).rotors
+
+
+def any_airframe(random: np.random.Generator, rotors: int, tilt: float) -> Airframe:
+    return airframe_of(replace(load_vehicle("paper"), rotors=ring(random, rotors, tilt)))
+
+
+@pytest.mark.parametrize("failed", [False, True], ids=["sound", "one fails"])
+@pytest.mark.parametrize("rotors", range(4, 9))
+def test_of_any_layout_yaw_goes_first_then_thrust_and_roll_and_pitch_are_kept(
+    rotors: int, failed: bool
+) -> None:
+    """What can be had on the pseudoinverse's line is had: of thrust all, of yaw what it leaves."""
+    random = np.random.default_rng(10 * rotors + failed)
+    for _ in range(40):
+        airframe = any_airframe(random, rotors, float(random.uniform(0.0, 0.3)))
+        top, n = airframe.rotor_thrust_max, rotors
+        least, most = [0.0] * n, [math.inf] * n
+        stuck = int(random.integers(n)) if failed else -1
+        if failed:
+            least[stuck] = most[stuck] = float(random.uniform(0.0, 0.5)) * top
+        health = ActuatorHealth((1.0,) * n, tuple(least), tuple(most))
+        effect = np.array(airframe.wrench).reshape(-1, 6)[:n, [3, 4, 2, 5]].T * [
+            [1],
+            [1],
+            [-1],
+            [1],
+        ]
+        free = [i for i in range(n) if i != stuck]
+        inverse = np.linalg.pinv(effect[:, free], rcond=1e-4)
+        rest = effect[:, [stuck]] @ [least[stuck]] if failed else np.zeros(4)
+        hover = airframe.mass * 9.81
+        wish = random.uniform([-2.0, -2.0, 0.2 * hover, -0.5], [2.0, 2.0, 1.8 * hover, 0.5])
+        f = np.array(allocated(airframe, (*wish[:2], wish[3]), wish[2], 1e9, health))
+        assert (f >= np.array(least) - 1e-9).all()
+        assert (f <= np.minimum(top, most) + 1e-9).all()
+        # f = c + a T + b y: the program asks for the nearest thrust, then for the nearest yaw.
+        asked = wish - rest
+        c = inverse[:, :2] @ asked[:2]
+        if np.linalg.matrix_rank(effect[:, free], tol=1e-4) < 4:
+            continue  # the test below
+        lift = nearest(c, inverse[:, 2:], (0.0, top), asked[2:], 0)
+        if lift is None:
+            continue
+        got = np.linalg.lstsq(inverse, f[free], rcond=None)[0]
+        np.testing.assert_allclose(got[:2], asked[:2], atol=1e-7)
+        assert got[2] == pytest.approx(lift, abs=1e-6)
+        yaw = nearest(c + inverse[:, 2] * lift, inverse[:, 3:], (-1e-7, top + 1e-7), asked[3:], 0)
+        assert got[3] == pytest.approx(yaw, abs=1e-5)
+
+
+def nearest(
+    c: Array, directions: Array, limits: tuple[float, float], wish: Array, which: int
+) -> float | None:
+    """The entry nearest to its wish of all x with ``c + directions x`` within limits."""
+    count = directions.shape[1]
+    # Unknown: x and the distance of the one from its wish.
+    cost = np.append(np.zeros(count), 1.0)
+    rows = np.column_stack((directions, np.zeros(len(c))))
+    off = np.zeros((2, count + 1))
+    off[:, which], off[:, -1] = (1.0, -1.0), -1.0
+    found = linprog(
+        cost,
+        np.vstack((rows, -rows, off)),
+        np.concatenate((limits[1] - c, c - limits[0], (wish[which], -wish[which]))),
+        bounds=[(None, None)] * (count + 1),
+    )
+    return float(found.x[which]) if found.success else None
+
+
+@pytest.mark.parametrize("rotors", [4, 6, 8])
+def test_a_level_ring_hovers_without_any_of_its_rotors(rotors: int) -> None:
+    """Roll, pitch and thrust are as asked, of a quadrotor's as far as three rotors can."""
+    random = np.random.default_rng(rotors)
+    for lost in range(rotors):
+        airframe = any_airframe(random, rotors, 0.0)
+        none = tuple(0.0 if k == lost else math.inf for k in range(rotors))
+        health = ActuatorHealth((1.0,) * rotors, (0.0,) * rotors, none)
+        hover = 0.25 * rotors * airframe.rotor_thrust_max
+        w = np.array(airframe.wrench).reshape(-1, 6)[:rotors]
+        # Turned towards the lost rotor: it is the one opposite that must do it.
+        roll, pitch = -0.2 * w[lost, 3:5] / np.linalg.norm(w[lost, 3:5])
+        f = np.array(allocated(airframe, (float(roll), float(pitch), 0.0), hover, 1.0, health))
+        assert f[lost] == 0.0
+        np.testing.assert_allclose(w[:, 3].T @ f, roll, atol=1e-9)
+        np.testing.assert_allclose(w[:, 4].T @ f, pitch, atol=1e-9)
+        np.testing.assert_allclose(-w[:, 2].T @ f, hover, atol=1e-9)

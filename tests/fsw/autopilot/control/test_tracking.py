@@ -108,7 +108,7 @@ def test_a_disturbance_is_leaned_against() -> None:
     wd, _ = follow_plan(
         LAW,
         AIRFRAME.mass,
-        0.0,
+        NO_SWING,
         estimate,
         motion,
         observed(estimate.v_WB, (0.5, 0.0, 0.0)),
@@ -161,7 +161,7 @@ def test_height_errors_change_thrust_the_right_way(sign: float) -> None:
         PLAN._replace(a=(0.0, 0.0, sign * 0.5)),
     ):
         _, thrust = follow_plan(
-            LAW, AIRFRAME.mass, 0.0, estimate, motion, calm(estimate), plan, REST_INPUT
+            LAW, AIRFRAME.mass, NO_SWING, estimate, motion, calm(estimate), plan, REST_INPUT
         )
         assert sign * (thrust - WEIGHT) < -0.2
 

@@ -103,7 +103,7 @@ def check_laws(referee: Referee, m: Multibody, b: Bodies, random: np.random.Gene
     got = base_acceleration(m, b, vec3(turn), vec3(force), tuple(torque))
     np.testing.assert_allclose(got, free[3:6], rtol=1e-9, atol=1e-9)
     load = load_on_base(m, b, vec3(force), tuple(torque))
-    np.testing.assert_allclose(torque_to_turn(m, vec3(free[3:6]), load), turn, atol=1e-9)
+    np.testing.assert_allclose(torque_to_turn(m, b, vec3(free[3:6]), load), turn, atol=1e-9)
     needed = referee.mass @ free + referee.bias
     for k in range(int(b.joints)):
         got = joint_load(m, k, vec3(-free[:3]), vec3(free[3:6]))

@@ -14,7 +14,7 @@ from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import (
     estimate_mass,
-    lag_rotors,
+    lag_rotor,
     rotor_decay,
 )
 from fsw.autopilot.signals import Vec3, Vec4
@@ -119,7 +119,8 @@ def test_rotors_close_63_percent_of_a_step_in_one_time_constant() -> None:
     dt = 0.008  # an odd number of steps: a sign that flips each time must show
     decay, thrust = rotor_decay(AIRFRAME, dt), (0.0, 10.0, 2.0, 5.0)
     for _ in range(round(AIRFRAME.rotor_lag / dt)):
-        thrust = lag_rotors(thrust, (10.0, 0.0, 4.0, 6.0), decay)
+        goals = (10.0, 0.0, 4.0, 6.0)
+        thrust = tuple(lag_rotor(f, goal, decay) for f, goal in zip(thrust, goals, strict=True))
     share = 1.0 - math.exp(-1.0)
     assert thrust == pytest.approx(
         (10.0 * share, 10.0 * (1 - share), 2.0 + 2.0 * share, 5.0 + share)
