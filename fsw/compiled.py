@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
 from command_line.kernel_types import compile_for_types, types_of
 
-# The shapes' kernels are called by a table of functions (fsw/shapes/zones.py), which numba has had
-# for years and still calls new.
+# The shapes' kernels are called by a table of functions (fsw/autopilot/shapes/zones.py), which
+# numba has had for years and still calls new.
 warnings.filterwarnings(
     "ignore", "First-class function type", numba.NumbaExperimentalFeatureWarning
 )

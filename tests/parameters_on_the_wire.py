@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.parameters.facts import FACTS
-from fsw.parameters.registry import PARAMETERS
+from fsw.autopilot.parameters.facts import FACTS
+from fsw.autopilot.parameters.registry import PARAMETERS
 
 _TUNABLE: Final = {parameter.name: parameter.default for parameter in PARAMETERS}
 LISTED: Final = _TUNABLE | {fact.name: fact.read(_TUNABLE) for fact in FACTS}

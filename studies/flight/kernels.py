@@ -17,7 +17,7 @@ from typing import Final
 
 from command_line.compile_progress import CompileProgress
 from command_line.kernel_cache import KernelCache
-from fsw.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.control_choice import ControlChoice
 
 HALVES: Final = ("fsw", "sitl")
 _CAMPAIGN: Final = "campaign"
@@ -92,9 +92,9 @@ def _cache(half: str) -> KernelCache:
 
 def _build(half: str) -> None:
     if half == "fsw":
-        from fsw.flight.autopilot import Autopilot
-        from fsw.mpc.planner import Planner
-        from fsw.parameters.flight_config import flight_config
+        from fsw.autopilot.flight.autopilot import Autopilot
+        from fsw.autopilot.mpc.planner import Planner
+        from fsw.autopilot.parameters.flight_config import flight_config
         from studies.flight.result import processor_time_us
 
         config = flight_config()

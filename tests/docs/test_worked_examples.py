@@ -17,24 +17,24 @@ DIFFS = re.findall(r"\*\*(.+?)\*\*:.*?```diff\n(.*?)```", PAGE, re.DOTALL)
 MOST_FILES = 2
 
 NEW_MODE = """
-from fsw.flight.modes import MODES
+from fsw.autopilot.flight.modes import MODES
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
-from fsw.signals import CommandResult, Mode
-from tests.fsw.flight.asked import ask
-from tests.fsw.flight.contexts import flying
+from fsw.autopilot.signals import CommandResult, Mode
+from tests.fsw.autopilot.flight.asked import ask
+from tests.fsw.autopilot.flight.contexts import flying
 assert ask(flying(), 176, 1.0, 4.0, 12.0).mode is Mode.STOW
 refused = ask(flying(landed=True), 176, 1.0, 4.0, 12.0)
 assert refused.result == CommandResult.TEMPORARILY_REJECTED
 assert "ground" in refused.reason
 assert "Stow" in [one.name for one in AVAILABLE_MODES]
-assert MODES[Mode.STOW].__module__ == "fsw.flight.modes.stow"
+assert MODES[Mode.STOW].__module__ == "fsw.autopilot.flight.modes.stow"
 """
 NEW_CONDITION = """
 from dataclasses import replace
-from fsw.flight.commander import Commander
-from fsw.flight.state import FlightState, VehicleMemory
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode
+from fsw.autopilot.flight.commander import Commander
+from fsw.autopilot.flight.state import FlightState, VehicleMemory
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode
 from tests.fsw.random_states import random_estimate
 import numpy
 level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -53,10 +53,10 @@ assert "the arm swings" in texts[0].text
 """
 NEW_TILT = """
 import math
-from fsw.control.braking import Brake
-from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import PredictionState
+from fsw.autopilot.control.braking import Brake
+from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import PredictionState
 limit = flight_config().planner.limits.tilt
 assert limit == math.pi / 12.0
 level, still = (0.0, 0.0), (0.0, 0.0, 0.0)
