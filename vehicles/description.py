@@ -172,6 +172,7 @@ class Vehicle:
     critical_points: tuple[CriticalPoint, ...]
     coupled_limits: tuple[CoupledLimit, ...] = ()
     rest_posture: tuple[Annotated[float, _ANGLE], ...] = ()  # (j,) rad, on the ground; none: zeros
+    home_posture: tuple[Annotated[float, _ANGLE], ...] = ()  # (j,) rad, to fly in; none: that one
     parts: tuple[BodyPart, ...] = ()  # beside the rotors, which have a size of their own
     end_stops: EndStops = EndStops()
     battery: Battery = Battery()

@@ -106,6 +106,7 @@ def checked(vehicle: Vehicle) -> Vehicle:
             for i, joint in enumerate(vehicle.joints)
         ),
         rest_posture=vehicle.rest_posture or (0.0,) * len(vehicle.joints),
+        home_posture=vehicle.home_posture or vehicle.rest_posture or (0.0,) * len(vehicle.joints),
     )
     _check_names(vehicle)
     _check_inertia(vehicle.base.inertia, "base.inertia")
@@ -184,21 +185,11 @@ def _check_inertia(inertia: V6, path: str) -> None:
 
 def _check_limits(vehicle: Vehicle) -> None:
     count = len(vehicle.joints)
-    rest = vehicle.rest_posture
-    if len(rest) != count:
-        raise VehicleError(
-            f"rest_posture = {shown(list(rest))}: must be {count} angles, one for each joint"
-        )
     for i, joint in enumerate(vehicle.joints):
         low, high = joint.position_min, joint.position_max
         if not low < high:
             raise VehicleError(
                 f"joints[{i}].position_min = {low:g}: must be below position_max, which is {high:g}"
-            )
-        if not low <= rest[i] <= high:
-            raise VehicleError(
-                f"rest_posture[{i}] = {rest[i]:g}: must be {low:g} to {high:g}, the limits of "
-                f'joint "{joint.name}"'
             )
     for i, limit in enumerate(vehicle.coupled_limits):
         if len(limit.row) != count or not any(limit.row):
@@ -211,12 +202,36 @@ def _check_limits(vehicle: Vehicle) -> None:
                 f"coupled_limits[{i}].minimum = {limit.minimum:g}: must be below maximum, which is "
                 f"{limit.maximum:g}"
             )
-        angle = sum(factor * q for factor, q in zip(limit.row, rest, strict=True))
-        if not limit.minimum <= angle <= limit.maximum:
-            raise VehicleError(
-                f"rest_posture = {shown(list(rest))}: must keep coupled_limits[{i}]: its row makes "
-                f"{angle:.4g}, allowed is {limit.minimum:g} to {limit.maximum:g}"
+    for key in ("rest_posture", "home_posture"):
+        problem = posture_problem(vehicle, getattr(vehicle, key))
+        if problem is not None:
+            raise VehicleError(f"{key}{problem}")
+
+
+def posture_problem(vehicle: Vehicle, angles: tuple[float, ...], unit: float = 1.0) -> str | None:
+    """Why the joints cannot be at ``angles`` (j,) [rad], to be put behind a key; None if they can.
+
+    Angles are written in a ``unit`` [rad].
+    """
+    listed = [round(angle / unit, 6) for angle in angles]
+    if len(angles) != len(vehicle.joints):
+        return f" = {shown(listed)}: must be {len(vehicle.joints)} angles, one for each joint"
+    for i, (angle, joint) in enumerate(zip(angles, vehicle.joints, strict=True)):
+        low, high = joint.position_min, joint.position_max
+        if not low <= angle <= high:
+            return (
+                f"[{i}] = {listed[i]:g}: must be {low / unit:g} to {high / unit:g}, the limits of "
+                f'joint "{joint.name}"'
             )
+    for limit in vehicle.coupled_limits:
+        value = sum(factor * q for factor, q in zip(limit.row, angles, strict=True))
+        if not limit.minimum <= value <= limit.maximum:
+            return (
+                f' = {shown(listed)}: must keep the coupled limit "{limit.name}": its row makes '
+                f"{value / unit:.4g}, allowed is {limit.minimum / unit:g} to "
+                f"{limit.maximum / unit:g}"
+            )
+    return None
 
 
 def _check_rotors(rotors: Sequence[Rotor]) -> None:
