@@ -8,12 +8,13 @@ import time
 import numpy as np
 
 from command_line.parser import Parser
-from sitl.plant.aerial_manipulator import Inputs, plant
+from sitl.plant.aerial_manipulator import Inputs
 from sitl.plant.integrator import STEP_S, held, integrate
-from sitl.plant.parameters import Vehicle
-from sitl.plant.state import ARM, P_WB, THRUST, W_WB_B, at_rest
+from sitl.plant.parameters import plant
+from sitl.plant.state import JOINTS_MAX, P_WB, ROTORS_MAX, THRUST, W_WB_B, at_rest
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US, Controls, Simulation
+from vehicles.vehicle_file import load_vehicle
 
 STEPS = 2000  # per timed call: the call itself no longer counts
 ROUNDS = 25
@@ -22,15 +23,15 @@ EXCHANGES = 500
 
 def plant_step_us() -> list[float]:
     """Microseconds per 1 ms plant step, one value per round."""
-    numbers = plant(Vehicle())
-    start = at_rest(2)
+    numbers = plant(load_vehicle("paper"))
+    start = at_rest(4, 2)
     start[P_WB + 2] = -100.0
-    start[ARM : ARM + 2] = (-0.7, 1.4)
+    start[THRUST + 4 : THRUST + 6] = (-0.7, 1.4)
     start[W_WB_B:THRUST] = (0.1, -0.2, 0.3)
-    inputs = Inputs(np.full(4, 8.6), np.zeros(2), np.zeros(3), np.zeros(3))
+    inputs = Inputs(np.full(ROTORS_MAX, 8.6), np.zeros(JOINTS_MAX), np.zeros(3), np.zeros(3))
     places = np.empty((STEPS, 4, 3))
     states = np.empty((STEPS, len(start)))
-    blocks = held(2)
+    blocks = held()
     integrate(numbers, start.copy(), inputs, STEP_S, places, states, blocks)
     out = []
     for _ in range(ROUNDS):

@@ -37,14 +37,14 @@ def _swap_sitl() -> None:
         spoken: bytes = self._spoken(messages)
         return spoken + step(sender, readings)
 
-    def read_reply(received: bytes, joints: int) -> Any:
+    def read_reply(received: bytes, vehicle: Any) -> Any:
         messages = receiver.parse_buffer(received) or []
         if len(messages) != 1 or messages[0].get_type() != "HIL_ACTUATOR_CONTROLS":
-            return general(received, joints)
+            return general(received, vehicle)
         controls, (message,) = messages[0].controls, messages
-        wanted = Controls(
-            tuple(controls[:4]), tuple(controls[4 : 4 + joints]), bool(message.mode & 128)
-        )
+        rotors, outputs = len(vehicle.rotors), len(vehicle.rotors) + len(vehicle.joints)
+        shares = tuple(controls[:rotors]), tuple(controls[rotors:outputs])
+        wanted = Controls(*shares, bool(message.mode & 128))
         return decode.VehicleReply(message.time_usec, wanted)
 
     StepEncoder.datagram = datagram  # type: ignore[method-assign]

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from pandion.first_time import compiling
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.compiled import compiled
-from sitl.plant.parameters import Vehicle
-from sitl.plant.state import ARM, Q_WB, V_WB, W_WB_B
+from sitl.plant.state import Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 from sitl.result import EndKind
 from sitl.scenario_file import ScenarioError
@@ -76,12 +75,12 @@ class PandionEnv(gymnasium.Env[Floats, Floats]):
             simulation.leap(Controls((0.5,) * 4, (0.0, 0.0), armed=True), 1, PLANT_S)
         except ValueError as error:
             raise ScenarioError(f"{found.name}: {error}") from None
-        self._scenario, vehicle = found, Vehicle()
+        self._scenario = found
         self._world = simulation.world
         zones = len(self._world.zones)
         bound = np.full(_STATE + zones, _MOST, dtype=np.float32)
         self.observation_space = gymnasium.spaces.Box(-bound, bound, dtype=np.float32)
-        one = np.ones(4 + len(vehicle.links), dtype=np.float32)
+        one = np.ones(6, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-one, one, dtype=np.float32)
         self._margins = np.empty(len(self._world.keys))
         keys = [key.partition("/")[0] for key in self._world.keys]
@@ -150,7 +149,7 @@ def _observe_into(
 ) -> tuple[float, float]:
     """Fill an observation ``out`` (25 + zones,) and return the distance and least margin [m].
 
-    Of a ``state`` (17 + 2j,) [SI] and places (rows, 3) [m, NED], with a reference ``p`` [m, NED]
+    Of a ``state`` (21,) [SI] and places (rows, 3) [m, NED], with a reference ``p`` [m, NED]
     and ``v`` [m/s]; margins (keys,) [m] are overwritten, ``ends`` (zones + 1,) [1] are theirs.
     """
     fill_margins(table, parts, places, time_s, p, margins)
@@ -165,7 +164,7 @@ def _observe_into(
     out[9], out[10], out[11] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
     out[12], out[13], out[14] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
     for i in range(4):
-        out[18 + i] = state[ARM + i]
+        out[18 + i] = state[THRUST + 4 + i]
     least = math.inf
     for k in range(len(ends) - 1):
         nearest = math.inf

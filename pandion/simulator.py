@@ -17,12 +17,12 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.signals import StateEstimate, TickOutputs
 from pandion.first_time import compiling
 from pandion.scenarios import AnyScenario, load_scenario
-from sitl.plant.aerial_manipulator import plant
 from sitl.plant.integrator import held, step
+from sitl.plant.parameters import plant
 from sitl.result import TruthResult
 from sitl.scenario import Scenario
 from sitl.simulation import Simulation, Truth
-from sitl.start import first_state, flown_vehicle
+from sitl.start import effects, first_state, flown_vehicle
 from studies.flight.closed_loop import ScenarioFlight, controls, readings
 from studies.flight.mission import target
 from studies.flight.own_parts import Observation, OwnParts, PushLaw, numbers, observed
@@ -144,7 +144,7 @@ class Simulator:
         Of ``Observation.state``, and of thrusts and joint torques; rotors without their lag.
         """
         vehicle, trim = flown_vehicle(self.scenario), self.simulation.trim
-        model, blocks = plant(vehicle), held(2)
+        model, blocks = plant(vehicle, effects(self.scenario)), held()
         plants: Any = np.array([model])
         rest, _ = first_state(vehicle, self.scenario, self.simulation.clock.target_at(0.0).p)
         places, states = np.empty((2, 4, 3)), np.empty((2, len(rest)))
@@ -159,9 +159,9 @@ class Simulator:
             state[10:13] += x[9:12]
             state[13:17] = f = (hover + u)[:4]
             state[17:] += x[12:]
-            torque = tuple((hover + u)[4:].tolist())
+            torque = (*(hover + u)[4:].tolist(), *(0.0,) * 4)
             none = (0.0, 0.0, 0.0)
-            push = tuple(f.tolist()), torque, none, none, 0.001
+            push = (*f.tolist(), *(0.0,) * 4), torque, none, none, 0.001
             step(plants, blocks, state, *push, places, states)
             back = Rotation.from_quat(state[6:10], scalar_first=True)
             return np.concatenate([state[:6], back.as_rotvec(), state[10:13], state[17:]])

@@ -1,24 +1,25 @@
-"""What of the vehicle keeps clear: the paper's three points, or all that it consists of.
+"""What of the vehicle keeps clear: its critical points, or all that it consists of.
 
-The sizes are Table I's and those of ``sitl.plant.parameters.Size``. A part is placed by two ends,
-each given from a place that the plant integrates (base, joints, end-effector), in the base's axes.
+A part is placed by two ends, each given from a row of what the plant places (base, joints,
+end-effector, ``sitl.plant.places``), in the base's axes.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from sitl.plant.parameters import Vehicle
+from sitl.plant.places import row_of, rows_of
 from sitl.plant.vector import V3, Array
 from sitl.scenario import Body
+from vehicles.description import Vehicle
 
-CRITICAL_POINTS: Final = ("base", "joint2", "end_effector")  # in the order of the paper
-BASE, JOINT1, JOINT2, END_EFFECTOR = 0, 1, 2, 3  # rows of what the plant places
-AXES: Final = 4  # its first row of three with the base's axes
+BASE: Final = 0  # row of what the plant places
 BALL, CAPSULE, ROTOR = 0, 1, 2  # forms
 _HERE: V3 = (0.0, 0.0, 0.0)
 
@@ -32,7 +33,8 @@ class Part:
     radius: float  # m, of a ball or capsule, or of a rotor
     begin: tuple[int, V3]  # row, and m from there in the base's axes
     end: tuple[int, V3] | None = None  # of a capsule
-    half_height: float = 0.0  # m, of a rotor, along the base's z axis
+    half_height: float = 0.0  # m, of a rotor, along its axis
+    axis: V3 = _HERE  # of a rotor, against its thrust, in B
 
 
 class Parts(NamedTuple):
@@ -43,67 +45,81 @@ class Parts(NamedTuple):
     half_height: Array  # (parts,) m
     row: npt.NDArray[np.int64]  # (parts, 2) of begin and end
     local: Array  # (parts, 2, 3) m
+    axis: Array  # (parts, 3) [1] of a rotor, in B
     rigid: npt.NDArray[np.bool_]  # (parts,) whether the base's axes are needed
+    ground: npt.NDArray[np.int64]  # (points,) rows of the critical points, which may touch it
+    axes: int  # first of three rows with the base's axes
     reach: float  # m, from the base's origin to the farthest place of any part
 
 
 def parts_of(body: Body, vehicle: Vehicle) -> tuple[Part, ...]:
     """The parts of a body."""
     if body == "points":
-        rows = (BASE, JOINT2, END_EFFECTOR)
         return tuple(
-            Part(name, BALL, 0.0, (row, _HERE))
-            for name, row in zip(CRITICAL_POINTS, rows, strict=True)
+            Part(
+                one.name, BALL, 0.0, (row_of(vehicle, vehicle.places[one.on], one.position), _HERE)
+            )
+            for one in vehicle.critical_points
         )
-    size, rotors, legs = vehicle.size, vehicle.rotors, vehicle.legs
-    hubs = ((-rotors.arm, 0.0), (0.0, -rotors.arm), (rotors.arm, 0.0), (0.0, rotors.arm))
-    down = legs.length - size.leg
-    feet = [(north * legs.spread, east * legs.spread) for north in (1, -1) for east in (1, -1)]
-    return (
-        Part("base", BALL, size.hull, (BASE, _HERE)),
-        Part("joint2", BALL, size.link, (JOINT2, _HERE)),
-        Part("end_effector", BALL, size.tool, (END_EFFECTOR, _HERE)),
-        Part("link1", CAPSULE, size.link, (JOINT1, _HERE), (JOINT2, _HERE)),
-        Part("link2", CAPSULE, size.link, (JOINT2, _HERE), (END_EFFECTOR, _HERE)),
-        *(
-            Part(f"leg{k}", CAPSULE, size.leg, (BASE, _HERE), (BASE, (x, y, down)))
-            for k, (x, y) in enumerate(feet, start=1)
-        ),
-        *(
-            Part(f"rotor{k}", ROTOR, size.blade, (BASE, (x, y, 0.0)), half_height=size.disc)
-            for k, (x, y) in enumerate(hubs, start=1)
-        ),
-    )
+
+    def place(on: int, position: V3) -> tuple[int, V3]:
+        """What is on the base needs no row of its own."""
+        return (row_of(vehicle, on, position), _HERE) if on else (BASE, position)
+
+    parts = []
+    for one in vehicle.parts:
+        on = vehicle.places[one.on]
+        begin, end = place(on, one.position), None if one.end is None else place(on, one.end)
+        parts.append(Part(one.name, BALL if end is None else CAPSULE, one.radius, begin, end))
+    for number, rotor in enumerate(vehicle.rotors, start=1):
+        x, y, z = rotor.axis
+        begin, name = (BASE, rotor.position), f"rotor{number}"
+        down = (-x, -y, -z)
+        parts.append(Part(name, ROTOR, rotor.radius, begin, None, rotor.half_height, down))
+    return tuple(parts)
 
 
 def as_arrays(parts: tuple[Part, ...], vehicle: Vehicle) -> Parts:
     """The parts for kernels."""
     ends = [(part.begin, part.end or part.begin) for part in parts]
     local = np.array([[place for _, place in pair] for pair in ends])
-    arm = sum(link.a for link in vehicle.links)
     thick = np.array([part.radius + part.half_height for part in parts])
     in_arm = np.array([any(row != BASE for row, _ in pair) for pair in ends])
-    reach = np.linalg.norm(local, axis=2).max(axis=1) + arm * in_arm + thick
+    reach = np.linalg.norm(local, axis=2).max(axis=1) + arm_reach(vehicle) * in_arm + thick
+    points = [(vehicle.places[one.on], one.position) for one in vehicle.critical_points]
     return Parts(
         form=np.array([part.form for part in parts], dtype=np.int64),
         radius=np.array([part.radius for part in parts]),
         half_height=np.array([part.half_height for part in parts]),
         row=np.array([[row for row, _ in pair] for pair in ends], dtype=np.int64),
         local=local,
+        axis=np.array([part.axis for part in parts]),
         rigid=np.array(
             [
                 part.form == ROTOR or bool(places.any())
                 for part, places in zip(parts, local, strict=True)
             ]
         ),
+        ground=np.array([row_of(vehicle, *point) for point in points], dtype=np.int64),
+        axes=rows_of(vehicle),
         reach=float(reach.max()),
     )
 
 
+def arm_reach(vehicle: Vehicle) -> float:
+    """Farthest that any point on a link or a critical point is from the base's origin [m]."""
+    behind, farthest = [0.0], 0.0
+    for joint in vehicle.joints:
+        behind.append(behind[-1] + math.hypot(*joint.xyz))
+    points = [(one.on, one.position) for one in vehicle.critical_points]
+    points += [(one.on, end) for one in vehicle.parts for end in (one.position, one.end or _HERE)]
+    points.append((vehicle.joints[-1].name, vehicle.end_effector.position))
+    for on, place in points:
+        farthest = max(farthest, behind[vehicle.places[on]] + math.hypot(*place))
+    return farthest
+
+
 def spoken(part: str) -> str:
     """A part's name in a sentence."""
-    words = {"base": "the base", "joint2": "joint 2", "end_effector": "the end-effector"}
-    return (
-        words.get(part)
-        or f"{part.rstrip('0123456789')} {part.lstrip('abcdefghijklmnopqrstuvwxyz')}"
-    )
+    word, number = re.fullmatch(r"(.*?)(\d*)", part, re.DOTALL).groups()  # type: ignore[union-attr]
+    return f"{word} {number}" if number else f"the {word.replace('_', '-')}"

@@ -13,9 +13,9 @@ import math
 
 from numba import literal_unroll
 
-from sitl.body import AXES, BALL, CAPSULE, Parts
+from sitl.body import BALL, CAPSULE, Parts
 from sitl.compiled import kernel
-from sitl.plant.vector import V3, Array, add, dot, scale, sub
+from sitl.plant.vector import V3, Array, add, dot, row, scale, sub
 from sitl.shapes import KINDS
 from sitl.shapes.kind import Nearest
 
@@ -40,14 +40,19 @@ def nearest(kind: int, numbers: Array, p: V3) -> Nearest:
 
 @kernel
 def _place(parts: Parts, b: int, end: int, places: Array) -> V3:
-    row = parts.row[b, end]
-    p = (places[row, 0], places[row, 1], places[row, 2])
+    p = row(places, parts.row[b, end])
     if parts.rigid[b]:
-        for i in range(3):
-            share = parts.local[b, end, i]
-            axis = (places[AXES + i, 0], places[AXES + i, 1], places[AXES + i, 2])
-            p = add(p, scale(share, axis))
+        p = add(p, _turned(parts, places, row(parts.local[b], end)))
     return p
+
+
+@kernel
+def _turned(parts: Parts, places: Array, v: V3) -> V3:
+    """A vector v [any unit, B] in W, by the base's axes in places (rows, 3) [m, NED]."""
+    turned = (0.0, 0.0, 0.0)
+    for i in range(3):
+        turned = add(turned, scale(v[i], row(places, parts.axes + i)))
+    return turned
 
 
 @kernel
@@ -93,7 +98,7 @@ def part_distance(
             d = max(nearest(kind, numbers, begin).distance, nearest(kind, numbers, end).distance)
             return -d - radius
         return along_segment(kind, numbers, begin, end) - radius
-    axis = (places[AXES + 2, 0], places[AXES + 2, 1], places[AXES + 2, 2])
+    axis = _turned(parts, places, row(parts.axis, b))
     if keep_in:
         return -farthest_of_rotor(kind, numbers, begin, axis, radius, parts.half_height[b])
     return of_rotor(kind, numbers, begin, axis, radius, parts.half_height[b])

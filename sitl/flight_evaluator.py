@@ -8,32 +8,29 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sitl.body import BASE, END_EFFECTOR, JOINT2
 from sitl.compiled import machine_code
 from sitl.judged_step import Free, Judge, judge_steps
 from sitl.limits import LimitRecord, largest
 from sitl.mission_clock import MissionClock
-from sitl.plant.vector import V4, Array
+from sitl.plant.vector import Array
 from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthResult, score
-from sitl.scenario import V3, Scenario
+from sitl.scenario import V3, Scenario, vehicle_of
 from sitl.scenario_validation import check_start
 from sitl.start import flown_vehicle
 from sitl.world import World, headroom
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
-Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
-
 NO_AIM: Final = (np.empty(0), 0.0)
+_NOTHING: Final = (0.0, 0.0)  # sent to a vehicle that is disarmed
 
 
 class Flown(NamedTuple):
     """Plant steps that have been flown and wait to be judged."""
 
     places: Array  # (steps, rows, 3) m, NED
-    states: Array  # (steps, 17 + 2j) SI
-    thrust: V4  # commanded, before any saturation, of the most of a rotor [1]
-    torque: tuple[float, ...]  # of the most of a joint [1]
-    most: tuple[float, float]  # N, N·m
+    states: Array  # (steps, n) SI
+    thrust: tuple[float, ...]  # (r,) commanded, before any saturation, of each one's most [1]
+    torque: tuple[float, ...]  # (j,) likewise
     armed: bool  # whether the vehicle flies: of one that does not, nothing is asked
     before_s: float  # time before the first
     step_s: float  # between two
@@ -49,10 +46,11 @@ class FlightEvaluator:
     """
 
     def __init__(self, scenario: Scenario, clock: MissionClock, places: Array) -> None:
-        """Begin with places (rows, 3) [m, NED]: base, joint 1, joint 2, end-effector.
+        """Begin with places (rows, 3) [m, NED], see ``sitl.plant.places``.
 
         For the full body the base's axes [1, NED] follow.
         """
+        self._tool = 1 + len(vehicle_of(scenario).joints)  # row of the end-effector
         self.world = World(scenario)
         self.limits = LimitRecord(flown_vehicle(scenario))
         self.record = MarginRecord(self.world.keys, self.world.clearances)
@@ -67,7 +65,7 @@ class FlightEvaluator:
         room = headroom(table, len(self.world.keys), len(places))
         self.quick = Judge(table, parts, *self.record.arrays, room, *self.limits.arrays)
         self._still = not any(zone.moves or zone.kind.follows_target for zone in self.world.zones)
-        self._nowhere: Free = (room.places, parts.reach, -math.inf)
+        self._nowhere: Free = (room.places, parts.axes, parts.reach, -math.inf)
         self.free = self._nowhere  # in which there can be no incident
         self._flown: Flown | None = None
         none = (np.empty((0, *places.shape)), np.empty((0, 0)), (0.0, 0.0), NO_AIM, (0.0, 0.0))
@@ -76,7 +74,7 @@ class FlightEvaluator:
         check_start(self.world.keys, margins)
         self.record.add(margins, 0.0)
         self._sample: tuple[V3, float] | None = None  # m, NED, of the end-effector; s
-        self.sample_error(critical(places), 0.0)
+        self.sample_error(places, 0.0)
 
     def end(self, kind: EndKind, sentence: str, time_s: float) -> None:
         """End the run; the first reason stands."""
@@ -124,14 +122,15 @@ class FlightEvaluator:
     def _judge_flown(self) -> None:
         if self._flown is None:
             return
-        (places, states, thrust, torque, most, armed, before_s, step_s) = self._flown
+        (places, states, thrust, torque, armed, before_s, step_s) = self._flown
         self._flown = None
         aim = self.aim(before_s + len(places) * step_s)
-        how = (largest(thrust, torque, most), aim or NO_AIM, (before_s, step_s), aim is not None)
+        sent = largest(thrust, torque) if armed else _NOTHING
+        how = (sent, aim or NO_AIM, (before_s, step_s), aim is not None)
         # The arm of a vehicle that stands is limp, and may fall against its stops.
         judged = states if armed else states[:0]
         free = self._judge_steps(self.quick, places, judged, *how)
-        self.free = (*self._nowhere[:2], free) if self._still else self._nowhere
+        self.free = (*self._nowhere[:3], free) if self._still else self._nowhere
         if not free >= 0.0:
             self.judge_each(places, before_s, step_s)
 
@@ -157,14 +156,14 @@ class FlightEvaluator:
         if time_s >= self._duration_s - 1e-6:
             self.end(EndKind.DURATION, f"flew {time_s:.1f} s", time_s)
 
-    def sample_error(self, points: Points, time_s: float) -> None:
-        """Take one sample of the tracking error, if the trajectory is on.
+    def sample_error(self, places: Array, time_s: float) -> None:
+        """Take one sample of the tracking error, of places (rows, 3) [m, NED], if it counts.
 
         It is compared with the reference by ``catch_up``: the vehicle need not wait for that.
         """
         self._compare()
         if self._clock.counts(time_s):
-            self._sample = points[2], time_s
+            self._sample = row_of_three(places, self._tool), time_s
 
     def catch_up(self) -> None:
         """Do what has been left for later: the last steps' judgement, and a sample's comparison."""
@@ -193,11 +192,7 @@ def _whole(scenario: Scenario) -> EndKind:
     return EndKind.DURATION if math.isfinite(scenario.duration_s) else EndKind.INTERRUPTED
 
 
-def critical(places: Array) -> Points:
-    """Base, joint 2 and end-effector out of places (rows, 3) [m, NED]."""
-    rows = places.tolist()
-    return _three(rows[BASE]), _three(rows[JOINT2]), _three(rows[END_EFFECTOR])
-
-
-def _three(values: list[float]) -> V3:
-    return (values[0], values[1], values[2])
+def row_of_three(places: Array, row: int) -> V3:
+    """One ``row`` of places (rows, 3) [m, NED] as a tuple."""
+    x, y, z = places[row].tolist()
+    return (x, y, z)

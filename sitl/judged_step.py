@@ -8,15 +8,15 @@ from typing import NamedTuple, TypeAlias
 
 from sitl.body import Parts
 from sitl.compiled import compiled
-from sitl.limits import Use, record_use
+from sitl.limits import Bounds, Use, record_use
 from sitl.plant.aerial_manipulator import Plant
 from sitl.plant.integrator import Held, step
-from sitl.plant.vector import V3, V4, Array
+from sitl.plant.vector import V3, V6, V8, Array
 from sitl.world import Headroom, ZoneTable, record_if_clear, travel
 
-Free: TypeAlias = tuple[Array, float, float]
-"""Where the vehicle was, as ``travel`` has it, its reach [m], and how far all may travel from there
-until there can be an incident [m]."""
+Free: TypeAlias = tuple[Array, int, float, float]
+"""Where the vehicle was, the row of its axes and its reach [m], as ``travel`` has them, and how far
+all may travel from there until there can be an incident [m]."""
 
 
 class Judge(NamedTuple):
@@ -27,7 +27,7 @@ class Judge(NamedTuple):
     lowest: Array  # (margins,) m, the smallest so far
     when_s: Array  # (margins,) s, when that was
     room: Headroom
-    most: Array  # (limits,) SI, see ``sitl.limits``
+    bounds: Bounds
     use: Use
 
 
@@ -36,8 +36,8 @@ def watched_step(
     plants: Sequence[Plant],
     blocks: Sequence[Held],
     state: Array,
-    thrust: V4,
-    torque: tuple[float, ...],
+    thrust: V8,
+    torque: V6,
     force_W: V3,
     torque_B: V3,
     step_s: float,
@@ -50,14 +50,14 @@ def watched_step(
     Args:
         plants: One.
         blocks: One.
-        state: (17 + 2j,) [SI], overwritten.
-        thrust: Commanded [N], rotors 1 to 4.
-        torque: (j,) commanded [N·m].
+        state: (n,) [SI], overwritten.
+        thrust: Commanded [N], of the rotors, with anything behind.
+        torque: Commanded [N·m], of the joints, likewise.
         force_W: Force on the base [N, NED].
         torque_B: Torque on the base [N·m, B].
         step_s: Of a plant step [s].
         places: (steps, rows, 3) [m, NED], overwritten, an entry a plant step.
-        states: (steps, 17 + 2j) [SI], overwritten.
+        states: (steps, n) [SI], overwritten.
         free: In which there can be no incident.
 
     Returns:
@@ -66,11 +66,11 @@ def watched_step(
     """
     motion = (thrust, torque, force_W, torque_B, step_s)
     speed, felt = step(plants, blocks, state, *motion, places, states)
-    before, reach, most = free
+    before, axes, reach, most = free
     clear = True
     for k in range(places.shape[0]):
         # Written so that what is not a number is judged.
-        if not travel(before, places[k], reach) < most:
+        if not travel(before, places[k], axes, reach) < most:
             clear = False
     return speed, felt, clear
 
@@ -90,8 +90,8 @@ def judge_steps(
     Args:
         judge: By which, and where it is recorded.
         places: (steps, rows, 3) [m, NED], an entry a plant step.
-        states: (steps, 17 + 2j) [SI].
-        sent: Largest magnitudes commanded, torque [N·m] and thrust [N].
+        states: (steps, n) [SI].
+        sent: Largest commanded, of the most of a joint and of a rotor [1].
         aim: As of ``record_if_clear``.
         instants: Time before the first plant step, and between two [s].
         margins: Whether they are judged, or the vehicle's limits alone.
@@ -99,7 +99,7 @@ def judge_steps(
     Returns:
         As of ``record_if_clear``; minus infinity if margins were not judged.
     """
-    record_use(states, sent, judge.most, instants, judge.use)
+    record_use(states, sent, judge.bounds, instants, judge.use)
     if not margins:
         return -math.inf
     room = (judge.lowest, judge.when_s, judge.room)

@@ -3,29 +3,26 @@
 Angles and the tilt are of the true state, rates too; what the flight software commands to rotors
 and joints counts as it arrives, before the plant's own saturation: that could never be broken.
 
-Source: Table I of the paper; docs/decisions/0027-limits-that-hold.md.
+Source: the vehicle's file; docs/decisions/0027-limits-that-hold.md.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sitl.compiled import compiled
-from sitl.plant.parameters import Vehicle
-from sitl.plant.state import ARM, Q_WB, W_WB_B
-from sitl.plant.vector import V4, Array
+from sitl.plant.state import Q_WB, THRUST, W_WB_B
+from sitl.plant.vector import Array
+from vehicles.description import Vehicle
 
-FIRST_JOINT_DEG, BOTH_JOINTS_DEG = 60.0, 90.0  # Table I, either way
-# The servos': 2.5 N·m stall and 5.8 rad/s without load leave 5 rad/s against the arm's weight.
-JOINT_RATE_MAX = 5.0  # rad/s
-# The planner's pi / 10 of Table I, and what cancels 0.8 m/s² on both axes at once: 23.8 deg.
-TILT_MAX_DEG = 25.0
-ROLL_PITCH_RATE_MAX = 3.0  # rad/s; the fast loop's jerk limit on both axes turns a body at 2.9
-YAW_RATE_MAX = 1.0  # rad/s; three times what a setpoint may turn
+_ANGLE_KEPT = math.radians(0.5)  # rad, beyond an angle that still counts as kept
+_COMMAND_KEPT = 1e-6  # share of a command's most: commands travel as single precision
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,33 +47,82 @@ class LimitUse:
     kept: bool  # within the tolerance
 
 
+class Bounds(NamedTuple):
+    """The limits for kernels, in the order of ``limits``."""
+
+    most: Array  # (limits,) in the unit of each
+    share: Array  # (angles, j) of each joint in an angle that is limited
+    signed: npt.NDArray[np.bool_]  # (angles,) whether it is limited on this side only
+    command: Array  # (2,) what full torque and full thrust count, in the units of their limits
+    angles: int  # entry of the first joint's angle in the state
+
+
 def limits(vehicle: Vehicle) -> tuple[Limit, ...]:
     """Of a vehicle, in the order of ``record_use``."""
+    own = vehicle.limits
+    torques = {joint.torque_max for joint in vehicle.joints}
+    thrusts = {rotor.thrust_max for rotor in vehicle.rotors}
     return (
-        Limit("joint_1_angle", "rad", math.radians(FIRST_JOINT_DEG), math.radians(0.5)),
-        Limit("link_2_angle", "rad", math.radians(BOTH_JOINTS_DEG), math.radians(0.5)),
-        Limit("joint_1_rate", "rad/s", JOINT_RATE_MAX, 0.1),
-        Limit("joint_2_rate", "rad/s", JOINT_RATE_MAX, 0.1),
-        Limit("tilt", "rad", math.radians(TILT_MAX_DEG), math.radians(0.5)),
-        Limit("roll_pitch_rate", "rad/s", ROLL_PITCH_RATE_MAX, 0.1),
-        Limit("yaw_rate", "rad/s", YAW_RATE_MAX, 0.05),
-        # A share of 1e-6 for commands that travel as single precision.
-        Limit("joint_torque", "N m", vehicle.joints.torque_max, 1e-6 * vehicle.joints.torque_max),
-        Limit("rotor_thrust", "N", vehicle.rotors.thrust_max, 1e-6 * vehicle.rotors.thrust_max),
+        *(Limit(key, "rad", most, _ANGLE_KEPT) for key, _, _, most in _angles(vehicle)),
+        *(Limit(f"{_key(one.name)}_rate", "rad/s", one.rate_max, 0.1) for one in vehicle.joints),
+        Limit("tilt", "rad", own.tilt, _ANGLE_KEPT),
+        Limit("roll_pitch_rate", "rad/s", own.roll_pitch_rate, 0.1),
+        Limit("yaw_rate", "rad/s", own.yaw_rate, 0.05),
+        _command("joint_torque", "N m", torques),
+        _command("rotor_thrust", "N", thrusts),
     )
 
 
-def largest(
-    thrust: V4, torque: tuple[float, ...], most: tuple[float, float]
-) -> tuple[float, float]:
-    """Largest magnitudes commanded, torque [N·m] and thrust [N].
+def _command(key: str, unit: str, most: set[float]) -> Limit:
+    """Of drives that give the same; of others the share of each one's own."""
+    value, unit = (most.pop(), unit) if len(most) == 1 else (1.0, "of full")
+    return Limit(key, unit, value, _COMMAND_KEPT * value)
 
-    ``thrust`` and ``torque`` are shares [1] of the ``most`` of a rotor [N] and a joint [N·m].
+
+def _key(name: str) -> str:
+    return re.sub(r"(?<=[^\d_])(\d+)$", r"_\1", name)
+
+
+def _angles(vehicle: Vehicle) -> list[tuple[str, Array, bool, float]]:
+    """Key, shares of the joints, whether on this side only, and most [rad] of every angle."""
+    rows = [
+        (joint.name, unit, joint.position_min, joint.position_max)
+        for joint, unit in zip(vehicle.joints, np.eye(len(vehicle.joints)), strict=True)
+    ]
+    rows += [
+        (one.name, np.array(one.row), one.minimum, one.maximum) for one in vehicle.coupled_limits
+    ]
+    found = []
+    for name, row, least, most in rows:
+        key = f"{_key(name)}_angle"
+        if least == -most:
+            found.append((key, row, False, most))
+        else:
+            found += [(f"{key}_max", row, True, most), (f"{key}_min", -row, True, -least)]
+    return [one for one in found if math.isfinite(one[3])]
+
+
+def bounds(vehicle: Vehicle) -> Bounds:
+    """The limits of a vehicle for kernels."""
+    found, angles = limits(vehicle), _angles(vehicle)
+    return Bounds(
+        most=np.array([limit.most for limit in found]),
+        share=np.reshape([row for _, row, _, _ in angles], (-1, len(vehicle.joints))),
+        signed=np.array([one_side for _, _, one_side, _ in angles], dtype=np.bool_),
+        command=np.array([limit.most for limit in found[-2:]]),
+        angles=THRUST + len(vehicle.rotors),
+    )
+
+
+def largest(thrust: tuple[float, ...], torque: tuple[float, ...]) -> tuple[float, float]:
+    """Largest commanded, of the most of a joint and of a rotor [1].
+
+    ``thrust`` (r,) [1] and ``torque`` (j,) [1] are shares of what each rotor and joint can give.
     """
     weakest, strongest = min(thrust), max(thrust)
     # A thrust below zero is as far beyond its range as one that is as much too large.
     beyond = strongest if weakest >= 0.0 else max(strongest, 1.0 - weakest)
-    return most[1] * max(max(torque), -min(torque)), most[0] * beyond
+    return max(max(torque), -min(torque)), beyond
 
 
 class Use(NamedTuple):
@@ -92,17 +138,16 @@ class LimitRecord:
     """The largest use of every limit, when it was, and how long each was exceeded."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self.limits = limits(vehicle)
-        self._most = np.array([limit.most for limit in self.limits])
+        self.limits, self._bounds = limits(vehicle), bounds(vehicle)
         self._largest = np.zeros(len(self.limits))
         self._when_s = np.zeros(len(self.limits))
         self._beyond_s = np.zeros(len(self.limits))
         self._steps = np.zeros(1)
 
     @property
-    def arrays(self) -> tuple[Array, Use]:
+    def arrays(self) -> tuple[Bounds, Use]:
         """The limits and the memory behind the record, for ``record_use``."""
-        return self._most, Use(self._largest, self._when_s, self._beyond_s, self._steps)
+        return self._bounds, Use(self._largest, self._when_s, self._beyond_s, self._steps)
 
     def uses(self) -> dict[str, LimitUse]:
         """By the limit's key; empty before the first step."""
@@ -141,34 +186,41 @@ def spoken(value: float, unit: str) -> str:
 def record_use(
     states: Array,
     sent: tuple[float, float],
-    most: Array,
+    bounds: Bounds,
     instants: tuple[float, float],
     record: Use,
 ) -> None:
     """Take plant steps into a record.
 
     Args:
-        states: (steps, 17 + 2j) [SI], see ``sitl.plant.state``.
-        sent: Largest magnitudes commanded during them, torque [N·m] and thrust [N].
-        most: (limits,) [unit of each], the limits.
+        states: (steps, n) [SI], see ``sitl.plant.state``.
+        sent: Largest commanded during them, as of ``largest``.
+        bounds: The limits.
         instants: Time one step before the first, and between two steps [s].
         record: Overwritten.
     """
     largest, when_s, beyond_s = record.largest, record.when_s, record.beyond_s
     record.steps[0] += states.shape[0]
     before_s, step_s = instants
+    most, first, (angles, joints) = bounds.most, bounds.angles, bounds.share.shape
     used = np.empty(most.shape[0])
     for k in range(states.shape[0]):
         x = states[k]
-        joints = (x.shape[0] - ARM) // 2
-        used[0], used[1] = abs(x[ARM]), abs(x[ARM] + x[ARM + 1])
-        used[2], used[3] = abs(x[ARM + joints]), abs(x[ARM + joints + 1])
+        for i in range(angles):
+            angle = 0.0
+            for j in range(joints):
+                angle += bounds.share[i, j] * x[first + j]
+            used[i] = angle if bounds.signed[i] else abs(angle)
+        for j in range(joints):
+            used[angles + j] = abs(x[first + joints + j])
+        at = angles + joints
         # Half the tilt has the sine that the attitude has across the body's z axis.
         across = math.sqrt(x[Q_WB + 1] * x[Q_WB + 1] + x[Q_WB + 2] * x[Q_WB + 2])
-        used[4] = 2.0 * math.asin(min(across, 1.0))
-        used[5] = math.sqrt(x[W_WB_B] * x[W_WB_B] + x[W_WB_B + 1] * x[W_WB_B + 1])
-        used[6] = abs(x[W_WB_B + 2])
-        used[7], used[8] = sent
+        used[at] = 2.0 * math.asin(min(across, 1.0))
+        used[at + 1] = math.sqrt(x[W_WB_B] * x[W_WB_B] + x[W_WB_B + 1] * x[W_WB_B + 1])
+        used[at + 2] = abs(x[W_WB_B + 2])
+        for i in range(2):
+            used[at + 3 + i] = bounds.command[i] * sent[i]
         for i in range(most.shape[0]):
             # Written so that what is not a number is recorded, and beyond.
             if not (used[i] <= largest[i]):

@@ -9,10 +9,14 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from sitl.plant.parameters import Vehicle
+import numpy as np
+
+from sitl.plant.parameters import GRAVITY, effectiveness
 from sitl.sensors.keys import MeasuredSensors
+from vehicles.description import Vehicle
 
 _MOTOR, _ACTUATOR_SET = 101, 301  # output functions: Motor 1, Offboard Actuator Set 1
+_UP: Final = (0.0, 0.0, -1.0)  # PX4's default of a rotor's axis
 _RATE_BANDWIDTH: Final = 17.0  # rad/s, of roll and pitch rates: MC_ROLLRATE_P of 0.7
 _NO_MAGNETOMETER: Final = 5  # EKF2_MAG_TYPE
 _VISION: Final = 3  # EKF2_HGT_REF
@@ -39,50 +43,55 @@ def px4_parameters(
 
 
 def _geometry(vehicle: Vehicle) -> dict[str, int | float]:
-    """Rotors 1 rear, 2 left, 3 front, 4 right; a positive KM turns the body to the right."""
-    rotors = vehicle.rotors
-    places = ((-rotors.arm, 0.0), (0.0, -rotors.arm), (rotors.arm, 0.0), (0.0, rotors.arm))
-    found: dict[str, int | float] = {"CA_AIRFRAME": 0, "CA_ROTOR_COUNT": len(places)}
-    for k, (x, y) in enumerate(places):
-        turns = rotors.yaw_ratio if k % 2 == 0 else -rotors.yaw_ratio
-        found |= {
-            f"CA_ROTOR{k}_PX": x,
-            f"CA_ROTOR{k}_PY": y,
-            f"CA_ROTOR{k}_PZ": 0.0,
-            f"CA_ROTOR{k}_KM": turns,
-        }
+    """Rotors with the meanings that they have in the vehicle's file; KM is above 0 of "ccw"."""
+    found: dict[str, int | float] = {"CA_AIRFRAME": 0, "CA_ROTOR_COUNT": len(vehicle.rotors)}
+    for k, rotor in enumerate(vehicle.rotors):
+        sign = 1.0 if rotor.spin == "ccw" else -1.0
+        values = dict(zip(("PX", "PY", "PZ"), rotor.position, strict=True))
+        if rotor.axis != _UP:
+            values |= dict(zip(("AX", "AY", "AZ"), rotor.axis, strict=True))
+        values["KM"] = sign * rotor.torque_per_thrust
+        found |= {f"CA_ROTOR{k}_{name}": value for name, value in values.items()}
     return found
 
 
 def _outputs(vehicle: Vehicle) -> dict[str, int | float]:
     """Motors first, then the joints' servos, which MAV_CMD_DO_SET_ACTUATOR moves."""
-    functions = [_MOTOR + k for k in range(4)]
-    functions += [_ACTUATOR_SET + k for k in range(len(vehicle.links))]
+    functions = [_MOTOR + k for k in range(len(vehicle.rotors))]
+    functions += [_ACTUATOR_SET + k for k in range(len(vehicle.joints))]
     return {f"PWM_MAIN_FUNC{k}": function for k, function in enumerate(functions, start=1)}
 
 
 def _control(vehicle: Vehicle) -> dict[str, int | float]:
     """Hover thrust, and gains that carry over to other sizes.
 
-    A roll of 1 changes the thrust of two rotors by 0.707 of the full one, so the rate loop has the
-    bandwidth 0.707 · 2 · arm · thrust / inertia times its gain; its derivative cancels the rotors'
-    lag. With PX4's own gains the same vehicle follows as well, with larger errors.
+    The rate loop has the bandwidth torque / inertia times its gain, with the torque that PX4's
+    mixer makes of a roll or pitch of 1; its derivative cancels the rotors' lag. With PX4's own
+    gains the same vehicle follows as well, with larger errors.
     """
-    rotors = vehicle.rotors
-    lever = math.sqrt(2.0) * rotors.arm * rotors.thrust_max
+    full = np.array([rotor.thrust_max for rotor in vehicle.rotors])
+    effect = effectiveness(vehicle) * full
+    # As its ControlAllocationPseudoInverse scales the columns of roll and pitch.
+    mix = np.linalg.pinv(effect[2:])[:, 1:3]
+    mix[np.abs(mix) < 1e-9 * np.abs(mix).max()] = 0.0
+    mix /= np.sqrt(2.0 * (mix**2).sum(axis=0) / np.count_nonzero(mix, axis=0)).max()
+    torques = (effect[3:5] @ mix).diagonal()
+    lag = max(rotor.lag for rotor in vehicle.rotors)
+    hover = vehicle.mass * GRAVITY / full.sum()
     found: dict[str, int | float] = {
-        "MPC_THR_HOVER": round(vehicle.mass * vehicle.gravity / (4.0 * rotors.thrust_max), 3),
+        "MPC_THR_HOVER": round(float(hover), 3),
         "MPC_XY_P": 1.8,
         "MPC_XY_VEL_P_ACC": 4.0,
         "MPC_XY_VEL_I_ACC": 1.0,
         "MPC_Z_P": 1.5,
     }
-    for axis, inertia in zip(("ROLL", "PITCH"), vehicle.base_inertia[:2], strict=True):
-        gain = round(_RATE_BANDWIDTH * inertia / lever, 3)
+    both = zip(("ROLL", "PITCH"), vehicle.base.inertia[:2], torques.tolist(), strict=True)
+    for axis, inertia, torque in both:
+        gain = round(_RATE_BANDWIDTH * inertia / torque, 3)
         found |= {
             f"MC_{axis}_P": 7.0,
             f"MC_{axis}RATE_P": gain,
-            f"MC_{axis}RATE_D": round(gain * rotors.lag, 4),
+            f"MC_{axis}RATE_D": round(gain * lag, 4),
         }
     return found
 

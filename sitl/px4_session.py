@@ -24,9 +24,7 @@ class Px4Session:
         """See :class:`sitl.flight.Session`."""
         options = self._options
         period_s = 1.0 / options.rate_hz
-        exchange = Px4Exchange(
-            self._stream, len(simulation.vehicle.links), period_s, stop, self._answers
-        )
+        exchange = Px4Exchange(self._stream, simulation.vehicle, period_s, stop, self._answers)
         timing = serve_px4(
             *(simulation, exchange, Px4Encoder(options.origin), stop),
             *(watch.progress, watch.truth, watch.begun),

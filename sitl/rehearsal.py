@@ -12,7 +12,8 @@ def rehearse(simulation: Simulation) -> None:
     In the second a joint seizes: no other fault needs kernels that a step without does not.
     """
     simulation.inject(Fault("joint", "stuck"))
-    controls = Controls((0.5, 0.5, 0.5, 0.5), (0.0,) * len(simulation.vehicle.links), armed=True)
+    off = Controls.off(simulation.vehicle)
+    controls = off._replace(thrust=tuple(0.5 for _ in off.thrust), armed=True)
     for _ in range(2):
         simulation.sense()
         simulation.advance(controls)

@@ -5,7 +5,10 @@ A key is declared once: its name carries the unit, its annotation the type and t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
 from sitl.faults.keys import Fault
@@ -15,6 +18,7 @@ from sitl.ranges import V3 as V3
 from sitl.ranges import WORLD_M as WORLD_M
 from sitl.ranges import Range as Range
 from sitl.sensors.keys import MeasuredSensors
+from vehicles.description import Vehicle
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +26,8 @@ class Start:
     """How the flight begins."""
 
     kind: Literal["airborne", "ground"]
-    # Joint angles; the default folds the elbow backwards with the end-effector exactly
-    # 0.225 m below the base (cos = 3/4).
-    arm_deg: Annotated[V2, Range(-180.0, 180.0)] = (-41.40962210927086, 82.81924421854171)
+    # Joint angles; none: the vehicle's home posture.
+    arm_deg: tuple[Annotated[float, Range(-720.0, 720.0)], ...] = ()
     yaw_deg: Annotated[float, Range(-180.0, 180.0)] = 0.0
     position_m: Annotated[V2, Range(-WORLD_M, WORLD_M)] = (0.0, 0.0)  # ground start
 
@@ -300,6 +303,7 @@ class Scenario:
     pilot: Pilot
     trajectory: Trajectory
     description: str = ""
+    vehicle: str = "paper"  # one that comes with Pandion, or the path of a vehicle file
     # What of the vehicle keeps clear and is judged: the paper's three points, or all of it.
     body: Body = "full"
     walls: tuple[ScenarioWall, ...] = ()
@@ -312,3 +316,27 @@ class Scenario:
     air: AirKeys = AirKeys()
     actuators: ActuatorKeys = ActuatorKeys()
     faults: tuple[Fault, ...] = ()
+
+
+@lru_cache(maxsize=16)
+def _vehicle(name_or_path: str, _written_ns: int) -> Vehicle:
+    # Loads numpy, for which whoever only reads a scenario need not wait.
+    from vehicles.vehicle_file import load_vehicle
+
+    return load_vehicle(name_or_path)
+
+
+def vehicle_of(scenario: Scenario) -> Vehicle:
+    """The vehicle that a scenario is flown with, as its file describes it.
+
+    Raises:
+        VehicleError: There is no such file, or it describes none.
+    """
+    path = Path(scenario.vehicle)
+    return _vehicle(scenario.vehicle, path.stat().st_mtime_ns if path.is_file() else 0)
+
+
+def start_angles(scenario: Scenario) -> tuple[float, ...]:
+    """Joint angles [rad] with which a flight begins in the air."""
+    given = scenario.start.arm_deg
+    return tuple(map(math.radians, given)) if given else vehicle_of(scenario).home_posture

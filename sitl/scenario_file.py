@@ -77,19 +77,25 @@ def scenario_digest(name_or_path: str) -> str:
     """
     path = _path(name_or_path)
     digest = hashlib.sha256(_content(path))
-    beside = points_file(path)
-    if beside is not None:
-        digest.update(read_points(beside)[1])
+    for one in named_files(path):
+        digest.update(_content(one))
     return digest.hexdigest()[:_DIGITS]
 
 
-def points_file(path: Path) -> Path | None:
-    """The table of points that a scenario file names, beside it; None: it names none."""
+def named_files(path: Path) -> list[Path]:
+    """The table of points and the vehicle that a scenario file names, where they are files."""
     try:
-        named = tomllib.loads(_content(path).decode("utf-8")).get("trajectory", {}).get("file")
+        table = tomllib.loads(_content(path).decode("utf-8"))
+        named = [table.get("trajectory", {}).get("file"), table.get("vehicle")]
     except (ValueError, AttributeError, RecursionError):
-        return None  # whoever reads it as a scenario says what is wrong
-    return path.parent / named if isinstance(named, str) else None
+        return []  # whoever reads it as a scenario says what is wrong
+    points, vehicle = (one if isinstance(one, str) else "" for one in named)
+    return [path.parent / one for one in (points, vehicle if _is_file(vehicle) else "") if one]
+
+
+def _is_file(vehicle: str) -> bool:
+    """Whether a vehicle is named by its file, and not one of those that come with Pandion."""
+    return vehicle.endswith(".toml")
 
 
 def _path(name_or_path: str) -> Path:
@@ -142,6 +148,9 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
     curve = table.get("trajectory")
     if isinstance(curve, dict) and curve.get("kind") == "points" and "file" in curve:
         table["trajectory"] = _with_points(curve, folder)
+    vehicle = table.get("vehicle")
+    if isinstance(vehicle, str) and _is_file(vehicle) and folder is not None:
+        table["vehicle"] = str(folder / vehicle)
     scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
     return dataclasses.replace(
         scenario,

@@ -6,7 +6,6 @@ import itertools
 import math
 
 from sitl.faults.keys import EXACT, Fault, problem
-from sitl.limits import BOTH_JOINTS_DEG, FIRST_JOINT_DEG
 from sitl.scenario import (
     ActuatorKeys,
     Circle,
@@ -16,9 +15,12 @@ from sitl.scenario import (
     Scenario,
     Start,
     Trajectory,
+    start_angles,
+    vehicle_of,
 )
 from sitl.scenario_file import ScenarioError
 from sitl.sensors.keys import MeasuredSensors
+from vehicles.vehicle_file import VehicleError, posture_problem
 
 MOST_POINTS = 20_000  # of a trajectory
 _LEAST_APART_S = 0.002  # two points of a trajectory
@@ -33,6 +35,7 @@ def check(scenario: Scenario) -> None:
     Raises:
         ScenarioError: With the key, the value and what is allowed.
     """
+    _check_vehicle(scenario)
     _check_start(scenario.start)
     _check_walls(scenario)
     _check_zones(scenario)
@@ -86,6 +89,16 @@ def _check_points(curve: Points) -> None:
             )
 
 
+def _check_vehicle(scenario: Scenario) -> None:
+    try:
+        vehicle = vehicle_of(scenario)
+    except VehicleError as error:
+        raise ScenarioError(f"vehicle: {error}") from error
+    problem = posture_problem(vehicle, start_angles(scenario), math.radians(1.0))
+    if problem is not None:
+        raise ScenarioError(f"start.arm_deg{problem}")
+
+
 def _check_start(start: Start) -> None:
     given = Start(kind=start.kind, yaw_deg=start.yaw_deg)
     if start.kind == "airborne" and start.position_m != given.position_m:
@@ -93,16 +106,10 @@ def _check_start(start: Start) -> None:
             f"start.position_m = {list(start.position_m)}: only for a start on the ground, in the "
             "air the trajectory's first point decides"
         )
-    if start.kind == "ground" and start.arm_deg != given.arm_deg:
+    if start.kind == "ground" and start.arm_deg:
         raise ScenarioError(
             f"start.arm_deg = {list(start.arm_deg)}: only for a start in the air, on the ground "
             "the arm is limp"
-        )
-    first, second = start.arm_deg
-    if not (abs(first) <= FIRST_JOINT_DEG and abs(first + second) <= BOTH_JOINTS_DEG):
-        raise ScenarioError(
-            f"start.arm_deg = {list(start.arm_deg)}: must be within ±{FIRST_JOINT_DEG:g} for the "
-            f"first joint and ±{BOTH_JOINTS_DEG:g} for the sum"
         )
 
 
@@ -176,7 +183,7 @@ def _check_faults(scenario: Scenario) -> None:
 def fault_problem(fault: Fault, scenario: Scenario) -> str | None:
     """Why a fault cannot be flown in a scenario; None if it can."""
     exact = not isinstance(scenario.sensors, MeasuredSensors)
-    return problem(fault, units_aboard(scenario), exact=exact)
+    return problem(fault, units_aboard(scenario), vehicle_of(scenario), exact=exact)
 
 
 def units_aboard(scenario: Scenario) -> tuple[str, ...]:

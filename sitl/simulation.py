@@ -17,18 +17,20 @@ from sitl.drives import Drives
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.faults.active import Faults
 from sitl.faults.keys import Fault
-from sitl.flight_evaluator import FlightEvaluator, Flown, critical
+from sitl.flight_evaluator import FlightEvaluator, Flown, row_of_three
 from sitl.judged_step import watched_step
 from sitl.mission_clock import MissionClock
 from sitl.periods import STEP_US as STEP_US
-from sitl.plant.aerial_manipulator import Plant, plant
+from sitl.plant.aerial_manipulator import Plant
 from sitl.plant.battery import open_circuit
 from sitl.plant.integrator import STEP_S, held
 from sitl.plant.integrator import places as places_into
 from sitl.plant.lock import seize
-from sitl.plant.parameters import Vehicle
-from sitl.plant.state import ARM, THRUST, taken_apart
-from sitl.plant.vector import Array
+from sitl.plant.parameters import GRAVITY, plant
+from sitl.plant.places import rows_of
+from sitl.plant.state import JOINTS_MAX, ROTORS_MAX, THRUST, taken_apart
+from sitl.plant.stiffness import TooStiffError, check_stiffness
+from sitl.plant.vector import V6, V8, Array
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
@@ -37,9 +39,10 @@ from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
 from sitl.sensors.measurements import Measurement
 from sitl.sensors.suite import SensorSuite
-from sitl.start import first_state, flown_vehicle
+from sitl.start import effects, first_state, flown_vehicle
 from sitl.trajectory import TrajectoryPoint
 from sitl.world import World
+from vehicles.description import Vehicle
 
 START_US = 1_000_000  # so that no stamp is 0
 # For which the vehicle's sensors have run when the flight begins.
@@ -49,16 +52,23 @@ SETTLED_NEWEST = 2  # of each sensor, however long ago they came
 SUBSTEPS = STEP_US // round(1e6 * STEP_S)  # plant steps per exchange
 BATTERY_STEPS = 100_000 // STEP_US  # between two readings of the battery
 _NONE: V3 = (0.0, 0.0, 0.0)
-_OFF = (0.0, 0.0)  # N, N·m
+# Behind the commands of so many rotors and joints, for kernels that serve every vehicle.
+_ROOM = tuple((0.0,) * (ROTORS_MAX - n) for n in range(ROTORS_MAX + 1))
+_ARM_ROOM = tuple((0.0,) * (JOINTS_MAX - n) for n in range(JOINTS_MAX + 1))
 SAMPLE_STEPS = 100_000 // STEP_US  # tracking error at 10 Hz, as the paper's TE
 
 
 class Controls(NamedTuple):
     """What the flight software commands for one step."""
 
-    thrust: tuple[float, float, float, float]  # fraction of full thrust 0…1, rotors 1..4
+    thrust: tuple[float, ...]  # (r,) fraction of full thrust 0…1
     torque: tuple[float, ...]  # (j,) fraction of the torque limit −1…1
     armed: bool  # disarmed: rotors and joint drives are off, whatever the fractions
+
+    @classmethod
+    def off(cls, vehicle: Vehicle) -> Controls:
+        """Of a vehicle that is disarmed."""
+        return cls((0.0,) * len(vehicle.rotors), (0.0,) * len(vehicle.joints), armed=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +80,7 @@ class Truth:
     v_WB: V3  # m/s, NED
     q_WB: V4  # [w, x, y, z]
     w_WB_B: V3  # rad/s, B
-    thrust: V4  # N
+    thrust: tuple[float, ...]  # (r,) N
     q_arm: tuple[float, ...]  # rad
     qd_arm: tuple[float, ...]  # rad/s
     p_WE: V3  # m, NED, end-effector
@@ -102,11 +112,17 @@ class Simulation:
         self.vehicle = flown_vehicle(scenario)
         self.clock = MissionClock(scenario)
         self.step = 0
-        self._plant = plant(self.vehicle)
+        met = effects(scenario)
+        try:
+            check_stiffness(self.vehicle, met)
+        except TooStiffError as error:
+            raise ScenarioError(str(error)) from error
+        self._plant = plant(self.vehicle, met)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
         self._mass = self.vehicle.mass
-        self._joints = len(self.vehicle.links)
-        self._full = (self.vehicle.rotors.thrust_max, self.vehicle.joints.torque_max)  # N, N·m
+        self._rotors, self._joints = len(self.vehicle.rotors), len(self.vehicle.joints)
+        self._full = tuple(rotor.thrust_max for rotor in self.vehicle.rotors)  # N
+        self._full_torque = tuple(joint.torque_max for joint in self.vehicle.joints)  # N·m
         self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
@@ -118,34 +134,36 @@ class Simulation:
         step_s = 1e-6 * STEP_US
         self._drives: Drives | None = None
         if scenario.actuators.dead_time_ms > 0.0 or scenario.actuators.battery_a_h > 0.0:
-            self._drives = Drives(scenario.actuators, self.vehicle, trim.thrust, step_s)
+            self._drives = Drives(
+                scenario.actuators, self.vehicle, met.air.density, trim.thrust, step_s
+            )
         self._play: Array | None = None  # rad, of motors against their links
-        if self.vehicle.motors.backlash > 0.0:
+        if met.backlash > 0.0:
             gears = cast(Array, self._plants)["gears"]  # type: ignore[call-overload]
-            self._play = gears["position"][0]
+            self._play = gears["position"][0][: self._joints]
         self._wind: tuple[WindField, Array] | None = None
-        if self.vehicle.air.active:
+        if met.air.active:
             moving = cast(Array, self._plants)["air"]["wind"][0]  # type: ignore[call-overload]
             self._wind = (WindField(scenario.air, seed, step_s), moving)
         self.faults = Faults(
             scenario.faults,
             seed,
             step_us=STEP_US,
-            thrust_max=self.vehicle.rotors.thrust_max,
-            joints=len(self.vehicle.links),
+            full=self._full,
+            joints=self._joints,
             exact=self._suite is None,
             sags=self._drives is not None and self._drives.battery is not None,
         )
         self._locked = self.faults.locked
         axes = 3 if scenario.body == "full" else 0
-        self._places = np.empty((SUBSTEPS, 2 + len(self.vehicle.links) + axes, 3))
+        self._places = np.empty((SUBSTEPS, rows_of(self.vehicle) + axes, 3))
         self._states = np.empty((SUBSTEPS, len(self._state)))
         self._leaps: dict[int, tuple[Array, Array]] = {}  # the same of leaps, by their plant steps
         self._reading: SensorReadings | None = None  # of this step, once it has been asked for
-        self._turning: V4 = (0.0, 0.0, 0.0, 0.0)  # N, of the rotors at that reading
+        self._turning: tuple[float, ...] = ()  # (r,) N, of the rotors at that reading
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
-        self._held = held(len(self.vehicle.links))
+        self._held = held()
         self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
@@ -239,7 +257,7 @@ class Simulation:
         state, felt = self._state, self._felt
         out[:THRUST] = state[:THRUST]
         out[THRUST], out[THRUST + 1], out[THRUST + 2] = felt
-        out[THRUST + 3 :] = state[ARM:]
+        out[THRUST + 3 :] = state[THRUST + self._rotors :]
 
     def measurements(self) -> tuple[Measurement, ...] | None:
         """What arrives from the sensors in this step; None with the suite ``perfect``.
@@ -272,9 +290,9 @@ class Simulation:
         charge = self.faults.charge
         if own is not None:
             return own.voltage, min(own.charge, charge)
-        return open_circuit(charge), charge
+        return open_circuit(charge, self.vehicle.battery.full), charge
 
-    def _settled(self, suite: SensorSuite, thrust: V4) -> list[Measurement]:
+    def _settled(self, suite: SensorSuite, thrust: tuple[float, ...]) -> list[Measurement]:
         """What came before the first step, in which a flight software cannot wait for sensors.
 
         The vehicle has been where it starts for a while: the newest few of each sensor, and all of
@@ -322,12 +340,11 @@ class Simulation:
         self.step += 1
         self._reading = None
         wanted, torques, armed = controls
-        most = self._full if armed else _OFF
-        flown = Flown(places, states, wanted, torques, most, armed, before_s, STEP_S)
+        flown = Flown(places, states, wanted, torques, armed, before_s, STEP_S)
         evaluator.judge_flown(flown, clear)
         time_s = self.time_s
         if self.step % SAMPLE_STEPS == 0:
-            evaluator.sample_error(critical(self._places[-1]), time_s)
+            evaluator.sample_error(self._places[-1], time_s)
         evaluator.judge_landing(speed, time_s)
         evaluator.judge_time(time_s)
 
@@ -362,11 +379,10 @@ class Simulation:
             )
             self.step += n
             self._reading = None
-            most = self._full if controls.armed else _OFF
-            flown = Flown(places, states, *controls[:2], most, controls.armed, before_s, plant_s)
+            flown = Flown(places, states, *controls, before_s, plant_s)
             evaluator.judge_flown(flown, clear)
             if self.step % SAMPLE_STEPS == 0:
-                evaluator.sample_error(critical(places[-1]), self.time_s)
+                evaluator.sample_error(places[-1], self.time_s)
             evaluator.judge_landing(speed, self.time_s)
             evaluator.judge_time(self.time_s)
             left, now = left - n, places[-1]
@@ -401,18 +417,18 @@ class Simulation:
             thrust=thrust,
             q_arm=exact.q_arm,
             qd_arm=exact.qd_arm,
-            p_WE=critical(places)[2],
+            p_WE=row_of_three(places, 1 + self._joints),
             target=self.clock.target_at(self.time_s),
             margins_m=self._evaluator.margins(places, self.time_s),
         )
 
     @property
     def state(self) -> Array:
-        """The true state (17 + 2j,) [SI] now, see ``sitl.plant.state``; not to be changed."""
+        """The true state (n,) [SI] now, see ``sitl.plant.state``; not to be changed."""
         return self._state
 
     def places(self) -> Array:
-        """Base, frames of the arm, and of the full body the base's axes (rows, 3) [m, NED] now."""
+        """Rows of ``sitl.plant.places``, and the full body's axes, (rows, 3) [m, NED] now."""
         return self._places_now()
 
     @property
@@ -428,38 +444,38 @@ class Simulation:
         """The score so far, or of the whole run once ``ended`` is set."""
         return self._evaluator.result(self.time_s)
 
-    def _exact_reading(self) -> tuple[SensorReadings, V4]:
+    def _exact_reading(self) -> tuple[SensorReadings, tuple[float, ...]]:
         """The true state as readings, and the rotors' thrusts [N]."""
-        p, v, q, w, thrust, arm = taken_apart(self._state)
-        angles, rates = arm[: self._joints], arm[self._joints :]
+        p, v, q, w, thrust, angles, rates = taken_apart(self._state, self._rotors)
         # By position: keywords would take as long again. Gyro and accelerometer are w and felt.
         felt, torque = self._felt, self._torque
         return SensorReadings(self.t_us, p, v, q, w, w, felt, angles, rates, torque), thrust
 
     def _command(self, controls: Controls) -> None:
         wanted, torques, armed = controls
-        joints = self._joints
-        if len(wanted) != 4 or len(torques) != joints:
-            raise ValueError(f"{controls} at step {self.step}: expected 4 rotors, {joints} joints")
-        f1, f2, f3, f4 = wanted
-        kept = 0.0 <= f1 <= 1.0 and 0.0 <= f2 <= 1.0 and 0.0 <= f3 <= 1.0 and 0.0 <= f4 <= 1.0
-        for share in torques:
-            kept = kept and -1.0 <= share <= 1.0
-        if not kept:
-            if not math.isfinite(sum(wanted) + sum(torques)):
-                raise ValueError(f"{controls} at step {self.step}: every control must be finite")
-            f1, f2, f3, f4 = (min(max(f, 0.0), 1.0) for f in wanted)
+        if len(wanted) != self._rotors or len(torques) != self._joints:
+            raise ValueError(
+                f"{controls} at step {self.step}: expected {self._rotors} rotors, "
+                f"{self._joints} joints"
+            )
+        # What is not a number hides from min and max.
+        if not math.isfinite(sum(wanted) + sum(torques)):
+            raise ValueError(f"{controls} at step {self.step}: every control must be finite")
+        if not armed:
+            wanted, torques = (0.0,) * self._rotors, (0.0,) * self._joints
+        if not (min(wanted) >= 0.0 and max(wanted) <= 1.0):
+            wanted = tuple(min(max(f, 0.0), 1.0) for f in wanted)
+        if not (min(torques) >= -1.0 and max(torques) <= 1.0):
             torques = tuple(min(max(f, -1.0), 1.0) for f in torques)
-        thrust, torque = self._full if armed else _OFF
-        self._thrust = (thrust * f1, thrust * f2, thrust * f3, thrust * f4)
-        self._torque = tuple([torque * f for f in torques])
+        self._thrust = tuple([f * full for f, full in zip(wanted, self._full, strict=True)])
+        self._torque = tuple([f * full for f, full in zip(torques, self._full_torque, strict=True)])
 
     def _drive(self, drives: Drives) -> None:
         """What of the command takes effect in this step."""
         if drives.battery is not None:
             drives.battery.at_most = self.faults.charge
-        thrust = _four(self._state[THRUST:ARM].tolist())
-        self._thrust = drives.rotors(self._thrust, thrust)
+        thrust = self._state[THRUST : THRUST + self._rotors].tolist()
+        self._thrust = drives.rotors(self._thrust, tuple(thrust))
 
     def _fail(self) -> None:
         """What of the command takes effect, and which joints move, while something fails."""
@@ -469,9 +485,10 @@ class Simulation:
         if locked != self._locked:
             newly = tuple(now and not was for now, was in zip(locked, self._locked, strict=True))
             self._locked = locked
-            cast(Array, self._plants)["locked"][0] = locked  # type: ignore[call-overload]
+            held_now = cast(Array, self._plants)["locked"][0]  # type: ignore[call-overload]
+            held_now[: self._joints] = locked
             if any(newly):
-                seize(self.vehicle, self._state, newly)
+                seize(self._plant, self._held, self._state, newly)
 
     def _arguments(self, places: Array, states: Array) -> tuple[Any, ...]:
         """Those of ``watched_step`` for this step."""
@@ -479,8 +496,8 @@ class Simulation:
             self._plants,
             self._held,
             self._state,
-            self._thrust,
-            self._torque,
+            cast(V8, (*self._thrust, *_ROOM[self._rotors])),
+            cast(V6, (*self._torque, *_ARM_ROOM[self._joints])),
             *self._pushed,
             STEP_S,
             places,
@@ -519,12 +536,8 @@ def _sensors(
         sensors,
         seed,
         START_US - SETTLED_STEPS * STEP_US,
-        joints=len(vehicle.links),
-        hover_thrust=0.25 * vehicle.mass * vehicle.gravity,
+        vehicle=vehicle,
+        hover_thrust=vehicle.mass * GRAVITY / len(vehicle.rotors),
         origin=origin,
     )
     return ExactSensors(Sensors(), seed, STEP_US), suite
-
-
-def _four(values: list[float]) -> V4:
-    return (values[0], values[1], values[2], values[3])

@@ -11,9 +11,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from sitl.plant.parameters import Vehicle
+import numpy as np
+
+from sitl.plant.parameters import effectiveness
 from sitl.sensors.exact import SensorReadings
 from sitl.simulation import STEP_US, Controls
+from vehicles.description import Vehicle
 
 STALE_S: Final = 0.02  # ten steps; lost or late datagrams are fewer
 _MEAN_S: Final = 0.1  # of commands; what corrects a disturbance of this moment is left out
@@ -28,11 +31,12 @@ class StandIn:
     """Stands in for commands that do not come, on one vehicle."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        rotors, size = vehicle.rotors, vehicle.base_inertia
-        full = rotors.thrust_max
-        # Share of full thrust of a rotor for 1 rad/s^2 about x and y, and about z.
-        self._level = max(size[0], size[1]) / (2.0 * rotors.arm * full)
-        self._yaw = _YAW_SHARE * size[2] / (4.0 * rotors.yaw_ratio * full)
+        # Share of full thrust of every rotor for 1 rad/s^2 about each axis, and no lift.
+        effect = effectiveness(vehicle)
+        xx, yy, zz = vehicle.base.inertia[:3]
+        wanted = np.vstack([np.zeros(3), np.diag([max(xx, yy), max(xx, yy), _YAW_SHARE * zz])])
+        full = np.array([rotor.thrust_max for rotor in vehicle.rotors])
+        self._turn = (np.linalg.pinv(effect[2:]) @ wanted) / full[:, None]
         self._mean: Controls | None = None
         self._angles: tuple[float, ...] = ()  # rad, of the joints when commands stopped
 
@@ -51,12 +55,10 @@ class StandIn:
         wx, wy, wz = readings.gyro_B
         qw, qx, qy, qz = readings.q_WB
         ahead, right = 2.0 * (qx * qz - qw * qy), 2.0 * (qy * qz + qw * qx)  # of down, in B
-        x = -self._level * (_LEVELLING * right + _DAMPING * wx)
-        y = self._level * (_LEVELLING * ahead - _DAMPING * wy)
-        z = -self._yaw * _DAMPING * wz
-        f1, f2, f3, f4 = mean.thrust
-        # As in ``rotor_torque``: 1 rear, 2 left, 3 front, 4 right.
-        thrust = (_share(f1 - y + z), _share(f2 + x - z), _share(f3 + y + z), _share(f4 - x - z))
+        x = -(_LEVELLING * right + _DAMPING * wx)
+        y = _LEVELLING * ahead - _DAMPING * wy
+        more = self._turn @ (x, y, -_DAMPING * wz)
+        thrust = tuple(np.clip(mean.thrust + more, 0.0, 1.0).tolist())
         torque = tuple(
             min(max(t + _STIFFNESS * (a - q) - _JOINT_DAMPING * w, -1.0), 1.0)
             for t, a, q, w in zip(
@@ -70,12 +72,8 @@ class StandIn:
         if self._mean is None:
             return controls
         share = 1e-6 * STEP_US / _MEAN_S
-        a, b, c, d = (
+        thrust = tuple(
             old + share * (new - old)
             for old, new in zip(self._mean.thrust, controls.thrust, strict=True)
         )
-        return Controls((a, b, c, d), controls.torque, armed=True)
-
-
-def _share(thrust: float) -> float:
-    return min(max(thrust, 0.0), 1.0)
+        return Controls(thrust, controls.torque, armed=True)

@@ -7,36 +7,52 @@ from dataclasses import replace
 
 from sitl.air.load import SURFACES
 from sitl.mission_clock import MissionClock
-from sitl.plant.parameters import AirModel, Motors, Vehicle, level_reach
-from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B, at_rest
-from sitl.plant.trim import NoTrimError, Trim, level_hover, standing_height
+from sitl.plant.parameters import AirModel, Effects
+from sitl.plant.state import P_WB, Q_WB, THRUST, V_WB, W_WB_B, at_rest
+from sitl.plant.trim import NoTrimError, Trim, end_effector, level_hover, standing_height
 from sitl.plant.vector import Array
-from sitl.scenario import V3, Scenario, Start
+from sitl.scenario import V3, Scenario, Start, start_angles, vehicle_of
 from sitl.scenario_file import ScenarioError
+from vehicles.description import V6, Vehicle
 
 
 def flown_vehicle(scenario: Scenario) -> Vehicle:
-    """The default vehicle, scaled as the scenario says."""
-    scale = scenario.vehicle_scale
-    vehicle = Vehicle().scaled(scale.mass, scale.inertia)
-    rotors, joints = vehicle.rotors, vehicle.joints
+    """The scenario's vehicle, scaled as it says."""
+    vehicle, scale = vehicle_of(scenario), scenario.vehicle_scale
+
+    def inertia(of: V6) -> V6:
+        xx, yy, zz, xy, xz, yz = (scale.inertia * one for one in of)
+        return (xx, yy, zz, xy, xz, yz)
+
+    base = vehicle.base
     return replace(
         vehicle,
-        rotors=replace(
-            rotors,
-            lag=scale.rotor_lag * rotors.lag,
-            quadratic=scenario.actuators.quadratic_thrust,
+        base=replace(base, mass=scale.mass * base.mass, inertia=inertia(base.inertia)),
+        rotors=tuple(replace(one, lag=scale.rotor_lag * one.lag) for one in vehicle.rotors),
+        joints=tuple(
+            replace(
+                one,
+                viscous=scale.joint_friction * one.viscous,
+                coulomb=scale.joint_friction * one.coulomb,
+                link=replace(
+                    one.link,
+                    mass=scale.mass * one.link.mass,
+                    inertia=inertia(one.link.inertia),
+                ),
+            )
+            for one in vehicle.joints
         ),
-        joints=replace(
-            joints,
-            viscous=scale.joint_friction * joints.viscous,
-            coulomb=scale.joint_friction * joints.coulomb,
-        ),
-        motors=Motors(
-            inertia=scenario.actuators.motor_inertia_kg_m2,
-            backlash=math.radians(scenario.actuators.backlash_deg),
-        ),
+    )
+
+
+def effects(scenario: Scenario) -> Effects:
+    """What the vehicle meets in a scenario beside what its file says."""
+    actuators = scenario.actuators
+    return Effects(
         air=air_model(scenario),
+        motor_inertia=actuators.motor_inertia_kg_m2,
+        backlash=math.radians(actuators.backlash_deg),
+        quadratic_thrust=actuators.quadratic_thrust,
     )
 
 
@@ -96,30 +112,34 @@ def hovering(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array,
     Raises:
         ScenarioError: No equilibrium within the actuators' limits.
     """
-    angles = tuple(math.radians(angle) for angle in scenario.start.arm_deg)
+    angles = start_angles(scenario)
     yaw = math.radians(scenario.start.yaw_deg)
-    x, y, z = level_reach(vehicle, angles)
+    x, y, z = end_effector(vehicle, angles)
     c, s = math.cos(yaw), math.sin(yaw)
     try:
         trim = level_hover(vehicle, angles)
     except NoTrimError as error:
-        raise ScenarioError(f"start.arm_deg = {list(scenario.start.arm_deg)}: {error}") from error
-    state = at_rest(len(angles))
+        shown = [round(math.degrees(angle), 6) for angle in angles]
+        raise ScenarioError(f"start.arm_deg = {shown}: {error}") from error
     place = (p_target[0] - c * x + s * y, p_target[1] - s * x - c * y, p_target[2] - z)
-    state[P_WB:V_WB] = place
-    state[Q_WB:W_WB_B] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
-    state[ARM : ARM + len(angles)] = angles
-    state[THRUST:ARM] = trim.thrust
-    return state, trim
+    return _level(vehicle, place, yaw, trim, angles), trim
 
 
 def standing(vehicle: Vehicle, scenario: Scenario) -> tuple[Array, Trim]:
-    """On its legs, disarmed: rotors off, arm limp and therefore straight down."""
-    joints = len(vehicle.links)
-    yaw = math.radians(scenario.start.yaw_deg)
+    """On its feet, disarmed: rotors and drives off, the arm in its posture of rest."""
     x, y = scenario.start.position_m
-    state = at_rest(joints)
-    state[P_WB:V_WB] = (x, y, -standing_height(vehicle))
+    place = (x, y, -standing_height(vehicle))
+    off = Trim((0.0,) * len(vehicle.rotors), (0.0,) * len(vehicle.joints))
+    yaw = math.radians(scenario.start.yaw_deg)
+    return _level(vehicle, place, yaw, off, vehicle.rest_posture), off
+
+
+def _level(vehicle: Vehicle, place: V3, yaw: float, trim: Trim, angles: tuple[float, ...]) -> Array:
+    """State at rest at a place [m, NED] with a ``yaw`` [rad], trimmed, its joints at ``angles``."""
+    rotors, joints = len(vehicle.rotors), len(vehicle.joints)
+    state, arm = at_rest(rotors, joints), THRUST + rotors
+    state[P_WB:V_WB] = place
     state[Q_WB:W_WB_B] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
-    state[ARM : ARM + joints] = [-link.theta_offset for link in vehicle.links]
-    return state, Trim((0.0, 0.0, 0.0, 0.0), (0.0,) * joints)
+    state[THRUST:arm] = trim.thrust
+    state[arm : arm + joints] = angles
+    return state

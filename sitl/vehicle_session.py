@@ -51,13 +51,13 @@ class VehicleSession:
 
     def _exchange(self, simulation: Simulation, stop: StopRequest) -> Exchange:
         endpoint = self._link(simulation)
-        joints = len(simulation.vehicle.links)
+        vehicle = simulation.vehicle
         period_s = 1e-6 * STEP_US
         if self._options.realtime:
-            return RealTime(endpoint, joints, period_s, stop)
+            return RealTime(endpoint, vehicle, period_s, stop)
         speed = self._options.speed
         paced_s = None if speed is None else period_s / speed
-        return Lockstep(endpoint, joints, paced_s, stop)
+        return Lockstep(endpoint, vehicle, paced_s, stop)
 
     def _link(self, simulation: Simulation) -> Endpoint:
         """The way to the vehicle, with a network in between that fails if the scenario has one."""

@@ -11,23 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sitl.body import (
-    AXES,
-    BALL,
-    BASE,
-    CRITICAL_POINTS,
-    END_EFFECTOR,
-    JOINT2,
-    Parts,
-    as_arrays,
-    parts_of,
-    spoken,
-)
+from sitl.body import BALL, Parts, as_arrays, parts_of, spoken
 from sitl.compiled import compiled, kernel
 from sitl.distance import nearest, part_bound, part_distance
-from sitl.plant.parameters import Vehicle
 from sitl.plant.vector import V3, Array, dot, put_row, row, sub
-from sitl.scenario import Scenario
+from sitl.scenario import Scenario, vehicle_of
 from sitl.shapes import KINDS
 from sitl.shapes.kind import NUMBERS
 from sitl.trajectory import place_on_curve
@@ -55,7 +43,7 @@ class World:
     """The surroundings of one scenario, and what of the vehicle is kept clear of them."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self.zones, vehicle = zones_of(scenario), Vehicle()
+        self.zones, vehicle = zones_of(scenario), vehicle_of(scenario)
         parts = parts_of(scenario.body, vehicle)
         self.table, self.parts = zone_table(self.zones), as_arrays(parts, vehicle)
         self.follows = bool(self.table.follows.any())
@@ -66,6 +54,7 @@ class World:
         ]
         self.keys = tuple(f"{zone.table.name}/{part}" for zone, part in kept)
         self._kept = kept
+        self._points = [one.name for one in vehicle.critical_points]
         self.clearances = np.array([zone.table.clearance_m for zone, _ in kept])
 
     def margins(self, places: Array, time_s: float, target: V3 | None) -> tuple[float, ...]:
@@ -89,7 +78,7 @@ class World:
         for (zone, part), margin in zip(self._kept, margins, strict=True):
             if not zone.table.keep_in and not (margin + zone.table.clearance_m > 0.0):
                 return f"{spoken(part)} hit the {zone.table.name}{zone.kind.noun}"
-        for name, k in zip(CRITICAL_POINTS, (BASE, JOINT2, END_EFFECTOR), strict=True):
+        for name, k in zip(self._points, self.parts.ground, strict=True):
             if not (places[k, 2] < 0.0):
                 return f"{spoken(name)} hit the ground"
         return None
@@ -218,8 +207,9 @@ def record_if_clear(
             if margins[k, i] < lowest[i]:
                 lowest[i] = margins[k, i]
                 when_s[i] = before_s + (k + 1) * step_s
-    last = places[places.shape[0] - 1]
-    free = -float(max(last[BASE, 2], last[JOINT2, 2], last[END_EFFECTOR, 2]))
+    free, last = math.inf, places[places.shape[0] - 1]
+    for k in parts.ground:
+        free = min(free, -float(last[k, 2]))
     for i in range(lowest.shape[0]):
         free = min(free, room.left[i] + _held_back(lowest[i]))
     return max(free, 0.0)
@@ -237,9 +227,10 @@ def _is_clear(
     room: Headroom,
 ) -> bool:
     """Whether one step had no incident; the margins that may be below the lowest go to margins."""
-    if not (places[BASE, 2] < 0.0 and places[JOINT2, 2] < 0.0 and places[END_EFFECTOR, 2] < 0.0):
-        return False
-    path = travelled(room.places, places, parts.reach)
+    for k in range(parts.ground.shape[0]):
+        if not places[parts.ground[k], 2] < 0.0:
+            return False
+    path = travelled(room.places, places, parts.axes, parts.reach)
     i = 0
     for z in range(len(table.kind)):
         shift = moved(table, z, time_s, target)
@@ -257,29 +248,29 @@ def _is_clear(
 
 
 @kernel
-def travelled(before: Array, places: Array, reach: float) -> float:
+def travelled(before: Array, places: Array, axes: int, reach: float) -> float:
     """As ``travel``, from ``before`` (rows, 3) to ``places`` (rows, 3) [m, NED], kept there.
 
     No part is farther from the base's origin than ``reach`` [m].
     """
-    path = travel(before, places, reach)
+    path = travel(before, places, axes, reach)
     for r in range(places.shape[0]):
         put_row(before, r, row(places, r))
     return path
 
 
 @kernel
-def travel(before: Array, places: Array, reach: float) -> float:
+def travel(before: Array, places: Array, axes: int, reach: float) -> float:
     """No place of any part has moved farther [m] from ``before`` to ``places``.
 
-    ``before`` and ``places`` are (rows, 3) [m, NED], the base's axes [1, NED] below. No part is
-    farther from the base's origin than ``reach`` [m].
+    ``before`` and ``places`` are (rows, 3) [m, NED], from row ``axes`` on the base's axes [1, NED].
+    No part is farther from the base's origin than ``reach`` [m].
     """
     most, turn = 0.0, 0.0
     for r in range(places.shape[0]):
         by = sub(row(places, r), row(before, r))
         square = dot(by, by)
-        if r >= AXES:
+        if r >= axes:
             turn += square
         elif not (square <= most):  # written so that what is not a number remains
             most = square

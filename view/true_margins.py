@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.mission_clock import MissionClock
-from sitl.scenario import Scenario
+from sitl.scenario import Scenario, vehicle_of
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
 from view.flight_data import FlightData, Table
 
@@ -64,7 +64,7 @@ def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:
     from sitl.world import World  # here, because it loads the kernels
 
     world, clock = World(scenario), MissionClock(scenario)
-    placed = _placed(truth)
+    placed = _placed(truth, scenario)
     values = np.empty((len(truth), len(world.keys)))
     since = truth.t - flight.begin  # the simulation's time
     for row, time_s, places in zip(values, since.tolist(), placed, strict=True):
@@ -73,14 +73,15 @@ def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:
     return TrueMargins(world.keys, truth.t, values, placed[:, :4])
 
 
-def _placed(truth: Table) -> Array:
-    """Base, joints, end-effector and the base's axes of each record, (records, 7, 3)."""
-    from sitl.plant.aerial_manipulator import plant
+def _placed(truth: Table, scenario: Scenario) -> Array:
+    """Rows of ``sitl.plant.places`` and the base's axes of each record, (records, rows, 3)."""
     from sitl.plant.integrator import held, places
-    from sitl.plant.parameters import Vehicle
+    from sitl.plant.parameters import plant
+    from sitl.plant.places import rows_of
 
-    vehicle, out = Vehicle(), np.empty((len(truth), 7, 3))
-    numbers, memory = plant(vehicle), held(len(vehicle.links))
+    vehicle = vehicle_of(scenario)
+    out = np.empty((len(truth), rows_of(vehicle) + 3, 3))
+    numbers, memory = plant(vehicle), held()
     states = np.concatenate([truth[name] for name in _STATE], axis=1)
     for k, state in enumerate(states):
         places(numbers, state, memory, out[k : k + 1])

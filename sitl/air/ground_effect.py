@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from sitl.compiled import kernel
+from sitl.plant.vector import Array
 
 NEAREST = 0.5  # rotor radii; nearer, the theory has no answer
 
@@ -24,25 +25,21 @@ def image_share(radius: float, height: float, beside: float) -> float:
 
 
 @kernel
-def ground_effect(radius: float, height: float, arm: float) -> float:
-    r"""Thrust of one of four rotors over that without a floor [1], at the same power.
+def ground_effect(radius: Array, height: float, beside: Array, i: int, count: int) -> float:
+    r"""Thrust of rotor ``i`` of so many over that without a floor [1], at the same power.
 
-    .. math:: \frac{1}{1 - (R/4z)^2 - \frac{R^2 z}{(d^2+4z^2)^{3/2}}
-              - \frac{R^2 z}{2 (2d^2+4z^2)^{3/2}}}
+    .. math:: \left(1 - \sum_k \frac{R_k^2}{4} \frac{2z}{(d_{ik}^2 + 4z^2)^{3/2}}\right)^{-1}
 
-    with the distance d between neighbours, :math:`\sqrt2` times the ``arm`` [m]. The ``radius`` [m]
-    is a rotor's, the ``height`` [m] its own above the floor. With the arm endless it is the single
-    rotor of Cheeseman and Bennett.
+    The ``radius`` (8,) [m] is of every rotor, their hubs are ``beside`` (8, 8) [m] each other, and
+    the ``height`` [m] is that of this one above the floor. Alone it is the single rotor of
+    Cheeseman and Bennett; of four in a square it is the theory of Sanchez-Cuevas.
 
     Source: I. C. Cheeseman, W. E. Bennett, The Effect of the Ground on a Helicopter Rotor in
     Forward Flight, ARC R&M 3021, 1955; P. Sanchez-Cuevas, G. Heredia, A. Ollero, Characterization
     of the Aerodynamic Ground Effect and Its Influence in Multirotor Control, Int. J. Aerospace Eng.
     2017, 1823056, the rotors' part: its empirical term for the body is left out.
     """
-    neighbour = math.sqrt(2.0) * arm
-    lost = (
-        image_share(radius, height, 0.0)
-        + 2.0 * image_share(radius, height, neighbour)
-        + image_share(radius, height, 2.0 * arm)
-    )
+    lost = 0.0
+    for k in range(count):
+        lost += image_share(radius[k], height, beside[i, k])
     return 1.0 / (1.0 - lost)

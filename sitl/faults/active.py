@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sitl.faults.actuators import MotorFault, battery_charge, thrust_share
+from sitl.faults.actuators import MotorFault, battery_charge, scaled, thrust_share
 from sitl.faults.keys import SENSORS, Fault
 from sitl.faults.sensors import FrameFault, SuiteFault
 from sitl.faults.signal import Windows
-from sitl.plant.vector import V4
 from sitl.seeds import stream
 from sitl.sensors.exact import SensorReadings
 from sitl.sensors.measurements import Measurement
@@ -38,19 +37,19 @@ class Faults:
         seed: int,
         *,
         step_us: int,
-        thrust_max: float,
+        full: tuple[float, ...],
         joints: int,
         exact: bool,
         sags: bool = False,
     ) -> None:
-        """Rotors give up to ``thrust_max`` [N]; the states are ``exact`` or a suite's.
+        """Rotors give up to ``full`` (r,) [N]; the states are ``exact`` or a suite's.
 
         A battery that ``sags`` is simulated, and takes thrust by itself.
         """
         self._sags = sags
         self._seed = seed
         self._step_us = step_us
-        self._thrust_max = thrust_max
+        self._full = full
         self._exact = exact
         self._joints = joints
         self._entries: list[_Entry] = []
@@ -123,15 +122,11 @@ class Faults:
             arrived = tuple([one._replace(t_us=one.t_us + ahead) for one in arrived])
         return arrived
 
-    def motors(self, command: V4, t_us: int) -> V4:
-        """What takes effect at ``t_us`` [us] of a ``command`` [N]; to be called once a step."""
+    def motors(self, command: tuple[float, ...], t_us: int) -> tuple[float, ...]:
+        """What takes effect at ``t_us`` [us] of a ``command`` (r,) [N]; called once a step."""
         for one in self._motors:
             command = one.through(command, t_us)
-        if self._share < 1.0:
-            a, b, c, d = command
-            share = self._share
-            command = (share * a, share * b, share * c, share * d)
-        return command
+        return scaled(self._share, command) if self._share < 1.0 else command
 
     def drives(self, torques: tuple[float, ...]) -> tuple[float, ...]:
         """What reaches the joints of ``torques`` [N·m]."""
@@ -182,7 +177,7 @@ class Faults:
         if fault.unit in SENSORS:
             return FrameFault(fault, random) if self._exact else SuiteFault(fault, random)
         if fault.unit == "motor":
-            return MotorFault(fault, random, self._thrust_max, self._step_us)
+            return MotorFault(fault, random, self._full, self._step_us)
         if fault.unit == "mavlink":
             return Windows(1.0 if fault.kind == "off" else fault.share, random)
         return True

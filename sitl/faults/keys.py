@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Final, Literal, TypeAlias
 
 from sitl.ranges import Range
+from vehicles.description import Vehicle
 
 Unit: TypeAlias = Literal[
     "gyro",
@@ -63,7 +64,7 @@ class Fault:
     kind: Kind
     start_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # since the start of the simulation
     duration_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # 0: to the end of the flight
-    instance: Annotated[float, Range(0.0, 4.0, step=1.0)] = 0.0  # of motors and joints; 0: all
+    instance: Annotated[float, Range(0.0, 8.0, step=1.0)] = 0.0  # of motors and joints; 0: all
     # Of what a sensor measures as a vector, in its own frame; 0: all.
     axis: Annotated[float, Range(0.0, 3.0, step=1.0)] = 0.0
     # weak: of the thrust that is left, or of the battery's charge; intermittent, duplicated,
@@ -138,15 +139,15 @@ KINDS: Final[dict[str, tuple[str, ...]]] = {
 }
 """How each unit can fail."""
 
-_INSTANCES: Final = {"motor": 4, "joint": 2, "encoder": 2}
 # Units that the exact states stand for: the pose is of satellites and of cameras.
 EXACT: Final = ("gyro", "accel", "gps", "vio", "attitude", "encoder")
 _VECTORS: Final = ("gyro", "accel", "mag", "gps", "vio")
 
 
-def instances(unit: Unit) -> int:
-    """How many of a unit can fail each for itself; 0 where it is one."""
-    return _INSTANCES.get(unit, 0)
+def instances(unit: Unit, vehicle: Vehicle) -> int:
+    """How many of a unit of a vehicle can fail each for itself; 0 where it is one."""
+    joints = len(vehicle.joints)
+    return {"motor": len(vehicle.rotors), "joint": joints, "encoder": joints}.get(unit, 0)
 
 
 def absence(unit: Unit, aboard: tuple[str, ...]) -> str | None:
@@ -156,12 +157,12 @@ def absence(unit: Unit, aboard: tuple[str, ...]) -> str | None:
     return None
 
 
-def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None:
+def problem(fault: Fault, aboard: tuple[str, ...], vehicle: Vehicle, *, exact: bool) -> str | None:
     """Key, value and what is allowed, where a fault contradicts itself or what is ``aboard``.
 
-    The states are ``exact`` or a suite's.
+    The states of the ``vehicle`` are ``exact`` or a suite's.
     """
-    kinds, most = KINDS[fault.unit], instances(fault.unit)
+    kinds, most = KINDS[fault.unit], instances(fault.unit, vehicle)
     if fault.kind not in kinds:
         allowed = ", ".join(f'"{kind}"' for kind in kinds)
         return f'kind = "{fault.kind}": a {fault.unit} can be {allowed}'
@@ -179,7 +180,7 @@ def problem(fault: Fault, aboard: tuple[str, ...], *, exact: bool) -> str | None
         return f"jump_s = {fault.jump_s:g}: must be at least {-fault.start_s:g}, the clock's start"
     if fault.unit == "encoder" and fault.number and not exact and fault.kind in _OF_MESSAGES:
         return (
-            f"instance = {fault.number}: must be 0 (all): both encoders share a message, and "
+            f"instance = {fault.number}: must be 0 (all): the encoders share a message, and "
             f'"{fault.kind}" is of the message'
         )
     return None

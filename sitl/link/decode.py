@@ -12,6 +12,7 @@ from sitl.link.failures import Injection
 from sitl.link.message_ids import PATH_PLANNER
 from sitl.link.pilot_messages import Ack
 from sitl.simulation import Controls
+from vehicles.description import Vehicle
 
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
 _WHOLE: Final = range(256)  # numbers of units, kinds and instances
@@ -34,17 +35,17 @@ class VehicleReply(NamedTuple):
         return bool(self.acks or self.texts or self.custom_mode is not None)
 
 
-def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
-    """Read an answer of a vehicle with so many joints; None without HIL_ACTUATOR_CONTROLS."""
+def read_reply(datagram: bytes, vehicle: Vehicle) -> VehicleReply | None:
+    """Read an answer of a ``vehicle``; None without HIL_ACTUATOR_CONTROLS."""
     alone = _CONTROLS_ALONE.read(datagram)
     if alone is not None:
         (values,) = alone
-        return VehicleReply(int(values[0]), _controls(values, joints))
+        return VehicleReply(int(values[0]), _controls(values, vehicle))
     frames = list(split(datagram))
     if not frames or frames[-1].message_id != message_ids.HIL_ACTUATOR_CONTROLS:
         return None
     values = cast("tuple[float, ...]", frames[-1].payload_values)
-    controls = _controls(values, joints)
+    controls = _controls(values, vehicle)
     return VehicleReply(
         t_us=int(values[0]),
         controls=controls,
@@ -55,10 +56,12 @@ def read_reply(datagram: bytes, joints: int) -> VehicleReply | None:
     )
 
 
-def _controls(values: tuple[float, ...], joints: int) -> Controls:
-    """From the wire values of HIL_ACTUATOR_CONTROLS."""
-    _, _, f1, f2, f3, f4, *torques, mode = values
-    return Controls((f1, f2, f3, f4), tuple(torques[:joints]), bool(int(mode) & _ARMED))
+def _controls(values: tuple[float, ...], vehicle: Vehicle) -> Controls:
+    """From the wire values of HIL_ACTUATOR_CONTROLS: rotors, then joints."""
+    _, _, *shares, mode = values
+    rotors = len(vehicle.rotors)
+    torques = shares[rotors : rotors + len(vehicle.joints)]
+    return Controls(tuple(shares[:rotors]), tuple(torques), bool(int(mode) & _ARMED))
 
 
 def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:

@@ -14,6 +14,7 @@ from sitl.link.faulty_endpoint import Endpoint
 from sitl.link.step_grid import StepGrid
 from sitl.link.udp_endpoint import RESEND_S
 from sitl.simulation import Controls
+from vehicles.description import Vehicle
 
 STALL_S: Final = 1.2  # so that 2 s after a stall both processes have ended; a pause of 1 s passes
 SILENT_S: Final = 0.1  # from then on a vehicle that ends so counts as silent
@@ -21,8 +22,6 @@ SILENT_S: Final = 0.1  # from then on a vehicle that ends so counts as silent
 # computer (COM_OF_LOSS_T). Until then see ``sitl.stand_in``.
 HOLD_S: Final = 1.0
 _FIRST_PLAN_S: Final = 0.05  # between the first answer and the start of the clock
-
-_OFF: Final = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
 
 
 class SimulatorError(Exception):
@@ -44,7 +43,7 @@ class Lockstep:
     """Waits for the answer of every step, and repeats a step whose answer does not come."""
 
     def __init__(
-        self, endpoint: Endpoint, joints: int, period_s: float | None, stop: StopRequest
+        self, endpoint: Endpoint, vehicle: Vehicle, period_s: float | None, stop: StopRequest
     ) -> None:
         """Steps begin ``period_s`` of wall time apart, or as soon as possible.
 
@@ -54,7 +53,7 @@ class Lockstep:
         self.counts = ExchangeCounts()
         self._stop = stop
         self._endpoint = endpoint
-        self._joints = joints
+        self._vehicle = vehicle
         self._period_s = period_s
         self._start_s = time.perf_counter()
         self._number = 0
@@ -94,7 +93,7 @@ class Lockstep:
             if received is not None:
                 if number:
                     self.counts.waited_s += time.perf_counter() - begin_s
-                answer = decode.read_reply(received, self._joints)
+                answer = decode.read_reply(received, self._vehicle)
                 if answer is not None and answer.t_us == t_us:
                     return answer
             # Ctrl-C goes to the vehicle too: that it is silent from then on is not held against it.
@@ -126,21 +125,21 @@ class RealTime:
     def __init__(
         self,
         endpoint: Endpoint,
-        joints: int,
+        vehicle: Vehicle,
         period_s: float,
         stop: StopRequest,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """A step takes ``period_s`` of the clock; ``stop`` ends the wait for the first answer."""
-        self._first = Lockstep(endpoint, joints, None, stop)
+        self._first = Lockstep(endpoint, vehicle, None, stop)
         self.counts = ExchangeCounts()
         self._endpoint = endpoint
-        self._joints = joints
+        self._vehicle = vehicle
         self._period_s = period_s
         self._clock = clock
         self._grid = StepGrid(period_s, clock, sleep)
-        self._held = _OFF
+        self._held = Controls.off(self._vehicle)
         self._heard_s = clock()
         self._heard_step = 0
         self._silent_s = 0.0  # at the end of the last step
@@ -174,7 +173,7 @@ class RealTime:
             self._held = max(answers, key=lambda answer: answer.t_us).controls
         self._silent_s = self._clock() - self._heard_s
         if self._silent_s > HOLD_S:
-            self._held = _OFF
+            self._held = Controls.off(self._vehicle)
         if self._silent_s > STALL_S:
             raise SimulatorError(
                 f"the flight software sent nothing for {STALL_S:g} s after step {self._heard_step}"
@@ -214,7 +213,7 @@ class RealTime:
     def _waiting(self) -> list[VehicleReply]:
         answers = []
         while (received := self._endpoint.receive_waiting()) is not None:
-            answer = decode.read_reply(received, self._joints)
+            answer = decode.read_reply(received, self._vehicle)
             if answer is not None:
                 answers.append(answer)
         return answers

@@ -91,7 +91,7 @@ def carry_out(simulation: Simulation, asked: Injection) -> Answer:
         return Answer(UNSUPPORTED, f"no fault: {missing}")
     if unit == "mavlink" and not _has_pilot(simulation.scenario):
         return Answer(UNSUPPORTED, _NO_PILOT)
-    most = instances(unit)
+    most = instances(unit, simulation.vehicle)
     if asked.instance > max(most, 1):
         return Answer(DENIED, f"no fault: {unit} {asked.instance} is not one of {max(most, 1)}")
     number = asked.instance if most > 1 else 0

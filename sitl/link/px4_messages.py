@@ -25,7 +25,6 @@ from sitl.link.encode_sensors import (
 )
 from sitl.link.message_ids import SENSORS, SYSTEM_ID
 from sitl.sensors.measurements import (
-    V4,
     GnssMeasurement,
     ImuMeasurement,
     MagneticMeasurement,
@@ -34,20 +33,20 @@ from sitl.sensors.measurements import (
     PressureMeasurement,
     RangeMeasurement,
 )
+from vehicles.description import Vehicle
 
 # MAV_ESTIMATOR_TYPE: motion capture (6) is read and used by nothing in EKF2, vision is.
 _VISION: Final = 2
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
 _WARM_C: Final = 15.0
-_MOTORS: Final = 4
 
 
 class Px4Answer(NamedTuple):
     """HIL_ACTUATOR_CONTROLS."""
 
     t_us: int  # of the HIL_SENSOR that it answers
-    thrust: V4  # fraction of full thrust of the rotors
-    joints: tuple[float, ...]  # -1…1, positions
+    thrust: tuple[float, ...]  # (r,) fraction of full thrust
+    joints: tuple[float, ...]  # (j,) -1…1, positions
     armed: bool
 
 
@@ -100,8 +99,8 @@ def _mean(vectors: list[tuple[float, float, float]]) -> tuple[float, float, floa
     return (x, y, z)
 
 
-def read_answer(frame: Frame, joints: int) -> Px4Answer | None:
-    """What PX4 answers to a vehicle with so many joints; None of any other message.
+def read_answer(frame: Frame, vehicle: Vehicle) -> Px4Answer | None:
+    """What PX4 answers to a ``vehicle``; None of any other message.
 
     A control that is no number is one of an output that is off.
     """
@@ -109,6 +108,6 @@ def read_answer(frame: Frame, joints: int) -> Px4Answer | None:
         return None
     t_us, _, *controls, mode = cast("tuple[float, ...]", frame.payload_values)
     finite = [one if math.isfinite(one) else 0.0 for one in controls]
-    a, b, c, d = finite[:_MOTORS]
-    positions = tuple(finite[_MOTORS : _MOTORS + joints])
-    return Px4Answer(int(t_us), (a, b, c, d), positions, bool(int(mode) & _ARMED))
+    rotors = len(vehicle.rotors)
+    positions = tuple(finite[rotors : rotors + len(vehicle.joints)])
+    return Px4Answer(int(t_us), tuple(finite[:rotors]), positions, bool(int(mode) & _ARMED))

@@ -23,12 +23,13 @@ from sitl.result import EndKind
 from sitl.sensors.measurements import Measurement
 from sitl.servos import PositionServos
 from sitl.simulation import STEP_US, Controls, Simulation
+from sitl.start import effects
+from vehicles.description import Vehicle
 
 RATES_HZ: Final = (250, 500)  # of the exchange
 STALL_S: Final = 5.0  # PX4's scripts and logger take their time
 _SLICE_S: Final = 0.1  # after which a request to stop is seen
 _READ: Final = 4096
-_OFF: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 class Px4Exchange:
@@ -37,7 +38,7 @@ class Px4Exchange:
     def __init__(
         self,
         stream: ByteStream,
-        joints: int,
+        vehicle: Vehicle,
         period_s: float,
         stop: StopRequest,
         answers: Callable[[int], None] = lambda number: None,
@@ -48,7 +49,7 @@ class Px4Exchange:
         self._stream = stream
         self._reader = StreamReader()
         self._losses = Losses()
-        self._joints = joints
+        self._vehicle = vehicle
         self._period_s = period_s
         self._stop = stop
         self._answers = answers
@@ -109,7 +110,7 @@ class Px4Exchange:
                 select.select((self._stream,), (), (), left_s)
             return []
         frames = self._reader.cut(data, self._losses)
-        answers = (read_answer(frame, self._joints) for frame, _ in frames)
+        answers = (read_answer(frame, self._vehicle) for frame, _ in frames)
         return [answer for answer in answers if answer is not None]
 
 
@@ -143,8 +144,9 @@ def serve_px4(
     end is in ``simulation.ended``.
     """
     step_s = 1e-6 * STEP_US
-    servos = PositionServos(simulation.vehicle, simulation.healthy().q_arm, step_s)
-    answer = Px4Answer(0, _OFF, (0.0,) * len(simulation.vehicle.links), armed=False)
+    vehicle, angles = simulation.vehicle, simulation.healthy().q_arm
+    servos = PositionServos(vehicle, effects(simulation.scenario), angles, step_s)
+    answer = Px4Answer(0, *Controls.off(vehicle))
     arrived: list[Measurement] = []
     begin_s = reported_s = time.perf_counter()
 

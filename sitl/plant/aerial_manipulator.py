@@ -9,24 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.air.load import SURFACES, Air, drag_force, rotor_gain, wall_force
+from sitl.air.load import Air, drag_force, rotor_gain, wall_force
 from sitl.compiled import kernel
-from sitl.plant.actuators import joint_torque, rotor_torque, stop_torque, thrust_rate
-from sitl.plant.bodies import Chain, Posture, empty_posture, posture_into
+from sitl.plant.actuators import joint_torque, stop_torque, thrust_rate
+from sitl.plant.bodies import Chain, Points, Posture, empty_posture, posture_into
 from sitl.plant.contact import Feet, ground_wrench
-from sitl.plant.gears import Gears, gears
+from sitl.plant.gears import Gears
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.newton_euler import wrench_needed_into
-from sitl.plant.packing import pack_params
-from sitl.plant.parameters import Joints, Rotors, Vehicle, chain
 from sitl.plant.rotor_speed import quadratic_thrust_rate
-from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.state import JOINTS_MAX, P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import (
     V3,
     Array,
     add,
     put,
     rotation_into,
+    row,
     scale,
     times,
     transposed_times,
@@ -34,10 +33,34 @@ from sitl.plant.vector import (
 )
 
 
-class Stops(NamedTuple):
-    """Numbers of the end stops for the kernels (see ``parameters.EndStops``)."""
+class Rotors(NamedTuple):
+    """Numbers of the rotors for the kernels, an entry a rotor; there is room for eight."""
 
-    angle: Array  # (j,) rad, of each link against the base; infinite where there is none
+    number: int
+    place: Array  # (8, 3) m, hub in B
+    axis: Array  # (8, 3) direction of the thrust in B
+    moment: Array  # (8, 3) m, of the thrust about the base origin, per thrust
+    reaction: Array  # (8, 3) m, torque on the base against the shaft's, per thrust in free air
+    thrust_max: Array  # (8,) N
+    lag: Array  # (8,) s
+    quadratic: int  # 1: the speed lags, not the thrust
+
+
+class Drives(NamedTuple):
+    """Numbers of the joint drives for the kernels, an entry a joint."""
+
+    torque_max: Array  # (6,) N·m
+    viscous: Array  # (6,) N·m·s/rad
+    coulomb: Array  # (6,) N·m
+
+
+class Stops(NamedTuple):
+    """End stops: each bounds a sum of joint angles, and pushes back with the same shares."""
+
+    number: int
+    share: Array  # (12, 6) of each joint's angle
+    least: Array  # (12,) rad
+    most: Array  # (12,) rad
     stiffness: float  # N·m/rad
     damping: float  # N·m·s/rad
 
@@ -48,19 +71,20 @@ class Plant(NamedTuple):
     chain: Chain
     feet: Feet
     rotors: Rotors
-    joints: Joints
+    drives: Drives
     stops: Stops
     gears: Gears
     air: Air
-    locked: Array  # (j,) 1 for a joint that cannot move, which is then at rest; else 0
+    points: Points
+    locked: Array  # (6,) 1 for a joint that cannot move, which is then at rest; else 0
     gravity: float  # m/s²
 
 
 class Inputs(NamedTuple):
     """What acts on the plant, constant over a step."""
 
-    thrust: Array  # (4,) N commanded
-    torque: Array  # (j,) N·m commanded
+    thrust: Array  # (8,) N commanded
+    torque: Array  # (6,) N·m commanded
     force_W: Array  # (3,) N on the base origin, NED
     torque_B: Array  # (3,) N·m on the base, B
 
@@ -70,73 +94,29 @@ class Workspace(NamedTuple):
 
     posture: Posture
     rotation: Array  # (3, 3) R_WB
-    mass: Array  # (6+j, 6+j)
-    load: Array  # (6+j,) generalised force, then acceleration
-    bias: Array  # (6+j,) force that gravity and velocities take up
-    still: Array  # (j,) zeros
+    mass: Array  # (12, 12)
+    load: Array  # (12,) generalised force, then acceleration
+    bias: Array  # (12,) force that gravity and velocities take up
+    still: Array  # (6,) zeros
 
 
-def plant(vehicle: Vehicle) -> Plant:
-    """The numbers of a vehicle for the kernels."""
-    legs = vehicle.legs
-    s, h = legs.spread, legs.length
-    points = np.array([(x, y, h) for x in (-s, s) for y in (-s, s)])
-    stops = vehicle.stops
-    stop_angle = np.full(len(vehicle.links), np.inf)
-    stop_angle[: len(stops.angle)] = stops.angle[: len(stop_angle)]
-    numbers = Plant(
-        chain=chain(vehicle),
-        feet=Feet(
-            points=points,
-            reach=float(np.linalg.norm(points[0])),
-            stiffness=legs.stiffness,
-            dissipation=legs.dissipation,
-            friction=legs.friction,
-            slip_rate=legs.slip_rate,
-        ),
-        rotors=vehicle.rotors,
-        joints=vehicle.joints,
-        stops=Stops(stop_angle, stops.stiffness, stops.damping),
-        gears=gears(vehicle.motors.inertia, vehicle.motors.backlash, len(vehicle.links)),
-        air=_air(vehicle),
-        locked=np.zeros(len(vehicle.links)),
-        gravity=vehicle.gravity,
-    )
-    return pack_params(numbers)
-
-
-def _air(vehicle: Vehicle) -> Air:
-    model, rotors = vehicle.air, vehicle.rotors
-    surfaces = np.zeros((SURFACES, 4))
-    for k, (normal, offset) in enumerate(model.surfaces):
-        surfaces[k] = (*normal, offset)
-    return Air(
-        active=float(model.active),
-        wind=np.zeros(3),
-        drag=vehicle.mass * np.array(model.rotor_drag),
-        area=model.drag_area,
-        density=model.density,
-        radius=vehicle.size.blade,
-        arm=rotors.arm,
-        ground=float(model.ground),
-        ceiling=float(model.ceiling),
-        suction=model.suction,
-        surfaces=surfaces,
-        surface_count=float(len(model.surfaces)),
-    )
-
-
-def empty_workspace(joints: int) -> Workspace:
-    """Memory for a vehicle with ``joints`` joints."""
-    n = 6 + joints
+def empty_workspace() -> Workspace:
+    """Memory for any vehicle."""
+    n = 6 + JOINTS_MAX
     return Workspace(
-        empty_posture(joints),
+        empty_posture(),
         np.empty((3, 3)),
         np.empty((n, n)),
         np.empty(n),
         np.empty(n),
-        np.zeros(joints),
+        np.zeros(JOINTS_MAX),
     )
+
+
+@kernel
+def first_angle(plant: Plant) -> int:
+    """Entry of the first joint's angle in the state vector."""
+    return THRUST + int(plant.rotors.number)
 
 
 @kernel
@@ -147,67 +127,65 @@ def gravity_in_body(rotation: Array, g: float) -> V3:
 
 @kernel
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """Forces of rotors, drives, ground, disturbance at a state (17 + 2j,) [SI], into work.load."""
-    load, rotation = work.load, work.rotation
-    feet_force, feet_moment = ground_wrench(
-        plant.feet, triple(state, P_WB), triple(state, V_WB), triple(state, W_WB_B), rotation
+    """Forces of rotors, drives, ground, disturbance at a state (n,) [SI], into work.load."""
+    load, rotation, rotors, air = work.load, work.rotation, plant.rotors, plant.air
+    p = triple(state, P_WB)
+    force, moment = ground_wrench(
+        plant.feet, p, triple(state, V_WB), triple(state, W_WB_B), rotation
     )
-    thrust = (state[THRUST], state[THRUST + 1], state[THRUST + 2], state[THRUST + 3])
-    # The air's laws are of thrust at the same power, which is the same torque at the same speed:
-    # what a surface adds to the thrust, it does not add to the torque of the shaft.
-    shaft = thrust
-    air = plant.air
-    if air.active > 0.0:
-        p = triple(state, P_WB)
-        thrust = (
-            rotor_gain(air, p, rotation, 0) * thrust[0],
-            rotor_gain(air, p, rotation, 1) * thrust[1],
-            rotor_gain(air, p, rotation, 2) * thrust[2],
-            rotor_gain(air, p, rotation, 3) * thrust[3],
-        )
-    lift = (0.0, 0.0, -(thrust[0] + thrust[1] + thrust[2] + thrust[3]))
-    push = transposed_times(rotation, triple(inputs.force_W, 0))
-    force = add(add(lift, push), feet_force)
-    if air.active > 0.0:
+    force = add(force, transposed_times(rotation, triple(inputs.force_W, 0)))
+    moment = add(moment, triple(inputs.torque_B, 0))
+    if air.active > 0:
         force = add(force, drag_force(air, triple(state, V_WB), rotation))
-        force = add(force, wall_force(air, triple(state, P_WB), rotation, thrust))
+    for i in range(rotors.number):
+        # The air's laws are of thrust at the same power, which is the same torque at the same
+        # speed: what a surface adds to the thrust, it does not add to the torque of the shaft.
+        thrust = shaft = state[THRUST + i]
+        if air.active > 0:
+            hub = add(p, times(rotation, row(rotors.place, i)))
+            thrust *= rotor_gain(air, hub, i)
+            force = add(force, transposed_times(rotation, wall_force(air, hub, i, thrust)))
+        force = add(force, scale(thrust, row(rotors.axis, i)))
+        moment = add(moment, scale(thrust, row(rotors.moment, i)))
+        moment = add(moment, scale(shaft, row(rotors.reaction, i)))
     put(load, 0, force)
-    turn = rotor_torque(thrust, shaft, plant.rotors.arm, plant.rotors.yaw_ratio)
-    put(load, 3, add(add(turn, triple(inputs.torque_B, 0)), feet_moment))
-    joints, drive, stops = work.still.shape[0], plant.joints, plant.stops
+    put(load, 3, moment)
+    joints, drives, angles = plant.chain.joints, plant.drives, first_angle(plant)
     for i in range(joints):
-        rate = state[ARM + joints + i]
         # Within the gap of its gear the motor drives no link.
         driven = plant.gears.gap == 0.0 or plant.gears.side[i] != 0.0
         load[6 + i] = joint_torque(
             inputs.torque[i] if driven else 0.0,
-            rate,
-            drive.torque_max,
-            drive.viscous,
-            drive.coulomb,
-            drive.coulomb_rate,
+            state[angles + joints + i],
+            drives.torque_max[i],
+            drives.viscous[i],
+            drives.coulomb[i],
         )
-    angle, rate = 0.0, 0.0  # of a link against the base: of all joints up to it
-    for i in range(joints):
-        angle += state[ARM + i]
-        rate += state[ARM + joints + i]
-        if abs(angle) > stops.angle[i]:
-            stop = stop_torque(angle, rate, stops.angle[i], stops.stiffness, stops.damping)
-            for k in range(i + 1):
-                load[6 + k] += stop
+    stops = plant.stops
+    for k in range(stops.number):
+        angle = 0.0
+        for i in range(joints):
+            angle += stops.share[k, i] * state[angles + i]
+        if angle < stops.least[k] or angle > stops.most[k]:
+            rate = 0.0
+            for i in range(joints):
+                rate += stops.share[k, i] * state[angles + joints + i]
+            beyond = angle - min(max(angle, stops.least[k]), stops.most[k])
+            push = stop_torque(beyond, rate, stops.stiffness, stops.damping)
+            for i in range(joints):
+                load[6 + i] += stops.share[k, i] * push
 
 
 @kernel
 def place_bodies(plant: Plant, state: Array, work: Workspace) -> None:
-    """Rotation and posture of a state (17 + 2j,) [SI] into ``work``."""
-    joints = work.still.shape[0]
+    """Rotation and posture of a state (n,) [SI] into ``work``."""
     rotation_into(state, Q_WB, work.rotation)
-    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
+    posture_into(plant.chain, state, first_angle(plant), work.posture)
 
 
 @kernel
 def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """``placed_acceleration_into`` for any state (17 + 2j,) [SI]."""
+    """``placed_acceleration_into`` for any state (n,) [SI]."""
     place_bodies(plant, state, work)
     placed_acceleration_into(plant, state, inputs, work)
 
@@ -216,15 +194,15 @@ def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspac
 def placed_acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Solve M x = load − bias into ``work.load``: base linear and angular, joint accelerations.
 
-    Taken at a state (17 + 2j,) [SI], see ``sitl.plant.state``, whose bodies ``work`` has placed.
+    Taken at a state (n,) [SI], see ``sitl.plant.state``, whose bodies ``work`` has placed.
 
     The linear part is the acceleration of the base origin written in B (not the rate of the
     velocity's components in B).
     """
-    joints, load, bias = work.still.shape[0], work.load, work.bias
+    joints, load, bias = plant.chain.joints, work.load, work.bias
     lift = scale(-1.0, gravity_in_body(work.rotation, plant.gravity))
     w, still = triple(state, W_WB_B), (0.0, 0.0, 0.0)
-    rates = state[ARM + joints :]
+    rates = state[first_angle(plant) + joints :]
     wrench_needed_into(plant.chain, work.posture, w, still, lift, rates, work.still, bias)
     load_into(plant, state, inputs, work)
     for i in range(6 + joints):
@@ -233,19 +211,19 @@ def placed_acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: W
     for i in range(joints):
         work.mass[6 + i, 6 + i] += plant.gears.carried[i]
         if plant.locked[i] > 0.0:
-            hold_joint(work.mass, load, 6 + i)
-    solve_in_place(work.mass, load)
+            hold_joint(work.mass, load, 6 + i, 6 + joints)
+    solve_in_place(work.mass, load, 6 + joints)
 
 
 @kernel
-def hold_joint(mass: Array, load: Array, row: int) -> None:
+def hold_joint(mass: Array, load: Array, row: int, n: int) -> None:
     """Replace one row of mass (n, n) [any unit] x = load (n,) [any unit] by x[row] = 0.
 
     The torque that this takes acts between two links and does no work.
     """
     for k in range(row):
         mass[row, k] = 0.0
-    for k in range(row + 1, load.shape[0]):
+    for k in range(row + 1, n):
         mass[k, row] = 0.0
     mass[row, row] = 1.0
     load[row] = 0.0
@@ -255,7 +233,7 @@ def hold_joint(mass: Array, load: Array, row: int) -> None:
 def derivative_into(
     plant: Plant, state: Array, inputs: Inputs, work: Workspace, out: Array
 ) -> None:
-    """Time derivative into out (17 + 2j,) [SI/s] at a state (17 + 2j,) [SI].
+    """Time derivative into out (n,) [SI/s] at a state (n,) [SI].
 
     ``work`` has placed the bodies.
     """
@@ -269,14 +247,15 @@ def derivative_into(
     out[Q_WB + 1] = 0.5 * (w * a + y * c - z * b)
     out[Q_WB + 2] = 0.5 * (w * b + z * a - x * c)
     out[Q_WB + 3] = 0.5 * (w * c + x * b - y * a)
-    limit, lag = plant.rotors.thrust_max, plant.rotors.lag
-    for i in range(4):
+    rotors = plant.rotors
+    for i in range(rotors.number):
         thrust, command = state[THRUST + i], inputs.thrust[i]
-        if plant.rotors.quadratic > 0.0:
-            out[THRUST + i] = quadratic_thrust_rate(thrust, command, limit, lag)
+        if rotors.quadratic > 0:
+            rate = quadratic_thrust_rate(thrust, command, rotors.thrust_max[i], rotors.lag[i])
         else:
-            out[THRUST + i] = thrust_rate(thrust, command, limit, lag)
-    joints = work.still.shape[0]
+            rate = thrust_rate(thrust, command, rotors.thrust_max[i], rotors.lag[i])
+        out[THRUST + i] = rate
+    angles, joints = first_angle(plant), plant.chain.joints
     for i in range(joints):
-        out[ARM + i] = state[ARM + joints + i]
-        out[ARM + joints + i] = work.load[6 + i]
+        out[angles + i] = state[angles + joints + i]
+        out[angles + joints + i] = work.load[6 + i]

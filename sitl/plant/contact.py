@@ -11,9 +11,10 @@ from sitl.plant.vector import V3, Array, add, cross, row, times, transposed_time
 
 
 class Feet(NamedTuple):
-    """Numbers of the landing gear for the kernels (see ``parameters.Legs``)."""
+    """Numbers of the landing gear for the kernels; there is room for eight."""
 
-    points: Array  # (k, 3) m, in B
+    number: int
+    points: Array  # (8, 3) m, in B
     reach: float  # m, largest distance of a foot from the base origin
     stiffness: float  # N/m
     dissipation: float  # s/m
@@ -44,7 +45,7 @@ def ground_wrench(feet: Feet, p: V3, v: V3, w: V3, rotation: Array) -> tuple[V3,
     force = moment = (0.0, 0.0, 0.0)
     if p[2] + feet.reach < 0.0:
         return force, moment
-    for i in range(feet.points.shape[0]):
+    for i in range(feet.number):
         foot = row(feet.points, i)
         depth = p[2] + times(rotation, foot)[2]
         if depth > 0.0:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 
-from sitl.plant.vector import V4
-
 
 class DeadTime:
     """Delays the rotors' commands by whole exchanges."""
 
-    def __init__(self, exchanges: int, first: V4) -> None:
-        """Before the first command arrives the rotors keep ``first`` [N]."""
-        self._line: deque[V4] = deque([first] * exchanges)
+    def __init__(self, exchanges: int, first: tuple[float, ...]) -> None:
+        """Before the first command arrives the rotors keep ``first`` (r,) [N]."""
+        self._line: deque[tuple[float, ...]] = deque([first] * exchanges)
 
-    def through(self, command: V4) -> V4:
-        """Take the newest ``command`` [N], return the one that takes effect [N]."""
+    def through(self, command: tuple[float, ...]) -> tuple[float, ...]:
+        """Take the newest ``command`` (r,) [N], return the one that takes effect [N]."""
         self._line.append(command)
         return self._line.popleft()

@@ -23,28 +23,30 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl.compiled import kernel
+from sitl.plant.state import JOINTS_MAX
 from sitl.plant.vector import Array
 
 
 class Gears(NamedTuple):
-    """Numbers and state of the gears for the kernels, an entry a joint."""
+    """Numbers and state of the gears for the kernels, an entry a joint; there is room for six."""
 
+    joints: int
     gap: float  # rad, from one tooth to the other; 0: the teeth always touch
-    inertia: Array  # (j,) kg·m², of a motor behind its gear
-    carried: Array  # (j,) kg·m², what of it the joint carries now
-    side: Array  # (j,) of the teeth that touch: 1 the motor is ahead, -1 behind, 0 none do
-    position: Array  # (j,) rad, of the motor against the link, within ± half of the gap
-    speed: Array  # (j,) rad/s, of a motor within the gap
+    inertia: Array  # (6,) kg·m², of a motor behind its gear
+    carried: Array  # (6,) kg·m², what of it the joint carries now
+    side: Array  # (6,) of the teeth that touch: 1 the motor is ahead, -1 behind, 0 none do
+    position: Array  # (6,) rad, of the motor against the link, within ± half of the gap
+    speed: Array  # (6,) rad/s, of a motor within the gap
 
 
-def gears(inertia: float, gap: float, joints: int) -> Gears:
-    """Motors of an ``inertia`` [kg·m²] behind gears with a ``gap`` [rad], for ``joints``.
+def gears(inertia: Array, gap: float) -> Gears:
+    """Motors of an ``inertia`` (j,) [kg·m²] behind gears with a ``gap`` [rad].
 
     With a gap they stand in its middle, at rest.
     """
-    each = np.full(joints, inertia)
-    none = np.zeros(joints)
-    return Gears(gap, each, none if gap > 0.0 else each, none, none, none)
+    none, each = np.zeros(JOINTS_MAX), np.zeros(JOINTS_MAX)
+    each[: len(inertia)] = inertia
+    return Gears(len(inertia), gap, each, none if gap > 0.0 else each, none, none, none)
 
 
 @kernel
@@ -55,7 +57,7 @@ def part_teeth(gears: Gears, torque: Array, acceleration: Array, rates: Array) -
     ``acceleration`` (6 + j,) [SI] is what follows if the teeth hold.
     """
     parted = False
-    for i in range(torque.shape[0]):
+    for i in range(gears.joints):
         between = torque[i] - gears.inertia[i] * acceleration[6 + i]
         if between * gears.side[i] < 0.0:
             gears.side[i] = 0.0
@@ -73,7 +75,7 @@ def move_free(gears: Gears, torque: Array, moved: Array, rates: Array, step: flo
     drives them. Then ``moved`` holds the momentum [N·m·s] with which motors meet their joints.
     """
     half, met = 0.5 * gears.gap, False
-    for i in range(torque.shape[0]):
+    for i in range(gears.joints):
         link, moved[i] = moved[i], 0.0
         if gears.side[i] != 0.0:
             continue
@@ -93,6 +95,6 @@ def move_free(gears: Gears, torque: Array, moved: Array, rates: Array, step: flo
 @kernel
 def servo_rates_into(gears: Gears, rates: Array) -> None:
     """Joints' ``rates`` (j,) [rad/s], replaced by those of motors that are within their gaps."""
-    for i in range(rates.shape[0]):
+    for i in range(gears.joints):
         if gears.side[i] == 0.0:
             rates[i] = gears.speed[i]

@@ -14,23 +14,23 @@ from sitl.plant.aerial_manipulator import (
     Workspace,
     derivative_into,
     empty_workspace,
+    first_angle,
     gravity_in_body,
     place_bodies,
     placed_acceleration_into,
 )
-from sitl.plant.bodies import posture_into
 from sitl.plant.gears import move_free, part_teeth, servo_rates_into
 from sitl.plant.kinematics import places_of_bodies, touch_down_speed
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.packing import pack_params
-from sitl.plant.state import ARM, Q_WB, V_WB, W_WB_B
-from sitl.plant.vector import V3, V4, Array, add, put, rotation_into, sub, times, triple
+from sitl.plant.state import JOINTS_MAX, Q_WB, ROTORS_MAX, STATE_MAX, V_WB, W_WB_B
+from sitl.plant.vector import V3, V6, V8, Array, add, put, sub, times, triple
 
 STEP_S = 0.001  # 1e-9 error after a second of tumbling (tests/sitl/test_conservation.py)
 
 
 class Slopes(NamedTuple):
-    """Memory of one Runge–Kutta step, each (17 + 2j,)."""
+    """Memory of one Runge–Kutta step, each (33,)."""
 
     one: Array
     total: Array
@@ -42,8 +42,8 @@ class Memory(NamedTuple):
 
     work: Workspace
     slopes: Slopes
-    moved: Array  # (j,)
-    now: Array  # (17 + 2j,), the state: in here, as all else, one type serves every kernel
+    moved: Array  # (6,)
+    now: Array  # (33,), the state: in here, as all else, one type serves every kernel
 
 
 class Arrival(NamedTuple):
@@ -55,7 +55,7 @@ class Arrival(NamedTuple):
 
 @kernel
 def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> V3:
-    """Acceleration minus gravity at the base origin [m/s², B] in a state (17 + 2j,) [SI].
+    """Acceleration minus gravity at the base origin [m/s², B] in a state (n,) [SI].
 
     ``work`` has placed the bodies.
     """
@@ -64,14 +64,20 @@ def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) 
 
 
 @kernel
+def state_size(plant: Plant) -> int:
+    """Entries that the state vector of the vehicle has."""
+    return first_angle(plant) + 2 * int(plant.chain.joints)
+
+
+@kernel
 def rk4_step(
     plant: Plant, state: Array, inputs: Inputs, step: float, work: Workspace, slopes: Slopes
 ) -> None:
-    """Advance a state (17 + 2j,) [SI] in place by ``step`` [s]; the attitude gets unit length.
+    """Advance a state (n,) [SI] in place by ``step`` [s]; the attitude gets unit length.
 
     ``work`` has placed the bodies of the state before.
     """
-    n = state.shape[0]
+    n = state_size(plant)
     one, total, middle = slopes.one, slopes.total, slopes.middle
     for i in range(n):
         middle[i] = state[i]
@@ -107,39 +113,39 @@ def geared_step(
     slopes: Slopes,
     moved: Array,
 ) -> None:
-    """``rk4_step`` of ``step`` [s] with the gaps of the gears; ``moved`` (j,) [rad] is memory.
+    """``rk4_step`` of ``step`` [s] with the gaps of the gears; ``moved`` (6,) [rad] is memory.
 
-    The ``state`` (17 + 2j,) [SI] is advanced in place; ``work`` has placed its bodies.
+    The ``state`` (n,) [SI] is advanced in place; ``work`` has placed its bodies.
     """
-    joints = moved.shape[0]
+    joints, angles = plant.chain.joints, first_angle(plant)
+    rates = state[angles + joints :]
     placed_acceleration_into(plant, state, inputs, work)
-    part_teeth(plant.gears, inputs.torque, work.load, state[ARM + joints :])
+    part_teeth(plant.gears, inputs.torque, work.load, rates)
     for i in range(joints):
-        moved[i] = -state[ARM + i]
+        moved[i] = -state[angles + i]
     rk4_step(plant, state, inputs, step, work, slopes)
     for i in range(joints):
-        moved[i] += state[ARM + i]
-    if move_free(plant.gears, inputs.torque, moved, state[ARM + joints :], step):
+        moved[i] += state[angles + i]
+    if move_free(plant.gears, inputs.torque, moved, rates, step):
         strike(plant, state, moved, work)
 
 
 @kernel
 def strike(plant: Plant, state: Array, momentum: Array, work: Workspace) -> None:
-    """Let motors strike joints with a ``momentum`` (j,) [N·m·s]; state (17 + 2j,) [SI]."""
-    joints = momentum.shape[0]
-    rotation_into(state, Q_WB, work.rotation)
-    posture_into(plant.chain, state[ARM : ARM + joints], work.posture)
+    """Let motors strike joints with a ``momentum`` (6,) [N·m·s]; state (n,) [SI]."""
+    joints, rates = plant.chain.joints, first_angle(plant) + plant.chain.joints
+    place_bodies(plant, state, work)
     mass_matrix_into(plant.chain, work.posture, work.mass)
     for i in range(6):
         work.load[i] = 0.0
     for i in range(joints):
         work.mass[6 + i, 6 + i] += plant.gears.carried[i]
         work.load[6 + i] = momentum[i]
-    solve_in_place(work.mass, work.load)
+    solve_in_place(work.mass, work.load, 6 + joints)
     put(state, V_WB, add(triple(state, V_WB), times(work.rotation, triple(work.load, 0))))
     put(state, W_WB_B, add(triple(state, W_WB_B), triple(work.load, 3)))
     for i in range(joints):
-        state[ARM + joints + i] += work.load[6 + i]
+        state[rates + i] += work.load[6 + i]
 
 
 @kernel
@@ -154,11 +160,11 @@ def run_steps(
 ) -> Arrival:
     """``integrate`` with ``memory`` to write to.
 
-    The ``state`` (17 + 2j,) [SI] is advanced in place by as many steps of ``step`` [s] as
-    ``places`` (steps, rows, 3) [m, NED] has room for; ``states`` (steps, 17 + 2j) [SI] follow it.
+    The ``state`` (n,) [SI] is advanced in place by as many steps of ``step`` [s] as
+    ``places`` (steps, rows, 3) [m, NED] has room for; ``states`` (steps, n) [SI] follow it.
     """
     moved, work, now = memory.moved, memory.work, memory.now
-    n, fastest = now.shape[0], 0.0
+    n, fastest = state_size(plant), 0.0
     for i in range(n):
         now[i] = state[i]
     place_bodies(plant, now, work)
@@ -169,11 +175,11 @@ def run_steps(
         else:
             rk4_step(plant, now, inputs, step, work, memory.slopes)
         place_bodies(plant, now, work)
-        places_of_bodies(now, work, k, places)
+        places_of_bodies(plant, now, work, k, places)
         for i in range(n):
             states[k, i] = now[i]
         if loose:
-            servo_rates_into(plant.gears, states[k, n - len(moved) :])
+            servo_rates_into(plant.gears, states[k, n - plant.chain.joints :])
         fastest = max(fastest, touch_down_speed(plant, now, work))
     for i in range(n):
         state[i] = now[i]
@@ -187,12 +193,11 @@ class Held(NamedTuple):
     memory: Memory
 
 
-def held(joints: int) -> Sequence[Held]:
-    """A block for ``step`` and a vehicle with ``joints`` joints, in an array of one."""
-    n = ARM + 2 * joints
-    inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
-    slopes = Slopes(np.zeros(n), np.zeros(n), np.zeros(n))
-    memory = Memory(empty_workspace(joints), slopes, np.zeros(joints), np.zeros(n))
+def held() -> Sequence[Held]:
+    """A block for ``step`` and any vehicle, in an array of one."""
+    inputs = Inputs(np.zeros(ROTORS_MAX), np.zeros(JOINTS_MAX), np.zeros(3), np.zeros(3))
+    slopes = Slopes(np.zeros(STATE_MAX), np.zeros(STATE_MAX), np.zeros(STATE_MAX))
+    memory = Memory(empty_workspace(), slopes, np.zeros(JOINTS_MAX), np.zeros(STATE_MAX))
     return cast(Sequence[Held], np.array([pack_params(Held(inputs, memory))]))
 
 
@@ -206,13 +211,13 @@ def integrate(
     states: Array,
     blocks: Sequence[Held],
 ) -> Arrival:
-    """Advance ``state`` (17 + 2j,) [SI] in place by one ``step`` [s] per row of ``places``.
+    """Advance ``state`` (n,) [SI] in place by one ``step`` [s] per row of ``places``.
 
     The inputs are held over all steps; ``blocks`` is one, for memory.
 
-    Base origin and origin of every DH frame go to places (steps, 2 + j, 3) [m, NED], after each
-    step, and the state itself to ``states`` (steps, 17 + 2j) [SI], but with the rates of the
-    joints' servos, which limits are about; without rows the state stays as it is.
+    Base origin, joints and end-effector go to places (steps, 2 + j, 3) [m, NED], after each step,
+    and the state itself to ``states`` (steps, n) [SI], but with the rates of the joints' servos,
+    which limits are about; without rows the state stays as it is.
     """
     return run_steps(plant, state, inputs, step, places, states, blocks[0].memory)
 
@@ -222,8 +227,8 @@ def step(
     plants: Sequence[Plant],
     blocks: Sequence[Held],
     state: Array,
-    thrust: V4,
-    torque: tuple[float, ...],
+    thrust: V8,
+    torque: V6,
     force_W: V3,
     torque_B: V3,
     step_s: float,
@@ -235,16 +240,16 @@ def step(
     One call does all that an exchange needs, because handing the plant's arrays to compiled code
     one by one costs as much as two steps.
 
-    ``thrust`` [N] and ``torque`` [N·m] are commanded, rotors 1 to 4 and joints;
+    ``thrust`` [N] and ``torque`` [N·m] are commanded, of rotors and joints, with anything behind;
     ``force_W`` [N, NED] and ``torque_B`` [N·m, B] disturb the base.
 
-    Overwritten are state (17 + 2j,) [SI], places (steps, 2 + j, 3) [m, NED] and ``states``
-    (steps, 17 + 2j) [SI].
+    Overwritten are state (n,) [SI], places (steps, 2 + j, 3) [m, NED] and ``states``
+    (steps, n) [SI].
     """
     inputs = blocks[0].inputs
-    for i in range(4):
+    for i in range(ROTORS_MAX):
         inputs.thrust[i] = thrust[i]
-    for i in range(len(torque)):
+    for i in range(JOINTS_MAX):
         inputs.torque[i] = torque[i]
     put(inputs.force_W, 0, force_W)
     put(inputs.torque_B, 0, torque_B)
@@ -254,12 +259,12 @@ def step(
 
 @compiled
 def places(plant: Plant, state: Array, blocks: Sequence[Held], out: Array) -> None:
-    """``places_of_bodies`` for one state (17 + 2j,) [SI], into out (1, 2 + j, 3) [m, NED].
+    """``places_of_bodies`` for one state (n,) [SI], into out (1, 2 + j, 3) [m, NED].
 
     ``blocks`` is one, for memory.
     """
     memory = blocks[0].memory
-    for i in range(memory.now.shape[0]):
+    for i in range(state_size(plant)):
         memory.now[i] = state[i]
     place_bodies(plant, memory.now, memory.work)
-    places_of_bodies(memory.now, memory.work, 0, out)
+    places_of_bodies(plant, memory.now, memory.work, 0, out)

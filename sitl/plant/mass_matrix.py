@@ -14,13 +14,13 @@ from sitl.plant.vector import Array, add, column, cross, dot, put_row, row, scal
 
 @kernel
 def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
-    """Lower triangle of the exact coupled mass matrix into out (6+j, 6+j) [kg, kg·m, kg·m²].
+    """Lower triangle of the exact coupled mass matrix into out (12, 12) [kg, kg·m, kg·m²].
 
     Rows and columns: base linear acceleration, base angular acceleration (both in B), joints.
     Equal, column by column, to ``wrench_needed_into`` with unit accelerations and zero rates;
     written with the composite body outboard of each joint because that is five times cheaper.
     """
-    joints = at.origin.shape[0] - 1
+    joints = chain.joints
     for r in range(6):
         for s in range(r):
             out[r, s] = 0.0
@@ -41,8 +41,8 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
             break
         # Unit rate of joint i moves the composite body: about z, and at the base origin
         # with o × z.
-        z = column(at.axes, i - 1, 2)
-        v = cross(row(at.origin, i - 1), z)
+        z = column(at.axes, i, 2)
+        v = cross(row(at.origin, i), z)
         p = add(scale(m, v), cross(z, h))
         spin = (
             xx * z[0] + xy * z[1] + xz * z[2],
@@ -53,8 +53,8 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
         put_row(out, 5 + i, p)
         out[5 + i, 3], out[5 + i, 4], out[5 + i, 5] = momentum
         for k in range(1, i + 1):
-            z_k = column(at.axes, k - 1, 2)
-            v_k = cross(row(at.origin, k - 1), z_k)
+            z_k = column(at.axes, k, 2)
+            v_k = cross(row(at.origin, k), z_k)
             out[5 + i, 5 + k] = dot(z_k, momentum) + dot(v_k, p)
     out[0, 0] = out[1, 1] = out[2, 2] = m
     # Angular acceleration α gives the force α × h: rows 3..5 hold its transpose.
@@ -66,12 +66,11 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
 
 
 @kernel
-def solve_in_place(m: Array, b: Array) -> None:
+def solve_in_place(m: Array, b: Array, n: int) -> None:
     """Solve m (n, n) [any unit] x = b (n,) [any unit] by Cholesky; both are overwritten.
 
-    Only the lower triangle of ``m`` is read.
+    Both may have room for more. Only the lower triangle of ``m`` is read.
     """
-    n = b.shape[0]
     for k in range(n):
         pivot, value = m[k, k], b[k]
         for s in range(k):

@@ -46,35 +46,33 @@ def wrench_needed_into(
 
     The base has w [rad/s, B], alpha [rad/s², B] and, less gravity, a [m/s², B]; the joints have qd
     (j,) [rad/s] and qdd (j,) [rad/s²]. Into out (6 + j,) [SI]: force [N, B], moment about the base
-    origin [N·m, B], joint torques [N·m].
+    origin [N·m, B], joint torques [N·m]. Each array may be longer.
 
     Source: eqs 4 and 5 with errata; docs/equations.md E4, E5.
     """
-    joints = qd.shape[0]
-    force, moment = at.force, at.moment
+    joints, force, moment = chain.joints, at.force, at.moment
     # Forward, eq 4: inertial force and moment of each body about the origin of its joint.
     w_i, alpha_i, a_i = w, alpha, a
     for i in range(joints + 1):
         if i > 0:
-            turn = scale(qd[i - 1], column(at.axes, i - 1, 2))
+            to_joint = sub(row(at.origin, i), row(at.origin, i - 1))
+            a_i = add(a_i, add(cross(alpha_i, to_joint), cross(w_i, cross(w_i, to_joint))))
+            z = column(at.axes, i, 2)
+            turn = scale(qd[i - 1], z)
             alpha_i = add(alpha_i, cross(w_i, turn))
-            alpha_i = add(alpha_i, scale(qdd[i - 1], column(at.axes, i - 1, 2)))
+            alpha_i = add(alpha_i, scale(qdd[i - 1], z))
             w_i = add(w_i, turn)
-        joint = row(at.origin, i - 1) if i > 0 else (0.0, 0.0, 0.0)
-        to_com = sub(row(at.com, i), joint)
+        to_com = sub(row(at.com, i), row(at.origin, i))
         a_com = add(a_i, add(cross(alpha_i, to_com), cross(w_i, cross(w_i, to_com))))
         f = scale(chain.mass[i], a_com)
         spin = times_one(at.inertia, i, w_i)
         own = add(times_one(at.inertia, i, alpha_i), cross(w_i, spin))
         put_row(force, i, f)
         put_row(moment, i, add(own, cross(to_com, f)))
-        to_end = sub(row(at.origin, i), joint)
-        a_i = add(a_i, add(cross(alpha_i, to_end), cross(w_i, cross(w_i, to_end))))
     # Backward, eq 5.
     for i in range(joints, 0, -1):
-        out[5 + i] = dot(column(at.axes, i - 1, 2), row(moment, i))
-        joint_below = row(at.origin, i - 2) if i > 1 else (0.0, 0.0, 0.0)
-        arm = sub(row(at.origin, i - 1), joint_below)
+        out[5 + i] = dot(column(at.axes, i, 2), row(moment, i))
+        arm = sub(row(at.origin, i), row(at.origin, i - 1))
         f = row(force, i)
         put_row(moment, i - 1, add(row(moment, i - 1), add(row(moment, i), cross(arm, f))))
         put_row(force, i - 1, add(row(force, i - 1), f))

@@ -30,10 +30,11 @@ def _fields(numbers: Any) -> dict[str, Any]:
 
 
 def _layout(numbers: Any) -> np.dtype[Any]:
-    fields = _fields(numbers)
     parts = [
-        (name, _layout(part)) if _fields(part) else (name, np.float64, np.shape(part))
-        for name, part in fields.items()
+        (name, _layout(part))
+        if _fields(part)
+        else (name, np.int64 if isinstance(part, int) else np.float64, np.shape(part))
+        for name, part in _fields(numbers).items()
     ]
     return np.dtype((np.record, parts))
 

@@ -1,117 +1,28 @@
-"""What the simulated vehicle is made of, and where each number comes from."""
+"""From the description of a vehicle to the numbers that the plant's kernels need."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, cast
 
 import numpy as np
 
-from sitl.plant.bodies import Chain
-from sitl.plant.vector import V3
+from sitl.air.load import SURFACES, Air
+from sitl.plant.aerial_manipulator import Drives, Plant, Rotors, Stops
+from sitl.plant.bodies import Chain, Points
+from sitl.plant.contact import Feet
+from sitl.plant.gears import gears
+from sitl.plant.packing import pack_params
+from sitl.plant.places import own_points
+from sitl.plant.state import JOINTS_MAX, PARTS_MAX, ROTORS_MAX
+from sitl.plant.vector import V3, Array
+from vehicles.description import Base, Link, Vehicle
+from vehicles.vehicle_file import inertia_matrix
 
 GRAVITY = 9.81  # m/s², along +z of NED
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """One link of the arm, its joint at the near end (standard DH convention)."""
-
-    a: float  # m, along x of the link frame
-    mass: float  # kg
-    com: V3  # m, in the link frame, whose origin is the far end
-    inertia: V3  # kg·m², principal values about the centre of mass along the link frame's axes
-    alpha: float = 0.0  # rad
-    d: float = 0.0  # m
-    theta_offset: float = 0.0  # rad
-
-
-def slender_link(length: float, mass: float, inertia: float) -> Link:
-    """A planar link of a ``length`` [m] and ``mass`` [kg], its centre of mass half-way.
-
-    ``inertia`` [kg·m²] is about either axis across the link, through the centre of mass; the paper
-    gives one per link. About the long axis we take a solid cylinder of 10 mm radius, m r²/2: small
-    beside the rest, but a body without it would not be physical.
-    """
-    along = 0.5 * mass * 0.01**2
-    return Link(
-        a=length, mass=mass, com=(-0.5 * length, 0.0, 0.0), inertia=(along, inertia, inertia)
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Rotors:
-    """Four rotors in '+': 1 rear, 2 left, 3 front, 4 right."""
-
-    arm: float = 0.3  # m, Table I
-    yaw_ratio: float = 0.016  # m, reaction torque per thrust (same laboratory's public model)
-    thrust_max: float = 2.0 * 3.5 * GRAVITY / 4.0  # N each: thrust-to-weight 2:1, our choice
-    lag: float = 0.04  # s, first order, our choice
-    quadratic: bool = False  # the speed lags, not the thrust
-
-
-@dataclass(frozen=True, slots=True)
-class Joints:
-    """Joint drives: a torque source behind friction."""
-
-    torque_max: float = 2.0  # N·m, our choice: ten times the arm's static load
-    viscous: float = 0.005  # N·m·s/rad
-    coulomb: float = 0.01  # N·m
-    coulomb_rate: float = 0.05  # rad/s, width of the smoothed sign change
-
-
-@dataclass(frozen=True, slots=True)
-class Motors:
-    """Of the joints, behind their gears; without inertia or gap by default."""
-
-    inertia: float = 0.0  # kg·m², as the joint feels it
-    backlash: float = 0.0  # rad, from one tooth to the other; needs an inertia
-
-
-@dataclass(frozen=True, slots=True)
-class EndStops:
-    """Springs and dampers that push a link back and never pull it.
-
-    Each is between a link and the base, as Table I's limits are: a parallelogram drives the second
-    link. An arm that reaches them at 5 rad/s with full torque behind it goes less than 4 deg
-    beyond, one that full torque has thrown across less than 8. On the lightest motion of the arm
-    spring and damper have poles at 1.4 / ms; RK4 is stable to 2.8.
-    """
-
-    # rad, either way, 3 deg beyond Table I; a link without an entry has none.
-    angle: tuple[float, ...] = (math.radians(63.0), math.radians(93.0))
-    stiffness: float = 600.0  # N·m/rad
-    damping: float = 0.6  # N·m·s/rad
-
-
-@dataclass(frozen=True, slots=True)
-class Legs:
-    """Four feet of a landing gear.
-
-    They reach 20 mm below the straight arm (0.30 m), so that a limp arm hangs free while the
-    vehicle stands, whatever its joints do.
-    """
-
-    spread: float = 0.2  # m, feet at (±spread, ±spread) in B
-    length: float = 0.32  # m, below the base origin
-    stiffness: float = 4000.0  # N/m each: 2 mm deep at rest
-    dissipation: float = 4.0  # s/m, Hunt–Crossley: normal force = k d (1 + c ḋ)
-    friction: float = 0.7  # Coulomb coefficient
-    slip_rate: float = 0.03  # m/s, width of the smoothed sign change
-
-
-@dataclass(frozen=True, slots=True)
-class Size:
-    """How far the vehicle reaches beyond its joints, feet and rotor hubs: our choice."""
-
-    hull: float = 0.08  # m, radius of a ball about the base origin: frame and battery
-    link: float = 0.02  # m, radius of an arm's link and of the joints between
-    tool: float = 0.025  # m, radius of a ball about the end-effector
-    leg: float = 0.01  # m, radius of a leg, from the base origin to a foot
-    blade: float = 0.165  # m, radius of a rotor: the blades' tips are 0.465 m from the base origin
-    disc: float = (
-        0.02  # m, half the height of what the blades sweep, as they flap and the hubs yield
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,73 +45,180 @@ class AirModel:
 
 
 @dataclass(frozen=True, slots=True)
-class Vehicle:
-    """The aerial manipulator; the defaults are the paper's Table I."""
+class Effects:
+    """What a vehicle meets in a flight and its file does not say; nothing by default."""
 
-    base_mass: float = 3.1  # kg, 3.5 in all
-    base_com: V3 = (0.0, 0.0, 0.0)  # m, in B
-    base_inertia: V3 = (0.3, 0.3, 0.6)  # kg·m², about the base's centre of mass
-    links: tuple[Link, ...] = (
-        slender_link(0.15, 0.2, 4.256e-5),
-        slender_link(0.15, 0.2, 8.321e-5),
-    )
-    mount: V3 = (0.0, 0.0, 0.0)  # m, joint 1 in B
-    rotors: Rotors = Rotors()
-    joints: Joints = Joints()
-    motors: Motors = Motors()
-    stops: EndStops = EndStops()
-    legs: Legs = Legs()
-    size: Size = Size()
     air: AirModel = AirModel()
+    motor_inertia: float = 0.0  # kg·m², of each joint's motor, beside its armature
+    backlash: float = 0.0  # rad, from one tooth to the other; needs an inertia
+    quadratic_thrust: bool = False  # the rotors' speed lags, not their thrust
     gravity: float = GRAVITY
 
-    @property
-    def mass(self) -> float:
-        """Total mass [kg]."""
-        return self.base_mass + sum(link.mass for link in self.links)
 
-    def scaled(self, mass: float, inertia: float) -> Vehicle:
-        """The same vehicle, masses times ``mass`` [1] and inertias times ``inertia`` [1]."""
-        return replace(
-            self,
-            base_mass=mass * self.base_mass,
-            base_inertia=_times(inertia, self.base_inertia),
-            links=tuple(
-                replace(link, mass=mass * link.mass, inertia=_times(inertia, link.inertia))
-                for link in self.links
-            ),
-        )
+def plant(vehicle: Vehicle, effects: Effects = Effects()) -> Plant:
+    """The numbers of a vehicle for the kernels, in one record of their own."""
+    copied: Plant = cast(Any, _packed(vehicle, effects)).copy()
+    return copied
 
 
-def _times(factor: float, v: V3) -> V3:
-    return (factor * v[0], factor * v[1], factor * v[2])
+@lru_cache(maxsize=16)
+def _packed(vehicle: Vehicle, effects: Effects) -> Plant:
+    # To put it together takes 2 ms, as long as all else that begins a flight.
+    joints, feet = vehicle.joints, vehicle.feet
+    inertia = np.array([joint.armature for joint in joints]) + effects.motor_inertia
+    numbers = Plant(
+        chain=chain(vehicle),
+        feet=Feet(
+            number=len(feet.positions),
+            points=_with_room(PARTS_MAX, feet.positions),
+            reach=max(math.hypot(*foot) for foot in feet.positions),
+            stiffness=feet.stiffness,
+            dissipation=feet.dissipation,
+            friction=feet.friction,
+            slip_rate=feet.slip_rate,
+        ),
+        rotors=rotors(vehicle, quadratic=effects.quadratic_thrust),
+        drives=Drives(
+            torque_max=_with_room(JOINTS_MAX, [joint.torque_max for joint in joints]),
+            viscous=_with_room(JOINTS_MAX, [joint.viscous for joint in joints]),
+            coulomb=_with_room(JOINTS_MAX, [joint.coulomb for joint in joints]),
+        ),
+        stops=_stops(vehicle),
+        gears=gears(inertia, effects.backlash),
+        air=_air(vehicle, effects.air),
+        points=_points(vehicle),
+        locked=np.zeros(JOINTS_MAX),
+        gravity=effects.gravity,
+    )
+    return pack_params(numbers)
 
 
 def chain(vehicle: Vehicle) -> Chain:
-    """The rigid bodies of a vehicle as arrays for the kernels.
-
-    DH frame 0 has z0 = +y_B (the joint axes) and x0 = +z_B (the arm hangs down at zero).
-    """
-    links = vehicle.links
-    diagonals = [vehicle.base_inertia, *(link.inertia for link in links)]
+    """The rigid bodies of a vehicle."""
+    frames = joint_axes(vehicle)
+    bodies: list[Base | Link] = [vehicle.base, *(joint.link for joint in vehicle.joints)]
+    turns, origins = [np.eye(3)], [np.zeros(3)]
+    for k, joint in enumerate(vehicle.joints, start=1):
+        turns.append(frames[k - 1].T @ _rotation(joint.rpy) @ frames[k])
+        origins.append(frames[k - 1].T @ joint.xyz)
+    origins.append(frames[-1].T @ vehicle.end_effector.position)
+    own = list(zip(frames, bodies, strict=True))
+    n = JOINTS_MAX + 1
     return Chain(
-        mount_R=np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
-        mount_p=np.array(vehicle.mount),
-        dh=np.array(
-            [(k.a, math.cos(k.alpha), math.sin(k.alpha), k.d, k.theta_offset) for k in links]
-        ).reshape(-1, 5),
-        mass=np.array([vehicle.base_mass, *(link.mass for link in links)]),
-        com=np.array([vehicle.base_com, *(link.com for link in links)]),
-        inertia=np.array([np.diag(diagonal) for diagonal in diagonals]),
+        joints=len(vehicle.joints),
+        turn=_with_room(n, turns),
+        origin=_with_room(n + 1, origins),
+        mass=_with_room(n, [body.mass for body in bodies]),
+        com=_with_room(n, [frame.T @ body.com for frame, body in own]),
+        inertia=_with_room(n, [f.T @ inertia_matrix(body.inertia) @ f for f, body in own]),
     )
 
 
-def level_reach(vehicle: Vehicle, angles: tuple[float, ...]) -> V3:
-    """End-effector in B of a planar arm at the given joint angles [m]."""
-    x, y, z = vehicle.mount
-    total = 0.0
-    for link, angle in zip(vehicle.links, angles, strict=True):
-        total += angle + link.theta_offset
-        x += link.a * math.sin(total)
-        z += link.a * math.cos(total)
-    return (x, y, z)
+def joint_axes(vehicle: Vehicle) -> list[Array]:
+    """Axes (3, 3) of the plant's frame of each body, in the frame that its description is in.
+
+    That of the base is the same; of a link it has the joint's axis along z.
+    """
+    found = [np.eye(3)]
+    for joint in vehicle.joints:
+        z = np.array(joint.axis)
+        helper = np.zeros(3)
+        helper[(int(np.argmax(np.abs(z))) + 1) % 3] = 1.0
+        x = helper - (helper @ z) * z
+        x /= np.linalg.norm(x)
+        found.append(np.column_stack([x, np.cross(z, x), z]))
+    return found
+
+
+def _rotation(rpy: V3) -> Array:
+    """Of roll, pitch and yaw [rad] about fixed axes, in this order, as in URDF."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    yaw = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
+    turned: Array = yaw @ pitch @ roll
+    return turned
+
+
+def rotors(vehicle: Vehicle, *, quadratic: bool = False) -> Rotors:
+    """The rotors of a vehicle; one that turns counter-clockwise turns the base clockwise."""
+    place = np.array([rotor.position for rotor in vehicle.rotors])
+    axis = np.array([rotor.axis for rotor in vehicle.rotors])
+    sign = [-1.0 if rotor.spin == "ccw" else 1.0 for rotor in vehicle.rotors]
+    lever = np.array([rotor.torque_per_thrust for rotor in vehicle.rotors]) * sign
+    return Rotors(
+        number=len(place),
+        place=_with_room(ROTORS_MAX, place),
+        axis=_with_room(ROTORS_MAX, axis),
+        moment=_with_room(ROTORS_MAX, np.cross(place, axis)),
+        reaction=_with_room(ROTORS_MAX, lever[:, None] * axis),
+        thrust_max=_with_room(ROTORS_MAX, [rotor.thrust_max for rotor in vehicle.rotors]),
+        lag=_with_room(ROTORS_MAX, [rotor.lag for rotor in vehicle.rotors]),
+        quadratic=int(quadratic),
+    )
+
+
+def effectiveness(vehicle: Vehicle) -> Array:
+    """Force [N, B] and moment [N·m, B] of the rotors, (6, r), for 1 N of each in free air."""
+    numbers = rotors(vehicle)
+    columns = np.hstack([numbers.axis, numbers.moment + numbers.reaction])
+    matrix: Array = columns[: numbers.number].T
+    return matrix
+
+
+def _stops(vehicle: Vehicle) -> Stops:
+    joints, beyond = vehicle.joints, vehicle.end_stops.beyond
+    rows = [
+        (tuple(unit), joint.position_min, joint.position_max)
+        for unit, joint in zip(np.eye(len(joints)), joints, strict=True)
+    ]
+    rows += [(limit.row, limit.minimum, limit.maximum) for limit in vehicle.coupled_limits]
+    room = JOINTS_MAX + PARTS_MAX
+    return Stops(
+        number=len(rows),
+        share=_with_room(room, [_with_room(JOINTS_MAX, row) for row, _, _ in rows]),
+        least=_with_room(room, [least - beyond for _, least, _ in rows]),
+        most=_with_room(room, [most + beyond for _, _, most in rows]),
+        stiffness=vehicle.end_stops.stiffness,
+        damping=vehicle.end_stops.damping,
+    )
+
+
+def _air(vehicle: Vehicle, model: AirModel) -> Air:
+    hubs = np.array([rotor.position for rotor in vehicle.rotors])
+    beside = np.zeros((ROTORS_MAX, ROTORS_MAX))
+    beside[: len(hubs), : len(hubs)] = np.linalg.norm(hubs[:, None] - hubs, axis=2)
+    planes = [(*normal, offset) for normal, offset in model.surfaces]
+    return Air(
+        active=int(model.active),
+        wind=np.zeros(3),
+        drag=vehicle.mass * np.array(model.rotor_drag),
+        area=model.drag_area,
+        density=model.density,
+        rotors=len(hubs),
+        radius=_with_room(ROTORS_MAX, [rotor.radius for rotor in vehicle.rotors]),
+        beside=beside,
+        ground=int(model.ground),
+        ceiling=int(model.ceiling),
+        suction=model.suction,
+        surfaces=_with_room(SURFACES, np.reshape(planes, (-1, 4))),
+        surface_count=len(planes),
+    )
+
+
+def _points(vehicle: Vehicle) -> Points:
+    points, frames = own_points(vehicle), joint_axes(vehicle)
+    places = [frames[body].T @ place for body, place in points]
+    return Points(
+        number=len(points),
+        body=_with_room(3 * PARTS_MAX, [body for body, _ in points]),
+        place=_with_room(3 * PARTS_MAX, np.reshape(places, (-1, 3))),
+    )
+
+
+def _with_room(room: int, rows: Sequence[object] | Array) -> Array:
+    """The rows with zeros behind them, so that a record of every vehicle has one layout."""
+    given = np.asarray(rows, dtype=np.float64)
+    out = np.zeros((room, *given.shape[1:]))
+    out[: len(given)] = given
+    return out

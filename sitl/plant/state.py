@@ -1,4 +1,8 @@
-"""The plant's state vector: the only place that knows which entry is what."""
+"""The plant's state vector: the only place that knows which entry is what.
+
+It is as long as the vehicle needs: 13 + r + 2j entries for r rotors and j joints. Records of
+kernels have room for the most of both instead, so that one compile serves every vehicle.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +11,38 @@ from typing import Final
 import numpy as np
 
 from sitl.plant.vector import V3, V4, Array
+from vehicles.description import JOINTS_MAX as JOINTS_MAX
+from vehicles.description import ROTORS_MAX as ROTORS_MAX
+
+PARTS_MAX: Final = 64  # that a vehicle has of feet, critical points, parts, and coupled limits each
 
 # First entry of each part; compiled kernels use these too (numba freezes them as constants).
 P_WB: Final = 0  # m, base origin, NED
 V_WB: Final = 3  # m/s, its velocity, NED
 Q_WB: Final = 6  # attitude [w, x, y, z], maps B to W
 W_WB_B: Final = 10  # rad/s, written in B
-THRUST: Final = 13  # N, of rotors 1..4
-ARM: Final = 17  # j angles [rad], then j rates [rad/s]
+THRUST: Final = 13  # N, of every rotor; then the joints' angles [rad], then their rates [rad/s]
+
+STATE_MAX: Final = THRUST + ROTORS_MAX + 2 * JOINTS_MAX
 
 
-def taken_apart(state: Array) -> tuple[V3, V3, V4, V3, V4, tuple[float, ...]]:
-    """Place, velocity, attitude, rate, thrusts and arm of a ``state`` (17 + 2j,) [SI]."""
+def taken_apart(
+    state: Array, rotors: int
+) -> tuple[V3, V3, V4, V3, tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """Place, velocity, attitude, rate, thrusts, angles, rates of a ``state`` (13 + r + 2j,) [SI].
+
+    The vehicle has so many ``rotors``.
+    """
     # As a list at once: a view into the vector costs as much as all of this.
-    px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, f1, f2, f3, f4, *arm = state.tolist()
-    q, thrust = (qw, qx, qy, qz), (f1, f2, f3, f4)
-    return (px, py, pz), (vx, vy, vz), q, (wx, wy, wz), thrust, tuple(arm)
+    px, py, pz, vx, vy, vz, qw, qx, qy, qz, wx, wy, wz, *rest = state.tolist()
+    joints = (len(rest) - rotors) // 2
+    thrust, angles, rates = rest[:rotors], rest[rotors : rotors + joints], rest[rotors + joints :]
+    motion = (px, py, pz), (vx, vy, vz), (qw, qx, qy, qz), (wx, wy, wz)
+    return *motion, tuple(thrust), tuple(angles), tuple(rates)
 
 
-def at_rest(joints: int) -> Array:
-    """State of a level vehicle at the origin, nothing moving, rotors off, arm straight down."""
-    state = np.zeros(ARM + 2 * joints)
+def at_rest(rotors: int, joints: int) -> Array:
+    """State of a level vehicle at the origin, nothing moving, rotors off, all joints at zero."""
+    state = np.zeros(THRUST + rotors + 2 * joints)
     state[Q_WB] = 1.0
     return state

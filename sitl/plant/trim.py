@@ -8,14 +8,18 @@ import numpy as np
 
 from sitl.plant.bodies import empty_posture, posture_into
 from sitl.plant.newton_euler import wrench_needed_into
-from sitl.plant.parameters import Vehicle, chain
+from sitl.plant.parameters import GRAVITY, chain, effectiveness
+from sitl.plant.vector import V3
+from vehicles.description import Vehicle
+
+_LEFT = 1e-9  # of the weight, what rotors may leave of a wrench
 
 
 @dataclass(frozen=True, slots=True)
 class Trim:
     """Actuator values of a static equilibrium."""
 
-    thrust: tuple[float, float, float, float]  # N, rotors 1..4
+    thrust: tuple[float, ...]  # (r,) N
     torque: tuple[float, ...]  # (j,) N·m
 
 
@@ -24,48 +28,46 @@ class NoTrimError(ValueError):
 
 
 def level_hover(vehicle: Vehicle, angles: tuple[float, ...]) -> Trim:
-    """Equilibrium of a level hover with the arm at ``angles`` [rad].
+    """Equilibrium of a level hover with the arm at ``angles`` [rad], at the least thrust squared.
 
     Raises:
         NoTrimError: A rotor or a joint would have to exceed its limit.
     """
-    joints = len(angles)
-    posture = empty_posture(joints)
-    bodies = chain(vehicle)
-    posture_into(bodies, np.array(angles), posture)
-    needed, zeros = np.empty(6 + joints), np.zeros(joints)
-    up = (0.0, 0.0, -vehicle.gravity)
-    still = (0.0, 0.0, 0.0)
+    posture, needed, zeros = empty_posture(), np.empty(6 + len(angles)), np.zeros(len(angles))
+    bodies, still = chain(vehicle), (0.0, 0.0, 0.0)
+    posture_into(bodies, np.array(angles), 0, posture)
+    up = (0.0, 0.0, -GRAVITY)
     wrench_needed_into(bodies, posture, still, still, up, zeros, zeros, needed)
-    rotors = vehicle.rotors
-    arm, ratio = rotors.arm, rotors.yaw_ratio
-    mixer = np.array(
-        [
-            [-1.0, -1.0, -1.0, -1.0],
-            [0.0, arm, 0.0, -arm],
-            [-arm, 0.0, arm, 0.0],
-            [ratio, -ratio, ratio, -ratio],
-        ]
-    )
-    f1, f2, f3, f4 = (float(f) for f in np.linalg.solve(mixer, needed[2:6]))
-    torque = tuple(float(t) for t in needed[6:])
-    for number, thrust in enumerate((f1, f2, f3, f4), start=1):
-        if not (0.0 <= thrust <= rotors.thrust_max):
+    effect = effectiveness(vehicle)
+    thrusts = np.linalg.pinv(effect) @ needed[:6]
+    left = np.abs(effect @ thrusts - needed[:6]).max()
+    if not (left <= _LEFT * vehicle.mass * GRAVITY):
+        raise NoTrimError(f"the rotors cannot hold the base level: {left:.2f} N or N·m are left")
+    for number, (thrust, rotor) in enumerate(zip(thrusts, vehicle.rotors, strict=True), start=1):
+        if not (-_LEFT <= thrust <= rotor.thrust_max):
             raise NoTrimError(
                 f"rotor {number} would need {thrust:.2f} N to hover, "
-                f"it can give 0 to {rotors.thrust_max:.2f} N"
+                f"it can give 0 to {rotor.thrust_max:.2f} N"
             )
-    for number, value in enumerate(torque, start=1):
-        if not (abs(value) <= vehicle.joints.torque_max):
+    for number, (torque, joint) in enumerate(zip(needed[6:], vehicle.joints, strict=True), start=1):
+        if not (abs(torque) <= joint.torque_max):
             raise NoTrimError(
-                f"joint {number} would need {value:.3f} N·m to hold the arm, "
-                f"it can give ±{vehicle.joints.torque_max:.3f} N·m"
+                f"joint {number} would need {torque:.3f} N·m to hold the arm, "
+                f"it can give ±{joint.torque_max:.3f} N·m"
             )
-    return Trim(thrust=(f1, f2, f3, f4), torque=torque)
+    return Trim(tuple(np.maximum(thrusts, 0.0).tolist()), tuple(needed[6:].tolist()))
 
 
 def standing_height(vehicle: Vehicle) -> float:
-    """Height of the base above ground at which the legs carry the vehicle [m]."""
-    legs = vehicle.legs
-    depth = vehicle.mass * vehicle.gravity / (4.0 * legs.stiffness)
-    return legs.length - depth
+    """Height of the base above ground at which the feet carry the vehicle [m]."""
+    feet = vehicle.feet
+    depth = vehicle.mass * GRAVITY / (len(feet.positions) * feet.stiffness)
+    return max(z for _, _, z in feet.positions) - depth
+
+
+def end_effector(vehicle: Vehicle, angles: tuple[float, ...]) -> V3:
+    """End-effector in B [m] with the joints at ``angles`` (j,) [rad]."""
+    posture = empty_posture()
+    posture_into(chain(vehicle), np.array(angles), 0, posture)
+    x, y, z = posture.origin[len(angles) + 1].tolist()
+    return (x, y, z)

@@ -12,6 +12,8 @@ from sitl.compiled import kernel
 Array: TypeAlias = npt.NDArray[np.float64]
 V3: TypeAlias = tuple[float, float, float]
 V4: TypeAlias = tuple[float, float, float, float]
+V6: TypeAlias = tuple[float, float, float, float, float, float]
+V8: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
 
 # Entries are picked by index, not through slices: a slice of an array inside a kernel costs a

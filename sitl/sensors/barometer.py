@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Barometer
 from sitl.sensors.measurements import PressureMeasurement
 from sitl.sensors.noise import GaussMarkov, normal, rounded
@@ -46,7 +46,7 @@ class BarometerSensor:
         self._drift = GaussMarkov((keys.drift_pa,), keys.drift_time_s, period_s, random)
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> PressureMeasurement:
         """A pressure; an outlier is off by a fixed amount, up or down."""
         keys = self._keys

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Timing
 from sitl.sensors.measurements import Measurement
 
@@ -19,7 +19,7 @@ class Sensor(Protocol):
     """One sensor of one flight."""
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> Measurement | None:
         """What it says about the vehicle now, or an outlier; None where it cannot measure.
 
@@ -65,7 +65,7 @@ class Channel:
         self._newest_us = -math.inf  # arrival of the newest message
         self._under_way: deque[tuple[float, Measurement]] = deque()
 
-    def step(self, exact: SensorReadings, thrust: V4, out: list[Measurement]) -> None:
+    def step(self, exact: SensorReadings, thrust: Thrusts, out: list[Measurement]) -> None:
         """Measure if it is time, and append what arrives in this step, the oldest first.
 
         The rotors give ``thrust`` [N].
@@ -87,7 +87,7 @@ class Channel:
             out.append(under_way.popleft()[1])
         self.next_us = min(under_way[0][0], self._due_us) if under_way else self._due_us
 
-    def measure(self, exact: SensorReadings, thrust: V4) -> None:
+    def measure(self, exact: SensorReadings, thrust: Thrusts) -> None:
         """Measure if it is time, and send; the rotors give ``thrust`` [N]."""
         t_us = exact.t_us
         if t_us < self._due_us:
@@ -103,7 +103,7 @@ class Channel:
             self._under_way.append((arrives_us, said))
         self.next_us = min(self._under_way[0][0], self._due_us) if self._under_way else self._due_us
 
-    def _sensed(self, exact: SensorReadings, thrust: V4, outlier: bool) -> Measurement | None:
+    def _sensed(self, exact: SensorReadings, thrust: Thrusts, outlier: bool) -> Measurement | None:
         """What the sensor says at a tick of its clock, of which the next one is then due."""
         t_us = exact.t_us
         self._due_us += self._period_us

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Encoders
 from sitl.sensors.measurements import JointMeasurement
 from sitl.sensors.noise import normal
@@ -24,7 +24,7 @@ class EncoderSensor:
         self._offsets: list[tuple[float, ...]] = []
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> JointMeasurement:
         """All angles; an outlier has a wrong bit, in the first joint."""
         offset = self._offset

@@ -10,6 +10,7 @@ from sitl.scenario import V3, Sensors
 from sitl.seeds import stream
 
 V4 = tuple[float, float, float, float]
+Thrusts = tuple[float, ...]  # (r,) N, of every rotor
 T = TypeVar("T")
 
 

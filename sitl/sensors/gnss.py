@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from sitl.earth import RADIUS
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Gnss
 from sitl.sensors.measurements import GnssMeasurement
 from sitl.sensors.noise import GaussMarkov, anywhere, digits
@@ -29,7 +29,7 @@ class GnssSensor:
         self._vertical = math.hypot(keys.vertical_m, down)
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> GnssMeasurement:
         """Position and velocity; an outlier's position is off by a fixed length."""
         keys, (x, y, z), (vx, vy, vz) = self._keys, exact.p_WB, exact.v_WB

@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from sitl.compiled import kernel, machine_code
 from sitl.plant.packing import pack_params
-from sitl.plant.vector import V3, V4, Array, times
-from sitl.sensors.exact import SensorReadings
+from sitl.plant.state import ROTORS_MAX
+from sitl.plant.vector import V3, V6, V8, Array, times
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Imu
 from sitl.sensors.measurements import ImuMeasurement
 from sitl.sensors.noise import GaussMarkov, normal
-
-V6: TypeAlias = tuple[float, float, float, float, float, float]
 
 _BLOCK = 25  # samples for which a bias is held
 _BLOCKS = 10  # drawn at once, in the order in which one by one would be
@@ -36,11 +35,12 @@ class _Errors(NamedTuple):
     vibration: Array  # (2,) rad/s, m/s², of one rotor in hover
     hover_thrust: float  # N, of one rotor
     turn: float  # rad, of a rotor in hover from one sample to the next
-    phase: Array  # (4,) rad, where each rotor stands; moved on by the kernel
+    spin: Array  # (8,) 1 of a rotor that turns counter-clockwise, -1 clockwise, 0 where none is
+    phase: Array  # (8,) rad, where each rotor stands; moved on by the kernel
 
 
 @kernel
-def vibrate(errors: _Errors, thrust: V4) -> V3:
+def vibrate(errors: _Errors, thrust: V8) -> V3:
     """Turn the rotors on by one sample; the unbalance of all, as a share of one in hover, B.
 
     An unbalance pulls outwards in the plane of the disc; the blades shake along the axis twice a
@@ -48,14 +48,16 @@ def vibrate(errors: _Errors, thrust: V4) -> V3:
     """
     x, y, z = 0.0, 0.0, 0.0
     phase = errors.phase
-    for i in range(4):
+    for i in range(ROTORS_MAX):
+        if errors.spin[i] == 0.0:
+            continue
         share = max(thrust[i], 0.0) / errors.hover_thrust
         at = phase[i] + errors.turn * np.sqrt(share)
         at -= 2.0 * np.pi * np.floor(at / (2.0 * np.pi))
         phase[i] = at
         c, s = np.cos(at), np.sin(at)
         x += share * c
-        y += share * s if i % 2 == 0 else -share * s  # neighbours turn the other way
+        y += errors.spin[i] * share * s
         z += share * c * s  # half of sin 2φ
     return (x, y, z)
 
@@ -70,7 +72,7 @@ def _digit(value: float, limit: float, resolution: float) -> float:
 
 
 @kernel
-def _measure(units: Sequence[_Errors], rate: V3, force: V3, thrust: V4, offset: V6) -> V6:
+def _measure(units: Sequence[_Errors], rate: V3, force: V3, thrust: V8, offset: V6) -> V6:
     """What a unit makes of the truth; ``offset`` is its bias and noise in this sample."""
     errors = units[0]
     w, a = times(errors.gyro, rate), times(errors.accel, force)
@@ -93,8 +95,19 @@ def _measure(units: Sequence[_Errors], rate: V3, force: V3, thrust: V4, offset: 
 class ImuSensor:
     """One unit of one flight."""
 
-    def __init__(self, keys: Imu, random: np.random.Generator, hover_thrust: float) -> None:
-        """Draw what this flight's unit is like; a rotor gives ``hover_thrust`` [N] in hover."""
+    def __init__(
+        self,
+        keys: Imu,
+        random: np.random.Generator,
+        hover_thrust: float,
+        spins: Sequence[float],
+    ) -> None:
+        """Draw what this flight's unit is like; a rotor gives ``hover_thrust`` [N] in hover.
+
+        Of every rotor ``spins`` says 1 if it turns counter-clockwise, -1 if clockwise.
+        """
+        count = len(spins)
+        self._room = (0.0,) * (ROTORS_MAX - count)
         self._random = random
         errors = _Errors(
             gyro=_distorted(random, keys.gyro_scale_share, math.radians(keys.misalignment_deg)),
@@ -104,7 +117,8 @@ class ImuSensor:
             vibration=np.array([keys.vibration_rad_s, keys.vibration_m_s2]),
             hover_thrust=hover_thrust,
             turn=2.0 * math.pi * keys.rotor_hz / keys.rate_hz,
-            phase=random.uniform(0.0, 2.0 * math.pi, 4),
+            spin=np.array([*spins, *self._room]),
+            phase=np.array([*random.uniform(0.0, 2.0 * math.pi, count), *self._room]),
         )
         turn_on = normal(random, keys.gyro_turn_on_rad_s, 3)
         turn_on += normal(random, keys.accel_turn_on_m_s2, 3)
@@ -118,11 +132,11 @@ class ImuSensor:
         self._offsets: list[V6] = []  # of the samples to come, the next one last
         self._units = cast(Sequence[_Errors], np.array([pack_params(errors)]))
         none = (0.0, 0.0, 0.0)
-        still: V4 = (0.0, 0.0, 0.0, 0.0)
+        still = (0.0,) * ROTORS_MAX
         self._code = machine_code(_measure, self._units, none, none, still, (*none, *none))
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> ImuMeasurement:
         """A reading; an outlier is a spike to an end of the range.
 
@@ -134,7 +148,8 @@ class ImuSensor:
         if outlier:
             rate, force = (_SPIKE, -_SPIKE, _SPIKE), (_SPIKE, -_SPIKE, _SPIKE)
         code, units, offset = self._code, self._units, self._offsets.pop()
-        x, y, z, ax, ay, az = code(units, rate, force, thrust, offset)
+        every = cast(V8, (*thrust, *self._room))
+        x, y, z, ax, ay, az = code(units, rate, force, every, offset)
         return ImuMeasurement(stamp_us, (x, y, z), (ax, ay, az))
 
     def _drawn(self) -> list[V6]:

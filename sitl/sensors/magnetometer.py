@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import V4, SensorReadings, Thrusts
 from sitl.sensors.keys import Magnetometer
 from sitl.sensors.measurements import MagneticMeasurement
 from sitl.sensors.noise import anywhere, normal, rounded
@@ -20,7 +20,7 @@ class MagnetometerSensor:
         self._scale = [1.0 + error for error in normal(random, keys.scale_share, 3)]
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> MagneticMeasurement:
         """A field; an outlier has a disturbance of a fixed size in any direction."""
         keys, field = self._keys, _in_body(exact.q_WB, self._keys.field_gauss)

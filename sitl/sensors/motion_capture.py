@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sitl.sensors.exact import V4, SensorReadings, turned
+from sitl.sensors.exact import SensorReadings, Thrusts, turned
 from sitl.sensors.keys import MotionCapture
 from sitl.sensors.measurements import PoseMeasurement
 from sitl.sensors.noise import anywhere, digits, rounded
@@ -21,7 +21,7 @@ class MotionCaptureSensor:
         self._attitude_rad = math.radians(keys.attitude_deg)
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> PoseMeasurement:
         """A pose in the digits that it has."""
         return in_digits(self.seen(exact, stamp_us, outlier), self._keys)

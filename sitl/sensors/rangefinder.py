@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Rangefinder
 from sitl.sensors.measurements import RangeMeasurement
 from sitl.sensors.noise import normal, rounded
@@ -19,7 +19,7 @@ class RangefinderSensor:
         self._scale = 1.0 + normal(random, keys.scale_share, 1)[0]
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> RangeMeasurement | None:
         """A distance; None out of range. An outlier is too short, as of an insect or dust."""
         keys, (_, x, y, _) = self._keys, exact.q_WB

@@ -7,7 +7,7 @@ from sitl.seeds import stream
 from sitl.sensors.barometer import BarometerSensor
 from sitl.sensors.channel import Channel, Sensor
 from sitl.sensors.encoders import EncoderSensor
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.gnss import GnssSensor
 from sitl.sensors.imu import ImuSensor
 from sitl.sensors.keys import MeasuredSensors, Timing
@@ -16,6 +16,7 @@ from sitl.sensors.measurements import Measurement
 from sitl.sensors.motion_capture import MotionCaptureSensor
 from sitl.sensors.rangefinder import RangefinderSensor
 from sitl.sensors.visual_odometry import VisualOdometrySensor
+from vehicles.description import Vehicle
 
 
 class SensorSuite:
@@ -31,11 +32,11 @@ class SensorSuite:
         seed: int,
         start_us: int,
         *,
-        joints: int,
+        vehicle: Vehicle,
         hover_thrust: float,
         origin: Place = DEFAULT_ORIGIN,
     ) -> None:
-        """Draw the sensors of this flight, which begins at the stamp ``start_us``.
+        """Draw the sensors of a ``vehicle`` for a flight that begins at the stamp ``start_us``.
 
         A rotor gives ``hover_thrust`` [N] in hover; the local frame begins at ``origin``.
         """
@@ -66,13 +67,15 @@ class SensorSuite:
             name, ray = "rangefinder", one.rangefinder
             add(name, ray, RangefinderSensor(ray, stream(seed, "sensor", name)))
         name = "encoders"
-        encoders = EncoderSensor(one.encoders, stream(seed, "sensor", name), joints)
+        encoders = EncoderSensor(one.encoders, stream(seed, "sensor", name), len(vehicle.joints))
         add(name, one.encoders, encoders)
-        add("imu", one.imu, ImuSensor(one.imu, stream(seed, "sensor", "imu"), hover_thrust))
+        spins = [1.0 if rotor.spin == "ccw" else -1.0 for rotor in vehicle.rotors]
+        unit = ImuSensor(one.imu, stream(seed, "sensor", "imu"), hover_thrust, spins)
+        add("imu", one.imu, unit)
         self._late = [channel for channel in self._channels if channel.late]
-        self._last: tuple[SensorReadings, V4] | None = None  # which they have not measured yet
+        self._last: tuple[SensorReadings, Thrusts] | None = None  # which they have not measured yet
 
-    def step(self, exact: SensorReadings, thrust: V4) -> list[Measurement]:
+    def step(self, exact: SensorReadings, thrust: Thrusts) -> list[Measurement]:
         """What arrives in the step of the exact readings; to be called once a step.
 
         The rotors give ``thrust`` [N].

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from sitl.ranges import V3
-from sitl.sensors.exact import V4, SensorReadings
+from sitl.sensors.exact import V4, SensorReadings, Thrusts
 from sitl.sensors.keys import VisualOdometry
 from sitl.sensors.measurements import PoseMeasurement
 from sitl.sensors.motion_capture import MotionCaptureSensor, in_digits
@@ -37,7 +37,7 @@ class VisualOdometrySensor:
         self._recognises_share = period_s / keys.recognises_every_s
 
     def measure(
-        self, exact: SensorReadings, thrust: V4, stamp_us: int, outlier: bool
+        self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> PoseMeasurement:
         """A pose in the frame as it is now."""
         if self._begun:

@@ -24,7 +24,7 @@ from sitl.scenario_file import (
     ScenarioError,
     build_table,
     load_scenario,
-    points_file,
+    named_files,
     suite_of,
 )
 from sitl.scenario_validation import check
@@ -337,10 +337,16 @@ def _plan(
 
 
 def _files(scenarios: tuple[str, ...], folder: Path) -> tuple[str, ...]:
-    """Scenarios beside the campaign file, and the points that they name beside themselves."""
+    """Scenarios beside the campaign file, and the points and vehicles that they name."""
     found = [name for name in scenarios if name.endswith(".toml")]
-    points = [points_file(folder / name) for name in found]
-    return (*found, *(str(one.relative_to(folder)) for one in points if one is not None))
+    for one in [one for name in found for one in named_files(folder / name)]:
+        if one.is_absolute() != folder.is_absolute() or ".." in one.parts[len(folder.parts) :]:
+            raise CampaignError(
+                f'scenarios: the file "{one}" that one of them names must be beside the campaign '
+                "file or in a folder there, so that the campaign can be kept as a whole"
+            )
+        found.append(str(one.relative_to(folder)))
+    return tuple(dict.fromkeys(found))
 
 
 def _scenario(

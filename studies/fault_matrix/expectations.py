@@ -14,6 +14,7 @@ from command_line.bounded_toml import TomlError, toml_table
 from sitl.faults.keys import Fault, Kind, Unit, instances
 from sitl.scenario_file import SUITE_NAMES, build_table
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight, is_believed
+from vehicles.vehicle_file import load_vehicle
 
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
 ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
@@ -194,7 +195,7 @@ def _more(table: dict[str, Any]) -> tuple[Fault, ...]:
 
 def _instances(table: dict[str, Any], unit: Unit) -> list[int]:
     """Which of a unit fail, each in a flight of its own."""
-    found, most = table.get("instances", [0]), instances(unit)
+    found, most = table.get("instances", [0]), instances(unit, load_vehicle("paper"))
     allowed = f"whole numbers from 0 (all) to {most}" if most else "0 alone: there is one"
     if not isinstance(found, list):
         raise ExpectationError(

@@ -22,6 +22,7 @@ from sitl.seeds import stream
 from studies.fault_matrix.expectations import ACTIONS, Expectation, Expected, NotFlown
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight, fly, is_believed
 from studies.fault_matrix.matrix import Cell, Judged, sound_seed, without_natural
+from vehicles.vehicle_file import load_vehicle
 
 KNOWN_LIMITS: Final = Path(__file__).with_name("known_limits.toml")
 FINDINGS: Final = ("wall", "ground", "lost", "silent", "no flight")
@@ -125,7 +126,7 @@ def _fault(random: np.random.Generator, latest_s: float) -> Fault:
     kind = cast(Kind, str(random.choice(KINDS[unit])))
     sensor = unit in SENSORS
     sign = float(random.choice((-1.0, 1.0))) if sensor else 1.0
-    most = instances(unit)
+    most = instances(unit, load_vehicle("paper"))
     drawn = {
         "start_s": round(float(random.uniform(0.0, latest_s)), 2),
         "duration_s": between(0.05, 6.0) if random.random() < 0.5 else 0.0,

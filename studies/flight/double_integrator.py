@@ -22,11 +22,11 @@ from fsw.autopilot.model.nominal import REST_STATE
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Plan, PlanInput, PlanRequest, PredictionState
 from sitl.disturbances.items import push
-from sitl.flight_evaluator import FlightEvaluator, Points
+from sitl.flight_evaluator import FlightEvaluator
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
 from sitl.result import EndReason, TruthResult
-from sitl.scenario import V3, Scenario
+from sitl.scenario import V3, Scenario, start_angles
 from sitl.scenario_validation import check
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
 from studies.flight.collector import collector_off
@@ -64,6 +64,9 @@ def after(state: PredictionState, u: PlanInput, push_W: V3, dt: float) -> Predic
         q_arm=(q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
         qd_arm=(qd1 + dt * qdd1, qd2 + dt * qdd2),
     )
+
+
+Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
 
 
 def points(state: PredictionState) -> Points:
@@ -115,7 +118,7 @@ class DoubleIntegrator:
         now = points(self.state)
         self.evaluator.judge(_places(now), self.time_s, _STEP_S)
         if self.step % SAMPLE_STEPS == 0:
-            self.evaluator.sample_error(now, self.time_s)
+            self.evaluator.sample_error(_places(now), self.time_s)
         self.evaluator.judge_time(self.time_s)
 
     def result(self) -> TruthResult:
@@ -176,7 +179,7 @@ def simulate(
 
 
 def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:
-    th1, th2 = (math.radians(angle) for angle in scenario.start.arm_deg)
+    th1, th2 = start_angles(scenario)
     at_origin = REST_STATE._replace(yaw=math.radians(scenario.start.yaw_deg), q_arm=(th1, th2))
     return at_origin._replace(p=subtract(p_target, points(at_origin)[2]))
 

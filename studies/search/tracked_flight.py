@@ -23,12 +23,13 @@ from fsw.autopilot.tick_record import FILTER_ACTED, Accelerations, PlanState, Ti
 from fsw.compiled import compilable, packed
 from sitl.body import Parts
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import Inputs, Plant, plant
+from sitl.plant.aerial_manipulator import Inputs, Plant
 from sitl.plant.integrator import STEP_S, Held, held, integrate
-from sitl.plant.parameters import GRAVITY
+from sitl.plant.parameters import GRAVITY, plant
+from sitl.plant.state import JOINTS_MAX, ROTORS_MAX
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, SUBSTEPS
-from sitl.start import flown_vehicle
+from sitl.start import effects, flown_vehicle
 from sitl.trajectory import place_on_curve
 from sitl.world import Headroom, World, ZoneTable, fill_margins, headroom, record_if_clear
 from studies.search.plan_record import PlanRecord, Start
@@ -61,7 +62,7 @@ class TrackedFlight:
         cascade = Cascade(config.airframe, config.tuning, config.inner, tick, keep_clear(config))
         self._law = np.asarray(packed(cascade.law))
         self._probes = cascade.probes
-        self._plants = np.array([plant(flown_vehicle(scenario))])
+        self._plants = np.array([plant(flown_vehicle(scenario), effects(scenario))])
         self._record = flown
         self._world, clock = World(scenario), MissionClock(scenario)
         assert clock.starts_s is not None  # it starts in the air
@@ -98,7 +99,7 @@ class TrackedFlight:
             places,
             lowest,
             headroom(self._world.table, len(lowest), places.shape[1]),
-            held(2),
+            held(),
         )
         return kept[:flown], float(lowest.min(initial=np.inf))
 
@@ -142,7 +143,7 @@ def _track(
     reading[6], reading[15] = 1.0, -GRAVITY
     r: Tick = ticks[0]
     top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
-    thrust, torque = np.empty(4), np.empty(2)
+    thrust, torque = np.zeros(ROTORS_MAX), np.zeros(JOINTS_MAX)
     for k in range(kept.shape[0]):
         planned, ahead = rows[k], rows[k + 1]
         _take_plan(planned, r.plan, r.u)

@@ -18,11 +18,13 @@ import pytest
 from messages.frames import FrameWriter, Losses
 from messages.stream_reader import StreamReader
 from pandion.px4 import main
-from sitl.plant.actuators import rotor_torque
-from sitl.plant.parameters import Rotors, Vehicle
+from sitl.plant.parameters import effectiveness
 from sitl.px4_parameters import px4_parameters
 from sitl.scenario_file import SUITE_NAMES, load_scenario
 from sitl.sensors.keys import MeasuredSensors
+from tests.sitl.vehicles import random_vehicle
+from vehicles.description import Vehicle
+from vehicles.vehicle_file import load_vehicle
 
 PARAM_REQUEST_READ, PARAM_VALUE, PARAM_SET, SET_GPS_GLOBAL_ORIGIN = 20, 22, 23, 48
 MEASURED = [name for name in SUITE_NAMES if name != "perfect"]
@@ -41,23 +43,23 @@ def printed(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, str]:
 
 
 VEHICLES = [
-    Vehicle(),
-    replace(Vehicle(), rotors=Rotors(arm=0.174, yaw_ratio=0.02, thrust_max=8.55, lag=0.02)),
+    load_vehicle("paper"),
+    random_vehicle(2, 4, np.random.default_rng(0)),
+    random_vehicle(3, 6, np.random.default_rng(0)),
 ]
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_the_geometry_is_that_of_the_plant(vehicle: Vehicle) -> None:
-    """PX4 takes a rotor for a thrust along -z at its place, with KM times it about +z."""
+    """PX4 takes a rotor for a thrust along its axis at its place, with KM times it against it."""
     values = px4_parameters(vehicle, sensors("mocap"), 250)
-    rotors = vehicle.rotors
-    for k in range(4):
-        thrust = tuple(float(k == other) for other in range(4))
+    effect = effectiveness(vehicle)
+    assert values["CA_ROTOR_COUNT"] == len(vehicle.rotors)
+    for k in range(len(vehicle.rotors)):
         place = np.array([values[f"CA_ROTOR{k}_P{axis}"] for axis in "XYZ"])
-        moment = np.cross(place, (0.0, 0.0, -1.0)) + (0.0, 0.0, values[f"CA_ROTOR{k}_KM"])
-        assert moment == pytest.approx(
-            rotor_torque(thrust, thrust, rotors.arm, rotors.yaw_ratio)  # type: ignore[arg-type]
-        )
+        up = [values.get(f"CA_ROTOR{k}_A{axis}", -float(axis == "Z")) for axis in "XYZ"]
+        moment = np.cross(place, up) - np.multiply(values[f"CA_ROTOR{k}_KM"], up)
+        assert np.concatenate([up, moment]) == pytest.approx(effect[:, k], abs=1e-15)
 
 
 def test_the_papers_vehicle_has_the_values_that_were_flown_with_px4(
@@ -82,12 +84,18 @@ def test_the_papers_vehicle_has_the_values_that_were_flown_with_px4(
 
 
 def test_the_rate_loop_keeps_its_bandwidth_on_another_vehicle() -> None:
-    for vehicle in VEHICLES:
-        values, rotors = px4_parameters(vehicle, sensors("mocap"), 250), vehicle.rotors
-        lever = math.sqrt(2.0) * rotors.arm * rotors.thrust_max / vehicle.base_inertia[0]
+    """A roll of 1 changes the thrust of two rotors of a '+' by 0.707 of the full one."""
+    paper = VEHICLES[0]
+    small = [
+        replace(one, position=tuple(0.58 * x for x in one.position), thrust_max=8.55, lag=0.02)
+        for one in paper.rotors
+    ]
+    for vehicle in (paper, replace(paper, rotors=tuple(small))):
+        values, rotor = px4_parameters(vehicle, sensors("mocap"), 250), vehicle.rotors[3]
+        lever = math.sqrt(2.0) * rotor.position[1] * rotor.thrust_max / vehicle.base.inertia[0]
         assert values["MC_ROLLRATE_P"] * lever == pytest.approx(17.0, rel=0.01)
         assert values["MC_ROLLRATE_D"] / values["MC_ROLLRATE_P"] == pytest.approx(
-            rotors.lag, rel=0.01
+            rotor.lag, rel=0.01
         )
 
 
@@ -107,7 +115,7 @@ def test_a_heavier_vehicle_hovers_at_more_thrust(
 @pytest.mark.parametrize("suite", MEASURED)
 def test_px4_fuses_what_the_suite_has(suite: str) -> None:
     one = sensors(suite)
-    values = px4_parameters(Vehicle(), one, 250)
+    values = px4_parameters(VEHICLES[0], one, 250)
     assert values["SYS_HAS_MAG"] == (one.magnetometer is not None)
     assert values["SYS_HAS_BARO"] == (one.barometer is not None)
     assert values["SYS_HAS_GPS"] == (one.gnss is not None)
@@ -150,7 +158,7 @@ def a_px4() -> Iterator[tuple[str, dict[str, float], list[tuple[float, ...]]]]:
     held: dict[str, float] = {}
     origins: list[tuple[float, ...]] = []
     server = socket.create_server(("127.0.0.1", 0))
-    values = px4_parameters(Vehicle(), sensors("mocap"), 250)
+    values = px4_parameters(VEHICLES[0], sensors("mocap"), 250)
 
     def serve() -> None:
         client, _ = server.accept()

@@ -45,6 +45,7 @@ from tests.messages.test_ulog import written
 from tests.replay import recorded
 from tests.view import flights
 from tests.view.test_telemetry import a_log
+from vehicles.vehicle_file import load_vehicle
 from view.log_flight import LogFlight
 from view.tlog_flight import TlogFlight
 
@@ -182,7 +183,7 @@ def _vehicle_replies(stack: ExitStack) -> Try:
     encoder, done = StepEncoder(lockstep=True), Answer(0, "fault injected")
 
     def attempt(data: bytes) -> None:
-        reply = read_reply(b"".join(_valid_frames(data, _REPLIES)) or data, 2)
+        reply = read_reply(b"".join(_valid_frames(data, _REPLIES)) or data, load_vehicle("paper"))
         for one in () if reply is None else reply.injections:
             encoder.answer(one, done)
 

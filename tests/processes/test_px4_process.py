@@ -13,13 +13,14 @@ from typing import Any
 
 import pytest
 
-from sitl.plant.parameters import Vehicle
 from tests.px4_stand_in import Airframe, Connected, Px4StandIn, Wish
+from vehicles.vehicle_file import load_vehicle
 
-VEHICLE = Vehicle()
+VEHICLE = load_vehicle("paper")
+FRONT = VEHICLE.rotors[2]
 AIRFRAME = Airframe(
-    VEHICLE.mass, VEHICLE.base_inertia, VEHICLE.rotors.arm, VEHICLE.rotors.yaw_ratio,
-    VEHICLE.rotors.thrust_max,
+    VEHICLE.mass, VEHICLE.base.inertia[:3], FRONT.position[0], FRONT.torque_per_thrust,
+    FRONT.thrust_max,
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The same vehicle built in Pinocchio, from the parameters alone (none of our kinematics)."""
+"""The same vehicle built in Pinocchio, from its description alone (none of our kinematics)."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from sitl.plant.parameters import Link, Vehicle
+from sitl.plant.parameters import GRAVITY
 from sitl.plant.vector import Array
+from vehicles.description import Base, Link, Vehicle
 
 
-def _dh_tail(link: Link) -> Any:
-    """From the turned joint frame to the next one: d along z, a along x, alpha about x."""
-    return pin.SE3(pin.utils.rotate("x", link.alpha), np.array([link.a, 0.0, link.d]))
+def _inertia(body: Base | Link) -> Any:
+    xx, yy, zz, xy, xz, yz = body.inertia
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return pin.Inertia(body.mass, np.array(body.com), matrix)
 
 
-def _turned(angle: float) -> Any:
-    return pin.SE3(pin.utils.rotate("z", angle), np.zeros(3))
+def pinocchio_model(vehicle: Vehicle, gravity: float = GRAVITY, motor: float = 0.0) -> Any:
+    """A free-flyer with one unaligned revolute joint per link; gravity along +z (NED).
 
-
-def pinocchio_model(vehicle: Vehicle) -> Any:
-    """A free-flyer with one revolute z joint per link; gravity along +z (NED)."""
+    Each joint carries its armature and a ``motor`` [kg·m²].
+    """
     model = pin.Model()
-    model.gravity.linear = np.array([0.0, 0.0, vehicle.gravity])
+    model.gravity.linear = np.array([0.0, 0.0, gravity])
     parent = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
-    base = pin.Inertia(vehicle.base_mass, np.array(vehicle.base_com), np.diag(vehicle.base_inertia))
-    model.appendBodyToJoint(parent, base, pin.SE3.Identity())
-    # z0 = +y_B and x0 = +z_B: the cyclic permutation of the axes.
-    place = pin.SE3(np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]), np.array(vehicle.mount))
-    for number, link in enumerate(vehicle.links):
-        joint = place * _turned(link.theta_offset)
-        parent = model.addJoint(parent, pin.JointModelRZ(), joint, f"joint{number}")
-        inertia = pin.Inertia(link.mass, np.array(link.com), np.diag(link.inertia))
-        place = _dh_tail(link)
-        model.appendBodyToJoint(parent, inertia, place)
+    model.appendBodyToJoint(parent, _inertia(vehicle.base), pin.SE3.Identity())
+    for joint in vehicle.joints:
+        place = pin.SE3(pin.rpy.rpyToMatrix(*joint.rpy), np.array(joint.xyz))
+        turn = pin.JointModelRevoluteUnaligned(np.array(joint.axis))
+        parent = model.addJoint(parent, turn, place, joint.name)
+        model.appendBodyToJoint(parent, _inertia(joint.link), pin.SE3.Identity())
+    model.armature[6:] = [joint.armature + motor for joint in vehicle.joints]
+    tool = pin.SE3(np.eye(3), np.array(vehicle.end_effector.position))
+    model.addFrame(pin.Frame("tool", parent, tool, pin.FrameType.OP_FRAME))
     return model
 
 

@@ -61,11 +61,11 @@ def airframe(simulation: Simulation) -> Airframe:
     vehicle = simulation.vehicle
     return Airframe(
         mass=vehicle.mass,
-        inertia=vehicle.base_inertia,
-        arm=vehicle.rotors.arm,
-        yaw_ratio=vehicle.rotors.yaw_ratio,
-        thrust_max=vehicle.rotors.thrust_max,
-        joints=len(vehicle.links),
+        inertia=vehicle.base.inertia[:3],
+        arm=vehicle.rotors[2].position[0],
+        yaw_ratio=vehicle.rotors[0].torque_per_thrust,
+        thrust_max=vehicle.rotors[0].thrust_max,
+        joints=len(vehicle.joints),
     )
 
 
@@ -88,8 +88,7 @@ def fly(
         connected = Connected(stand_in, port)
         connected.start()
         assert wait_for_px4(stream, 10.0, stop)
-        joints = len(simulation.vehicle.links)
-        exchange = Px4Exchange(stream, joints, 1.0 / rate_hz, stop)
+        exchange = Px4Exchange(stream, simulation.vehicle, 1.0 / rate_hz, stop)
         timing = serve_px4(
             *(simulation, exchange, Px4Encoder(DEFAULT_ORIGIN), stop),
             *(lambda *_: None, trace.add, lambda _: None),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sitl.plant.state import ARM, P_WB, Q_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.state import P_WB, Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
 
 
@@ -12,12 +12,8 @@ from sitl.plant.vector import Array
 class StateView:
     """Named views into one state vector (writing through them changes it)."""
 
-    vector: Array  # (17 + 2j,)
-
-    @property
-    def joints(self) -> int:
-        """Number of joints."""
-        return int(self.vector.shape[0] - ARM) // 2
+    vector: Array  # (13 + r + 2j,)
+    joints: int = 2
 
     @property
     def p_WB(self) -> Array:
@@ -41,15 +37,15 @@ class StateView:
 
     @property
     def thrust(self) -> Array:
-        """(4,) N."""
-        return self.vector[THRUST:ARM]
+        """(r,) N."""
+        return self.vector[THRUST : len(self.vector) - 2 * self.joints]
 
     @property
     def q_arm(self) -> Array:
         """(j,) rad."""
-        return self.vector[ARM : ARM + self.joints]
+        return self.vector[-2 * self.joints : -self.joints]
 
     @property
     def qd_arm(self) -> Array:
         """(j,) rad/s."""
-        return self.vector[ARM + self.joints :]
+        return self.vector[-self.joints :]

@@ -2,115 +2,135 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from sitl.plant.actuators import joint_torque, rotor_torque
-from sitl.plant.aerial_manipulator import (
-    Inputs,
-    acceleration_into,
-    empty_workspace,
-    plant,
-)
-from sitl.plant.parameters import EndStops, Link, Vehicle
+from sitl.plant.actuators import joint_torque
+from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace
+from sitl.plant.integrator import held, places
+from sitl.plant.parameters import plant
+from sitl.plant.places import row_of, rows_of
 from sitl.plant.state import at_rest
+from sitl.plant.trim import end_effector
 from sitl.plant.vector import Array
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
+from tests.sitl.vehicles import inputs, random_vehicle, without_stops
+from vehicles.description import CriticalPoint, Vehicle
+from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 STATES = 1000
-_in_long = partial(pytest.param, marks=pytest.mark.long)
 TOLERANCE = 1e-9  # relative to the largest acceleration of the state
 
 
-def random_vehicle(joints: int, random: np.random.Generator) -> Vehicle:
-    """A vehicle with no symmetry that could hide a sign: skew axes, offset centres of mass."""
-
-    def three(low: float, high: float) -> tuple[float, float, float]:
-        a, b, c = (float(v) for v in random.uniform(low, high, 3))
-        return (a, b, c)
-
-    links = tuple(
-        Link(
-            a=float(random.uniform(0.1, 0.3)),
-            alpha=float(random.uniform(-2.0, 2.0)),
-            d=float(random.uniform(-0.1, 0.1)),
-            theta_offset=float(random.uniform(-1.0, 1.0)),
-            mass=float(random.uniform(0.1, 0.5)),
-            com=three(-0.1, 0.1),
-            inertia=three(2e-4, 3e-4),
-        )
-        for _ in range(joints)
-    )
-    return Vehicle(
-        base_com=three(-0.05, 0.05), mount=three(-0.1, 0.1), links=links, stops=EndStops(())
-    )
-
-
-def random_state(joints: int, random: np.random.Generator) -> Array:
+def random_state(vehicle: Vehicle, random: np.random.Generator) -> Array:
     """In the air, moving and turning every way."""
-    state = at_rest(joints)
-    view = StateView(state)
+    joints = len(vehicle.joints)
+    state = at_rest(len(vehicle.rotors), joints)
+    view = StateView(state, joints)
     view.p_WB[:] = random.uniform(-12.0, -8.0, 3)
     view.v_WB[:] = random.uniform(-3.0, 3.0, 3)
     quaternion = random.standard_normal(4)
     view.q_WB[:] = quaternion / np.linalg.norm(quaternion)
     view.w_WB_B[:] = random.uniform(-4.0, 4.0, 3)
-    view.thrust[:] = random.uniform(0.0, 17.0, 4)
+    view.thrust[:] = random.uniform(0.0, 17.0, len(vehicle.rotors))
     view.q_arm[:] = random.uniform(-3.0, 3.0, joints)
     view.qd_arm[:] = random.uniform(-5.0, 5.0, joints)
     return state
 
 
+def rotor_wrench(vehicle: Vehicle, thrust: Array) -> Array:
+    """Force [N, B] and moment [N·m, B] of all rotors, from PX4's definition of their numbers."""
+    wrench = np.zeros(6)
+    for rotor, f in zip(vehicle.rotors, thrust, strict=True):
+        axis = np.array(rotor.axis)
+        km = rotor.torque_per_thrust if rotor.spin == "ccw" else -rotor.torque_per_thrust
+        wrench += np.concatenate([f * axis, f * (np.cross(rotor.position, axis) - km * axis)])
+    return wrench
+
+
 def pinocchio_acceleration(
-    vehicle: Vehicle, model: pin.Model, data: pin.Data, state: Array, inputs: Inputs
+    vehicle: Vehicle, model: pin.Model, data: pin.Data, state: Array, given: Inputs
 ) -> Array:
     """Acceleration of the base origin [B], angular acceleration [B], joint accelerations."""
-    view = StateView(state)
+    view = StateView(state, len(vehicle.joints))
     q = configuration(view.p_WB, view.q_WB, view.q_arm)
     rotation = pin.Quaternion(q[3:7]).toRotationMatrix()
     v_B = rotation.T @ view.v_WB
-    rotors, drive = vehicle.rotors, vehicle.joints
-    lift = np.array([0.0, 0.0, -view.thrust.sum()])
-    f1, f2, f3, f4 = view.thrust
-    turn = rotor_torque((f1, f2, f3, f4), (f1, f2, f3, f4), rotors.arm, rotors.yaw_ratio)
-    force = lift + rotation.T @ inputs.force_W
-    moment = np.array(turn) + inputs.torque_B
+    wrench = rotor_wrench(vehicle, view.thrust)
+    wrench += np.concatenate([rotation.T @ given.force_W, given.torque_B])
     torque = [
-        joint_torque(t, r, drive.torque_max, drive.viscous, drive.coulomb, drive.coulomb_rate)
-        for t, r in zip(inputs.torque, view.qd_arm, strict=True)
+        joint_torque(given.torque[k], view.qd_arm[k], one.torque_max, one.viscous, one.coulomb)
+        for k, one in enumerate(vehicle.joints)
     ]
     velocity = np.concatenate([v_B, view.w_WB_B, view.qd_arm])
-    out = np.array(pin.aba(model, data, q, velocity, np.concatenate([force, moment, torque])))
+    out = np.array(pin.aba(model, data, q, velocity, np.concatenate([wrench, torque])))
     # Pinocchio returns the rate of the velocity's components in B.
     out[:3] += np.cross(view.w_WB_B, v_B)
     return out
 
 
-# Each number of joints is a recursion compiled anew; two are what flies.
-@pytest.mark.parametrize("joints", [_in_long(1), 2, _in_long(3)])
+def worst_difference(vehicle: Vehicle, states: int, random: np.random.Generator) -> float:
+    """Largest difference of accelerations, relative to the largest of each state."""
+    model = pinocchio_model(vehicle)
+    data, numbers, work = model.createData(), plant(vehicle), empty_workspace()
+    worst, joints = 0.0, len(vehicle.joints)
+    for _ in range(states):
+        state = random_state(vehicle, random)
+        force, torque = random.uniform(-5.0, 5.0, 3).tolist(), random.uniform(-1.0, 1.0, 3).tolist()
+        given = inputs(torque=random.uniform(-4.0, 4.0, joints), force_W=force, torque_B=torque)
+        acceleration_into(numbers, state, given, work)
+        expected = pinocchio_acceleration(vehicle, model, data, state, given)
+        error = np.abs(work.load[: 6 + joints] - expected).max() / np.abs(expected).max()
+        worst = max(worst, float(error))
+    return worst
+
+
+@pytest.mark.parametrize("joints", range(1, 7))
 def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> None:
     random = np.random.default_rng(joints)
-    work = empty_workspace(joints)
-    worst = 0.0
-    for trial in range(STATES):
-        if trial % 100 == 0:
-            vehicle = random_vehicle(joints, random)
-            model = pinocchio_model(vehicle)
-            data, numbers = model.createData(), plant(vehicle)
-        state = random_state(joints, random)
-        inputs = Inputs(
-            np.zeros(4),
-            random.uniform(-2.0, 2.0, joints),
-            random.uniform(-5.0, 5.0, 3),
-            random.uniform(-1.0, 1.0, 3),
-        )
-        acceleration_into(numbers, state, inputs, work)
-        expected = pinocchio_acceleration(vehicle, model, data, state, inputs)
-        error = np.abs(work.load - expected).max() / np.abs(expected).max()
-        worst = max(worst, float(error))
+    worst = max(
+        worst_difference(random_vehicle(joints, 4 + k % 5, random), STATES // 10, random)
+        for k in range(10)
+    )
     print(f"\nj = {joints}: worst relative difference {worst:.1e} over {STATES} states")
     assert worst <= TOLERANCE
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_so_they_do_for_every_vehicle_that_comes_with_pandion(name: str) -> None:
+    vehicle = without_stops(load_vehicle(name))
+    assert worst_difference(vehicle, STATES, np.random.default_rng(0)) <= TOLERANCE
+
+
+@pytest.mark.parametrize("joints", range(1, 7))
+def test_joints_tool_and_points_are_where_pinocchio_has_them(joints: int) -> None:
+    random = np.random.default_rng(joints)
+    vehicle = random_vehicle(joints, 4, random)
+    points = [
+        CriticalPoint(name=f"point{k}", on=one, position=tuple(random.uniform(-0.3, 0.3, 3)))
+        for k, one in enumerate(vehicle.places)
+    ]
+    vehicle = Vehicle(
+        **{name: getattr(vehicle, name) for name in vehicle.__slots__ if name != "critical_points"},
+        critical_points=tuple(points),
+    )
+    model = pinocchio_model(vehicle)
+    data, out = model.createData(), np.empty((1, rows_of(vehicle), 3))
+    for _ in range(20):
+        state = random_state(vehicle, random)
+        view = StateView(state, joints)
+        pin.framesForwardKinematics(model, data, configuration(view.p_WB, view.q_WB, view.q_arm))
+        places(plant(vehicle), state, held(), out)
+        tool = data.oMf[model.getFrameId("tool")].translation
+        assert out[0, 0] == pytest.approx(view.p_WB, abs=1e-12)
+        assert out[0, 1 : 1 + joints] == pytest.approx(
+            np.array([data.oMi[2 + k].translation for k in range(joints)]), abs=1e-12
+        )
+        assert out[0, 1 + joints] == pytest.approx(tool, abs=1e-12)
+        for k, point in enumerate(points):
+            where = data.oMi[1 + k].act(np.array(point.position))
+            assert out[0, row_of(vehicle, k, point.position)] == pytest.approx(where, abs=1e-12)
+        base = data.oMi[1].actInv(tool)
+        assert end_effector(vehicle, tuple(view.q_arm)) == pytest.approx(base, abs=1e-12)

@@ -8,12 +8,13 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.plant.aerial_manipulator import plant
 from sitl.plant.contact import foot_force, ground_wrench
-from sitl.plant.parameters import Legs, Vehicle
+from sitl.plant.parameters import plant
 from sitl.plant.vector import Array
+from tests.sitl.vehicles import PAPER
 
-FEET = plant(Vehicle()).feet
+FEET = plant(PAPER).feet
+LENGTH = PAPER.feet.positions[0][2]  # m, of the legs
 SPEED = st.floats(-3.0, 3.0)
 LEVEL: Array = np.eye(3)
 
@@ -34,14 +35,14 @@ def test_the_reaction_begins_without_a_jump() -> None:
 
 def test_a_vehicle_in_the_air_feels_no_ground() -> None:
     still = (0.0, 0.0, 0.0)
-    above = (0.0, 0.0, -Legs().length - 1e-6)
+    above = (0.0, 0.0, -LENGTH - 1e-6)
     assert ground_wrench(FEET, above, still, still, LEVEL) == (still, still)
 
 
 def test_a_level_vehicle_is_carried_by_all_feet_alike() -> None:
     still = (0.0, 0.0, 0.0)
-    force, moment = ground_wrench(FEET, (0.0, 0.0, 0.002 - Legs().length), still, still, LEVEL)
-    assert abs(force[2] + 4 * 0.002 * Legs().stiffness) < 1e-9
+    force, moment = ground_wrench(FEET, (0.0, 0.0, 0.002 - LENGTH), still, still, LEVEL)
+    assert abs(force[2] + 4 * 0.002 * PAPER.feet.stiffness) < 1e-9
     assert max(map(abs, (*force[:2], *moment))) < 1e-9
 
 
@@ -50,5 +51,5 @@ def test_a_foot_that_is_deeper_lifts_its_side() -> None:
     c, s = math.cos(small), math.sin(small)
     rolled: Array = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
     still = (0.0, 0.0, 0.0)
-    _, moment = ground_wrench(FEET, (0.0, 0.0, -Legs().length), still, still, rolled)
+    _, moment = ground_wrench(FEET, (0.0, 0.0, -LENGTH), still, still, rolled)
     assert moment[0] < 0.0

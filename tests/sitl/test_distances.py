@@ -8,9 +8,8 @@ import coal
 import numpy as np
 import pytest
 
-from sitl.body import AXES, Parts, as_arrays, parts_of
+from sitl.body import Parts, as_arrays, parts_of
 from sitl.distance import along_segment, of_rotor, part_bound, part_distance
-from sitl.plant.parameters import Vehicle
 from sitl.plant.vector import V3, Array
 from sitl.scenario import ScenarioZone
 from sitl.shapes import KINDS, kind_of
@@ -20,8 +19,10 @@ from sitl.shapes.cylinder import Cylinder
 from sitl.shapes.half_space import HalfSpace
 from sitl.shapes.kind import NUMBERS
 from sitl.shapes.vertical_cylinder import VerticalCylinder
+from vehicles.vehicle_file import load_vehicle
 
-VEHICLE = Vehicle()
+VEHICLE = load_vehicle("paper")
+AXES = as_arrays(parts_of("full", VEHICLE), VEHICLE).axes
 PARTS = parts_of("full", VEHICLE)
 COAL_M = 5e-6  # Coal's own accuracy at round shapes
 SHAPES = ("half-space", "ball", "vertical cylinder", "cylinder", "box")

@@ -10,15 +10,15 @@ import pytest
 
 from sitl.flight_evaluator import FlightEvaluator, Flown
 from sitl.mission_clock import MissionClock
-from sitl.plant.aerial_manipulator import plant
 from sitl.plant.integrator import held
 from sitl.plant.integrator import places as places_into
-from sitl.plant.parameters import Vehicle
-from sitl.plant.state import ARM, P_WB, Q_WB, at_rest
+from sitl.plant.parameters import plant
+from sitl.plant.state import P_WB, Q_WB, at_rest
 from sitl.plant.vector import Array
 from sitl.result import EndKind
 from sitl.scenario_file import load_scenario
 from sitl.world import record_if_clear
+from tests.sitl.vehicles import PAPER
 
 STEP_S = 0.001
 
@@ -87,15 +87,15 @@ def test_joint_1_is_no_critical_point() -> None:
 def swinging(name: str) -> Array:
     """Places of 400 plant steps of a vehicle that sways, pitches and swings its arm."""
     target = MissionClock(load_scenario(name)).target_at(0.0).p
-    body, state = plant(Vehicle()), at_rest(2)
-    passed, blocks = np.empty((400, 7, 3)), held(2)
+    body, state = plant(PAPER), at_rest(4, 2)
+    passed, blocks = np.empty((400, 7, 3)), held()
     for k in range(len(passed)):
         turn = 2.0 * math.pi * k / len(passed)
         sway = (0.1 * math.sin(turn), 0.15 * math.sin(2.0 * turn), 0.05 * math.sin(turn))
         state[P_WB : P_WB + 3] = np.add(target, sway) - np.array([0.0, 0.0, 0.225])
         pitch = 0.2 * math.sin(3.0 * turn)
         state[Q_WB : Q_WB + 4] = (math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0)
-        state[ARM : ARM + 2] = (-0.7 + 0.3 * math.sin(turn), 1.4)
+        state[17:19] = (-0.7 + 0.3 * math.sin(turn), 1.4)
         places_into(body, state, blocks, passed[k : k + 1])
     return passed
 
@@ -122,21 +122,21 @@ def test_there_is_no_incident_within_what_is_free(name: str) -> None:
     for k in range(0, len(passed), 2):
         judge.judge_flown(flown(passed, k), clear=False)
         height = -passed[k + 1, [0, 2, 3], 2].max()
-        assert 0.0 < judge.free[2] <= min(*judge.margins(passed[k + 1], 0.0), height)
+        assert 0.0 < judge.free[3] <= min(*judge.margins(passed[k + 1], 0.0), height)
 
 
 def flown(passed: Array, k: int) -> Flown:
     """Two steps of a vehicle at rest, placed."""
-    commanded = ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    commanded = ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
     return Flown(
-        passed[k : k + 2], np.array([at_rest(2)] * 2), *commanded, True, STEP_S * k, STEP_S
+        passed[k : k + 2], np.array([at_rest(4, 2)] * 2), *commanded, True, STEP_S * k, STEP_S
     )
 
 
 def test_where_a_zone_moves_nothing_is_free() -> None:
     judge, passed = evaluator("workspace"), places(np.random.default_rng(4), "workspace")
     judge.judge_flown(flown(passed, 0), clear=False)
-    assert judge.free[2] == -math.inf
+    assert judge.free[3] == -math.inf
 
 
 def test_a_judgement_that_waited_is_the_same() -> None:

@@ -8,31 +8,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sitl.plant.aerial_manipulator import Inputs, Plant, plant
+from sitl.plant.aerial_manipulator import Plant
 from sitl.plant.integrator import held, integrate
-from sitl.plant.parameters import Motors, Vehicle
-from sitl.plant.state import ARM, at_rest
+from sitl.plant.parameters import Effects, plant
+from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from sitl.scenario import ActuatorKeys
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.scenario_validation import check
-from tests.sitl.free_motion import frictionless, tumbling
+from tests.sitl.free_motion import tumbling
 from tests.sitl.test_conservation import weigh
+from tests.sitl.vehicles import frictionless, inputs
 
 STEP_S = 0.001
-RATES = slice(ARM + 2, ARM + 4)
-LOOSE = Motors(inertia=0.0025, backlash=math.radians(0.5))
-
-
-def loose(gravity: float = 0.0) -> Vehicle:
-    return replace(frictionless(gravity), motors=LOOSE)
+RATES = slice(19, 21)
+VEHICLE = frictionless()
+LOOSE = Effects(motor_inertia=0.0025, backlash=math.radians(0.5), gravity=0.0)
 
 
 class Arm:
     """A vehicle that is advanced step by step."""
 
-    def __init__(self, vehicle: Vehicle, start: Array) -> None:
-        self.plants = np.array([plant(vehicle)])
+    def __init__(self, start: Array, effects: Effects = LOOSE) -> None:
+        self.plants = np.array([plant(VEHICLE, effects)])
         self.state = start.copy()
         self.judged = np.empty((1, len(start)))
 
@@ -42,18 +40,17 @@ class Arm:
         return now
 
     def step(self, torque: tuple[float, float] = (0.0, 0.0)) -> None:
-        inputs = Inputs(np.zeros(4), np.array(torque), np.zeros(3), np.zeros(3))
         room = np.empty((1, 4, 3)), self.judged
-        integrate(self.plant, self.state, inputs, STEP_S, *room, held(2))
+        integrate(self.plant, self.state, inputs(torque=torque), STEP_S, *room, held())
 
     def speeds(self) -> Array:
         """Of the motors [rad/s], whether free or not."""
         gears = self.plant.gears
-        return np.where(gears.side == 0.0, gears.speed, self.state[RATES])
+        return np.where(gears.side == 0.0, gears.speed, [*self.state[RATES], *(0.0,) * 4])[:2]
 
 
 def test_a_motor_crosses_the_gap_alone_in_the_time_that_its_inertia_takes() -> None:
-    arm = Arm(loose(), at_rest(2))
+    arm = Arm(at_rest(4, 2))
     # Half of 0.5 deg from the middle: sqrt(2 * 4.36 mrad * 0.0025 kg m² / 0.2 N m) = 10.4 ms.
     for _ in range(10):
         arm.step((0.2, 0.0))
@@ -67,13 +64,13 @@ def test_a_motor_crosses_the_gap_alone_in_the_time_that_its_inertia_takes() -> N
 
 
 def test_teeth_keep_the_vehicles_momentum_and_give_no_energy() -> None:
-    vehicle = loose()
-    arm = Arm(vehicle, tumbling())
+    arm = Arm(tumbling(VEHICLE))
 
     def energy() -> float:
-        return weigh(vehicle, arm.state)[0] + 0.5 * LOOSE.inertia * float(sum(arm.speeds() ** 2))
+        of_motors = 0.5 * LOOSE.motor_inertia * float(sum(arm.speeds() ** 2))
+        return weigh(VEHICLE, arm.state, 0.0)[0] + of_motors
 
-    _, momentum = weigh(vehicle, arm.state)
+    _, momentum = weigh(VEHICLE, arm.state, 0.0)
     last, meetings = energy(), 0
     for _ in range(200):
         sides = arm.plant.gears.side.copy()
@@ -83,11 +80,11 @@ def test_teeth_keep_the_vehicles_momentum_and_give_no_energy() -> None:
         assert now <= last + 1e-9
         last = now
     assert meetings >= 2
-    assert np.abs(weigh(vehicle, arm.state)[1] - momentum).max() <= 1e-7
+    assert np.abs(weigh(VEHICLE, arm.state, 0.0)[1] - momentum).max() <= 1e-7
 
 
 def test_teeth_push_and_never_pull() -> None:
-    arm = Arm(loose(), at_rest(2))
+    arm = Arm(at_rest(4, 2))
     for _ in range(40):
         arm.step((0.2, 0.0))
     gears = arm.plant.gears
@@ -104,8 +101,7 @@ def test_a_gap_that_is_crossed_hardly_jerks_the_other_joint() -> None:
     """A joint that is driven while the other's motor is free turns no faster than with it."""
     rates = []
     for backlash in (0.0, LOOSE.backlash):
-        vehicle = replace(frictionless(0.0), motors=replace(LOOSE, backlash=backlash))
-        arm = Arm(vehicle, at_rest(2))
+        arm = Arm(at_rest(4, 2), replace(LOOSE, backlash=backlash))
         for k in range(60):
             arm.step((-0.05 if k < 45 else 0.05, 0.05))
         rates.append(arm.state[RATES])

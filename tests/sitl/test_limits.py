@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,22 +11,22 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.model.airframe import AIRFRAME
 from sitl.limits import LimitRecord, limits, record_use
-from sitl.plant.parameters import EndStops, Vehicle
-from sitl.plant.state import ARM, at_rest
+from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Controls, Simulation
 from tests.sitl.state_view import StateView
+from tests.sitl.vehicles import PAPER, random_vehicle
 
-KEYS = [limit.key for limit in limits(Vehicle())]
+KEYS = [limit.key for limit in limits(PAPER)]
 STEP_S = 0.001
 
 
 def state_with(key: str, value: float) -> tuple[Array, tuple[float, float]]:
     """A state, and commands, that use one limit that much and the others little."""
-    state = at_rest(2)
+    state = at_rest(4, 2)
     view = StateView(state)
-    torque = thrust = 0.1
+    torque = thrust = 0.01
     if key == "joint_1_angle":
         view.q_arm[:] = (value, -value)
     elif key == "link_2_angle":
@@ -40,9 +41,9 @@ def state_with(key: str, value: float) -> tuple[Array, tuple[float, float]]:
     elif key == "yaw_rate":
         view.w_WB_B[2] = value
     elif key == "joint_torque":
-        torque = abs(value)
+        torque = abs(value) / PAPER.joints[0].torque_max
     else:
-        thrust = abs(value)
+        thrust = abs(value) / PAPER.rotors[0].thrust_max
     return state, (torque, thrust)
 
 
@@ -50,8 +51,8 @@ def add(
     record: LimitRecord, states: list[Array], sent: tuple[float, float], before_s: float
 ) -> None:
     """Take steps that followed ``before_s``."""
-    most, use = record.arrays
-    record_use(np.array(states), sent, most, (before_s, STEP_S), use)
+    bounds, use = record.arrays
+    record_use(np.array(states), sent, bounds, (before_s, STEP_S), use)
 
 
 @pytest.mark.requirement("REQ-ACT-9")
@@ -60,13 +61,13 @@ def add(
 def test_each_limit_is_recorded_alone_timed_and_broken_beyond_its_tolerance(
     key: str, sign: float
 ) -> None:
-    limit = limits(Vehicle())[KEYS.index(key)]
+    limit = limits(PAPER)[KEYS.index(key)]
     for value, kept in (
         (0.9 * limit.most, True),
         (limit.most + 0.9 * limit.tolerance, True),
         (limit.most + 1.1 * limit.tolerance, False),
     ):
-        record = LimitRecord(Vehicle())
+        record = LimitRecord(PAPER)
         quiet, sent = state_with(key, 0.2 * sign * limit.most)
         loud, much = state_with(key, sign * value)
         add(record, [quiet, quiet], sent, 0.0)
@@ -85,9 +86,9 @@ def test_each_limit_is_recorded_alone_timed_and_broken_beyond_its_tolerance(
 
 
 def test_what_is_not_a_number_breaks_its_limit() -> None:
-    state = at_rest(2)
+    state = at_rest(4, 2)
     StateView(state).q_arm[0] = math.nan
-    record = LimitRecord(Vehicle())
+    record = LimitRecord(PAPER)
     assert not record.uses()
     add(record, [state], (0.0, 0.0), 0.0)
     assert not record.uses()["joint_1_angle"].kept
@@ -100,7 +101,7 @@ def test_limits_are_those_of_a_vehicle_that_is_armed(armed: bool) -> None:
     """The arm of one that has landed is limp: it falls, as fast as it likes."""
     simulation = Simulation(load_scenario("ground"), 0)
     simulation.advance(Controls((0.0,) * 4, (0.0, 0.0), armed=True))
-    simulation._state[ARM : ARM + 2] = (0.9, 0.5)  # rad; then nothing holds it
+    simulation._state[17:19] = (0.9, 0.5)  # rad; then nothing holds it
     for _ in range(200):
         simulation.advance(Controls((0.0,) * 4, (0.0, 0.0), armed=armed))
     result = simulation.result()
@@ -119,7 +120,7 @@ def test_a_run_in_which_a_joint_leaves_its_limit_is_not_completed() -> None:
     result = simulation.result()
     use = result.limits["joint_1_angle"]
     assert use.largest > math.radians(60.5)
-    assert use.largest < EndStops().angle[0] + math.radians(8.0)
+    assert use.largest < math.radians(63.0 + 8.0)
     assert not use.kept
     assert not result.completed
     assert "joint 1 angle reached" in result.end_reason
@@ -137,11 +138,11 @@ def test_commands_count_as_they_arrive(
     simulation.advance(Controls(thrust, (0.0, torque), armed=True))
     uses = simulation.result().limits
     assert [key for key, use in uses.items() if not use.kept] == ([broken] if broken else [])
-    assert simulation.vehicle.rotors.thrust_max == uses["rotor_thrust"].most
+    assert simulation.vehicle.rotors[0].thrust_max == uses["rotor_thrust"].most
 
 
 def test_both_sides_have_the_same_limits() -> None:
-    most = {limit.key: limit.most for limit in limits(Vehicle())}
+    most = {limit.key: limit.most for limit in limits(PAPER)}
     assert most == pytest.approx(
         {
             "joint_1_angle": AIRFRAME.joint1_limit,
@@ -155,3 +156,34 @@ def test_both_sides_have_the_same_limits() -> None:
             "rotor_thrust": AIRFRAME.rotor_thrust_max,
         }
     )
+
+
+def test_an_angle_that_is_limited_on_one_side_or_unevenly_has_a_limit_for_each() -> None:
+    first, second = PAPER.joints
+    vehicle = replace(
+        PAPER,
+        joints=(replace(first, position_min=-0.5), replace(second, position_max=1.5)),
+        coupled_limits=(),
+    )
+    record = LimitRecord(vehicle)
+    angles = {limit.key: limit.most for limit in record.limits if limit.key.endswith("e_max")}
+    angles |= {limit.key: limit.most for limit in record.limits if limit.key.endswith("e_min")}
+    top = first.position_max
+    assert angles == {"joint_1_angle_max": top, "joint_1_angle_min": 0.5, "joint_2_angle_max": 1.5}
+    state = at_rest(4, 2)
+    StateView(state).q_arm[:] = (-0.6, -3.0)
+    add(record, [state], (0.0, 0.0), 0.0)
+    broken = [key for key, use in record.uses().items() if not use.kept]
+    assert broken == ["joint_1_angle_min"]
+    assert record.uses()["joint_1_angle_min"].largest == pytest.approx(0.6)
+
+
+def test_drives_that_are_not_alike_are_judged_by_the_share_of_each() -> None:
+    vehicle = random_vehicle(3, 5, np.random.default_rng(1))
+    record, state = LimitRecord(vehicle), at_rest(5, 3)
+    add(record, [state], (1.01, 0.4), 0.0)
+    use = record.uses()
+    assert (use["joint_torque"].largest, use["joint_torque"].most) == (1.01, 1.0)
+    assert not use["joint_torque"].kept
+    assert use["rotor_thrust"].kept
+    assert "joint torque reached 1.01 of full of 1.00 of full" in record.flaws()[0]

@@ -20,6 +20,7 @@ from sitl.start import on_the_ground
 from tests.px4_stand_in import Connected, Px4StandIn, Wish
 from tests.sitl.px4_flight import fly, listening
 from tests.sitl.test_px4_recordings import AIRFRAME
+from tests.sitl.vehicles import PAPER
 
 ODOMETRY, HIL_GPS, HIL_SENSOR, DISTANCE_SENSOR = 331, 113, 107, 132
 
@@ -91,7 +92,7 @@ def test_a_px4_that_leaves_ends_the_run_with_the_step() -> None:
     with listening() as (stream, port):
         peer = socket.create_connection(("127.0.0.1", port))
         assert wait_for_px4(stream, 5.0, stop)
-        exchange = Px4Exchange(stream, 2, 0.004, stop)
+        exchange = Px4Exchange(stream, PAPER, 0.004, stop)
         exchange.step(0, 1_000_000, b"", lambda: None)
         peer.close()
         with pytest.raises(SimulatorError, match="PX4 closed the connection at step 1"):
@@ -107,7 +108,7 @@ def test_a_px4_that_does_not_answer_any_more_ends_the_run(
         connected = Connected(stand_in, port)
         connected.start()
         assert wait_for_px4(stream, 5.0, stop)
-        exchange = Px4Exchange(stream, 2, 0.004, stop)
+        exchange = Px4Exchange(stream, PAPER, 0.004, stop)
         encoder = Px4Encoder(DEFAULT_ORIGIN)
         for step in range(500):  # the first ones are not waited for
             t_us = 1_000_000 + 4_000 * step

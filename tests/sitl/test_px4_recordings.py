@@ -34,6 +34,7 @@ from tests.px4_stand_in import (
     Px4StandIn,
     Wish,
 )
+from tests.sitl.vehicles import PAPER
 
 FOLDER = Path(__file__).parents[1] / "recordings" / "px4"
 AIRFRAME = Airframe(3.5, (0.3, 0.3, 0.6), 0.3, 0.016, 17.17)
@@ -86,7 +87,7 @@ def test_in_flight_it_answers_each_step_in_the_recorded_format() -> None:
 def test_every_recorded_answer_is_understood() -> None:
     for name, armed in (("boot", False), ("hover", True)):
         frames = said(name, "<")
-        answers = [read_answer(frame, 2) for frame in frames]
+        answers = [read_answer(frame, PAPER) for frame in frames]
         for frame, answer in zip(frames, answers, strict=True):
             if frame.message_id in (HEARTBEAT, COMMAND_LONG):
                 assert answer is None

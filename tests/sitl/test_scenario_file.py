@@ -111,8 +111,12 @@ def test_the_papers_cases_are_there() -> None:
         ('"trajectory"', '"hop"', ["pilot.plan", "airborne"]),
         ('"airborne"', '"airborne"\nposition_m = [1.0, 0.0]', ["start.position_m", "ground"]),
         ('"airborne"', '"ground"\narm_deg = [10.0, 0.0]', ["start.arm_deg", "limp"]),
-        ('"airborne"', '"airborne"\narm_deg = [70.0, 0.0]', ["start.arm_deg", "±60"]),
-        ('"airborne"', '"airborne"\narm_deg = [50.0, 50.0]', ["start.arm_deg", "±90"]),
+        ('"airborne"', '"airborne"\narm_deg = [70.0, 0.0]', ["start.arm_deg[0] = 70", "-60 to 60"]),
+        (
+            '"airborne"',
+            '"airborne"\narm_deg = [50.0, 50.0]',
+            ["link2", "-90 to 90"],
+        ),
     ],
 )
 def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
@@ -339,7 +343,7 @@ FAULT = '[[faults]]\nunit = "{}"\nkind = "{}"\n{}\n'
         ("gyro", "of", "", 'faults[0].kind = "of": must be one of "off"'),
         ("gyro", "full", "", 'faults[0].kind = "full": a gyro can be "off", "stuck"'),
         ("mag", "off", "", 'faults[0].unit = "mag": not on board; the sensors are gyro, accel'),
-        ("motor", "off", "instance = 5", "faults[0].instance = 5: must be 0 to 4"),
+        ("motor", "off", "instance = 5", "faults[0].instance = 5: must be 0 (all) to 4"),
         ("joint", "off", "instance = 3", "faults[0].instance = 3: must be 0 (all) to 2"),
         ("gps", "off", "instance = 1", "faults[0].instance = 1: must be 0, because"),
         (

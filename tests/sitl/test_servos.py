@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sitl.plant.parameters import Effects
 from sitl.scenario_file import load_scenario
-from sitl.servos import RANGES, PositionServos
+from sitl.servos import PositionServos, ranges, targets
 from sitl.simulation import STEP_US, Controls, Simulation
 from sitl.start import on_the_ground
+from tests.sitl.vehicles import PAPER
 
 STEP_S = 1e-6 * STEP_US
 REST = (0.0, 0.0, 0.0, 0.0)
+RANGES = [most for _, most in ranges(PAPER)]
 
 
 def moved(*commands: tuple[float, float], seconds: float = 2.0) -> np.ndarray:
     """Angles and rates (n, 4) of an arm on its legs, a command after the other."""
     simulation = Simulation(on_the_ground(load_scenario("ground")), 0)
-    servos = PositionServos(simulation.vehicle, simulation.healthy().q_arm, STEP_S)
+    servos = PositionServos(simulation.vehicle, Effects(), simulation.healthy().q_arm, STEP_S)
     rows = []
     for command in commands:
         for _ in range(round(seconds / STEP_S)):
@@ -56,9 +60,18 @@ def test_commands_beyond_the_range_or_against_the_end_stops_stop_at_the_limit() 
 
 def test_without_power_it_is_limp_and_begins_where_the_arm_is() -> None:
     simulation = Simulation(on_the_ground(load_scenario("ground")), 0)
-    servos = PositionServos(simulation.vehicle, (0.0, 0.0), STEP_S)
+    servos = PositionServos(simulation.vehicle, Effects(), (0.0, 0.0), STEP_S)
     for _ in range(100):
         servos.torques((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), powered=True)
     assert servos.torques((1.0, 1.0), (0.2, -0.1), (0.0, 0.0), powered=False) == (0.0, 0.0)
     first = servos.torques((1.0, 1.0), (0.2, -0.1), (0.0, 0.0), powered=True)
     assert all(abs(one) < 0.05 for one in first)
+
+
+def test_a_joint_whose_range_does_not_have_zero_in_its_middle() -> None:
+    first, second = PAPER.joints
+    askew = replace(first, position_min=-0.5, position_max=1.0)
+    vehicle = replace(PAPER, joints=(askew, second))
+    assert targets(vehicle, (1.0, 0.0)) == [1.0, 0.0]
+    assert targets(vehicle, (-1.0, 0.0)) == [-0.5, 0.0]
+    assert targets(vehicle, (0.5, 0.5)) == [0.5, math.pi / 4.0]

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
-from sitl.plant.parameters import Vehicle, level_reach
+from sitl.plant.aerial_manipulator import acceleration_into, empty_workspace
+from sitl.plant.parameters import GRAVITY, plant
 from sitl.plant.state import at_rest
-from sitl.plant.trim import level_hover
+from sitl.plant.trim import end_effector, level_hover
 from sitl.plant.vector import Array
 from tests.sitl.state_view import StateView
+from tests.sitl.vehicles import PAPER, inputs
 
-HOVER = Vehicle().mass * Vehicle().gravity / 4.0
+HOVER = PAPER.mass * GRAVITY / 4.0
 
 
 def _acceleration(
@@ -23,15 +24,15 @@ def _acceleration(
     q_WB: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
 ) -> Array:
     """Accelerations (8,) of a vehicle at rest in the air, arm straight down."""
-    state = at_rest(2)
+    state = at_rest(4, 2)
     view = StateView(state)
     view.p_WB[2] = -5.0
     view.q_WB[:] = q_WB
     view.thrust[:] = thrust
-    work = empty_workspace(2)
-    inputs = Inputs(np.zeros(4), np.array(torque), np.array(force_W), np.array(torque_B))
-    acceleration_into(plant(Vehicle()), state, inputs, work)
-    return work.load.copy()
+    work = empty_workspace()
+    given = inputs(torque=torque, force_W=force_W, torque_B=torque_B)
+    acceleration_into(plant(PAPER), state, given, work)
+    return work.load[:8].copy()
 
 
 def test_hover_thrust_holds_the_vehicle_against_gravity() -> None:
@@ -87,10 +88,10 @@ def test_an_outer_torque_turns_the_base_that_way() -> None:
 
 
 def test_positive_angles_swing_the_arm_forward() -> None:
-    assert level_reach(Vehicle(), (0.3, 0.2))[0] > 0.1
+    assert end_effector(PAPER, (0.3, 0.2))[0] > 0.1
 
 
 def test_holding_the_arm_forward_loads_the_front_rotor() -> None:
-    trim = level_hover(Vehicle(), (1.0, 0.0))
+    trim = level_hover(PAPER, (1.0, 0.0))
     assert trim.thrust[2] > trim.thrust[0]
     assert trim.torque[0] > 0.1  # gravity pulls the arm back to straight down

@@ -9,7 +9,17 @@ import pytest
 
 from sitl.plant.trim import level_hover
 from sitl.result import EndKind
-from sitl.scenario import Hold, Impulses, ImuErrors, Pilot, Scenario, Sensors, Wind, Workspace
+from sitl.scenario import (
+    Hold,
+    Impulses,
+    ImuErrors,
+    Pilot,
+    Scenario,
+    Sensors,
+    Wind,
+    Workspace,
+    start_angles,
+)
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.sensors.exact import SensorReadings
 from sitl.simulation import Controls, Simulation, Truth
@@ -20,10 +30,10 @@ OFF = Controls((0.0, 0.0, 0.0, 0.0), (0.0, 0.0), armed=False)
 def _trimmed(simulation: Simulation) -> Controls:
     """The controls that hold the start of an airborne scenario."""
     vehicle = simulation.vehicle
-    trim = level_hover(vehicle, tuple(math.radians(a) for a in simulation.scenario.start.arm_deg))
-    f1, f2, f3, f4 = (f / vehicle.rotors.thrust_max for f in trim.thrust)
-    torque = tuple(t / vehicle.joints.torque_max for t in trim.torque)
-    return Controls((f1, f2, f3, f4), torque, armed=True)
+    trim = level_hover(vehicle, start_angles(simulation.scenario))
+    thrust = [f / one.thrust_max for f, one in zip(trim.thrust, vehicle.rotors, strict=True)]
+    torque = [t / one.torque_max for t, one in zip(trim.torque, vehicle.joints, strict=True)]
+    return Controls(tuple(thrust), tuple(torque), armed=True)
 
 
 def _fly(simulation: Simulation, controls: Controls, seconds: float) -> None:

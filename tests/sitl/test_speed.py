@@ -9,9 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from sitl.plant.vector import Array
-from tests.sitl.free_motion import flown, frictionless, tumbling
+from tests.sitl.free_motion import flown, tumbling
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
+from tests.sitl.vehicles import frictionless
 
 STEPS = 200
 ROUNDS = 60  # a quarter of a second: longer than another process takes a core at once
@@ -19,10 +20,10 @@ ROUNDS = 60  # a quarter of a second: longer than another process takes a core a
 
 def _rival() -> Callable[[], None]:
     """RK4 in Python around Pinocchio's compiled articulated-body algorithm."""
-    vehicle = frictionless(9.81)
+    vehicle = frictionless()
     model = pinocchio_model(vehicle)
     data, load = model.createData(), np.zeros(8)
-    view = StateView(tumbling())
+    view = StateView(tumbling(vehicle))
     q0 = configuration(view.p_WB, view.q_WB, view.q_arm)
     v0 = np.concatenate([view.v_WB, view.w_WB_B, view.qd_arm])
 
@@ -52,7 +53,8 @@ def _seconds(run: Callable[[], object]) -> float:
 
 
 def test_a_step_is_at_least_three_times_as_fast_as_pinocchio_under_python() -> None:
-    vehicle, start, rival = frictionless(9.81), tumbling(), _rival()
+    vehicle, rival = frictionless(), _rival()
+    start = tumbling(vehicle)
     flown(vehicle, start, 0.001, 0.001)
     # Interleaved, best of several: another process may take the core from either side.
     pairs = [

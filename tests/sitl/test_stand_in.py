@@ -17,8 +17,8 @@ def hovering() -> tuple[Simulation, Controls]:
     """A vehicle in the air, and what holds it there."""
     scenario = Scenario("hover", 600.0, Start("airborne"), Pilot("none"), Hold((0.0, 0.0, -1.2)))
     simulation = Simulation(scenario, 1)
-    thrust = simulation.truth().thrust
-    full, most = simulation.vehicle.rotors.thrust_max, simulation.vehicle.joints.torque_max
+    thrust, vehicle = simulation.truth().thrust, simulation.vehicle
+    full, most = vehicle.rotors[0].thrust_max, vehicle.joints[0].torque_max
     torque = tuple(one / most for one in simulation.healthy().tau_arm)
     f1, f2, f3, f4 = (one / full for one in thrust)
     return simulation, Controls((f1, f2, f3, f4), torque, armed=True)

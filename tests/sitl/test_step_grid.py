@@ -11,6 +11,7 @@ import pytest
 from messages.frames import FrameWriter
 from sitl.link.exchange import STALL_S, RealTime, SimulatorError
 from sitl.link.step_grid import MOST_BEHIND_S, StepGrid
+from tests.sitl.vehicles import PAPER
 
 PERIOD_S = 0.002
 HIL_ACTUATOR_CONTROLS, ARMED = 93, 128
@@ -61,7 +62,7 @@ class Run:
         self.clock = clock
         vehicle: Any = Vehicle(awake)
         stop: Any = None
-        self.exchange = RealTime(vehicle, 2, PERIOD_S, stop, clock, clock.sleep)
+        self.exchange = RealTime(vehicle, PAPER, PERIOD_S, stop, clock, clock.sleep)
         self.ends_s: list[float] = []
         self.armed: list[bool] = []
 

@@ -47,6 +47,7 @@ from sitl.simulation import Controls, Simulation
 from studies.flight.mission import safe_set as safe_set_of
 from tests.fsw.link.ground import ManualClock
 from tests.fsw.link.snapshots import FACTS, outputs_at
+from tests.sitl.vehicles import PAPER
 
 NAN = float("nan")
 SHUTDOWN = SendCommand(246, (0.0, 2.0, NAN, NAN, NAN, NAN, NAN))
@@ -262,7 +263,7 @@ class Flight:
         stamps = []
         with contextlib.suppress(TimeoutError):
             while True:
-                reply = read_reply(self.wire.hear(), 2)
+                reply = read_reply(self.wire.hear(), PAPER)
                 assert reply is not None
                 stamps.append(reply.t_us)
         return stamps
@@ -542,7 +543,7 @@ def test_a_fault_is_asked_for_in_the_name_of_its_sender_and_the_answer_comes_bac
     simulation = Simulation(load_scenario("walls-calm"), 0)
     wire.link.route(INJECT)
     wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
-    reply = read_reply(wire.hear(), 2)
+    reply = read_reply(wire.hear(), PAPER)
     assert reply is not None
     (asked,) = reply.injections
     assert asked == Injection(unit=0, kind=1, instance=0, system=245, component=190, confirmation=1)
@@ -614,7 +615,7 @@ def test_a_command_to_the_simulator_is_answered_however_often_it_is_lost(
         wire.link.send_actuators(t_us, outputs_at(t_us))
         if wire.link.routed_acks:
             break
-        reply = read_reply(wire.hear(), 2)
+        reply = read_reply(wire.hear(), PAPER)
         assert reply is not None
         answer = b""
         for asked in reply.injections:
@@ -646,7 +647,7 @@ def test_the_simulator_passes_over_a_fault_of_no_number(
     params[place] = number
     wire.link.route(replace(INJECT, params=tuple(params)))
     wire.link.send_actuators(1_002_000, outputs_at(1_002_000))
-    reply = read_reply(wire.hear(), 2)
+    reply = read_reply(wire.hear(), PAPER)
     assert reply is not None
     assert reply.injections == ()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,25 +16,47 @@ from sitl.air.rotor_drag import rotor_drag
 from sitl.air.wall_effect import IDEAL, wall_pull
 
 R, ARM = 0.165, 0.3
-FAR = 1e9  # m, of an arm that leaves a rotor alone
+HUBS = ARM * np.array([(-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+RADII = np.full(4, R)
+BESIDE = np.linalg.norm(HUBS[:, None] - HUBS, axis=2)
 GROUND = ((0.0, 0.0, -1.0), 0.0)
 LEVEL = np.eye(3)
 
 
-def air(*surfaces: tuple[tuple[float, float, float], float], **numbers: float) -> Air:
+def air(*surfaces: tuple[tuple[float, float, float], float], **numbers: Any) -> Air:
     """Numbers of an air in which nothing happens but what is named."""
     planes = np.zeros((SURFACES, 4))
     for k, (normal, offset) in enumerate(surfaces):
         planes[k] = (*normal, offset)
-    usual = {"active": 1.0, "area": 0.0, "density": 1.225, "radius": R, "arm": ARM,
-             "ground": 0.0, "ceiling": 0.0, "suction": 0.0}  # fmt: skip
+    usual = {"active": 1, "area": 0.0, "density": 1.225, "ground": 0, "ceiling": 0, "suction": 0.0}
     return Air(
+        rotors=4,
+        radius=RADII,
+        beside=BESIDE,
         wind=np.zeros(3),
         drag=np.zeros(3),
         surfaces=planes,
-        surface_count=float(len(surfaces)),
+        surface_count=len(surfaces),
         **{**usual, **numbers},
     )
+
+
+def of_four(z: float) -> float:
+    """Gain of a rotor of four at a height [m]."""
+    return ground_effect(RADII, z, BESIDE, 0, 4)
+
+
+def alone(z: float) -> float:
+    """Gain of a single rotor at a height [m]."""
+    return ground_effect(RADII, z, BESIDE, 0, 1)
+
+
+def at_hub(
+    i: int, p: tuple[float, float, float], rotation: np.ndarray
+) -> tuple[float, float, float]:
+    """Hub of rotor ``i`` with the base at p [m, NED]."""
+    x, y, z = (p + rotation @ HUBS[i]).tolist()
+    return (x, y, z)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +65,7 @@ def air(*surfaces: tuple[tuple[float, float, float], float], **numbers: float) -
     [(0.5, 4.0 / 3.0), (1.0, 16.0 / 15.0), (2.0, 64.0 / 63.0), (4.0, 256.0 / 255.0)],
 )
 def test_a_rotor_alone_gains_what_cheeseman_and_bennett_say(z_over_r: float, ratio: float) -> None:
-    assert ground_effect(R, z_over_r * R, FAR) == pytest.approx(ratio, rel=1e-12)
+    assert alone(z_over_r * R) == pytest.approx(ratio, rel=1e-12)
 
 
 @pytest.mark.parametrize("z_over_r", [0.5, 1.0, 2.0, 3.0])
@@ -53,12 +76,12 @@ def test_four_rotors_gain_what_sanchez_cuevas_says(z_over_r: float) -> None:
         + R**2 * z / math.sqrt((d**2 + 4 * z**2) ** 3)
         + R**2 / 2 * z / math.sqrt((2 * d**2 + 4 * z**2) ** 3)
     )
-    assert ground_effect(R, z, ARM) == pytest.approx(1.0 / (1.0 - lost), rel=1e-12)
-    assert ground_effect(R, z, ARM) > ground_effect(R, z, FAR)
+    assert of_four(z) == pytest.approx(1.0 / (1.0 - lost), rel=1e-12)
+    assert of_four(z) > alone(z)
 
 
 def test_on_the_ground_the_gain_is_that_of_half_a_radius() -> None:
-    assert ground_effect(R, -0.1, ARM) == ground_effect(R, 0.5 * R, ARM)
+    assert of_four(-0.1) == of_four(0.5 * R)
 
 
 @pytest.mark.parametrize("d_over_r", [0.2, 0.5, 1.0, 3.0])
@@ -82,7 +105,7 @@ def test_a_ceiling_gains_what_momentum_theory_says(d_over_r: float) -> None:
 
 
 def test_far_from_all_surfaces_thrust_is_what_it_was() -> None:
-    assert ground_effect(R, 50.0, ARM) == pytest.approx(1.0, abs=1e-5)
+    assert of_four(50.0) == pytest.approx(1.0, abs=1e-5)
     assert ceiling_effect(R, 50.0) == pytest.approx(1.0, abs=1e-5)
     assert wall_pull(0.05, R, 50.0, 8.0) == pytest.approx(0.0, abs=1e-5)
 
@@ -107,21 +130,23 @@ def test_drag_is_felt_against_the_air_in_the_bodys_axes() -> None:
 
 
 def test_a_tilted_vehicle_gains_more_at_the_lower_rotor() -> None:
-    numbers = air(GROUND, ground=1.0)
+    numbers = air(GROUND, ground=1)
     s, c = math.sin(0.2), math.cos(0.2)
     nose_up = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    rear, left, front, right = (rotor_gain(numbers, (0.0, 0.0, -0.3), nose_up, i) for i in range(4))
+    rear, left, front, right = (
+        rotor_gain(numbers, at_hub(i, (0.0, 0.0, -0.3), nose_up), i) for i in range(4)
+    )
     assert rear > left == right > front > 1.0
-    assert left == pytest.approx(ground_effect(R, 0.3, ARM))
+    assert left == pytest.approx(of_four(0.3))
 
 
 def test_a_ceiling_is_a_wall_whose_free_side_is_below() -> None:
     roof = ((0.0, 0.0, 1.0), -2.0)  # 2 m above the ground
-    numbers = air(GROUND, roof, ground=1.0, ceiling=1.0)
-    expected = ground_effect(R, 1.8, ARM) * ceiling_effect(R, 0.2)
-    assert rotor_gain(numbers, (0.0, 0.0, -1.8), LEVEL, 0) == pytest.approx(expected)
+    numbers = air(GROUND, roof, ground=1, ceiling=1)
+    expected = of_four(1.8) * ceiling_effect(R, 0.2)
+    assert rotor_gain(numbers, at_hub(0, (0.0, 0.0, -1.8), LEVEL), 0) == pytest.approx(expected)
     off = air(GROUND, roof)
-    assert rotor_gain(off, (0.0, 0.0, -1.8), LEVEL, 0) == 1.0
+    assert rotor_gain(off, at_hub(0, (0.0, 0.0, -1.8), LEVEL), 0) == 1.0
 
 
 @pytest.mark.parametrize("d_over_r", [1.0, 1.5, 3.0])
@@ -138,9 +163,9 @@ def test_a_wall_pulls_as_the_suction_upon_it_does(d_over_r: float) -> None:
 
 
 def test_a_wall_pulls_and_pulls_more_at_half_the_distance() -> None:
-    thrust = (8.0, 8.0, 8.0, 8.0)
     numbers = air(GROUND, ((-1.0, 0.0, 0.0), -1.0), suction=0.04)
-    x, y, z = wall_force(numbers, (0.4, 0.0, -1.2), LEVEL, thrust)
+    forces = [wall_force(numbers, at_hub(i, (0.4, 0.0, -1.2), LEVEL), i, 8.0) for i in range(4)]
+    x, y, z = np.sum(forces, axis=0)
     hubs = [1.0 - (0.4 + dx) for dx in (-ARM, 0.0, ARM, 0.0)]
     assert x == pytest.approx(sum(0.04 * 8.0 * (R / d) ** 2 for d in hubs))
     assert (y, z) == (0.0, 0.0)

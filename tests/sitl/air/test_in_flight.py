@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sitl.plant.state import ARM, P_WB, THRUST, V_WB, W_WB_B
+from sitl.plant.parameters import GRAVITY
+from sitl.plant.state import P_WB, THRUST, V_WB, W_WB_B
 from sitl.scenario import (
     ActuatorKeys,
     AirKeys,
@@ -21,6 +22,7 @@ from sitl.scenario import (
 from sitl.scenario_file import ScenarioError
 from sitl.simulation import Controls, Simulation
 
+ROTORS = slice(THRUST, THRUST + 4)
 AIRBORNE = Scenario(
     "test", 60.0, Start(kind="airborne", arm_deg=(0.0, 0.0)), Pilot("none"), Hold((0.0, 0.0, -50.0))
 )
@@ -29,9 +31,8 @@ AIRBORNE = Scenario(
 def flown(scenario: Scenario, steps: int, thrust: float | None = None) -> Simulation:
     """The simulation after so many steps with the same thrust [N] on all rotors; None: hover."""
     simulation = Simulation(scenario, 0)
-    rotors = simulation.vehicle.rotors
-    weight = 0.25 * simulation.vehicle.mass * simulation.vehicle.gravity
-    share = (weight if thrust is None else thrust) / rotors.thrust_max
+    weight = 0.25 * simulation.vehicle.mass * GRAVITY
+    share = (weight if thrust is None else thrust) / simulation.vehicle.rotors[0].thrust_max
     for _ in range(steps):
         simulation.advance(Controls((share,) * 4, (0.0, 0.0), armed=True))
     return simulation
@@ -92,8 +93,8 @@ def test_what_a_surface_adds_to_the_thrust_it_does_not_add_to_the_torque_about_y
 
     def turned(scenario: Scenario) -> tuple[float, float]:
         simulation = Simulation(scenario, 0)
-        weight = 0.25 * simulation.vehicle.mass * simulation.vehicle.gravity
-        share = weight / simulation.vehicle.rotors.thrust_max
+        weight = 0.25 * simulation.vehicle.mass * GRAVITY
+        share = weight / simulation.vehicle.rotors[0].thrust_max
         pairs = (1.2 * share, 0.8 * share, 1.2 * share, 0.8 * share)
         for _ in range(10):
             simulation.advance(Controls(pairs, (0.0, 0.0), armed=True))
@@ -117,27 +118,27 @@ def test_more_walls_than_there_is_room_for_are_refused() -> None:
 def test_with_quadratic_thrust_the_speed_lags_by_the_stated_time() -> None:
     keys = ActuatorKeys(quadratic_thrust=True)
     simulation = flown(replace(AIRBORNE, actuators=keys), 20, thrust=16.0)
-    lag = simulation.vehicle.rotors.lag
-    start = math.sqrt(0.25 * simulation.vehicle.mass * simulation.vehicle.gravity)
+    lag = simulation.vehicle.rotors[0].lag
+    start = math.sqrt(0.25 * simulation.vehicle.mass * GRAVITY)
     speed = 4.0 + (start - 4.0) * math.exp(-0.04 / lag)
-    assert np.sqrt(state(simulation)[THRUST:ARM]) == pytest.approx([speed] * 4, rel=1e-3)
+    assert np.sqrt(state(simulation)[ROTORS]) == pytest.approx([speed] * 4, rel=1e-3)
 
 
 def test_a_rotor_with_quadratic_thrust_starts_from_rest() -> None:
     ground = replace(AIRBORNE, start=Start(kind="ground"), trajectory=Hold((0.0, 0.0, -1.0)))
     keys = ActuatorKeys(quadratic_thrust=True)
     simulation = flown(replace(ground, actuators=keys), 40, thrust=4.0)
-    lag = simulation.vehicle.rotors.lag
+    lag = simulation.vehicle.rotors[0].lag
     expected = 4.0 * (1.0 - math.exp(-0.08 / lag)) ** 2
-    assert state(simulation)[THRUST:ARM] == pytest.approx([expected] * 4, rel=0.1)
+    assert state(simulation)[ROTORS] == pytest.approx([expected] * 4, rel=0.1)
 
 
 def test_a_dead_time_holds_the_command_back_by_exactly_that() -> None:
     late = replace(AIRBORNE, actuators=ActuatorKeys(dead_time_ms=10.0))
-    hover = state(flown(late, 0))[THRUST:ARM]
-    assert state(flown(late, 5, thrust=16.0))[THRUST:ARM] == pytest.approx(hover)
-    after = state(flown(late, 8, thrust=16.0))[THRUST:ARM]
-    prompt = state(flown(AIRBORNE, 3, thrust=16.0))[THRUST:ARM]
+    hover = state(flown(late, 0))[ROTORS]
+    assert state(flown(late, 5, thrust=16.0))[ROTORS] == pytest.approx(hover)
+    after = state(flown(late, 8, thrust=16.0))[ROTORS]
+    prompt = state(flown(AIRBORNE, 3, thrust=16.0))[ROTORS]
     assert after == pytest.approx(prompt)
 
 
@@ -171,6 +172,6 @@ def test_backlash_keeps_the_torque_from_a_link_until_the_gap_is_crossed() -> Non
         simulation = Simulation(scenario, 0)
         for _ in range(2):
             simulation.advance(Controls((0.5,) * 4, (0.1, 0.0), armed=True))
-        rates.append(state(simulation)[ARM + 2])
+        rates.append(state(simulation)[19])
     assert rates[0] > 0.01
     assert abs(rates[1]) < 0.1 * rates[0]

@@ -10,16 +10,16 @@ import pytest
 
 from sitl.faults.active import Faults
 from sitl.faults.keys import KINDS, Fault, Kind
-from sitl.plant.aerial_manipulator import Inputs, plant
 from sitl.plant.integrator import held, integrate
 from sitl.plant.lock import seize
-from sitl.plant.parameters import Vehicle
+from sitl.plant.parameters import Effects, plant
 from sitl.scenario import ActuatorKeys, Scenario
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
-from tests.sitl.free_motion import frictionless, tumbling
+from tests.sitl.free_motion import tumbling
 from tests.sitl.test_conservation import weigh
 from tests.sitl.test_simulation import _trimmed
+from tests.sitl.vehicles import PAPER, frictionless, inputs
 
 V4 = tuple[float, float, float, float]
 FIRST, END, STEPS = 50, 150, 200
@@ -30,7 +30,7 @@ def command(step: int) -> V4:
 
 
 def sent(fault: Fault) -> list[V4]:
-    flight = Faults((fault,), 1, step_us=2000, thrust_max=17.0, joints=2, exact=True)
+    flight = Faults((fault,), 1, step_us=2000, full=(17.0,) * 4, joints=2, exact=True)
     out = []
     for step in range(STEPS):
         active = flight.at(step)
@@ -98,11 +98,10 @@ def test_a_joint_that_is_free_again_moves_again() -> None:
 
 @pytest.mark.parametrize("locked", [(True, False), (False, True), (True, True)])
 def test_a_joint_that_seizes_keeps_momentum_and_gains_no_energy(locked: tuple[bool, bool]) -> None:
-    vehicle = replace(Vehicle(), gravity=0.0)
-    state = tumbling()
-    energy, momentum = weigh(vehicle, state)
-    seize(vehicle, state, locked)
-    after, kept = weigh(vehicle, state)
+    state = tumbling(PAPER)
+    energy, momentum = weigh(PAPER, state, 0.0)
+    seize(plant(PAPER), held(), state, locked)
+    after, kept = weigh(PAPER, state, 0.0)
     assert after < energy
     assert np.abs(kept - momentum).max() <= 1e-12 * np.abs(momentum).max()
     rates = state[-2:]
@@ -111,17 +110,16 @@ def test_a_joint_that_seizes_keeps_momentum_and_gains_no_energy(locked: tuple[bo
 
 def test_a_flight_with_a_stuck_joint_keeps_energy_and_momentum() -> None:
     """The lock holds by a constraint, which does no work, not by a brake, which would."""
-    vehicle = frictionless(0.0)
-    numbers = np.array([plant(vehicle)])
-    numbers["locked"][0] = (1.0, 0.0)
-    state = tumbling()
-    seize(vehicle, state, (True, False))
-    energy, momentum = weigh(vehicle, state)
-    zeros = Inputs(np.zeros(4), np.zeros(2), np.zeros(3), np.zeros(3))
+    vehicle = frictionless()
+    numbers = np.array([plant(vehicle, Effects(gravity=0.0))])
+    numbers["locked"][0, 0] = 1.0
+    state = tumbling(vehicle)
+    seize(numbers[0], held(), state, (True, False))
+    energy, momentum = weigh(vehicle, state, 0.0)
     steps = 500
     places, states = np.empty((steps, 4, 3)), np.empty((steps, len(state)))
-    integrate(numbers[0], state, zeros, 0.001, places, states, held(2))
-    after, kept = weigh(vehicle, state)
+    integrate(numbers[0], state, inputs(), 0.001, places, states, held())
+    after, kept = weigh(vehicle, state, 0.0)
     assert abs(after - energy) <= 1e-7 * energy
     assert np.abs(kept - momentum)[3:].max() <= 1e-7 * np.linalg.norm(momentum[3:])
     assert np.ptp(states[:, 17]) == 0.0

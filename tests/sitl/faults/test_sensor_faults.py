@@ -22,6 +22,7 @@ from sitl.sensors.measurements import (
     PressureMeasurement,
     RangeMeasurement,
 )
+from vehicles.vehicle_file import load_vehicle
 
 FIRST, END, STEPS = 100, 400, 500
 START_S, DURATION_S = 0.2, 0.6
@@ -30,7 +31,7 @@ V3 = tuple[float, float, float]
 
 
 def faults(*each: Fault, exact: bool = True) -> Faults:
-    return Faults(each, 3, step_us=2000, thrust_max=17.0, joints=2, exact=exact)
+    return Faults(each, 3, step_us=2000, full=(17.0,) * 4, joints=2, exact=exact)
 
 
 def failing(unit: Unit, kind: Kind) -> Fault:
@@ -258,7 +259,7 @@ def test_one_axis_is_off_by_a_constant_of_either_sign_and_the_others_are_not() -
     ],
 )
 def test_what_a_unit_cannot_be_is_refused(fault: Fault, sentence: str) -> None:
-    found = problem(fault, EXACT, exact=True)
+    found = problem(fault, EXACT, load_vehicle("paper"), exact=True)
     assert found is not None
     assert found.startswith(sentence)
 

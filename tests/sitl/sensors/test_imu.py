@@ -15,12 +15,13 @@ from sitl.sensors.keys import Imu
 from tests.sitl.sensors.readings import HOVER, reading
 
 RATE_HZ = 500.0
+SPINS = (1.0, -1.0, 1.0, -1.0)
 Array = npt.NDArray[np.float64]
 
 
 def samples(count: int, seed: int = 0, thrust: V4 = HOVER, **keys: Any) -> Array:
     """(count, 6) of gyro [rad/s] and accelerometer [m/s²] at rest, less the truth."""
-    sensor = ImuSensor(Imu(rate_hz=RATE_HZ, **keys), np.random.default_rng(seed), 8.0)
+    sensor = ImuSensor(Imu(rate_hz=RATE_HZ, **keys), np.random.default_rng(seed), 8.0, SPINS)
     exact = reading()
     rows = []
     for _ in range(count):
@@ -115,7 +116,7 @@ def test_no_saturated_reading_exceeds_the_range(limit: float, resolution: float)
         gyro_resolution_rad_s=resolution,
         accel_resolution_m_s2=resolution,
     )
-    sensor = ImuSensor(keys, np.random.default_rng(0), 8.0)
+    sensor = ImuSensor(keys, np.random.default_rng(0), 8.0, SPINS)
     said = sensor.measure(reading(), HOVER, 0, True)
     assert said.gyro_B == (limit, -limit, limit)
     assert said.accel_B == (limit, -limit, limit)
@@ -139,7 +140,7 @@ def test_the_rotors_shake_at_their_frequency_and_harder_with_thrust() -> None:
 
 def test_an_outlier_is_a_spike_to_the_ends_of_the_range() -> None:
     keys = Imu(rate_hz=RATE_HZ, gyro_limit_rad_s=34.9, accel_limit_m_s2=156.9)
-    sensor = ImuSensor(keys, np.random.default_rng(0), 8.0)
+    sensor = ImuSensor(keys, np.random.default_rng(0), 8.0, SPINS)
     said = sensor.measure(reading(), HOVER, 0, True)
     assert said.gyro_B == (34.9, -34.9, 34.9)
     assert said.accel_B == (156.9, -156.9, 156.9)

@@ -19,6 +19,7 @@ from sitl.sensors.measurements import (
 from sitl.sensors.suite import SensorSuite
 from sitl.simulation import Controls, Simulation
 from tests.sitl.sensors.readings import HOVER, START_US, STEP_US, reading
+from tests.sitl.vehicles import PAPER
 
 HEAD = """
 duration_s = 10.0
@@ -41,7 +42,7 @@ def sensors(text: str, suite: str | None = None) -> MeasuredSensors:
 
 def arrivals(suite: MeasuredSensors, steps: int, seed: int = 3) -> list[Measurement]:
     """Everything that a suite says of a vehicle that moves evenly."""
-    fitted = SensorSuite(suite, seed, START_US, joints=2, hover_thrust=8.0)
+    fitted = SensorSuite(suite, seed, START_US, vehicle=PAPER, hover_thrust=8.0)
     return [
         one for k in range(steps) for one in fitted.step(reading(START_US + STEP_US * k), HOVER)
     ]

@@ -1,0 +1,106 @@
+"""How fast friction and end stops can move the arm, beside what a step of the plant can follow."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from sitl.plant.actuators import SLOW
+from sitl.plant.aerial_manipulator import empty_workspace, place_bodies
+from sitl.plant.mass_matrix import mass_matrix_into
+from sitl.plant.parameters import GRAVITY, Effects, plant
+from sitl.plant.state import THRUST, at_rest
+from sitl.plant.vector import Array
+from vehicles.description import Vehicle
+
+FASTEST = 2500.0  # 1/s; at 2785 a step of 1 ms is no longer stable
+_POSTURES = 64
+_REMEDIES = (
+    (
+        "the joints' friction",
+        "divide joints.coulomb and viscous by {:.2g}, or give the joints more armature",
+    ),
+    (
+        "end_stops",
+        "divide their stiffness and damping by {:.2g}, or give the joints more armature",
+    ),
+    ("feet", "divide feet.stiffness by {0:.2g} and multiply feet.slip_rate by it"),
+)
+
+
+class TooStiffError(ValueError):
+    """Joints that a step of the plant cannot follow; the message says what to change."""
+
+
+def check_stiffness(vehicle: Vehicle, effects: Effects) -> None:
+    """Refuse a vehicle whose arm the plant could not integrate.
+
+    Raises:
+        TooStiffError: Friction or end stops are too strong for the inertia of the arm.
+    """
+    for rate, (what, remedy) in zip(
+        fastest_rates(vehicle, effects.motor_inertia), _REMEDIES, strict=True
+    ):
+        if not (rate <= FASTEST):
+            raise TooStiffError(
+                f"vehicle {vehicle.name}: {what} would move it at {rate:.0f} 1/s, a step of the "
+                f"plant follows {FASTEST:.0f}; {remedy.format(rate / FASTEST)}"
+            )
+
+
+@lru_cache(maxsize=16)
+def fastest_rates(vehicle: Vehicle, motor_inertia: float = 0.0) -> tuple[float, float, float]:
+    r"""Fastest eigenvalue of the joints about zero rate, at their stops, and of feet [1/s].
+
+    .. math:: \ddot x = -A (D \dot x + K x), \quad A = (M^{-1})_{xx}
+
+    Of the joints over postures within the limits; Coulomb's friction is steep about zero rate only,
+    and every stop is touched at once. Each joint carries a ``motor_inertia`` [kg·m²] beside its
+    armature. The vehicle stands on all feet in its posture of rest.
+    """
+    numbers, work = plant(vehicle, Effects(motor_inertia=motor_inertia)), empty_workspace()
+    joints, arm = len(vehicle.joints), THRUST + len(vehicle.rotors)
+    state, stops = at_rest(len(vehicle.rotors), joints), numbers.stops
+    there = np.isfinite(stops.most) | np.isfinite(stops.least)
+    touched = stops.share[: stops.number][there[: stops.number], :joints]
+    viscous = np.diag([one.viscous for one in vehicle.joints])
+    friction = viscous + np.diag([one.coulomb / SLOW for one in vehicle.joints])
+    damping = viscous + stops.damping * touched.T @ touched
+    stiffness = stops.stiffness * touched.T @ touched
+    least = np.array([max(one.position_min, -math.pi) for one in vehicle.joints])
+    most = np.array([min(one.position_max, math.pi) for one in vehicle.joints])
+    shares = np.random.default_rng(0).uniform(size=(_POSTURES, joints))
+    worst, mobility = [0.0, 0.0], np.eye(6 + joints)
+    for angles in (*(least + shares * (most - least)), vehicle.home_posture, vehicle.rest_posture):
+        state[arm : arm + joints] = angles
+        place_bodies(numbers, state, work)
+        mass_matrix_into(numbers.chain, work.posture, work.mass)
+        lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
+        mass = lower + np.tril(lower, -1).T
+        mass[6:, 6:] += np.diag(numbers.gears.inertia[:joints])
+        mobility[:] = np.linalg.inv(mass)
+        of_joints = mobility[6:, 6:]
+        worst[0] = max(worst[0], _fastest(of_joints, friction, np.zeros_like(friction)))
+        worst[1] = max(worst[1], _fastest(of_joints, damping, stiffness))
+    return worst[0], worst[1], _fastest(mobility[:6, :6], *_of_feet(vehicle))
+
+
+def _of_feet(vehicle: Vehicle) -> tuple[Array, Array]:
+    """Damping and stiffness (6, 6) [SI] of a base that stands on all its feet."""
+    feet, damping, stiffness = vehicle.feet, np.zeros((6, 6)), np.zeros((6, 6))
+    load = vehicle.mass * GRAVITY / len(feet.positions)  # N, on each
+    slip = feet.friction * load / feet.slip_rate
+    for x, y, z in feet.positions:
+        to_foot = np.array([[1, 0, 0, 0, z, -y], [0, 1, 0, -z, 0, x], [0, 0, 1, y, -x, 0]])
+        damping += to_foot.T @ np.diag([slip, slip, feet.dissipation * load]) @ to_foot
+        stiffness += to_foot.T @ np.diag([0.0, 0.0, feet.stiffness]) @ to_foot
+    return damping, stiffness
+
+
+def _fastest(mobility: Array, damping: Array, stiffness: Array) -> float:
+    """Largest eigenvalue [1/s] of motion with a mobility, damping and stiffness (n, n) [SI]."""
+    n = len(mobility)
+    rates = np.block([[np.zeros((n, n)), np.eye(n)], [-mobility @ stiffness, -mobility @ damping]])
+    return float(np.abs(np.linalg.eigvals(rates)).max())
