@@ -93,7 +93,7 @@ def share_out(m: Mixer, airframe: Airframe) -> None:
     for i in range(m.gram.size):
         m.gram[i] = 0.0
     for i in range(n):
-        s, at, obeys = _AXES * i, 6 * i, float(m.low[i] < m.top[i])
+        s, at, obeys = _AXES * i, 6 * i, 1.0 if m.low[i] < m.top[i] else 0.0
         m.share[s + ROLL], m.share[s + PITCH] = obeys * w[at + 3], obeys * w[at + 4]
         m.share[s + THRUST], m.share[s + YAW] = -obeys * w[at + 2], obeys * w[at + 5]
         for k in range(_AXES):
@@ -112,7 +112,7 @@ def share_out(m: Mixer, airframe: Airframe) -> None:
 @compilable
 def _level(m: Mixer, i: int, roll: float, pitch: float) -> float:
     """What roll and pitch ask of a rotor [N]."""
-    return m.share[_AXES * i + ROLL] * roll + m.share[_AXES * i + PITCH] * pitch
+    return float(m.share[_AXES * i + ROLL] * roll + m.share[_AXES * i + PITCH] * pitch)
 
 
 @compilable

@@ -75,7 +75,7 @@ class Airframe:
 def airframe_of(vehicle: Vehicle) -> Airframe:
     """What the controllers know of a vehicle."""
     rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
-    rows = [_wrench(rotor) for rotor in rotors]
+    rows = [wrench_of(rotor) for rotor in rotors]
     wrench = [number for row in rows for number in row]
     effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
     share = np.linalg.pinv(effect).ravel().tolist()
@@ -102,7 +102,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     )
 
 
-def _wrench(rotor: Rotor) -> Several:
+def wrench_of(rotor: Rotor) -> Several:
     """Force [1] and torque [m] in B, about its origin, of a rotor per thrust."""
     (px, py, pz), (x, y, z) = rotor.position, rotor.axis
     # PX4's: a rotor that turns counter-clockwise turns the vehicle the other way about its axis.
