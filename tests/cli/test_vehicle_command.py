@@ -12,7 +12,7 @@ import pytest
 from pandion.vehicle import main
 from pandion.vehicle_figures import figures, warnings
 from tests.vehicles.test_urdf import PARAMS, ROBOT
-from vehicles.vehicle_file import load_vehicle, vehicle_text
+from vehicles.vehicle_file import load_vehicle, vehicle_names, vehicle_text
 
 PAPER = load_vehicle("paper")
 
@@ -25,7 +25,9 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
 
 
 def test_paper_is_listed_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(capsys, "list") == (0, "paper        3.50 kg, 4 rotors, 2 joints\n", "")
+    code, out, err = run(capsys, "list")
+    assert (code, err) == (0, "")
+    assert "paper        3.50 kg, 4 rotors, 2 joints" in out.splitlines()
     code, out, _ = run(capsys, "show", "paper")
     assert code == 0
     assert "hover throttle    50 % of full thrust" in out
@@ -133,3 +135,14 @@ def test_numbers_of_a_urdf_are_kept_in_their_ranges(
     code, out, err = run(capsys, "import", str(robot), "--rotors", str(rotors))
     assert (code, out) == (1, "")
     assert "must be -10 to 10" in err
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_every_vehicle_that_comes_with_pandion_is_sound(
+    capsys: pytest.CaptureFixture[str], name: str, tmp_path: Path
+) -> None:
+    code, out, err = run(capsys, "check", name)
+    assert (code, err) == (0, "")
+    assert "no warning" in out
+    assert run(capsys, "show", name)[0] == 0
+    assert run(capsys, "export", name, "--urdf", str(tmp_path / "robot.urdf"))[0] == 0
