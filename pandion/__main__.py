@@ -29,6 +29,7 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
             "pandion.param",
             "list, set, import and export parameters of a vehicle or a file",
         ),
+        "vehicle": ("pandion.vehicle", "list, show, check, import and export vehicles"),
         "px4": ("pandion.px4", "print what PX4 needs to fly the simulated vehicle"),
     },
     "look": {

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.toml_tables import TableReader, nearest, shown
+from command_line.toml_text import toml_lines
 from vehicles.description import JOINTS_MAX, ROTORS_MAX, V3, V6, Rotor, Vehicle
 
 PACKAGED: Final = Path(__file__).parent
@@ -36,7 +37,7 @@ def vehicle_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in PACKAGED.glob("*.toml")))
 
 
-def vehicle_text(name_or_path: str) -> tuple[str, str]:
+def read_text(name_or_path: str) -> tuple[str, str]:
     """Name and text of a packaged vehicle, or of any by the path of its file.
 
     Raises:
@@ -64,7 +65,7 @@ def load_vehicle(name_or_path: str) -> Vehicle:
     Raises:
         VehicleError: Unknown name, unreadable file, unknown key or impossible value.
     """
-    name, text = vehicle_text(name_or_path)
+    name, text = read_text(name_or_path)
     return parse_vehicle(text, name)
 
 
@@ -84,6 +85,15 @@ def parse_vehicle(text: str, name: str) -> Vehicle:
     except RecursionError:
         raise VehicleError(f"vehicle {name} is nested too deeply") from None
     return checked(vehicle)
+
+
+def vehicle_text(vehicle: Vehicle, comment: str = "") -> str:
+    """The TOML text of a vehicle, after a comment of one or several lines.
+
+    The name is left out: a vehicle is named by its file.
+    """
+    head = "".join(f"# {line}\n" for line in comment.splitlines())
+    return head + "\n".join(toml_lines("", vehicle, ("name",))) + "\n"
 
 
 def checked(vehicle: Vehicle) -> Vehicle:

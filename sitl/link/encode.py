@@ -10,7 +10,7 @@ from messages.frames import FrameWriter
 from messages.lockstep_codec import LockstepFrame
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.link import message_ids
-from sitl.link.encode_sensors import SensorEncoder
+from sitl.link.encode_sensors import JOINTS_MAX, SensorEncoder
 from sitl.link.failures import Answer, Injection
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
@@ -63,14 +63,14 @@ class StepEncoder:
         self._hil_sensor = LockstepFrame(self._sensors, message_ids.HIL_SENSOR, *_HIL_TAIL)
         self._arms = {
             joints: LockstepFrame(self._sensors, message_ids.ARM_JOINT_STATE, *_ARM_TAIL, joints)
-            for joints in range(1, 5)
+            for joints in range(1, JOINTS_MAX + 1)
         }
 
     def datagram(self, readings: SensorReadings, messages: tuple[PilotMessage, ...]) -> bytes:
         """Pilot's messages, pose, arm, and HIL_SENSOR last, as the barrier."""
         t_us, p, v, q, w, gyro, accel, angles, rates, torques = readings
         arm = self._arms[len(angles)]
-        rest = (0.0,) * (4 - len(angles))
+        rest = (0.0,) * (JOINTS_MAX - len(angles))
         step = (
             self._odometry(t_us, *p, *q, *v, *w)
             + arm(t_us, *angles, *rest, *rates, *rest, *torques, *rest)

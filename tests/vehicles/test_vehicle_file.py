@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME, BodySize, airframe_of
 from vehicles.vehicle_file import (
     PACKAGED,
     VehicleError,
@@ -51,6 +51,27 @@ def test_paper_is_the_vehicle_that_the_flight_software_knows() -> None:
     assert paper.joints[0].position_max == AIRFRAME.joint1_limit
     assert paper.coupled_limits[0].maximum == AIRFRAME.joint12_limit
     assert paper.limits.tilt == AIRFRAME.tilt_max
+
+
+def test_its_parts_are_the_sizes_that_the_flight_software_keeps_clear() -> None:
+    assert AIRFRAME.size == BodySize()
+    assert AIRFRAME.leg_length == 0.32
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("axis = [0.0, 1.0, 0.0]", "axis = [1.0, 0.0, 0.0]"),
+        ("xyz = [0.0, 0.0, 0.15]", "xyz = [0.0, 0.05, 0.15]"),
+        ("position_max = 1.0471975511965976", "position_max = 1.0"),
+        ("row = [1.0, 1.0]", "row = [1.0, 2.0]"),
+    ],
+)
+def test_an_arm_that_the_flight_software_does_not_know_is_refused(old: str, new: str) -> None:
+    """No arm is flown as if it were another one."""
+    other = parse_vehicle(PAPER.replace(old, new, 1), "mine")
+    with pytest.raises(VehicleError, match="vehicle mine: the flight software flies an arm like"):
+        airframe_of(other)
 
 
 def test_axes_that_are_rounded_are_scaled() -> None:

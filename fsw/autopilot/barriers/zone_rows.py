@@ -52,12 +52,11 @@ from fsw.autopilot.signals import SafeSet, Vec3, Vec4
 from fsw.compiled import kernel, machine_code
 
 _NO_ROW = 1e3  # residual of a row that is left out
-_LEVER = 0.6  # m, no place of the vehicle is farther from the base
 _LEAST_THRUST = 6.0  # m/s^2, specific, within the limits of the inputs
 
 
 # Entries of the settings, for kernels: one array costs what one number costs to hand over.
-_DISTANCES, _TIGHTENING, _FIRST, _MOST, _KEPT, _FOLLOWING = 0, 1, 2, 3, 7, 13
+_DISTANCES, _TIGHTENING, _FIRST, _MOST, _KEPT, _FOLLOWING, _REACH = 0, 1, 2, 3, 7, 13, 19
 _LAMBDA = 3  # among the entries of a tuning
 
 
@@ -69,14 +68,15 @@ def settings(
     tightening: float = 0.0,
     first_node: int = 1,
     most: Vec4 = (math.inf, 0.0, 0.0, 0.0),
+    reach: float = math.inf,
 ) -> Array:
-    """What the kernels need to know besides geometry (19,) [SI]; arguments as of ``ZoneRows``.
+    """What the kernels need to know besides geometry (20,) [SI]; arguments as of ``ZoneRows``.
 
     ``period`` [s] is the planner's, ``first_node`` [1] the first with rows; ``tightening`` [m],
-    ``most`` [m/s^2, rad/s^2].
+    ``most`` [m/s^2, rad/s^2]; no place of the vehicle is farther from the base than ``reach`` [m].
     """
     numbers = [entry for tuning in tunings for entry in tuning.numbers(period)]
-    return np.array([distances, tightening, first_node, *most, *numbers], dtype=np.float64)
+    return np.array([distances, tightening, first_node, *most, *numbers, reach], dtype=np.float64)
 
 
 class ZoneRows:
@@ -119,6 +119,7 @@ class ZoneRows:
             tightening=tightening,
             first_node=first_node,
             most=most,
+            reach=body.reach,
         )
         parts = len(body.parts)
         starts = sum(1 if follows else parts for follows in following)
@@ -258,7 +259,7 @@ def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
     A bound for all inputs within their limits: horizontal, vertical, yaw, joints. A
     place swings about the base by the tilt that a change of acceleration takes, by yaw and joints.
     """
-    most = settings[_MOST : _MOST + 4]
+    most, lever = settings[_MOST : _MOST + 4], settings[_REACH]
     far = fast = up = up_fast = 0.0
     tilt = tilt_rate = turn = turn_rate = swing = swing_rate = 0.0
     for step in range(node):
@@ -283,8 +284,8 @@ def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
     rate += angle * (jerk / _LEAST_THRUST + abs(state[YAW_RATE]) + rates)
     rate_of_arm = swing_rate + swing * (rates + jerk / _LEAST_THRUST + abs(state[YAW_RATE]))
     return (
-        math.sqrt(far * far + up * up) + angle * _LEVER + swing * _LEVER,
-        math.sqrt(fast * fast + up_fast * up_fast) + rate * _LEVER + rate_of_arm * _LEVER,
+        math.sqrt(far * far + up * up) + (angle + swing) * lever,
+        math.sqrt(fast * fast + up_fast * up_fast) + (rate + rate_of_arm) * lever,
     )
 
 

@@ -22,7 +22,7 @@ from fsw.compiled import compilable
 from fsw.record import JOINTS
 
 ROLL, PITCH, THRUST, YAW = 0, 1, 2, 3  # of a rotor's share, in the order of what is kept
-_AXES: Final = 4
+AXES: Final = 4
 _NONE: Final = 1e-9  # N a unit; a rotor with less has no share
 _FAR: Final = 1e9
 
@@ -39,7 +39,7 @@ def allocate(r: Tick, airframe: Airframe, torque: Vec3, thrust: float, yaw_limit
     roll, pitch, lift, yaw = _left_to_others(r, airframe, torque, thrust)
     most = 0.0
     for i in range(n):
-        most = max(most, abs(m.share[_AXES * i + YAW]))
+        most = max(most, abs(m.share[AXES * i + YAW]))
     yaw = clamp_magnitude(yaw, yaw_limit / max(most, _NONE))
     low, high = _yaw_room(m, n, roll, pitch, lift)
     if not low <= high:
@@ -54,7 +54,7 @@ def allocate(r: Tick, airframe: Airframe, torque: Vec3, thrust: float, yaw_limit
     for i in range(n):
         f = m.low[i]
         if f < m.top[i]:
-            s = _AXES * i
+            s = AXES * i
             f = _level(m, i, roll, pitch) + m.share[s + THRUST] * lift + m.share[s + YAW] * yaw
             if f < m.low[i]:
                 f = m.low[i]
@@ -79,7 +79,7 @@ def _left_to_others(
             x, y, z = x - w[at + 3] * f, y - w[at + 4] * f, z - w[at + 5] * f
             lift, all_obey = lift + w[at + 2] * f, False
     if all_obey:
-        for i in range(_AXES * n):
+        for i in range(AXES * n):
             m.share[i] = airframe.share[i]
     else:
         share_out(m, airframe)
@@ -93,26 +93,26 @@ def share_out(m: Mixer, airframe: Airframe) -> None:
     for i in range(m.gram.size):
         m.gram[i] = 0.0
     for i in range(n):
-        s, at, obeys = _AXES * i, 6 * i, float(m.low[i] < m.top[i])
+        s, at, obeys = AXES * i, 6 * i, 1.0 if m.low[i] < m.top[i] else 0.0
         m.share[s + ROLL], m.share[s + PITCH] = obeys * w[at + 3], obeys * w[at + 4]
         m.share[s + THRUST], m.share[s + YAW] = -obeys * w[at + 2], obeys * w[at + 5]
-        for k in range(_AXES):
-            for j in range(_AXES):
+        for k in range(AXES):
+            for j in range(AXES):
                 m.gram[JOINTS * k + j] += m.share[s + k] * m.share[s + j]
     # What the rotors that are left cannot do independently is not asked of them: yaw first.
-    factorise(m.factor, m.gram, _AXES)
+    factorise(m.factor, m.gram, AXES)
     for i in range(n):
-        for k in range(_AXES):
-            m.work[k] = m.share[_AXES * i + k]
-        solve(m.factor, m.work, _AXES)
-        for k in range(_AXES):
-            m.share[_AXES * i + k] = m.work[k]
+        for k in range(AXES):
+            m.work[k] = m.share[AXES * i + k]
+        solve(m.factor, m.work, AXES)
+        for k in range(AXES):
+            m.share[AXES * i + k] = m.work[k]
 
 
 @compilable
 def _level(m: Mixer, i: int, roll: float, pitch: float) -> float:
     """What roll and pitch ask of a rotor [N]."""
-    return m.share[_AXES * i + ROLL] * roll + m.share[_AXES * i + PITCH] * pitch
+    return float(m.share[AXES * i + ROLL] * roll + m.share[AXES * i + PITCH] * pitch)
 
 
 @compilable
@@ -120,9 +120,9 @@ def _room(m: Mixer, n: int, roll: float, pitch: float, along: int, by: int, valu
     """Range of thrust or yaw, ``along``, within all rotors' limits at a ``value`` of the other."""
     low, high = -_FAR, _FAR
     for i in range(n):
-        share = m.share[_AXES * i + along]
+        share = m.share[AXES * i + along]
         if m.low[i] < m.top[i] and abs(share) > _NONE:
-            rest = _level(m, i, roll, pitch) + m.share[_AXES * i + by] * value
+            rest = _level(m, i, roll, pitch) + m.share[AXES * i + by] * value
             a, b = (m.low[i] - rest) / share, (m.top[i] - rest) / share
             low, high = max(low, min(a, b)), min(high, max(a, b))
     return low, high
@@ -133,8 +133,8 @@ def _yaw_room(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
     """Range of yaw [N m]; empty also where a rotor that does not yaw has no room."""
     low, high = _room(m, n, roll, pitch, YAW, THRUST, lift)
     for i in range(n):
-        if m.low[i] < m.top[i] and abs(m.share[_AXES * i + YAW]) <= _NONE:
-            f = _level(m, i, roll, pitch) + m.share[_AXES * i + THRUST] * lift
+        if m.low[i] < m.top[i] and abs(m.share[AXES * i + YAW]) <= _NONE:
+            f = _level(m, i, roll, pitch) + m.share[AXES * i + THRUST] * lift
             if not m.low[i] - _NONE <= f <= m.top[i] + _NONE:
                 return 1.0, -1.0
     return low, high
@@ -146,7 +146,7 @@ def _thrust_room(m: Mixer, n: int, roll: float, pitch: float) -> Vec2:
     low, high = -_FAR, _FAR
     for i in range(n):
         if m.low[i] < m.top[i]:
-            a, b = m.share[_AXES * i + THRUST], m.share[_AXES * i + YAW]
+            a, b = m.share[AXES * i + THRUST], m.share[AXES * i + YAW]
             c = _level(m, i, roll, pitch)
             if abs(b) <= _NONE:
                 low, high = _narrowed(low, high, a, m.low[i] - c, m.top[i] - c)
@@ -154,7 +154,7 @@ def _thrust_room(m: Mixer, n: int, roll: float, pitch: float) -> Vec2:
             # Least yaw of the one, greatest of the other: (rate, at no thrust) each.
             at_least = ((m.low[i] if b > 0.0 else m.top[i]) - c) / b
             for j in range(n):
-                e, d = m.share[_AXES * j + THRUST], m.share[_AXES * j + YAW]
+                e, d = m.share[AXES * j + THRUST], m.share[AXES * j + YAW]
                 if m.low[j] < m.top[j] and abs(d) > _NONE:
                     free = (m.top[j] if d > 0.0 else m.low[j]) - _level(m, j, roll, pitch)
                     low, high = _narrowed(low, high, a / b - e / d, at_least - free / d, _FAR)
@@ -178,12 +178,12 @@ def _cut(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
     found, worst = 0, 0.0
     for i in range(n):
         if m.low[i] < m.top[i]:
-            s = _AXES * i
+            s = AXES * i
             f = _level(m, i, roll, pitch) + m.share[s + THRUST] * lift + m.share[s + YAW] * yaw
             lacks = max(f - m.top[i], 0.0) + min(f - m.low[i], 0.0)
             if abs(lacks) > abs(worst):
                 found, worst = i, lacks
-    x, y = m.share[_AXES * found + ROLL], m.share[_AXES * found + PITCH]
+    x, y = m.share[AXES * found + ROLL], m.share[AXES * found + PITCH]
     if abs(x * roll) > abs(y * pitch):
         return roll - worst / x, pitch
     return (roll, pitch - worst / y) if abs(y) > _NONE else (roll, pitch)

@@ -38,6 +38,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from fsw.autopilot.control.allocation import AXES, PITCH, ROLL
 from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import posture
@@ -249,19 +250,25 @@ def _fits_all_axes(airframe: Airframe, loop: Tube, disturbance: float) -> bool:
     pushed = disturbance + lean * disturbance * loop.vertical_acceleration
     change = disturbance * loop.vertical_acceleration / GRAVITY  # of the thrust
     lever = 1.0 - change
-    hover = airframe.mass * GRAVITY / 4.0
+    hover = airframe.mass * GRAVITY / airframe.rotors
     shared = 1.0 - change * hover / min(hover, airframe.rotor_thrust_max - hover)
     used = pushed * loop.snap / _snap_in_hover(airframe)
     return math.sqrt(2.0) * used <= lever and used <= lever * shared
 
 
 def _snap_in_hover(airframe: Airframe) -> float:
-    """The snap [m/s^4] that the torque about one axis gives; straight down the arm weighs most."""
-    hover = airframe.mass * GRAVITY / 4.0
+    """The snap [m/s^4] that the torque about one axis gives, where it gives least.
+
+    At angles of zero: straight down the arm weighs most.
+    """
+    hover = airframe.mass * GRAVITY / airframe.rotors
     headroom = min(hover, airframe.rotor_thrust_max - hover)
     m = posture(airframe.bodies, (0.0,) * airframe.bodies.joints)
-    inertia = max(float(m.inertia[0]), float(m.inertia[4]))
-    return GRAVITY * 2.0 * airframe.rotor_arm * headroom / inertia
+    least = math.inf
+    for axis, inertia in ((ROLL, float(m.inertia[0])), (PITCH, float(m.inertia[4]))):
+        hardest = max(map(abs, airframe.share[axis::AXES]))  # N a N m
+        least = min(least, headroom / hardest / inertia)
+    return GRAVITY * least
 
 
 def _sum(response: Array) -> float:

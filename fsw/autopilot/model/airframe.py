@@ -11,7 +11,7 @@ from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.signals import Vec2
 from fsw.record import ROTORS
 from vehicles.description import Rotor, Vehicle
-from vehicles.vehicle_file import load_vehicle
+from vehicles.vehicle_file import VehicleError, load_vehicle
 
 GRAVITY = 9.81  # m/s^2, along +z of the world
 
@@ -75,10 +75,11 @@ class Airframe:
 def airframe_of(vehicle: Vehicle) -> Airframe:
     """What the controllers know of a vehicle."""
     rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
-    rows = [_wrench(rotor) for rotor in rotors]
+    rows = [wrench_of(rotor) for rotor in rotors]
     wrench = [number for row in rows for number in row]
     effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
     share = np.linalg.pinv(effect).ravel().tolist()
+    _check_arm(vehicle)
     joint, limit = vehicle.joints[0], vehicle.coupled_limits[0]
     return Airframe(
         mass=vehicle.mass,
@@ -99,10 +100,62 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         tilt_max=vehicle.limits.tilt,
         body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
         leg_length=max(z for _, _, z in vehicle.feet.positions),
+        size=_size(vehicle),
     )
 
 
-def _wrench(rotor: Rotor) -> Several:
+def _size(vehicle: Vehicle) -> BodySize:
+    """How far the parts of a vehicle reach; where there is none they are thin."""
+    first, second = (joint.name for joint in vehicle.joints)
+
+    def largest(on: str, *, capsule: bool) -> float:
+        radii = [
+            one.radius for one in vehicle.parts if (one.on, one.end is not None) == (on, capsule)
+        ]
+        return max(radii, default=0.0)
+
+    return BodySize(
+        hull=largest("base", capsule=False),
+        blade=max(rotor.radius for rotor in vehicle.rotors),
+        disc=max(rotor.half_height for rotor in vehicle.rotors),
+        feet_spread=max(max(abs(x), abs(y)) for x, y, _ in vehicle.feet.positions),
+        leg=largest("base", capsule=True),
+        link=max(
+            *(largest(on, capsule=True) for on in (first, second)), largest(first, capsule=False)
+        ),
+        tool=largest(second, capsule=False),
+    )
+
+
+def _check_arm(vehicle: Vehicle) -> None:
+    """Refuse an arm that planner and compensation do not know yet.
+
+    Raises:
+        VehicleError: With what it is, and what they know.
+    """
+    joints, limits = vehicle.joints, vehicle.coupled_limits
+    below = [*(joint.xyz for joint in joints[1:]), vehicle.end_effector.position]
+    below += [joint.link.com for joint in joints]
+    first, second = joints[0], joints[-1]
+    planar = all(joint.axis == (0.0, 1.0, 0.0) and not any(joint.rpy) for joint in joints)
+    if not (
+        len(joints) == 2
+        and planar
+        and not any(first.xyz)
+        and all(x == y == 0.0 for x, y, _ in below)
+        and first.position_max == -first.position_min < math.inf
+        and second.position_max == -second.position_min == math.inf
+        and [limit.row for limit in limits] == [(1.0, 1.0)]
+        and limits[0].maximum == -limits[0].minimum
+    ):
+        raise VehicleError(
+            f"vehicle {vehicle.name}: the flight software flies an arm like that of paper as yet: "
+            "two joints about y, from the body's origin straight down, with limits of joint 1 and "
+            "of both joints' sum alone, each as far to either side"
+        )
+
+
+def wrench_of(rotor: Rotor) -> Several:
     """Force [1] and torque [m] in B, about its origin, of a rotor per thrust."""
     (px, py, pz), (x, y, z) = rotor.position, rotor.axis
     # PX4's: a rotor that turns counter-clockwise turns the vehicle the other way about its axis.

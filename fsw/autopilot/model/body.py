@@ -17,6 +17,7 @@ disc     four places of the rim, the first of them nearest
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -63,6 +64,15 @@ class Body:
     parts: tuple[Part, ...]
 
     @property
+    def reach(self) -> float:
+        """Farthest that any place of a part is from the base [m], in any posture."""
+        base, first, second = (
+            _extent(part for part in self.parts if part.on == on)
+            for on in (ON_BASE, ON_LINK1, ON_LINK2)
+        )
+        return max(base, first + second)
+
+    @property
     def probes(self) -> NDArray[np.float64]:
         """A row of numbers a probe (probes, 12) [SI], in the order of the parts."""
         rows = []
@@ -73,6 +83,12 @@ class Body:
                 angle = 2.0 * math.pi * turn / _RIM_PLACES
                 rows.append((k, form, part.on, *ends, part.radius, part.rim, angle))
         return np.array(rows, dtype=np.float64)
+
+
+def _extent(parts: Iterable[Part]) -> float:
+    """How far from the origin of what they are on the places of parts are [m], at most."""
+    places = [(place, part.rim) for part in parts for place in (part.begin, part.end or part.begin)]
+    return max((math.hypot(*place) + rim for place, rim in places), default=0.0)
 
 
 def body_of(name: BodyName, airframe: Airframe) -> Body:

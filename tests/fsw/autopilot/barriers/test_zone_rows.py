@@ -13,10 +13,10 @@ from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.barriers.margins import Margins
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.zone_rows import ZoneRows, layout
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME, airframe_of
 from fsw.autopilot.model.body import DISC, FORM, ON, RADIUS, SPHERE, Body, Part, body_of
-from fsw.autopilot.model.linearisation import position, velocity
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.linearisation import Linearisation, position, velocity
+from fsw.autopilot.model.prediction import INPUTS, Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.shapes.ball import ball, point
@@ -40,6 +40,8 @@ from tests.fsw.autopilot.mpc.requests import below, hovering, planned, planner, 
 from tests.fsw.autopilot.shapes import by_coal
 from tests.fsw.random_states import random_estimate, vec3
 from tests.fsw.vehicle_places import placed
+from vehicles.description import EndEffector, Vehicle
+from vehicles.vehicle_file import load_vehicle
 
 FULL = body_of("full", AIRFRAME)
 OUT = [
@@ -198,6 +200,50 @@ def test_rows_that_no_input_can_make_bind_change_no_optimum() -> None:
         inputs = random.choice([-1.0, 1.0], INPUTS * NODES) * most
         reached = full.rows.value + full.rows.gradient @ inputs - full.rows.lower_bound
         assert (reached[left_out] > 0.0).all()
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 6.0])
+def test_on_a_vehicle_of_any_size_no_row_is_left_out_that_binds(scale: float) -> None:
+    """Against all rows under inputs at their limits; the arm is as long as the vehicle says."""
+    airframe = airframe_of(scaled(scale))
+    model, body, config = (
+        condense(airframe, PERIOD, NODES),
+        body_of("full", airframe),
+        PlannerConfig(),
+    )
+    case, random = random_case(np.random.default_rng(1)), np.random.default_rng(2)
+    horizon = Linearisation(model)
+    horizon.refill(np.zeros(19), np.zeros(INPUTS * NODES))
+    level, vertical, yaw, joint = config.limits.most
+    most = np.tile([level, level, vertical, yaw, joint, joint], NODES)
+    inputs = random.choice([-1.0, 1.0], (300, INPUTS * NODES)) * most
+    some = 0
+    for far in np.linspace(0.5, 6.0, 12):
+        zones = SafeSet((wall((0.0, 0.0, -1.0), -far * scale, 0.1),))
+        rows = ZoneRows(zones, body, model, (TUNING, TUNING), most=config.limits.most)
+        whole = ZoneRows(zones, body, model, (TUNING, TUNING))
+        for one in (rows, whole):
+            one.refill(horizon, case.targets)
+        left_out = ~rows.rows.gradient.any(axis=1) & whole.rows.gradient.any(axis=1)
+        some += int(left_out.sum())
+        reached = whole.rows.value + inputs @ whole.rows.gradient.T - whole.rows.lower_bound
+        assert (reached[:, left_out] > 0.0).all()
+    assert some > 0
+
+
+def scaled(scale: float) -> Vehicle:
+    """Paper's vehicle, every length of its arm so many times as large."""
+    paper = load_vehicle("paper")
+
+    def longer(v: Vec3) -> Vec3:
+        return scale * v[0], scale * v[1], scale * v[2]
+
+    joints = tuple(
+        replace(one, xyz=longer(one.xyz), link=replace(one.link, com=longer(one.link.com)))
+        for one in paper.joints
+    )
+    tip = EndEffector(position=longer(paper.end_effector.position))
+    return replace(paper, joints=joints, end_effector=tip)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])

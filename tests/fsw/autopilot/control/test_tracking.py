@@ -244,12 +244,13 @@ def test_only_differences_of_place_and_velocity_count(there: Vec3, moving: Vec3)
     def moved(p: Vec3, by: Vec3) -> Vec3:
         return p[0] + by[0], p[1] + by[1], p[2] + by[2]
 
+    swing = (0.0, 0.01, 0.0, -0.01, *(0.0,) * 5)
     ahead = PLAN._replace(p=(0.02, -0.01, -1.01), v=(0.05, 0.04, -0.02))
     estimate, motion = on_plan(Rotation.from_euler("ZYX", [0.7, 0.1, -0.2]), PLAN)
-    here = follow_plan(LAW, 3.5, 0.01, estimate, motion, calm(estimate), ahead, REST_INPUT)
+    here = follow_plan(LAW, 3.5, swing, estimate, motion, calm(estimate), ahead, REST_INPUT)
     estimate = estimate._replace(p_WB=moved(estimate.p_WB, there), v_WB=moving)
     ahead = ahead._replace(p=moved(ahead.p, there), v=moved(ahead.v, moving))
-    same = follow_plan(LAW, 3.5, 0.01, estimate, motion, calm(estimate), ahead, REST_INPUT)
+    same = follow_plan(LAW, 3.5, swing, estimate, motion, calm(estimate), ahead, REST_INPUT)
     assert same[0] == pytest.approx(here[0], abs=1e-6)
     assert same[1] == pytest.approx(here[1], abs=1e-6)
 

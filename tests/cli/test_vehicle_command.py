@@ -1,0 +1,148 @@
+"""``pandion vehicle`` as somebody types it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pandion.vehicle import main
+from pandion.vehicle_figures import figures, warnings
+from tests.vehicles.test_urdf import PARAMS, ROBOT
+from vehicles.vehicle_file import load_vehicle, vehicle_names, vehicle_text
+
+PAPER = load_vehicle("paper")
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    code = main(list(words))
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return code, out, err
+
+
+def test_paper_is_listed_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "list")
+    assert (code, err) == (0, "")
+    assert "paper        3.50 kg, 4 rotors, 2 joints" in out.splitlines()
+    code, out, _ = run(capsys, "show", "paper")
+    assert code == 0
+    assert "hover throttle    50 % of full thrust" in out
+    assert "thrust to weight  2.00" in out
+    # Rotor 3 is ahead, 1 behind, 2 to the left, and the arm hangs down.
+    rows = [line.strip() for line in out[out.index("from above") :].splitlines()]
+    assert rows[1] == "3"
+    assert "2" in next(row for row in rows if "*" in row).split()[0]
+    assert "." in out[out.index("from the right") :]
+
+
+def test_the_figures_of_paper_are_those_of_a_plus_quadrotor() -> None:
+    found = figures(PAPER)
+    assert found.hover_throttle == pytest.approx(0.5)
+    assert found.thrust_to_weight == pytest.approx(2.0)
+    hover = 3.5 * 9.81 / 4.0
+    assert found.authority["pitch"] == pytest.approx(2.0 * 0.3 * hover / 0.3, rel=1e-6)
+    assert found.authority["yaw"] == pytest.approx(4.0 * 0.016 * hover / 0.60002, rel=1e-4)
+    # Straight out at its limit of 60 degrees, and the second link at 90.
+    most = 0.2 * 9.81 * (0.075 * 0.866 + 0.15 * 0.866 + 0.075)
+    assert 0.85 * most < found.joint_load[0] <= most
+    assert found.joint_load[1] == pytest.approx(0.2 * 9.81 * 0.075, rel=0.02)
+    assert not warnings(PAPER, found)
+
+
+def test_as_json_the_figures_are_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "show", "paper", "--json")
+    table = json.loads(out)
+    assert (code, table["name"], table["warnings"]) == (0, "paper", [])
+    assert table["authority"].keys() == {"roll", "pitch", "yaw"}
+
+
+@pytest.mark.parametrize(
+    ("share", "code", "words"),
+    [
+        (0.55, 0, "hovers at 91 % of a rotor's thrust: above 80 %"),
+        (0.45, 1, "it cannot hover"),
+    ],
+)
+def test_too_little_thrust_is_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, share: float, code: int, words: str
+) -> None:
+    rotors = tuple(replace(rotor, thrust_max=share * rotor.thrust_max) for rotor in PAPER.rotors)
+    path = tmp_path / "weak.toml"
+    path.write_text(vehicle_text(replace(PAPER, rotors=rotors)))
+    got, _, err = run(capsys, "check", str(path))
+    assert got == code
+    assert words in err
+
+
+def test_weak_joints_and_tilted_rotors_are_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    weak = replace(PAPER.joints[0], torque_max=0.3)
+    side = replace(PAPER.rotors[1], axis=(0.0, math.sin(0.2), -math.cos(0.2)))
+    vehicle = replace(
+        PAPER,
+        joints=(weak, PAPER.joints[1]),
+        rotors=(PAPER.rotors[0], side, *PAPER.rotors[2:]),
+    )
+    path = tmp_path / "mine.toml"
+    path.write_text(vehicle_text(vehicle))
+    code, out, err = run(capsys, "check", str(path))
+    assert code == 0
+    assert "joint joint1 cannot hold its own arm" in err
+    assert "torque_max is 0.3 N m" in err
+    assert "lateral thrust of tilted rotors is not used: 2" in err
+    assert "2 warnings" in out
+
+
+def test_what_cannot_be_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(vehicle_text(PAPER).replace("mass = 3.1", "mass = 0"))
+    code, out, err = run(capsys, "check", str(path))
+    assert (code, out) == (1, "")
+    assert err == "pandion vehicle: base.mass = 0: must be 1e-06 to 1000\n"
+    code, _, err = run(capsys, "show", "papr")
+    assert (code, 'did you mean "paper"' in err) == (1, True)
+
+
+def test_a_urdf_and_px4s_rotors_become_a_file_and_a_urdf_again(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    robot, rotors, out = tmp_path / "r.urdf", tmp_path / "r.params", tmp_path / "mine.toml"
+    robot.write_text(ROBOT)
+    rotors.write_text(PARAMS)
+    words = ("import", str(robot), "--rotors", str(rotors))
+    code, printed, _ = run(capsys, *words)
+    assert code == 0
+    assert run(capsys, *words, "--out", str(out))[0] == 0
+    assert out.read_text() == printed
+    assert load_vehicle(str(out)).mass == pytest.approx(2.27)
+    assert run(capsys, "export", str(out), "--urdf", str(tmp_path / "again.urdf"))[0] == 0
+    assert "<robot" in (tmp_path / "again.urdf").read_text()
+    code, _, err = run(capsys, "export", "paper", "--urdf", str(tmp_path / "no" / "where.urdf"))
+    assert (code, "cannot write" in err) == (2, True)
+
+
+def test_numbers_of_a_urdf_are_kept_in_their_ranges(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    robot, rotors = tmp_path / "r.urdf", tmp_path / "r.params"
+    robot.write_text(ROBOT.replace('xyz="0 0 -0.2"', 'xyz="0 0 -200"'))
+    rotors.write_text(PARAMS)
+    code, out, err = run(capsys, "import", str(robot), "--rotors", str(rotors))
+    assert (code, out) == (1, "")
+    assert "must be -10 to 10" in err
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_every_vehicle_that_comes_with_pandion_is_sound(
+    capsys: pytest.CaptureFixture[str], name: str, tmp_path: Path
+) -> None:
+    code, out, err = run(capsys, "check", name)
+    assert (code, err) == (0, "")
+    assert "no warning" in out
+    assert run(capsys, "show", name)[0] == 0
+    assert run(capsys, "export", name, "--urdf", str(tmp_path / "robot.urdf"))[0] == 0

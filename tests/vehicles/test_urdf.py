@@ -1,0 +1,178 @@
+"""URDF in and out, with Pinocchio as the one who reads it as well."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.vehicles.random_vehicles import random_vehicle
+from vehicles.rotor_files import read_rotors, rotors_from_parameters
+from vehicles.urdf import urdf_text
+from vehicles.urdf_reader import vehicle_from_urdf
+from vehicles.vehicle_file import PACKAGED, VehicleError, load_vehicle, parse_vehicle, vehicle_text
+
+PAPER = load_vehicle("paper")
+# A base with a battery that is fixed to it, a propeller that turns, and an arm with a gripper.
+ROBOT = """<?xml version="1.0"?>
+<robot name="r">
+  <link name="base"><inertial><origin xyz="0.01 0 0.02" rpy="0.1 0.2 0.3"/><mass value="1.5"/>
+    <inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0.001" ixz="0.002" iyz="-0.001"/>
+  </inertial></link>
+  <link name="battery"><inertial><origin xyz="0 0 0.01"/><mass value="0.4"/>
+    <inertia ixx="0.001" iyy="0.002" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="b" type="fixed"><parent link="base"/><child link="battery"/>
+    <origin xyz="-0.05 0.01 -0.04" rpy="0 0.3 1.0"/></joint>
+  <link name="p1"><inertial><mass value="0.02"/>
+    <inertia ixx="1e-5" iyy="1e-5" izz="2e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="j_p1" type="continuous"><parent link="base"/><child link="p1"/>
+    <origin xyz="0.2 0.2 0.03"/><axis xyz="0 0 1"/></joint>
+  <link name="upper"><inertial><origin xyz="0 0 -0.1"/><mass value="0.2"/>
+    <inertia ixx="0.001" iyy="0.001" izz="0.0001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder.yaw" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0.03 0 -0.05" rpy="0.2 0 -0.4"/><axis xyz="0 0 2"/>
+    <limit lower="-1.5" upper="2.0" effort="1.5" velocity="6"/>
+    <dynamics damping="0.01" friction="0.02"/></joint>
+  <link name="lower"><inertial><origin xyz="0.1 0 0"/><mass value="0.1"/>
+    <inertia ixx="0.0001" iyy="0.0005" izz="0.0005" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0 0 -0.2" rpy="0 1.57 0"/><axis xyz="0 1 0"/>
+    <limit effort="0" velocity="1e4"/></joint>
+  <link name="gripper"><inertial><mass value="0.05"/>
+    <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="g" type="fixed"><parent link="lower"/><child link="gripper"/>
+    <origin xyz="0.2 0.01 0" rpy="0 0 0.5"/></joint>
+</robot>
+"""
+
+
+def mass_matrix(urdf: str, angles: dict[str, float]) -> Any:
+    """Pinocchio's, of base and named joints, others locked at zero."""
+    model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+    locked = [k for k in range(2, model.njoints) if model.names[k] not in angles]
+    q = pin.neutral(model)
+    model = pin.buildReducedModel(model, locked, q)
+    q = pin.neutral(model)
+    for name, angle in angles.items():
+        joint = model.joints[model.getJointId(name)]
+        turn = (angle,) if joint.nq == 1 else (math.cos(angle), math.sin(angle))
+        q[joint.idx_q : joint.idx_q + joint.nq] = turn
+    mass = pin.crba(model, model.createData(), q)
+    return np.triu(mass) + np.triu(mass, 1).T
+
+
+def test_a_robot_is_the_same_bodies_when_it_has_been_read_and_written() -> None:
+    vehicle, notes = vehicle_from_urdf(ROBOT, "mine", PAPER.rotors)
+    assert [joint.name for joint in vehicle.joints] == ["shoulder_yaw", "elbow"]
+    assert vehicle.mass == pytest.approx(2.27)
+    random, half_turn = np.random.default_rng(1), np.diag([1.0, -1.0, -1.0])
+    turn = np.eye(8)
+    turn[:3, :3] = turn[3:6, 3:6] = half_turn
+    for first, second in random.uniform(-1.5, 1.5, (20, 2)):
+        read = mass_matrix(ROBOT, {"shoulder.yaw": first, "elbow": second})
+        ours = mass_matrix(urdf_text(vehicle), {"shoulder_yaw": first, "elbow": second})
+        np.testing.assert_allclose(ours, turn @ read @ turn, atol=1e-12)
+    shoulder, elbow = vehicle.joints
+    limits = (shoulder.position_min, shoulder.position_max, shoulder.torque_max, shoulder.rate_max)
+    assert limits == (-1.5, 2.0, 1.5, 6.0)
+    assert (shoulder.viscous, shoulder.coulomb) == (0.01, 0.02)
+    assert (elbow.position_min, elbow.rate_max, elbow.torque_max) == (-math.inf, 5.0, 2.0)
+    assert any("velocity = 10000 is no limit: 5 rad/s is assumed" in note for note in notes)
+    assert max(z for _, _, z in vehicle.feet.positions) > 0.3
+
+
+@pytest.mark.parametrize("joints", range(1, 7))
+def test_what_is_exported_is_imported_again(joints: int) -> None:
+    random = np.random.default_rng(joints)
+    for _ in range(5):
+        vehicle = random_vehicle(random, joints, 6)
+        text = urdf_text(vehicle)
+        again, _ = vehicle_from_urdf(text, "made_up", vehicle.rotors, frd=True)
+        names = [joint.name for joint in vehicle.joints]
+        angles = dict(zip(names, random.uniform(-1.9, 1.9, joints), strict=True))
+        np.testing.assert_allclose(
+            mass_matrix(urdf_text(again), angles), mass_matrix(text, angles), atol=1e-12
+        )
+        tip = again.end_effector.position
+        np.testing.assert_allclose(tip, vehicle.end_effector.position, atol=1e-12)
+
+
+def test_a_vehicle_is_the_same_when_its_text_has_been_read() -> None:
+    random = np.random.default_rng(5)
+    for vehicle in (PAPER, *(random_vehicle(random, k, 4 + k % 5, 0.1) for k in range(1, 7))):
+        assert parse_vehicle(vehicle_text(vehicle, "two\nlines"), vehicle.name) == vehicle
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
+        ("</robot>", "", "not XML"),
+        ('<robot name="r">', '<robot name="r"></robot><robot>', "not XML"),
+        ('type="continuous"><parent link="upper"', 'type="prismatic"><parent link="upper"',
+         "joint \"elbow\" is 'prismatic': joints of an arm must be revolute"),
+        ('child link="lower"', 'child link="nowhere"', "there is no link 'nowhere'"),
+        ('mass value="1.5"', 'mass value="x"', "value = 'x': must be a finite number"),
+        ('mass value="1.5"', 'mass value="nan"', "value = 'nan': must be a finite number"),
+        ('mass value="1.5"', 'mass value="-1"', 'link "base": mass = -1: must be 0 or more'),
+        ('xyz="0 0 -0.2"', 'xyz="0 0"', "xyz = '0 0': must be 3 finite numbers"),
+        ('mass value="0.2"', 'mass value="0"', 'link "upper" has no mass'),
+        ('axis xyz="0 1 0"', 'axis xyz="0 0 0"', "joints[1].axis"),
+        ('child link="upper"', 'child link="base"', "as one tree"),
+        ('ixx="0.001" iyy="0.001" izz="0.0001"', 'ixx="0.001" iyy="0.001" izz="0.1"',
+         "no body has this"),
+    ],
+)  # fmt: skip
+def test_what_is_no_robot_with_an_arm_is_refused_in_a_sentence(
+    old: str, new: str, words: str
+) -> None:
+    assert old in ROBOT
+    with pytest.raises(VehicleError) as error:
+        vehicle_from_urdf(ROBOT.replace(old, new, 1), "mine", PAPER.rotors)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_of_several_arms_one_is_named() -> None:
+    second = ROBOT.replace('parent link="upper"', 'parent link="base"')
+    with pytest.raises(VehicleError, match=r"3 links are behind 1 joints each.*--tip"):
+        vehicle_from_urdf(second, "mine", PAPER.rotors)
+    vehicle, _ = vehicle_from_urdf(second, "mine", PAPER.rotors, "gripper")
+    assert [joint.name for joint in vehicle.joints] == ["elbow"]
+    with pytest.raises(VehicleError, match="there is no link 'griper', did you mean \"gripper\""):
+        vehicle_from_urdf(ROBOT, "mine", PAPER.rotors, "griper")
+    with pytest.raises(VehicleError, match="no joint moves"):
+        vehicle_from_urdf(ROBOT, "mine", PAPER.rotors, "battery")
+
+
+PARAMS = "\n".join(
+    f"1\t1\tCA_ROTOR{i}_{key}\t{value}\t9"
+    for i, (x, y, km) in enumerate(
+        ((0.15, 0.15, 0.05), (-0.15, -0.15, 0.05), (0.15, -0.15, -0.05), (-0.15, 0.15, -0.05))
+    )
+    for key, value in (("PX", x), ("PY", y), ("KM", km))
+)
+
+
+def test_px4s_parameters_are_rotors_with_px4s_defaults() -> None:
+    rotors = rotors_from_parameters("# a comment\n1\t1\tCA_ROTOR_COUNT\t4\t6\n" + PARAMS)
+    assert [rotor.spin for rotor in rotors] == ["ccw", "ccw", "cw", "cw"]
+    assert rotors[2].position == (0.15, -0.15, 0.0)
+    assert (rotors[0].thrust_max, rotors[0].axis) == (6.5, (0.0, 0.0, -1.0))
+    assert rotors == rotors_from_parameters(PARAMS)
+    with pytest.raises(VehicleError, match=r"CA_ROTOR_COUNT = 0: must be 4 to 8"):
+        rotors_from_parameters("1\t1\tMPC_XY_VEL_MAX\t4\t9")
+    with pytest.raises(VehicleError, match=r"line 1 = .*: must be a name and a number"):
+        rotors_from_parameters("1\t1\tCA_ROTOR0_PX\tfast\t9")
+
+
+def test_rotors_are_those_of_a_vehicles_file(tmp_path) -> None:
+    assert read_rotors(PACKAGED / "paper.toml") == PAPER.rotors
+    with pytest.raises(VehicleError, match="cannot read rotors"):
+        read_rotors(tmp_path / "none.params")
+    (tmp_path / "empty.toml").write_text("")
+    with pytest.raises(VehicleError, match='missing key "rotors"'):
+        read_rotors(tmp_path / "empty.toml")

@@ -1,0 +1,94 @@
+"""Rotors beside a URDF: from a table of a vehicle's file, or from PX4's parameters."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from command_line.bounded_file import read_bounded
+from command_line.bounded_toml import TomlError, toml_table
+from command_line.toml_tables import TableReader, shown
+from vehicles.description import ROTORS_MAX, Rotor
+from vehicles.vehicle_file import VehicleError
+
+_MOST_BYTES: Final = 1024 * 1024
+# PX4's defaults of what a file does not say.
+_DEFAULTS: Final = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0,
+                    "CT": 6.5, "KM": 0.05}  # fmt: skip
+_NAME: Final = re.compile(r"CA_ROTOR(\d+)_(PX|PY|PZ|AX|AY|AZ|CT|KM)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rotors:
+    rotors: tuple[Rotor, ...]
+
+
+def read_rotors(path: Path) -> tuple[Rotor, ...]:
+    """The rotors of a file: .toml with [[rotors]], anything else PX4's parameters.
+
+    Raises:
+        VehicleError: It cannot be read, or says what cannot be.
+    """
+    try:
+        text = read_bounded(path, _MOST_BYTES).decode("utf-8-sig")
+    except OSError as error:
+        raise VehicleError(f"cannot read rotors {path}: {error.strerror}") from error
+    except UnicodeDecodeError:
+        raise VehicleError(f"rotors {path} are not UTF-8") from None
+    if path.suffix != ".toml":
+        return rotors_from_parameters(text)
+    try:
+        table = toml_table(text)
+    except TomlError as error:
+        raise VehicleError(f"rotors {path} are {error}") from error
+    # A whole vehicle's file will do as well.
+    own = {"rotors": table["rotors"]} if "rotors" in table else {}
+    found: _Rotors = TableReader(VehicleError).build(_Rotors, own, "")
+    return found.rotors
+
+
+def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
+    """The rotors that PX4's parameters ``CA_ROTORn_*`` describe, of a file of QGroundControl.
+
+    CT is the thrust at full command [N], KM the torque per thrust [m], positive for a rotor that
+    turns counter-clockwise.
+
+    Raises:
+        VehicleError: It has none, or a value is no number.
+    """
+    values: dict[str, float] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split()
+        at = next((k for k, word in enumerate(words) if word.startswith("CA_ROTOR")), None)
+        if at is None or line.lstrip().startswith("#"):
+            continue
+        try:
+            values[words[at]] = float(words[at + 1])
+        except (IndexError, ValueError):
+            raise VehicleError(
+                f"line {number} = {shown(line)}: must be a name and a number"
+            ) from None
+    known = [match for name in values if (match := _NAME.fullmatch(name))]
+    count = int(values.get("CA_ROTOR_COUNT", 1 + max((int(m[1]) for m in known), default=-1)))
+    if not 1 <= count <= ROTORS_MAX:
+        raise VehicleError(
+            f"CA_ROTOR_COUNT = {count}: must be 4 to {ROTORS_MAX}; a file of parameters with "
+            "CA_ROTORn_PX and others describes the rotors"
+        )
+    return tuple(_rotor(values, i) for i in range(count))
+
+
+def _rotor(values: dict[str, float], i: int) -> Rotor:
+    v = {key: values.get(f"CA_ROTOR{i}_{key}", default) for key, default in _DEFAULTS.items()}
+    length = (v["AX"] ** 2 + v["AY"] ** 2 + v["AZ"] ** 2) ** 0.5
+    if not length > 0.0:
+        raise VehicleError(f"CA_ROTOR{i}_AX, _AY, _AZ: must be a direction, are all 0")
+    return Rotor(
+        position=(v["PX"], v["PY"], v["PZ"]),
+        axis=(v["AX"] / length, v["AY"] / length, v["AZ"] / length),
+        spin="ccw" if v["KM"] > 0.0 else "cw",
+        torque_per_thrust=abs(v["KM"]),
+        thrust_max=v["CT"],
+    )
