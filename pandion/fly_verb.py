@@ -27,6 +27,7 @@ from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
 from sitl.scenario_file import (
     ScenarioError,
+    check_flown,
     check_pacing,
     load_scenario,
     scenario_digest,
@@ -106,6 +107,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
     """
     scenario = load_scenario(options.scenario, options.sensors)
     check_pacing(scenario, realtime=options.realtime)
+    check_flown(scenario)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")

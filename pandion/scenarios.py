@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from sitl.scenario import Scenario
+from sitl.scenario_file import check_flown, parse_scenario
 from sitl.scenario_file import load_scenario as load_by_name
-from sitl.scenario_file import parse_scenario
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
 
@@ -40,6 +40,7 @@ def load_scenario(
         found = replace(found, duration_s=float(duration_s))
         found = parse_scenario(scenario_text(found), found.name)
     check(found)
+    check_flown(found)
     return found
 
 

@@ -13,7 +13,7 @@ from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.toml_tables import TableReader, nearest, shown
 from sitl.ranges import ROUNDED
-from sitl.scenario import V3, Scenario, ScenarioWall, ScenarioZone, Sensors
+from sitl.scenario import V3, Scenario, ScenarioWall, ScenarioZone, Sensors, vehicle_of
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
@@ -24,6 +24,7 @@ _UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
+FLOWN = "paper"  # vehicle that our own flight software flies
 SUITE_NAMES: tuple[str, ...] = get_args(SuiteName)
 
 
@@ -61,6 +62,19 @@ def check_pacing(scenario: Scenario, *, realtime: bool) -> None:
     for i, fault in enumerate(scenario.faults):
         if fault.of_real_time and not realtime:
             raise ScenarioError(f"faults[{i}]: {fault} needs real time; add --realtime")
+
+
+def check_flown(scenario: Scenario) -> None:
+    """Refuse a vehicle that our own flight software does not fly.
+
+    Raises:
+        ScenarioError: With what flies it none the less.
+    """
+    if scenario.vehicle != FLOWN:
+        raise ScenarioError(
+            f'vehicle = "{scenario.vehicle}": the flight software flies "{FLOWN}" alone; the '
+            "simulator flies others under PX4 (pandion sitl --for px4)"
+        )
 
 
 def suite_of(scenario: Scenario) -> str:
@@ -152,11 +166,22 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
     if isinstance(vehicle, str) and _is_file(vehicle) and folder is not None:
         table["vehicle"] = str(folder / vehicle)
     scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
+    if "vehicle" in table:
+        _check_vehicle(scenario)
     return dataclasses.replace(
         scenario,
         walls=tuple(map(_with_unit_normal, scenario.walls)),
         zones=tuple(map(_with_unit_normal, scenario.zones)),
     )
+
+
+def _check_vehicle(scenario: Scenario) -> None:
+    from vehicles.vehicle_file import VehicleError
+
+    try:
+        vehicle_of(scenario)
+    except VehicleError as error:
+        raise ScenarioError(f"vehicle: {error}") from error
 
 
 def _with_points(curve: dict[str, Any], folder: Path | None) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from sitl.scenario import Scenario
 from sitl.scenario_file import (
     ScenarioError,
     build_table,
+    check_flown,
     load_scenario,
     named_files,
     suite_of,
@@ -376,6 +377,7 @@ def _scenario(
                 f"faults: {one} cannot be flown in one process; can be of {', '.join(_FAILING)}"
             )
     check(found)
+    check_flown(found)
     return found
 
 

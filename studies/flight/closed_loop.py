@@ -39,7 +39,7 @@ from fsw.autopilot.signals import (
     TickOutputs,
 )
 from sitl.scenario import Scenario
-from sitl.scenario_file import ScenarioError
+from sitl.scenario_file import ScenarioError, check_flown
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from studies.flight.collector import collector_off
 from studies.flight.mission import announced, moves, target
@@ -249,6 +249,7 @@ class ScenarioFlight:
             ScenarioError: The body of the configuration starts outside the safe set.
             OwnPartError: A part cannot be used.
         """
+        check_flown(simulation.scenario)
         check_body(simulation.scenario, config)
         self.recorder = FlightRecorder()
         self.planner = InlinePlanner(planner_of(config, parts))

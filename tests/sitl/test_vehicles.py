@@ -23,7 +23,13 @@ from sitl.plant.trim import level_hover, standing_height
 from sitl.plant.vector import Array
 from sitl.result import EndKind
 from sitl.scenario import Hold, Pilot, Scenario, Start, start_angles, vehicle_of
-from sitl.scenario_file import ScenarioError, load_scenario, parse_scenario, scenario_digest
+from sitl.scenario_file import (
+    ScenarioError,
+    check_flown,
+    load_scenario,
+    parse_scenario,
+    scenario_digest,
+)
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
 from sitl.simulation import Controls, Simulation
@@ -282,3 +288,9 @@ def test_more_joints_than_the_link_carries_are_refused_with_who_flies_them() -> 
         pytest.raises(ScenarioError, match=r"has 5 joints: the link .* carries 4; PX4 flies it"),
     ):
         check_joints(scenario("random"))
+
+
+def test_what_our_flight_software_does_not_fly_is_refused_before_a_flight() -> None:
+    check_flown(scenario("paper"))
+    with pytest.raises(ScenarioError, match=r'vehicle = "octo-4r": .* flies "paper" alone'):
+        check_flown(scenario("octo-4r"))
