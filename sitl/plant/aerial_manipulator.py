@@ -58,9 +58,9 @@ class Stops(NamedTuple):
     """End stops: each bounds a sum of joint angles, and pushes back with the same shares."""
 
     number: int
-    share: Array  # (12, 6) of each joint's angle
-    least: Array  # (12,) rad
-    most: Array  # (12,) rad
+    share: Array  # (70, 6) of each joint's angle
+    least: Array  # (70,) rad
+    most: Array  # (70,) rad
     stiffness: float  # N·m/rad
     damping: float  # N·m·s/rad
 

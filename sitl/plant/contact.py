@@ -11,10 +11,10 @@ from sitl.plant.vector import V3, Array, add, cross, row, times, transposed_time
 
 
 class Feet(NamedTuple):
-    """Numbers of the landing gear for the kernels; there is room for eight."""
+    """Numbers of the landing gear for the kernels; there is room for 64."""
 
     number: int
-    points: Array  # (8, 3) m, in B
+    points: Array  # (64, 3) m, in B
     reach: float  # m, largest distance of a foot from the base origin
     stiffness: float  # N/m
     dissipation: float  # s/m
