@@ -6,6 +6,7 @@ they say. The flight log declares them, so that both can be joined after the fli
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from messages.ulog import Field, Topic, doubles
@@ -24,6 +25,15 @@ SIM_GROUND_TRUTH: Final = Topic(
         doubles("qd_arm", 2, "rad/s"),
     ),
 )
+
+
+def state_topic(rotors: int, joints: int) -> Topic:
+    """The same of a vehicle with so many rotors and joints; the state vector is the record."""
+    sizes = {"thrust": rotors, "q_arm": joints, "qd_arm": joints}
+    fields = [replace(one, count=sizes.get(one.name, one.count)) for one in SIM_GROUND_TRUTH.fields]
+    return replace(SIM_GROUND_TRUTH, fields=tuple(fields))
+
+
 SIM_TRACKING: Final = Topic(
     "sim_tracking",
     "True end-effector, and the reference it should follow",

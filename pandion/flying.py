@@ -187,7 +187,7 @@ class _Recording:
             config.log_profile,
         )
         self._flight = FlightLog(folder / "flight.ulg", subject)
-        self._truth = TruthLog(folder / "truth.ulg", scenario.name, job.seed, lambda _: None)
+        self._truth = TruthLog(folder / "truth.ulg", scenario, job.seed, lambda _: None)
         self._folder, self._begun = folder, False
         self.outputs: TickOutputs | None = None  # of the last tick
 

@@ -105,9 +105,9 @@ class Flight:
         options = self._options
         if options.out is None:
             return lambda _: None
-        name, path = self._simulation.scenario.name, options.out / "truth.ulg"
+        scenario, path = self._simulation.scenario, options.out / "truth.ulg"
         try:
-            log = TruthLog(path, name, options.seed, self._warn)
+            log = TruthLog(path, scenario, options.seed, self._warn)
         except OSError as error:
             self._warn(f"no truth.ulg: {error.strerror}")
             return lambda _: None

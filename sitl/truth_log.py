@@ -17,15 +17,16 @@ from messages.ground_truth import (
     FIRST_NUMBER,
     POSITION_TRUTH,
     RATES_TRUTH,
-    SIM_GROUND_TRUTH,
     SIM_TRACKING,
     TRUTH_TOPICS,
+    state_topic,
 )
+from messages.ulog import Topic
 from messages.ulog_reader import unpacker
+from sitl.scenario import Scenario, vehicle_of
 from sitl.simulation import SAMPLE_STEPS, START_US, Simulation
 
 _FLUSH_BYTES: Final = 1 << 16
-_STATE_HEAD: Final = ulog.data_head(FIRST_NUMBER, SIM_GROUND_TRUTH)
 _TRACKING_HEAD: Final = ulog.data_head(FIRST_NUMBER + 1, SIM_TRACKING)
 _TRACKING: Final = unpacker(SIM_TRACKING)
 _PX4_TOPICS: Final = (ATTITUDE_TRUTH, RATES_TRUTH, POSITION_TRUTH)
@@ -39,7 +40,9 @@ _MOTION: Final = Struct("<13d")  # position, velocity, attitude and rates, first
 class TruthLog:
     """Whole records, appended a few hundred steps at a time."""
 
-    def __init__(self, path: Path, scenario: str, seed: int, warn: Callable[[str], None]) -> None:
+    def __init__(
+        self, path: Path, scenario: Scenario, seed: int, warn: Callable[[str], None]
+    ) -> None:
         """Create the file in place of an older one; ``warn`` is called once if the disk refuses.
 
         Raises:
@@ -48,13 +51,16 @@ class TruthLog:
         path.unlink(missing_ok=True)
         self._file = BlockFile(path)
         self._warn = warn
-        self._records = bytearray(_definitions(scenario, seed))
+        vehicle = vehicle_of(scenario)
+        state = state_topic(len(vehicle.rotors), len(vehicle.joints))
+        self._state_head = ulog.data_head(FIRST_NUMBER, state)
+        self._records = bytearray(_definitions(scenario, seed, state))
 
     def add(self, simulation: Simulation) -> None:
         """Append the state of the current step."""
         t_us = simulation.t_us
         # The state vector lies in memory as the record's fields follow each other.
-        self._records += _STATE_HEAD + t_us.to_bytes(8, "little") + simulation.state_bytes()
+        self._records += self._state_head + t_us.to_bytes(8, "little") + simulation.state_bytes()
         if simulation.step % SAMPLE_STEPS == 0:
             truth = simulation.truth()
             self._records += _TRACKING_HEAD + _TRACKING.pack(t_us, *truth.p_WE, *truth.target.p)
@@ -80,10 +86,11 @@ class TruthLog:
             self._warn(f"truth.ulg ends early: {self._file.failure}")
 
 
-def _definitions(scenario: str, seed: int) -> bytes:
+def _definitions(scenario: Scenario, seed: int, state: Topic) -> bytes:
+    topics = (state, *TRUTH_TOPICS[1:])
     parts = [ulog.opening(START_US), ulog.information("sys_name", "Pandion simulator")]
-    parts += [ulog.information("scenario", scenario), ulog.information("seed", seed)]
-    parts += [ulog.format_of(topic) for topic in TRUTH_TOPICS]
-    numbered = enumerate(TRUTH_TOPICS, start=FIRST_NUMBER)
+    parts += [ulog.information("scenario", scenario.name), ulog.information("seed", seed)]
+    parts += [ulog.format_of(topic) for topic in topics]
+    numbered = enumerate(topics, start=FIRST_NUMBER)
     parts += [ulog.subscription(number, topic) for number, topic in numbered]
     return b"".join(parts)

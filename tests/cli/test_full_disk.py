@@ -74,7 +74,7 @@ def no_file_longer_than(size: int) -> Iterator[None]:
 
 def test_a_log_that_has_no_room_for_the_truth_stays_as_it_is(tmp_path: Path) -> None:
     simulation = Simulation(load_scenario("walls-calm"), 0)
-    truth = TruthLog(tmp_path / "truth.ulg", "walls-calm", 0, lambda _: None)
+    truth = TruthLog(tmp_path / "truth.ulg", load_scenario("walls-calm"), 0, lambda _: None)
     for _ in range(50):
         truth.add(simulation)
     truth.close()

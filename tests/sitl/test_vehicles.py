@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from pyulog import ULog
 
 from sitl.body import as_arrays, parts_of
 from sitl.faults.keys import KINDS, Fault
@@ -33,6 +34,7 @@ from sitl.scenario_file import (
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
 from sitl.simulation import Controls, Simulation
+from sitl.truth_log import TruthLog
 from sitl.vehicle_session import check_joints
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
@@ -294,3 +296,22 @@ def test_what_our_flight_software_does_not_fly_is_refused_before_a_flight() -> N
     check_flown(scenario("paper"))
     with pytest.raises(ScenarioError, match=r'vehicle = "octo-4r": .* flies "paper" alone'):
         check_flown(scenario("octo-4r"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_log_of_the_truth_has_the_state_of_any_vehicle(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "truth.ulg"
+    simulation = Simulation(scenario(name), 0)
+    log = TruthLog(path, simulation.scenario, 0, lambda sentence: pytest.fail(sentence))
+    for _ in range(60):
+        log.add(simulation)
+        simulation.advance(Controls.off(simulation.vehicle))
+    log.close()
+    data = {one.name: one.data for one in ULog(str(path)).data_list}["sim_ground_truth"]
+    truth, last = simulation.truth(), 59
+    assert len(data["timestamp"]) == 60
+    assert f"thrust[{len(truth.thrust) - 1}]" in data
+    assert f"thrust[{len(truth.thrust)}]" not in data
+    assert f"qd_arm[{len(truth.q_arm) - 1}]" in data
+    assert data["p_WB[2]"][last] == pytest.approx(truth.p_WB[2], abs=0.01)
+    assert data["q_arm[1]"][0] == simulation.vehicle.home_posture[1]
