@@ -90,19 +90,26 @@ def _list(_: _List) -> int:
 
 
 def _show(options: _Show) -> int:
-    from pandion.vehicle_figures import figures, warnings
+    from pandion.vehicle_figures import figures, start_up, warnings
     from vehicles.vehicle_file import load_vehicle
 
     vehicle = load_vehicle(options.vehicle)
     found = figures(vehicle)
     if options.json:
         told = warnings(vehicle, found)
-        print(json_text(asdict(found) | {"name": vehicle.name, "warnings": told}, 2))
+        print(
+            json_text(
+                asdict(found)
+                | {"name": vehicle.name, "warnings": told, "start_up": start_up(vehicle)},
+                2,
+            )
+        )
         return DONE
     from pandion.vehicle_drawing import drawing
 
     for title, text in _rows(vehicle, found):
         say(f"{title:17} {text}")
+    say(f"{'at start':17} {start_up(vehicle)}")
     for warning in warnings(vehicle, found):
         say(f"{'warning':17} {warning}")
     print(drawing(vehicle))
