@@ -505,6 +505,7 @@ class Autopilot:
             from_nominal=from_nominal,
             joint_targets=joints,
             recent_disturbance=state.cascade.observed.recent,
+            mode=state.vehicle.mode,
         )
         if safety.replan:
             safety = replace(safety, replan=False)
