@@ -75,7 +75,8 @@ OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages
 OF_CLIENTS := tests/conversations tests/interop
 OF_PROCESSES := tests/benchmarks tests/cli tests/processes tests/timing
 OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
-OF_STUDIES := tests/docs tests/fsw/control tests/fsw/estimation tests/library tests/replay tests/studies tests/view
+OF_STUDIES := tests/docs tests/library tests/replay tests/studies tests/view \
+	$(addprefix tests/fsw/autopilot/,control estimation)
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
 	$(call check,format,$(BIN)/ruff format --check .)
@@ -124,7 +125,7 @@ $(MUTATE): | $(READY)
 	@$(call tool,$(@D),$(MUTATION)/tool.lock)
 	@$(done)
 
-mutate: setup $(MUTATE) ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/mpc JSON=1
+mutate: setup $(MUTATE) ## change fsw a little, see if a test notices: SAMPLE=40 SEED=1 FILES=fsw/autopilot/mpc JSON=1
 	@$(UTF8) PYTHONPATH=. .mutation/tool/bin/python -m tests.mutation.mutate $(FILES) --seed $(or $(SEED),1) \
 		$(if $(MODULES),--modules $(MODULES)) $(if $(SAMPLE),--sample $(SAMPLE)) $(if $(BUDGET),--budget $(BUDGET)) $(if $(JSON),--json)
 

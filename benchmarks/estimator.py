@@ -8,14 +8,14 @@ from collections.abc import Callable
 from typing import Final
 
 from command_line.parser import Parser
-from fsw.estimation.fusion_memory import at_start
-from fsw.estimation.sensor_fusion import SensorFusion
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.measurements import Sample
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import TickInputs, TickOutputs
+from fsw.autopilot.estimation.fusion_memory import at_start
+from fsw.autopilot.estimation.sensor_fusion import SensorFusion
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import TickInputs, TickOutputs
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner

@@ -59,7 +59,7 @@ def lines(process: str, found: dict[str, Any]) -> list[str]:
 
 def _start(process: str) -> None:
     if process == "fsw":
-        from fsw.parameters.control_choice import ControlChoice
+        from fsw.autopilot.parameters.control_choice import ControlChoice
         from fsw.runtime.assembly import flight_software
 
         flight_software(ControlChoice())

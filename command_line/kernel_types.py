@@ -6,8 +6,8 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-# Said of a tuple of kernels, such as the table of shapes that a kernel calls (fsw/shapes/zones.py,
-# sitl/distance.py), which numba has unrolled for years and still calls experimental.
+# Said of a tuple of kernels, such as the table of shapes that a kernel calls (sitl/distance.py,
+# fsw/autopilot/shapes/zones.py), which numba has unrolled for years and still calls experimental.
 _TUPLE_OF_KERNELS: Final = "First-class function type feature is experimental"
 
 

@@ -22,16 +22,16 @@ site.addsitedir(str(INSTALLED))
 
 # A page each of the API; what is not there (yet) is left out.
 API = {
-    "fsw.signals": "Values that cross a boundary of the flight software",
-    "fsw.ports": "Protocols that the loop uses",
-    "fsw.flight": "The autopilot: tick, state, commander, modes, failsafes",
-    "fsw.barriers": "Barrier functions",
-    "fsw.mpc": "The model predictive controller",
-    "fsw.control": "The 500 Hz laws",
-    "fsw.model": "Kinematics, dynamics and prediction model of the vehicle",
-    "fsw.estimation": "From sensors to the state estimate",
-    "fsw.geometry": "Rotations and map projection",
-    "fsw.parameters": "Configuration, parameters and the consistency check",
+    "fsw.autopilot.signals": "Values that cross a boundary of the flight software",
+    "fsw.autopilot.ports": "Protocols that the loop uses",
+    "fsw.autopilot.flight": "The autopilot: tick, state, commander, modes, failsafes",
+    "fsw.autopilot.barriers": "Barrier functions",
+    "fsw.autopilot.mpc": "The model predictive controller",
+    "fsw.autopilot.control": "The 500 Hz laws",
+    "fsw.autopilot.model": "Kinematics, dynamics and prediction model of the vehicle",
+    "fsw.autopilot.estimation": "From sensors to the state estimate",
+    "fsw.autopilot.geometry": "Rotations and map projection",
+    "fsw.autopilot.parameters": "Configuration, parameters and the consistency check",
     "sitl.plant": "The simulated vehicle",
 }
 

@@ -1,1 +1,1 @@
-"""Pandion flight software; read ``flight/autopilot.py`` first and ``signals.py`` second."""
+"""Pandion flight software; ``autopilot/`` is pure, the rest is the process around it."""

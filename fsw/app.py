@@ -19,7 +19,8 @@ from command_line.process import (
     run_reported,
 )
 from fsw.arguments import FswOptions
-from fsw.control.control_metrics import ControlMetrics
+from fsw.autopilot.control.control_metrics import ControlMetrics
+from fsw.autopilot.ports import LoopHealth, PlanningCycle
 from fsw.link.build_links import build_links
 from fsw.link.events.event_service import EventService
 from fsw.link.files.flight_logs import FlightLogs
@@ -38,7 +39,6 @@ from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
 from fsw.log.run_directory import run_directory
 from fsw.log.run_files import RunFiles
-from fsw.ports import LoopHealth, PlanningCycle
 from fsw.runtime import clock, report
 from fsw.runtime.console import Console
 from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
@@ -54,7 +54,7 @@ from fsw.runtime.sim_loop import START_US, Ending, FlightEnd, FlightRecord, SimL
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
-    from fsw.parameters.kept_file import ParameterFile
+    from fsw.autopilot.parameters.kept_file import ParameterFile
 
 DONE: Final = 0  # exit code
 
@@ -184,7 +184,7 @@ class _Session:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
         # Imported here because they take a second, which the other refusals need not wait.
-        from fsw.parameters.kept_file import ParameterFile
+        from fsw.autopilot.parameters.kept_file import ParameterFile
         from fsw.runtime.assembly import configured
 
         path, record = self._options.params, directory / "parameters.params"

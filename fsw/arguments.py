@@ -8,8 +8,8 @@ from typing import Final
 
 from command_line.options import Option, declared, events, group, option
 from command_line.values import seconds, whole
+from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.link.link_choice import LinkChoice
-from fsw.parameters.control_choice import ControlChoice
 
 PARAMS: Final = Option(
     "--params FILE",

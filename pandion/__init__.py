@@ -10,10 +10,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from fsw.model.airframe import AIRFRAME as AIRFRAME
-    from fsw.signals import Plan as Plan
-    from fsw.signals import PlanFailure as PlanFailure
-    from fsw.signals import PlanRequest as PlanRequest
+    from fsw.autopilot.model.airframe import AIRFRAME as AIRFRAME
+    from fsw.autopilot.signals import Plan as Plan
+    from fsw.autopilot.signals import PlanFailure as PlanFailure
+    from fsw.autopilot.signals import PlanRequest as PlanRequest
     from pandion.flown import Log as Log
     from pandion.flown import Result as Result
     from pandion.flown import load_log as load_log
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     __version__: str
 
 _PLACES: Final = {
-    "fsw.model.airframe": ("AIRFRAME",),
-    "fsw.signals": ("Plan", "PlanFailure", "PlanRequest"),
+    "fsw.autopilot.model.airframe": ("AIRFRAME",),
+    "fsw.autopilot.signals": ("Plan", "PlanFailure", "PlanRequest"),
     "pandion.flown": ("Log", "Result", "load_log"),
     "pandion.flying": ("fly",),
     "pandion.scenarios": ("load_scenario", "save_scenario"),

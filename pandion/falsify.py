@@ -21,7 +21,7 @@ from pandion.own_options import OwnOptions
 from sitl.scenario_file import scenario_names
 
 if TYPE_CHECKING:
-    from fsw.parameters.flight_config import FlightConfig
+    from fsw.autopilot.parameters.flight_config import FlightConfig
     from sitl.scenario import Scenario
     from studies.search.falsify import Found, Outcome, Replayed, WholeFound, WholeOutcome
 
@@ -127,7 +127,7 @@ def _check(scenario: Scenario) -> None:
 
 
 def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
-    from fsw.parameters.flight_config import flight_config
+    from fsw.autopilot.parameters.flight_config import flight_config
 
     config = flight_config(body=scenario.body)  # as pandion fly
     if options.own.controller:
@@ -140,10 +140,10 @@ def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
         config = with_parts(config, options.own.planner, "")
     if options.params is None:
         return config
-    from fsw.parameters.contradictions import contradictions
-    from fsw.parameters.registry import tuning_of
-    from fsw.parameters.storage import load
-    from fsw.tuning import tuned
+    from fsw.autopilot.parameters.contradictions import contradictions
+    from fsw.autopilot.parameters.registry import tuning_of
+    from fsw.autopilot.parameters.storage import load
+    from fsw.autopilot.tuning import tuned
 
     loaded = load(options.params)
     config = tuned(config, tuning_of(loaded.values))

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from command_line.options import as_words
 from fsw.arguments import FswOptions
+from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.signals import Mode, Severity
 from fsw.link.link_choice import NO_LINK, LinkChoice
-from fsw.parameters.control_choice import ControlChoice
-from fsw.signals import Mode, Severity
 from pandion import child, fault_station, supervisor
 from pandion.display import Display
 from pandion.fault_station import Noted, Station

@@ -13,9 +13,9 @@ from command_line.output import complain, json_text, typed, unwritable, unwritte
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
+from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.link.link_choice import NO_LINK, LinkChoice, addresses
 from fsw.log.run_directory import run_directory
-from fsw.parameters.control_choice import ControlChoice
 from messages.addresses import LinkError, parse_link_address
 from pandion.display import Display
 from pandion.join_truth import join_truth

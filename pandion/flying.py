@@ -15,15 +15,15 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.parameters.contradictions import agreed
+from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
+from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
+from fsw.autopilot.parameters.storage import load, save
+from fsw.autopilot.signals import TickInputs, TickOutputs
+from fsw.autopilot.tuning import flat
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.revision import revision
-from fsw.model.airframe import AIRFRAME
-from fsw.parameters.contradictions import agreed
-from fsw.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
-from fsw.parameters.registry import BY_NAME, tuning_of
-from fsw.parameters.storage import load, save
-from fsw.signals import TickInputs, TickOutputs
-from fsw.tuning import flat
 from pandion.flown import Result, Verdict, write_json
 from pandion.join_truth import join_truth
 from pandion.references import AnyReference, trajectory

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from command_line.output import EXTRAS
-from fsw.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.control_choice import ControlChoice
 from pandion.own_modules import our_modules
 
 OK, WARN, FAIL = "ok", "warn", "fail"

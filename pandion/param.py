@@ -16,7 +16,7 @@ from command_line.parser import COULD_NOT_START, unknown_name
 from messages.addresses import LinkError, parse_link_address
 
 if TYPE_CHECKING:
-    from fsw.parameters.storage import Loaded
+    from fsw.autopilot.parameters.storage import Loaded
     from pandion.param_vehicle import ParameterClient
 
 DONE, REFUSED = 0, 1  # exit codes
@@ -80,7 +80,7 @@ class FileValues:
 
     def read_all(self) -> dict[str, float]:
         """Every value, by name."""
-        from fsw.parameters.registry import PARAMETERS
+        from fsw.autopilot.parameters.registry import PARAMETERS
 
         return {parameter.name: parameter.default for parameter in PARAMETERS} | self._kept()
 
@@ -90,11 +90,11 @@ class FileValues:
         Raises:
             ParameterRefused: It is out of range or contradicts the others.
         """
-        from fsw.parameters.facts import ALIASES
-        from fsw.parameters.flight_config import FlightConfig
-        from fsw.parameters.registry import BY_NAME, tuning_of
-        from fsw.parameters.storage import save
-        from fsw.tuning import tuned
+        from fsw.autopilot.parameters.facts import ALIASES
+        from fsw.autopilot.parameters.flight_config import FlightConfig
+        from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
+        from fsw.autopilot.parameters.storage import save
+        from fsw.autopilot.tuning import tuned
         from pandion.param_vehicle import ParameterRefused
 
         parameter = BY_NAME.get(ALIASES.get(name, name))
@@ -144,7 +144,7 @@ def main(argv: list[str]) -> int:
 
 
 def _list(options: _List, values: Values) -> int:
-    from fsw.parameters.registry import BY_NAME
+    from fsw.autopilot.parameters.registry import BY_NAME
 
     shown = {
         name: value
@@ -192,7 +192,7 @@ def _import(options: _File, values: Values) -> int:
 
 
 def _export(options: _File, values: Values) -> int:
-    from fsw.parameters.storage import save
+    from fsw.autopilot.parameters.storage import save
 
     known = values.read_all()
     # A reader of the file would refuse such a line.
@@ -208,7 +208,7 @@ def _export(options: _File, values: Values) -> int:
 
 def _read_file(path: Path) -> Loaded:
     """The values of a file; unusable lines are reported on standard error."""
-    from fsw.parameters.storage import load
+    from fsw.autopilot.parameters.storage import load
 
     loaded = load(path)
     for complaint in loaded.complaints:
@@ -228,9 +228,9 @@ def _show(values: Mapping[str, float], *, as_json: bool) -> None:
 
 
 def _described(name: str, value: float) -> dict[str, Any]:
-    from fsw.parameters.facts import FACT_BY_NAME, GROUP
-    from fsw.parameters.param_type import type_name
-    from fsw.parameters.registry import BY_NAME
+    from fsw.autopilot.parameters.facts import FACT_BY_NAME, GROUP
+    from fsw.autopilot.parameters.param_type import type_name
+    from fsw.autopilot.parameters.registry import BY_NAME
 
     entry: dict[str, Any] = {"name": name, "value": value, "type": type_name(value)}
     if (fact := FACT_BY_NAME.get(name)) is not None:
@@ -250,7 +250,7 @@ def _described(name: str, value: float) -> dict[str, Any]:
 
 
 def _number(value: float) -> str:
-    from fsw.parameters.float32 import as_text
+    from fsw.autopilot.parameters.float32 import as_text
 
     return as_text(value)
 

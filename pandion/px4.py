@@ -91,13 +91,13 @@ def parameters(options: _Plant) -> dict[str, int | float]:
 
 
 def _print_parameters(options: _Params) -> int:
-    from fsw.parameters.float32 import as_text
+    from fsw.autopilot.parameters.float32 import as_text
 
     values = parameters(options)
     for name, value in values.items():
         print(f"param set {name} {as_text(value)}")
     if options.out is not None:
-        from fsw.parameters.storage import as_params
+        from fsw.autopilot.parameters.storage import as_params
 
         text = as_params(values).replace("Stack: Pandion", "Stack: PX4 Pro")
         for problem in unwritten(options.out, text):
@@ -128,7 +128,7 @@ def _set_all(options: _Params, values: dict[str, int | float]) -> int:
 
 
 def _print_environment(options: _Plant) -> int:
-    from fsw.parameters.float32 import as_text
+    from fsw.autopilot.parameters.float32 import as_text
     from sitl.px4_parameters import AIRFRAME, MODEL
 
     print(f"PX4_SYS_AUTOSTART={AIRFRAME}\nPX4_SIM_MODEL={MODEL}")

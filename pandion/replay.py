@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from command_line.options import json_file, option, read, switch
 from command_line.output import complain, console_beside, json_text, say, write_text
 from command_line.parser import COULD_NOT_START
-from fsw.signals import Origin
+from fsw.autopilot.signals import Origin
 from pandion.display import Display
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _verify(options: ReplayOptions, log: UlogFile) -> int:
 
 def _program(log: UlogFile) -> FlightProgram[Any]:
     """The flight software of this build, configured by the names in the log."""
-    from fsw.parameters.control_choice import choice_of
+    from fsw.autopilot.parameters.control_choice import choice_of
     from fsw.runtime.assembly import flight_software
     from fsw.runtime.replay import fact
 

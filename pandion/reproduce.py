@@ -16,8 +16,8 @@ from command_line.output import complain, console_beside, say, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of
 from command_line.version import version
+from fsw.autopilot.parameters.control_choice import KNOWN
 from fsw.log.run_directory import new_run_directory
-from fsw.parameters.control_choice import KNOWN
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from pandion.gate_options import junit

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from fsw.estimation.estimator import estimate_state
-from fsw.model.airframe import AIRFRAME
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.signals import StateEstimate, TickOutputs
+from fsw.autopilot.estimation.estimator import estimate_state
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.signals import StateEstimate, TickOutputs
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.plant.aerial_manipulator import plant
 from sitl.plant.integrator import held, step

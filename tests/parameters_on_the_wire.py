@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from fsw.parameters.facts import FACTS
-from fsw.parameters.registry import PARAMETERS
+from fsw.autopilot.parameters.facts import FACTS
+from fsw.autopilot.parameters.registry import PARAMETERS
 
 
 def listed(kept: Mapping[str, float]) -> dict[str, float]:

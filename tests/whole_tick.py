@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from fsw.signals import TickInputs, TickOutputs
+from fsw.autopilot.signals import TickInputs, TickOutputs
 
 Tick = Callable[[Any, TickInputs], tuple[Any, TickOutputs]]
 

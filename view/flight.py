@@ -6,8 +6,8 @@ from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import NDArray
 
-from fsw.model.airframe import Airframe
-from fsw.signals import Vec3
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.signals import Vec3
 from view.scene import Event, Scene, Worst
 
 Array = NDArray[Any]

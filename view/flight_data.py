@@ -11,9 +11,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.autopilot.signals import TickInputs
 from fsw.log.json_codec import JsonCodec
 from fsw.log.topics import TOPICS
-from fsw.signals import TickInputs
 from messages import ulog
 from messages.ground_truth import TRUTH_TOPICS
 from messages.ulog import Field, Topic
@@ -117,7 +117,7 @@ class FlightData:
         return max((float(table.t[-1]) for table in self.tables.values()), default=0.0)
 
     def decoded(self, name: str) -> list[tuple[float, Any]]:
-        """Every value of one input with the time [s] at which it came; values of ``fsw.signals``.
+        """Every value of one input with the time [s] at which it came, from ``autopilot.signals``.
 
         Raises:
             UlogError: The log is of a build with other inputs.

@@ -13,9 +13,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.model.airframe import AIRFRAME
-from fsw.model.kinematics import links
-from fsw.signals import Vec3, Zone
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.kinematics import links
+from fsw.autopilot.signals import Vec3, Zone
 from view.flight_data import FlightData, Table, UlogError
 from view.zone_meshes import Mesh, zone_mesh
 

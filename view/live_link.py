@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+from fsw.autopilot.signals import SafeSet, Vec3
 from fsw.link.endpoints import open_endpoint
 from fsw.link.wire import message_ids as ids
-from fsw.signals import SafeSet, Vec3
 from messages.addresses import LinkAddress, address_text
 from messages.frames import FrameWriter, Losses
 from view.scene import Scene
@@ -129,7 +129,7 @@ class VehicleLink(threading.Thread):
         The vehicle is asked for the set first, because what is announced replaces it. Returns why
         nothing was announced, None if it was.
         """
-        from fsw.shapes import kind_of
+        from fsw.autopilot.shapes import kind_of
 
         safe_set = self._whole_set()
         if safe_set is None:

@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from fsw.model.airframe import AIRFRAME
-from fsw.signals import Vec3
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.signals import Vec3
 from view import live_link, panels
 from view.flight import Trail
 from view.live_link import VehicleLink

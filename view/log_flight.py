@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.model.body import BODIES, body_of
-from fsw.signals import (
+from fsw.autopilot.model.body import BODIES, body_of
+from fsw.autopilot.signals import (
     MissionUpdate,
     Plan,
     SafeSet,

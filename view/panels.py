@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Final
 
-from fsw.model.airframe import Airframe
-from fsw.periods import PLANNING_US
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.periods import PLANNING_US
 from view import colours
 from view.colours import Rgb, css, millimetres
 from view.scene import Event, Margin, Scene, Timing, Worst

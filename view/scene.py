@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from fsw.signals import SafeSet, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import SafeSet, Vec2, Vec3, Vec4
 
 NOWHERE: Vec3 = (math.nan, math.nan, math.nan)
 

@@ -9,9 +9,9 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from fsw.geometry.rotation import quaternion_from_matrix
-from fsw.model.airframe import Airframe
-from fsw.signals import SafeSet, Vec3, Vec4
+from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.signals import SafeSet, Vec3, Vec4
 from view import colours
 from view.colours import Rgb
 from view.flight import Trail

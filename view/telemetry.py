@@ -8,14 +8,22 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
-from fsw.flight.conditions import Condition
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.parameters.param_type import value_of
+from fsw.autopilot.signals import (
+    CommandResult,
+    PlanInput,
+    PredictionState,
+    SafeSet,
+    Vec3,
+    Vec4,
+    Zone,
+)
 from fsw.link.events.event_table import condition_of
 from fsw.link.wire import decode
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
-from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.parameters.param_type import value_of
-from fsw.signals import CommandResult, PlanInput, PredictionState, SafeSet, Vec3, Vec4, Zone
 from messages import dialect
 from messages.frames import Frame, wire_fields
 from view.flight_events import EventKind

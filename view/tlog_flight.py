@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.signals import Vec3
 from fsw.link.wire.message_ids import ATTITUDE, LOCAL_POSITION_NED, SYSTEM_ID
-from fsw.model.airframe import AIRFRAME
-from fsw.signals import Vec3
 from messages.frames import Frame
 from messages.tlog_reader import TlogFrames
 from view.flight import Curve, Trail

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_json import json_numbers
-from fsw.geometry.rotation import euler_zyx, matrix_from_quaternion
-from fsw.model.airframe import AIRFRAME, Airframe
-from fsw.model.kinematics import arm_points, point_in_flight
-from fsw.model.prediction import P, condense, to_vector
-from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
+from fsw.autopilot.geometry.rotation import euler_zyx, matrix_from_quaternion
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.kinematics import arm_points, point_in_flight
+from fsw.autopilot.model.prediction import P, condense, to_vector
+from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec3
 from view.scene import Horizon, Posture
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)

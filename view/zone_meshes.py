@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from fsw.geometry.rotation import matrix_from_quaternion
-from fsw.signals import Shape, Vec3, Zone
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.signals import Shape, Vec3, Zone
 
 Array = NDArray[Any]
 

@@ -17,15 +17,15 @@ import numpy as np
 
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.solved import Solved, timed
-from fsw.barriers.cbf_row import cbf_lower_bound
-from fsw.barriers.safe_approach import safe_approach_speed
-from fsw.model.airframe import AIRFRAME
-from fsw.model.body import body_of
-from fsw.model.linearisation import Linearisation, position, velocity
-from fsw.model.prediction import INPUTS, STATES, YAW, Array, P, V, condense, to_vector
-from fsw.mpc.planner_config import PlannerConfig
-from fsw.shapes.frame import outward_axis
-from fsw.signals import PlanRequest, SafeSet
+from fsw.autopilot.barriers.cbf_row import cbf_lower_bound
+from fsw.autopilot.barriers.safe_approach import safe_approach_speed
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.body import body_of
+from fsw.autopilot.model.linearisation import Linearisation, position, velocity
+from fsw.autopilot.model.prediction import INPUTS, STATES, YAW, Array, P, V, condense, to_vector
+from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.shapes.frame import outward_axis
+from fsw.autopilot.signals import PlanRequest, SafeSet
 
 SOLVERS = ("ipopt", "fatrop")
 _TOLERANCE = 1e-6  # as Clarabel's

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.barriers.constraint_block import TargetPoints
-from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import INPUTS, Array, condense, to_vector
-from fsw.mpc.ocp import Ocp
-from fsw.mpc.planner_config import PlannerConfig
-from fsw.signals import PlanRequest, SafeSet
+from fsw.autopilot.barriers.constraint_block import TargetPoints
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.signals import PlanRequest, SafeSet
 
 _MOST_ITERATIONS = 60
 _STAYS = 1e-7  # m/s^2 and rad/s^2

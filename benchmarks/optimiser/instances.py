@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import PlanRequest
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import PlanRequest
 from studies.flight.closed_loop import simulate
 from studies.paper.cases import CASES, Case, configuration, scenario, with_horizon
 

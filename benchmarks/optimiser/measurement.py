@@ -17,9 +17,9 @@ from benchmarks.optimiser.converged import ConvergedOcp
 from benchmarks.optimiser.instances import Instance, planner_of, record
 from benchmarks.optimiser.methods import Entry, Method, entries, guess_for
 from benchmarks.optimiser.solved import Solved, stopwatch_us
-from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import Array
-from fsw.mpc.planner import Planner
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.mpc.planner import Planner
 from studies.paper.cases import Case
 
 HORIZONS = (1, 5, 10, 20)

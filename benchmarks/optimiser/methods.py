@@ -13,14 +13,14 @@ from benchmarks.optimiser.converged import target_points
 from benchmarks.optimiser.instances import Instance
 from benchmarks.optimiser.slopes import slopes_of
 from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
-from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import INPUTS, Array, condense, to_vector
-from fsw.mpc.ocp import Ocp
-from fsw.mpc.planner import Planner
-from fsw.mpc.planner_config import PlannerConfig
-from fsw.mpc.slsqp_solver import NonlinearProgram, minimise
-from fsw.mpc.solution import Solution
-from fsw.signals import Plan, SafeSet
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.mpc.slsqp_solver import NonlinearProgram, minimise
+from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.signals import Plan, SafeSet
 
 _ITERATIONS = (1, 2, 3)
 

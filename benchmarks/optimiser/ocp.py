@@ -15,12 +15,22 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from fsw.barriers.safe_approach import BarrierTuning
-from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.model.kinematics import body_axes
-from fsw.model.prediction import INPUTS, Q_ARM, QD_ARM, STATES, YAW, YAW_RATE, P, V, discretise
-from fsw.mpc.planner_config import PlannerConfig
-from fsw.signals import TARGET_SPHERE, SafeSet, Zone
+from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.model.kinematics import body_axes
+from fsw.autopilot.model.prediction import (
+    INPUTS,
+    Q_ARM,
+    QD_ARM,
+    STATES,
+    YAW,
+    YAW_RATE,
+    P,
+    V,
+    discretise,
+)
+from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.signals import TARGET_SPHERE, SafeSet, Zone
 
 # A node's parameters: target position, velocity, yaw; directions as rows; required h of each row.
 TARGET, DIRECTIONS = 7, 9

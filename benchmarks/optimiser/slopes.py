@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.model.prediction import Array
-from fsw.mpc.qp_data import CONE
-from fsw.mpc.slsqp_solver import NonlinearProgram, Slopes
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.mpc.qp_data import CONE
+from fsw.autopilot.mpc.slsqp_solver import NonlinearProgram, Slopes
 
 
 def slopes_of(problem: NonlinearProgram) -> Slopes:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from fsw.model.prediction import Array
+from fsw.autopilot.model.prediction import Array
 
 Result = TypeVar("Result")
 

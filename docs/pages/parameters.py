@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fsw.parameters.facts import FACTS, Fact
-from fsw.parameters.float32 import as_text
-from fsw.parameters.param_type import type_name
-from fsw.parameters.registry import BY_NAME, GROUPS, NO_PARAMETERS, PARAMETERS, Parameter
+from fsw.autopilot.parameters.facts import FACTS, Fact
+from fsw.autopilot.parameters.float32 import as_text
+from fsw.autopilot.parameters.param_type import type_name
+from fsw.autopilot.parameters.registry import BY_NAME, GROUPS, NO_PARAMETERS, PARAMETERS, Parameter
 
 _HEAD = """\
 # Parameters
@@ -41,7 +41,8 @@ def reference() -> str:
     parts.append("\n".join(facts) + "\n")
     parts.append("## Constants that are not parameters\n")
     parts.append(
-        "Fields of `FlightConfig` (`fsw/parameters/flight_config.py`) without a parameter.\n"
+        "Fields of `FlightConfig` (`fsw/autopilot/parameters/flight_config.py`) without a "
+        "parameter.\n"
     )
     rows = ["| field | reason |", "|---|---|"]
     rows += [f"| `{path}` | {why} |" for path, why in NO_PARAMETERS.items()]

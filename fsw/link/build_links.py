@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from command_line.folders import NoHomeError, state_folder
+from fsw.autopilot.ports import Clock
 from fsw.link.gcs_link import GcsLink, LinkSetup, RecordFrame
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
@@ -18,7 +19,6 @@ from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.ports import Clock
 
 _GCS_PORT: Final = 18570  # of our own, as PX4 has it, if they are free
 _API_PORT: Final = 14580

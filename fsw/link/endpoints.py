@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fsw.autopilot.ports import Clock
 from fsw.link.stream_endpoint import StreamEndpoint
 from fsw.link.udp_endpoint import OpenEndpoint
-from fsw.ports import Clock
 from messages.addresses import Address, LinkAddress
 
 Endpoint = OpenEndpoint | StreamEndpoint

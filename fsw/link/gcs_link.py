@@ -9,6 +9,15 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
+from fsw.autopilot.ports import Clock, LinkLosses
+from fsw.autopilot.signals import (
+    CommandAck,
+    FlightSnapshot,
+    MessageSource,
+    Severity,
+    StatusText,
+    TickOutputs,
+)
 from fsw.link.bounded_memory import renew
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
@@ -25,15 +34,6 @@ from fsw.link.wire import encode_replies, message_ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.ports import Clock, LinkLosses
-from fsw.signals import (
-    CommandAck,
-    FlightSnapshot,
-    MessageSource,
-    Severity,
-    StatusText,
-    TickOutputs,
-)
 from messages import dialect
 from messages.addresses import Address, LinkAddress
 from messages.frames import Frame, Losses, as_version_1, is_version_1

@@ -9,11 +9,11 @@ from dataclasses import astuple
 from operator import attrgetter
 from typing import Final
 
+from fsw.autopilot.ports import Clock, LinkLosses
+from fsw.autopilot.signals import CommandAck, FlightSnapshot, StatusText, TickOutputs
 from fsw.link.gcs_link import GcsLink
 from fsw.link.telemetry.stream_rates import SLOT_US
 from fsw.link.wire.px4_mode import shown_mode
-from fsw.ports import Clock, LinkLosses
-from fsw.signals import CommandAck, FlightSnapshot, StatusText, TickOutputs
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
 _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client

@@ -7,20 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, TypeVar, cast
 
-from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
-from fsw.link.bounded_memory import renew
-from fsw.link.wire import decode, decode_commands, message_ids
-from fsw.link.wire.decode import Numbers
-from fsw.link.wire.decode_setpoints import (
-    actuator_setpoint,
-    attitude_setpoint,
-    body_setpoint,
-    end_effector_setpoint,
-    global_setpoint,
-    joint_setpoint,
-)
-from fsw.measurements import Sample
-from fsw.signals import (
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.signals import (
     AttitudeSetpoint,
     BatteryReading,
     Command,
@@ -42,7 +31,18 @@ from fsw.signals import (
     TickInputs,
     Zone,
 )
-from fsw.tuning import Tuning
+from fsw.autopilot.tuning import Tuning
+from fsw.link.bounded_memory import renew
+from fsw.link.wire import decode, decode_commands, message_ids
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.decode_setpoints import (
+    actuator_setpoint,
+    attitude_setpoint,
+    body_setpoint,
+    end_effector_setpoint,
+    global_setpoint,
+    joint_setpoint,
+)
 from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.ports import Clock
+from fsw.autopilot.ports import Clock
 
 FULL: Final = 0.8  # of what the line carries
 TELEMETRY: Final = 0.6  # of it

@@ -8,9 +8,9 @@ from typing import Final
 
 from command_line.options import option, switch
 from command_line.values import one_of, place
-from fsw.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.autopilot.signals import Origin
 from fsw.link.wire.telemetry_context import GENERIC, PX4
-from fsw.signals import Origin
 from messages.addresses import LinkAddress, LinkError, SerialLine, parse_link_address
 
 NO_LINK: Final = "none"

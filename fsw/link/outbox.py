@@ -5,12 +5,12 @@ from __future__ import annotations
 import struct
 from typing import Final
 
+from fsw.autopilot.signals import StatusText
 from fsw.link.signing.signing import Signing
 from fsw.link.text_limiter import TextLimiter
 from fsw.link.wire import message_ids
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput, WireValues
-from fsw.signals import StatusText
 from messages import status_text
 from messages.frames import FrameWriter
 

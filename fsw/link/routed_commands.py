@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.autopilot.signals import CommandAck, CommandRequest, CommandResult
 from fsw.link.bounded_memory import renew
 from fsw.link.wire import message_ids
 from fsw.link.wire.message_ids import SIMULATOR, SYSTEM_ID
-from fsw.signals import CommandAck, CommandRequest, CommandResult
 from messages.frames import FrameWriter
 
 _AGAIN_US: Final = 100_000

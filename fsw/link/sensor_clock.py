@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.ports import Clock
 from fsw.frozen import replace
-from fsw.measurements import Sample
-from fsw.ports import Clock
 
 _GAP_US: Final = 50_000  # in which steps may be missing, as many as a tick makes up for
 # So many steps in a row make another time. Those behind the last one may be old ones that come

@@ -18,6 +18,18 @@ from collections import deque
 from enum import Enum
 from typing import Final, cast
 
+from fsw.autopilot.measurements import ImuSample, Sample
+from fsw.autopilot.ports import Clock, VehicleFacts
+from fsw.autopilot.signals import (
+    CommandAck,
+    CommandRequest,
+    MessageSource,
+    Mode,
+    SensorFrame,
+    Severity,
+    StatusText,
+    TickOutputs,
+)
 from fsw.frozen import replace
 from fsw.link.inbox import MAX_SAMPLES, Inbox
 from fsw.link.outbox import packed
@@ -36,18 +48,6 @@ from fsw.link.wire.decode_sensors import (
 )
 from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
-from fsw.measurements import ImuSample, Sample
-from fsw.ports import Clock, VehicleFacts
-from fsw.signals import (
-    CommandAck,
-    CommandRequest,
-    MessageSource,
-    Mode,
-    SensorFrame,
-    Severity,
-    StatusText,
-    TickOutputs,
-)
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
 from messages.lockstep_codec import LockstepFrame, LockstepReader

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.ports import Clock
+from fsw.autopilot.ports import Clock
 from messages.addresses import Address, StreamAddress, address_text
 from messages.byte_stream import ByteStream
 from messages.frames import Frame, Losses

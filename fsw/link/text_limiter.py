@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
+from fsw.autopilot.signals import FailsafeEvent, Severity, StatusText
 from fsw.link.bounded_memory import renew
-from fsw.signals import FailsafeEvent, Severity, StatusText
 
 REPEAT_US: Final = 5_000_000  # the same text is sent once in this time
 _MOST: Final = 32  # texts and budgets remembered

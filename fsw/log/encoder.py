@@ -12,8 +12,8 @@ from dataclasses import astuple
 from operator import attrgetter
 from typing import Any, Final
 
-from fsw.estimation.sensor_fault import Sensor
-from fsw.flight.estimator_report import (
+from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.flight.estimator_report import (
     ABOVE_GROUND,
     ABSOLUTE,
     HEIGHT,
@@ -21,17 +21,13 @@ from fsw.flight.estimator_report import (
     RELATIVE,
     VERTICAL_VELOCITY,
 )
-from fsw.geometry.geodesy import DEFAULT_ORIGIN
-from fsw.geometry.rotation import quaternion_from_matrix
-from fsw.log import samples, topics
-from fsw.log.json_codec import JsonCodec
-from fsw.log.packed import Packed, Records
-from fsw.log.px4_records import Px4Records, validity
-from fsw.measurements import ImuSample
-from fsw.model.kinematics import point_in_flight
-from fsw.periods import TICK_US
-from fsw.ports import GroupTiming
-from fsw.signals import (
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.measurements import ImuSample
+from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.periods import TICK_US
+from fsw.autopilot.ports import GroupTiming
+from fsw.autopilot.signals import (
     CommandRequest,
     EstimatorReport,
     FlightSnapshot,
@@ -44,6 +40,10 @@ from fsw.signals import (
     TickOutputs,
     Vec2,
 )
+from fsw.log import samples, topics
+from fsw.log.json_codec import JsonCodec
+from fsw.log.packed import Packed, Records
+from fsw.log.px4_records import Px4Records, validity
 from messages.ulog import logged_text
 
 TYPED: Final = "sensors"  # the inputs that have topics of their own

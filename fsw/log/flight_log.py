@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from fsw.autopilot.parameters.facts import FACTS
+from fsw.autopilot.ports import GroupTiming
+from fsw.autopilot.signals import StatusText, TickInputs, TickOutputs, Vec2
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.px4_records import cpu_load, origin_of
 from fsw.log.topics import TOPICS
-from fsw.parameters.facts import FACTS
-from fsw.ports import GroupTiming
-from fsw.signals import StatusText, TickInputs, TickOutputs, Vec2
 from messages import ulog
 from messages.block_file import BlockFile
 from messages.ground_truth import TRUTH_TOPICS

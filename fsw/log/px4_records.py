@@ -7,17 +7,17 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, Final
 
-from fsw.control.attitude import attitude_reference
-from fsw.flight.conditions import Condition
-from fsw.flight.estimator_report import ABSOLUTE, HEIGHT, LEVEL_VELOCITY, RELATIVE
-from fsw.flight.estimator_report import VERTICAL_VELOCITY as CLIMB
-from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_global
-from fsw.geometry.rotation import quaternion_from_euler
-from fsw.geometry.vectors import dot
+from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.estimator_report import ABSOLUTE, HEIGHT, LEVEL_VELOCITY, RELATIVE
+from fsw.autopilot.flight.estimator_report import VERTICAL_VELOCITY as CLIMB
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_global
+from fsw.autopilot.geometry.rotation import quaternion_from_euler
+from fsw.autopilot.geometry.vectors import dot
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.signals import FlightSnapshot, Origin, PlanInput, PredictionState, Vec3, Vec4
 from fsw.log import px4_topics as topics
 from fsw.log.packed import Packed
-from fsw.model.airframe import GRAVITY
-from fsw.signals import FlightSnapshot, Origin, PlanInput, PredictionState, Vec3, Vec4
 
 _TORQUE_US: Final = 10_000
 _SETPOINTS_US: Final = 50_000

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from fsw.autopilot.measurements import ImuSample, Sample
+from fsw.autopilot.signals import SensorFrame, TickInputs
 from fsw.log import px4_topics, samples, topics
 from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
-from fsw.measurements import ImuSample, Sample
-from fsw.signals import SensorFrame, TickInputs
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
 

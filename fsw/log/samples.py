@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from struct import Struct, pack
 from typing import Any, Final
 
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.log import topics
-from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
 from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 

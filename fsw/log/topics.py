@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.log import px4_topics
-from fsw.measurements import (
+from fsw.autopilot.measurements import (
     GnssSample,
     ImuSample,
     JointSample,
@@ -20,6 +19,7 @@ from fsw.measurements import (
     RangeSample,
     Sample,
 )
+from fsw.log import px4_topics
 from messages.ulog import Field, Topic, doubles, floats
 
 TEXT_SIZE: Final = 140  # characters of an input's text in one record

@@ -6,20 +6,20 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
-from fsw.control.cascade import Inner
-from fsw.flight.state import FlightState
-from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.autopilot.control.cascade import Inner
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.control_choice import FULL, ControlChoice
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.parameters.store import ParameterStore
+from fsw.autopilot.ports import VehicleFacts
+from fsw.autopilot.signals import Origin
+from fsw.autopilot.tuning import flat
 from fsw.link.services.mission_store import MissionStore, Site
-from fsw.mpc.planner import Planner
-from fsw.parameters.control_choice import FULL, ControlChoice
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.parameters.store import ParameterStore
-from fsw.ports import VehicleFacts
 from fsw.runtime import clock
 from fsw.runtime.program import FlightProgram
-from fsw.signals import Origin
-from fsw.tuning import flat
 
 
 def flight_software(

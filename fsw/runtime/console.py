@@ -11,9 +11,9 @@ import threading
 from typing import Final
 
 from command_line.process import Events
-from fsw.flight.conditions import Condition
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
-from fsw.signals import Severity, StatusText
 
 _ROOM: Final = 256  # texts that wait for the console
 _PATIENCE_S: Final = 0.5  # at the end, for a console that is behind

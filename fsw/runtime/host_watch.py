@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from fsw.flight.failsafe_evidence import JUMP_US, MISSED_TICKS
+from fsw.autopilot.flight.failsafe_evidence import JUMP_US, MISSED_TICKS
+from fsw.autopilot.ports import Clock
+from fsw.autopilot.signals import HostHealth
 from fsw.link.ground_links import GroundLinks
-from fsw.ports import Clock
-from fsw.signals import HostHealth
 
 _FEW: Final = 100  # datagrams/s; fewer are not worth a number
 _ENOUGH_S: Final = 60.0  # for which a disk should take the log

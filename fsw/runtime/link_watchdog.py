@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.ports import Clock
+from fsw.autopilot.ports import Clock
 
 # A release waits for less; longer gaps mean this process was suspended. After a suspension of the
 # whole machine the simulator goes on as well, so such a gap must not end the flight.

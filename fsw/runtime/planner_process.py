@@ -20,11 +20,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from fsw.ports import Clock, PlanningCycle
+from fsw.autopilot.ports import Clock, PlanningCycle
+from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest, PlanTimings, SolverStatus
 from fsw.runtime.process import die_with_parent
 from fsw.runtime.process_link import PeerGone, ProcessLink, process_link
 from fsw.runtime.realtime import PLANNER_PRIORITY, claim_real_time
-from fsw.signals import Plan, PlanFailure, PlanRequest, PlanTimings, SolverStatus
 
 _RESTART_DELAY_S: Final = 0.02  # the next worker might die at once as well
 

@@ -14,7 +14,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Final
 
-from fsw.ports import Clock, PlanningCycle
+from fsw.autopilot.ports import Clock, PlanningCycle
+from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest
 from fsw.runtime.planner_process import (
     Answer,
     WorkerExited,
@@ -24,7 +25,6 @@ from fsw.runtime.planner_process import (
 )
 from fsw.runtime.process_link import PeerGone
 from fsw.runtime.timing import GroupTimer
-from fsw.signals import Plan, PlanFailure, PlanRequest
 
 # The limit of a solve in wall time: a planner process that is silent for longer is replaced.
 ANSWER_TIMEOUT_US: Final = 500_000

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
+from fsw.autopilot.ports import PlanningCycle, VehicleFacts
+from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.link.events.event_log import EventLog
 from fsw.link.services.mission_store import MissionStore
-from fsw.ports import PlanningCycle, VehicleFacts
-from fsw.signals import TickInputs, TickOutputs
 
 if TYPE_CHECKING:
     # Its table of parameters imports everything that flies; a refusal need not wait for that.
-    from fsw.parameters.store import ParameterStore
+    from fsw.autopilot.parameters.store import ParameterStore
 
 State = TypeVar("State")
 

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
-from fsw.periods import PLANNING_US, TICK_US
-from fsw.ports import Clock
+from fsw.autopilot.periods import PLANNING_US, TICK_US
+from fsw.autopilot.ports import Clock
 from fsw.runtime.timing import GroupTimer, Histogram
 
 Cycle = TypeVar("Cycle")

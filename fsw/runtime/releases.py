@@ -12,13 +12,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
+from fsw.autopilot.periods import TICK_US
+from fsw.autopilot.ports import Clock
+from fsw.autopilot.signals import SensorFrame
 from fsw.frozen import dataclass
 from fsw.link.sim_link import SimLink
-from fsw.periods import TICK_US
-from fsw.ports import Clock
 from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.release_schedule import ReleaseSchedule
-from fsw.signals import SensorFrame
 
 MAX_STALE_TICKS: Final = 10_000 // TICK_US  # as long as an estimate may be missing
 LEAD_US: Final = 600  # frames arrive so much before their tick, and may be so much late

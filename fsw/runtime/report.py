@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from fsw.parameters.control_choice import ControlChoice
-from fsw.ports import VehicleFacts
+from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.ports import VehicleFacts
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, TELEMETRY
 from fsw.runtime.sim_loop import FlightEnd, FlightRecord

@@ -12,27 +12,11 @@ from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
 from command_line.process import StopRequest
-from fsw.control.control_metrics import ControlMetrics
-from fsw.estimation.vibration import VibrationMeter
-from fsw.link.ground_links import GroundLinks
-from fsw.link.inbox import Inbox
-from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
-from fsw.log.run_files import RunFiles
-from fsw.parameters.registry import ACCEL_RANGE
-from fsw.ports import Clock, LoopHealth, PlanService
-from fsw.runtime.clock import unix_us
-from fsw.runtime.deadline_monitor import DeadlineMonitor
-from fsw.runtime.host_watch import HostWatch
-from fsw.runtime.link_watchdog import LinkWatchdog
-from fsw.runtime.planner_service import PlannerRecord
-from fsw.runtime.program import FlightProgram, State
-from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
-from fsw.runtime.realtime import rank_threads
-from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
-from fsw.runtime.tick_runner import TickRunner
-from fsw.runtime.timing import GroupTimer, Histogram
-from fsw.signals import (
+from fsw.autopilot.control.control_metrics import ControlMetrics
+from fsw.autopilot.estimation.vibration import VibrationMeter
+from fsw.autopilot.parameters.registry import ACCEL_RANGE
+from fsw.autopilot.ports import Clock, LoopHealth, PlanService
+from fsw.autopilot.signals import (
     Command,
     CommandAck,
     CommandRequest,
@@ -49,6 +33,22 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
 )
+from fsw.link.ground_links import GroundLinks
+from fsw.link.inbox import Inbox
+from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
+from fsw.log.run_files import RunFiles
+from fsw.runtime.clock import unix_us
+from fsw.runtime.deadline_monitor import DeadlineMonitor
+from fsw.runtime.host_watch import HostWatch
+from fsw.runtime.link_watchdog import LinkWatchdog
+from fsw.runtime.planner_service import PlannerRecord
+from fsw.runtime.program import FlightProgram, State
+from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
+from fsw.runtime.realtime import rank_threads
+from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
+from fsw.runtime.tick_runner import TickRunner
+from fsw.runtime.timing import GroupTimer, Histogram
 
 LINK_TIMEOUT_S: Final = 1.2  # silence that ends the flight; both processes end within 2 s
 START_US: Final = 1_000_000  # time stamp of the simulator's step 0

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, Generic
 
-from fsw.periods import TICK_US
+from fsw.autopilot.periods import TICK_US
+from fsw.autopilot.signals import Severity, StatusText, TickInputs, TickOutputs
 from fsw.runtime.program import Answered, Conclude, Control, State
-from fsw.signals import Severity, StatusText, TickInputs, TickOutputs
 
 MAX_FAILED_TICKS: Final = 10_000 // TICK_US  # as long as the estimate may be missing
 

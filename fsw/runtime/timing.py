@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Final
 
-from fsw.ports import GroupTiming
+from fsw.autopilot.ports import GroupTiming
 
 _BINS_PER_E: Final = 50.0  # 2 % resolution
 _BINS: Final = 900  # up to exp(18) us, about a minute

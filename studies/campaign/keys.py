@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
-from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.registry import BY_NAME
-from fsw.tuning import tuned
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.tuning import tuned
 from sitl.ranges import Range
 from sitl.scenario import Scenario, Wind
 from sitl.sensors.keys import MeasuredSensors, Timing

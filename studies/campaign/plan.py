@@ -13,10 +13,10 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias, cast
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
-from fsw.parameters.contradictions import contradictions
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.parameters.registry import BY_NAME, tuning_of
-from fsw.tuning import tuned
+from fsw.autopilot.parameters.contradictions import contradictions
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
+from fsw.autopilot.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
 from sitl.ranges import Range
 from sitl.scenario import Scenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from fsw.tuning import flat
+from fsw.autopilot.tuning import flat
 from sitl.scenario import Scenario, Uniform
 from sitl.sensors.keys import MeasuredSensors
 from studies.campaign.keys import FAULT, Flown

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.ports import PlanService
-from fsw.signals import (
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.ports import PlanService
+from fsw.autopilot.signals import (
     Arm,
     Command,
     CommandAction,

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
-from fsw.signals import Severity
+from fsw.autopilot.signals import Severity
 from sitl.scenario_file import PERFECT
 from studies.fault_matrix import flights
 from studies.fault_matrix.expectations import Expected, differences

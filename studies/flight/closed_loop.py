@@ -14,15 +14,15 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from fsw.estimation.estimator import READINGS
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.calm_tick import CalmTick
-from fsw.flight.state import FlightState
-from fsw.measurements import Sample, Vec2, Vec4
-from fsw.model.airframe import Airframe
-from fsw.parameters.flight_config import FlightConfig
-from fsw.ports import PlanningCycle, PlanService
-from fsw.signals import (
+from fsw.autopilot.estimation.estimator import READINGS
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.calm_tick import CalmTick
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.measurements import Sample, Vec2, Vec4
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.ports import PlanningCycle, PlanService
+from fsw.autopilot.signals import (
     Arm,
     BatteryReading,
     Command,
@@ -169,7 +169,7 @@ def controls(airframe: Airframe, command: tuple[Vec4, Vec2], *, armed: bool) -> 
 class CalmStretch:
     """Flies the calm ticks of a loop without the inputs and outputs of each, which nobody reads.
 
-    For studies of exact states: see ``fsw.flight.calm_tick``.
+    For studies of exact states: see ``fsw.autopilot.flight.calm_tick``.
     """
 
     def __init__(self, loop: ClosedLoop[FlightState], calm: CalmTick, *, allowed: bool) -> None:

@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from fsw.control.braking import Brake
-from fsw.flight.plan_exchange import plan_input
-from fsw.geometry.vectors import add_scaled, subtract
-from fsw.model.airframe import AIRFRAME
-from fsw.model.kinematics import end_effector_when_level
-from fsw.model.nominal import REST_STATE
-from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import Plan, PlanInput, PlanRequest, PredictionState
+from fsw.autopilot.control.braking import Brake
+from fsw.autopilot.flight.plan_exchange import plan_input
+from fsw.autopilot.geometry.vectors import add_scaled, subtract
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.kinematics import end_effector_when_level
+from fsw.autopilot.model.nominal import REST_STATE
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import Plan, PlanInput, PlanRequest, PredictionState
 from sitl.disturbances.items import push
 from sitl.flight_evaluator import FlightEvaluator, Points
 from sitl.mission_clock import MissionClock

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from fsw.parameters.registry import BY_NAME
-from fsw.parameters.storage import save
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.parameters.storage import save
 from sitl.scenario_file import load_scenario
 from sitl.scenario_text import scenario_text
 from studies.flight.job import Job, Outcome

@@ -16,7 +16,7 @@ import numpy as np
 
 import fsw
 import sitl
-from fsw.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from sitl.result import TruthResult
 from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
 from sitl.sensors.keys import MeasuredSensors

@@ -20,7 +20,7 @@ import numba
 from command_line.compile_progress import CompileProgress
 from command_line.kernel_cache import KernelCache
 from command_line.output import say as say_line
-from fsw.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.control_choice import ControlChoice
 
 HALVES: Final = ("fsw", "sitl")
 _COMPLETE: Final = "campaign"  # the mark of a cache that has all kernels of a half
@@ -106,9 +106,9 @@ def _cache(half: str) -> KernelCache:
 
 def _build(half: str) -> None:
     if half == "fsw":
-        from fsw.flight.autopilot import Autopilot
-        from fsw.mpc.planner import Planner
-        from fsw.parameters.flight_config import flight_config
+        from fsw.autopilot.flight.autopilot import Autopilot
+        from fsw.autopilot.mpc.planner import Planner
+        from fsw.autopilot.parameters.flight_config import flight_config
         from studies.flight.result import processor_time_us
 
         config = flight_config()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fsw.shapes import BY_NUMBER
-from fsw.signals import (
+from fsw.autopilot.shapes import BY_NUMBER
+from fsw.autopilot.signals import (
     EndEffectorTarget,
     MessageSource,
     SafeSet,

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.autopilot.control.cascade import Cascade
+from fsw.autopilot.control.safety_filter import filtered
+from fsw.autopilot.geometry.vectors import add_scaled
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.model.rotors import motion_state
+from fsw.autopilot.signals import ActuatorCommand
+from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compiled
-from fsw.control.cascade import Cascade
-from fsw.control.safety_filter import filtered
-from fsw.geometry.vectors import add_scaled
-from fsw.model.airframe import GRAVITY
-from fsw.model.rotors import motion_state
-from fsw.signals import ActuatorCommand
-from fsw.tick_record import Tick
 
 
 def passes(cascade: Cascade, r: Tick, zones: NDArray[np.float64], command: ActuatorCommand) -> bool:

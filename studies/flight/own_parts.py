@@ -28,18 +28,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from fsw.control.cascade import Cascade
-from fsw.control.safety_gate import gate
-from fsw.flight.autopilot import Autopilot, keep_clear
-from fsw.flight.state import FlightState
-from fsw.frozen import replace
-from fsw.measurements import Sample
-from fsw.model.airframe import GRAVITY
-from fsw.model.kinematics import point_in_flight
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import FlightConfig
-from fsw.ports import PlanningCycle
-from fsw.signals import (
+from fsw.autopilot.control.cascade import Cascade
+from fsw.autopilot.control.safety_gate import gate
+from fsw.autopilot.flight.autopilot import Autopilot, keep_clear
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.ports import PlanningCycle
+from fsw.autopilot.signals import (
     ActuatorCommand,
     EndEffectorTarget,
     Mode,
@@ -53,6 +52,7 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
 )
+from fsw.frozen import replace
 from sitl.mission_clock import MissionClock
 from sitl.simulation import START_US, STEP_US
 from studies.flight.mission import target

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from fsw.control.control_metrics import ControlMetrics
-from fsw.signals import Plan, PlanFailure
+from fsw.autopilot.control.control_metrics import ControlMetrics
+from fsw.autopilot.signals import Plan, PlanFailure
 from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.measurements import (
+from fsw.autopilot.measurements import (
     GnssSample,
     ImuSample,
     JointSample,
@@ -19,7 +19,7 @@ from fsw.measurements import (
     RangeSample,
     Sample,
 )
-from fsw.signals import SensorFrame
+from fsw.autopilot.signals import SensorFrame
 from sitl.sensors.barometer import standard_altitude
 from sitl.sensors.measurements import (
     GnssMeasurement,

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
-from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
-from fsw.signals import SensorFrame, Vec4
+from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.signals import SensorFrame, Vec4
 from sitl.simulation import START_US
 
 FaultKind: TypeAlias = Literal["silent", "frozen", "over", "fast", "ahead"]

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from fsw.barriers.safe_approach import BarrierTuning
-from fsw.control.cascade import Inner
-from fsw.model.airframe import AIRFRAME, AttitudeLag
-from fsw.mpc.planner_config import PlannerConfig
-from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.control.cascade import Inner
+from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
+from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fsw.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 
 Array = NDArray[np.float64]
 BOTH_ELBOWS = (1, -1)  # sign of theta_2

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
-from fsw.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from sitl.scenario import Scenario
 from studies.campaign.campaign import Campaign
 from studies.drawing import BOUND, sheet

@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Final
 
-from fsw.estimation.sensor_fault import Sensor
-from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.registry import BY_NAME
-from fsw.tuning import tuned
+from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.tuning import tuned
 from sitl.air.wall_effect import IDEAL
 from sitl.scenario import (
     ActuatorKeys,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from fsw.control.cascade import Inner
+from fsw.autopilot.control.cascade import Inner
 from studies.flight.job import PlantName
 from studies.paper.cases import REPORTING_FROM, TUNING_SEEDS, Family
 

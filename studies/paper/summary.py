@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest
 
-from fsw.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from sitl.scenario import Scenario
 from studies.campaign.campaign import Campaign
 from studies.flight.job import Job, Outcome

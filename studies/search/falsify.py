@@ -22,12 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from cmaes import CMA
 
-from fsw.control.tube import CALM_HEIGHT, all_axes, all_axes_up_to, limits_used
-from fsw.flight.state import FlightState
-from fsw.model.prediction import Array
-from fsw.parameters.consistency import loop_tube
-from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import TickOutputs
+from fsw.autopilot.control.tube import CALM_HEIGHT, all_axes, all_axes_up_to, limits_used
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.parameters.consistency import loop_tube
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import TickOutputs
 from sitl.disturbances.sequence import Played
 from sitl.result import EndKind
 from sitl.scenario import V3, Scenario, Sequence

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.model.prediction import Array
-from fsw.parameters.flight_config import FlightConfig
-from fsw.shapes.zones import NO_ZONES, moving_zones
-from fsw.signals import PlanInput, PredictionState, TickInputs, TickOutputs
-from fsw.tick_record import Tick
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.shapes.zones import NO_ZONES, moving_zones
+from fsw.autopilot.signals import PlanInput, PredictionState, TickInputs, TickOutputs
+from fsw.autopilot.tick_record import Tick
 from sitl.disturbances.items import Push
 from sitl.scenario import Scenario
 from sitl.simulation import Simulation

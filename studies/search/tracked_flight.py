@@ -14,13 +14,13 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.autopilot.control.cascade import Cascade, CascadeLaw, close_loops
+from fsw.autopilot.estimation.estimator import READINGS, read_into
+from fsw.autopilot.flight.autopilot import keep_clear
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.tick_record import FILTER_ACTED, Accelerations, PlanState, Tick
 from fsw.compiled import compilable, packed
-from fsw.control.cascade import Cascade, CascadeLaw, close_loops
-from fsw.estimation.estimator import READINGS, read_into
-from fsw.flight.autopilot import keep_clear
-from fsw.model.prediction import Array
-from fsw.parameters.flight_config import FlightConfig
-from fsw.tick_record import FILTER_ACTED, Accelerations, PlanState, Tick
 from sitl.body import Parts
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Inputs, Plant, plant

@@ -19,8 +19,8 @@ import numpy as np
 from cmaes import CMA
 from scipy.special import bdtrc, stdtrit
 
-from fsw.parameters.registry import BY_NAME, Parameter
-from fsw.tuning import tuned
+from fsw.autopilot.parameters.registry import BY_NAME, Parameter
+from fsw.autopilot.tuning import tuned
 from sitl.ranges import Range
 from sitl.scenario_file import ScenarioError, build_table
 from studies.campaign.campaign import Campaign

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.model.prediction import Array
-from fsw.parameters.flight_config import FlightConfig
-from fsw.signals import Mode, PredictionState, TickInputs, TickOutputs
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import Mode, PredictionState, TickInputs, TickOutputs
 from sitl.disturbances.sequence import Steered
 from sitl.result import EndKind
 from sitl.scenario import V3, Scenario

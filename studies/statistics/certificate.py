@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from command_line.version import version
-from fsw.tuning import flat
+from fsw.autopilot.tuning import flat
 from studies.campaign.flight import CampaignRow
 from studies.campaign.keys import (
     AIR,

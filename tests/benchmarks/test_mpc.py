@@ -18,8 +18,8 @@ from benchmarks.optimiser.measurement import Effort, Samples, run
 from benchmarks.optimiser.methods import Entry, guess_for
 from benchmarks.optimiser.report import lines
 from benchmarks.optimiser.solved import stopwatch_us
-from fsw.model.airframe import AIRFRAME
-from fsw.mpc.planner import Planner
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.mpc.planner import Planner
 
 KEYS = {"n", "method", "sqp_iterations", "median_us", "p99_us", "max_us", "suboptimality_p50"}
 LITTLE = Effort(instances=2, duration_s=3.0, budget_us=5e5)

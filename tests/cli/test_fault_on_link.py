@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fsw.signals import Mode
+from fsw.autopilot.signals import Mode
 from messages import dialect
 from pandion import fault_on_link
 from pandion.fault_on_link import LinkCell

@@ -22,9 +22,9 @@ from command_line.options import as_words, option, read, switch
 from command_line.parser import unknown_name
 from command_line.values import number, one_of, output_file, seconds, whole
 from fsw.arguments import FswOptions
+from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.signals import Origin
 from fsw.link.link_choice import LinkChoice
-from fsw.parameters.control_choice import ControlChoice
-from fsw.signals import Origin
 from pandion.certify import CertifyOptions
 from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions

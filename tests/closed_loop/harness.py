@@ -7,15 +7,14 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from fsw.flight.state import FlightState
-from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.geometry.geodesy import DEFAULT_ORIGIN, to_local
-from fsw.link.wire.decode_commands import command as read_command
-from fsw.measurements import Sample
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.ports import PlanningCycle as AnyPlanner
-from fsw.signals import (
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.ports import PlanningCycle as AnyPlanner
+from fsw.autopilot.signals import (
     ActuatorCommand,
     Command,
     CommandRequest,
@@ -30,7 +29,8 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
 )
-from fsw.tuning import Tuning
+from fsw.autopilot.tuning import Tuning
+from fsw.link.wire.decode_commands import command as read_command
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.measurements import Sample
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import (
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import (
     EndEffectorTarget,
     Plan,
     PlanFailure,

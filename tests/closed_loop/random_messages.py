@@ -20,19 +20,13 @@ from functools import partial
 from typing import Any, Final
 
 from docs.pages.messages import heard
-from fsw.flight.state import FlightState
-from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.geometry.geodesy import to_local
-from fsw.link.inbox import Inbox
-from fsw.link.services.mission_service import MissionService
-from fsw.link.services.mission_store import MissionStore, Site
-from fsw.link.services.parameter_service import ParameterService
-from fsw.link.services.service import LinkService, SourcedService
-from fsw.link.wire import message_ids as ids
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.parameters.store import ParameterStore
-from fsw.signals import (
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.geometry.geodesy import to_local
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.parameters.store import ParameterStore
+from fsw.autopilot.signals import (
     Arm,
     Command,
     CommandAction,
@@ -45,6 +39,12 @@ from fsw.signals import (
     TickOutputs,
     Vec3,
 )
+from fsw.link.inbox import Inbox
+from fsw.link.services.mission_service import MissionService
+from fsw.link.services.mission_store import MissionStore, Site
+from fsw.link.services.parameter_service import ParameterService
+from fsw.link.services.service import LinkService, SourcedService
+from fsw.link.wire import message_ids as ids
 from messages import dialect
 from messages.frames import FrameWriter, split, wire_fields
 from sitl.result import EndKind

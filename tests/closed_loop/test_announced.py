@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.parameters.flight_config import lowest_height
-from fsw.shapes.ball import ball, point
-from fsw.shapes.half_space import half_space, wall
-from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import (
+from fsw.autopilot.parameters.flight_config import lowest_height
+from fsw.autopilot.shapes.ball import ball, point
+from fsw.autopilot.shapes.half_space import half_space, wall
+from fsw.autopilot.shapes.target_sphere import target_sphere
+from fsw.autopilot.signals import (
     EndEffectorTarget,
     MessageSource,
     Mode,

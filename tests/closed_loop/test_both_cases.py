@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.control.cascade import Inner
-from fsw.parameters.flight_config import CONTROLLERS, flight_config
+from fsw.autopilot.control.cascade import Inner
+from fsw.autopilot.parameters.flight_config import CONTROLLERS, flight_config
 from sitl.scenario import Obstacle, Start
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fsw.estimation.fusion_memory import Trail
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.conditions import Condition
-from fsw.flight.state import AIDED, FlightState
+from fsw.autopilot.estimation.fusion_memory import Trail
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.state import AIDED, FlightState
+from fsw.autopilot.model.actuator_health import ActuatorHealth
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode, SensorFrame, TickInputs, TickOutputs
 from fsw.frozen import replace
-from fsw.model.actuator_health import ActuatorHealth
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode, SensorFrame, TickInputs, TickOutputs
 from sitl.disturbances.items import Uniform
 from sitl.faults.keys import Fault
 from sitl.scenario_file import load_scenario

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.signals import Mode
+from fsw.autopilot.signals import Mode
 from sitl.faults.keys import Fault, Unit
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.measurements import GnssSample, PoseSample
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode
+from fsw.autopilot.measurements import GnssSample, PoseSample
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode
 from sitl.scenario import Hold, Pilot, ScenarioWall
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, real_planner

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fsw.signals import Mode
+from fsw.autopilot.signals import Mode
 from tests.closed_loop.harness import ARM, LAND, TAKEOFF, Flight, command, on_the_ground
 
 

@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.geometry.geodesy import to_global
-from fsw.link.wire.mission_items import MissionItem, read_step
-from fsw.model.airframe import AIRFRAME
-from fsw.model.battery import charge_of
-from fsw.model.body import body_of, hull_reach
-from fsw.parameters.flight_config import FlightConfig, FlightLimits, flight_config
-from fsw.shapes.vertical_cylinder import column
-from fsw.signals import (
+from fsw.autopilot.geometry.geodesy import to_global
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.battery import charge_of
+from fsw.autopilot.model.body import body_of, hull_reach
+from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits, flight_config
+from fsw.autopilot.shapes.vertical_cylinder import column
+from fsw.autopilot.signals import (
     BatteryState,
     Charge,
     Command,
@@ -24,6 +23,7 @@ from fsw.signals import (
     MotionSetpoint,
     SafeSet,
 )
+from fsw.link.wire.mission_items import MissionItem, read_step
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, TAKEOFF, Flight, command, hover, on_the_ground
 

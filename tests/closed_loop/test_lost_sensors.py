@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.conditions import Condition
-from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
-from fsw.signals import Mode, SensorFrame
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.signals import Mode, SensorFrame
 from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.simulation import STEP_US
 from tests.closed_loop.harness import BESIDE_A_WALL, Flight

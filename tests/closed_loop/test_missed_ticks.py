@@ -6,12 +6,12 @@ import math
 
 import pytest
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.model.nominal import NominalModel
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import (
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.model.nominal import NominalModel
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import (
     EndEffectorTarget,
     Mode,
     Plan,

@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.link.wire.fence_items import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
-from fsw.link.wire.mission_items import MissionItem
-from fsw.signals import (
+from fsw.autopilot.signals import (
     EndEffectorTarget,
     MissionAction,
     MissionState,
@@ -20,6 +18,8 @@ from fsw.signals import (
     SafeSet,
     Vec3,
 )
+from fsw.link.wire.fence_items import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
+from fsw.link.wire.mission_items import MissionItem
 from sitl.scenario import Pilot
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import (

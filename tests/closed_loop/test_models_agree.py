@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.control.pid import PidGains
-from fsw.model.nominal import NominalModel
-from fsw.model.prediction import Array
-from fsw.parameters.flight_config import FlightConfig, flight_config
-from fsw.signals import (
+from fsw.autopilot.control.pid import PidGains
+from fsw.autopilot.model.nominal import NominalModel
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.signals import (
     Plan,
     PlanInput,
     PlanRequest,

@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from fsw.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint
 from fsw.runtime.assembly import flight_software
-from fsw.signals import AttitudeSetpoint, JointSetpoint, Mode, MotionSetpoint
 from sitl.faults.keys import KINDS, Fault
 from sitl.rehearsal import rehearse
 from sitl.scenario import ActuatorKeys, AirKeys, Scenario, Wind
@@ -160,8 +160,8 @@ def _fly(name: str) -> list[str]:
     flight_software(ControlChoice())
     rehearse(Simulation(flight.scenario, 0))
     ready = _variants()
-    assert ready["fsw.mpc.costs._add_tracking"] > 0
-    assert ready["fsw.control.cascade._close_loops"] > 0
+    assert ready["fsw.autopilot.mpc.costs._add_tracking"] > 0
+    assert ready["fsw.autopilot.control.cascade._close_loops"] > 0
     fly(flight)
     return [kernel for kernel, count in _variants().items() if count != ready.get(kernel)]
 

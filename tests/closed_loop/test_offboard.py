@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fsw.signals import (
+from fsw.autopilot.signals import (
     AttitudeSetpoint,
     EndEffectorTarget,
     JointSetpoint,

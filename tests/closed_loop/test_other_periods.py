@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 
 SECONDS = 10.0  # past the first wall of the scenario
-PLANNING = {"fsw.periods.PLANNING_US": 50_000}
+PLANNING = {"fsw.autopilot.periods.PLANNING_US": 50_000}
 # The tick's line, and the simulator's, which answers as often and knows nothing of the other.
-TICK = {"fsw.periods.TICK_US": 1_000, "sitl.periods.STEP_US": 1_000}
+TICK = {"fsw.autopilot.periods.TICK_US": 1_000, "sitl.periods.STEP_US": 1_000}
 
 
 @pytest.mark.parametrize("suite", ["exact", pytest.param("mocap", marks=pytest.mark.long)])
@@ -40,7 +40,7 @@ def test_other_periods_are_a_line_each_and_fly(
     assert flown.returncode == 0, flown.stderr
     found = json.loads(flown.stdout)
     assert abs(found["plans"] - 1e6 * SECONDS / planning_us) <= 2
-    assert found["ticks"] == 1e6 * SECONDS / periods.get("fsw.periods.TICK_US", 2_000)
+    assert found["ticks"] == 1e6 * SECONDS / periods.get("fsw.autopilot.periods.TICK_US", 2_000)
     assert found["failures"] == 0
     assert found["left"] == []
     assert not any("limited" in text for text in found["texts"]), found["texts"]
@@ -50,7 +50,7 @@ def test_other_periods_are_a_line_each_and_fly(
 
 
 def _fly(suite: str) -> dict[str, Any]:
-    from fsw.parameters.flight_config import flight_config
+    from fsw.autopilot.parameters.flight_config import flight_config
     from sitl.scenario_file import load_scenario
     from studies.flight.closed_loop import ClosedLoop, simulate
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sample
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.before_estimate import nowhere
-from fsw.flight.restart import restarted, rests
-from fsw.flight.state import (
+from fsw.autopilot.flight.before_estimate import nowhere
+from fsw.autopilot.flight.restart import restarted, rests
+from fsw.autopilot.flight.state import (
     Aiding,
     FlightState,
     OffboardMemory,
@@ -18,9 +18,9 @@ from fsw.flight.state import (
     SafetyMemory,
     VehicleMemory,
 )
-from fsw.measurements import PoseSample, Sample
-from fsw.shapes.half_space import wall
-from fsw.signals import (
+from fsw.autopilot.measurements import PoseSample, Sample
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.signals import (
     CommandResult,
     MessageSource,
     Mode,

@@ -13,10 +13,10 @@ from functools import partial
 
 import pytest
 
-from fsw.flight.conditions import Condition
-from fsw.model.airframe import GRAVITY
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode, Plan, PlanFailure, PlanRequest
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode, Plan, PlanFailure, PlanRequest
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, Flight, command, hover
 

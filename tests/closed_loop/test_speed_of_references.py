@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from fsw.autopilot.signals import Mode
 from fsw.frozen import replace
-from fsw.signals import Mode
 from tests.closed_loop.harness import LAND, Flight, command, hover
 
 # m/s over the largest speed: what the loops overshoot a reference that runs at it.

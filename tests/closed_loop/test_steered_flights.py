@@ -7,10 +7,17 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.geometry.geodesy import to_global
-from fsw.parameters.flight_config import flight_config
-from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import Command, CommandResult, Mode, SafeSet, SafeSetAnnouncement, SensorFrame
+from fsw.autopilot.geometry.geodesy import to_global
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.shapes.target_sphere import target_sphere
+from fsw.autopilot.signals import (
+    Command,
+    CommandResult,
+    Mode,
+    SafeSet,
+    SafeSetAnnouncement,
+    SensorFrame,
+)
 from sitl.scenario_file import load_scenario
 from studies.flight.mission import SIMULATOR, safe_set
 from tests.closed_loop.harness import (

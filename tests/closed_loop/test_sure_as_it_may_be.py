@@ -1,8 +1,8 @@
 """Whether the estimate is as sure as it may be with the simulator's suites and the tuning flown.
 
-The tests of the filter alone (tests/fsw/estimation) draw their sensors' errors as the filter
-believes them. Here sensors have the errors that no filter believes: offsets, scales, vibration,
-wander, outliers, delays that vary.
+The tests of the filter alone (tests/fsw/autopilot/estimation) draw their sensors' errors as the
+filter believes them. Here sensors have the errors that no filter believes: offsets, scales,
+vibration, wander, outliers, delays that vary.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from fsw.estimation.error_state import TH, P, V
-from fsw.estimation.lasting_error import lasting_error
-from fsw.estimation.sensor_fusion import SensorFusion
-from fsw.geometry.quaternion import conjugate, multiply, rotation_vector
-from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.estimation.error_state import TH, P, V
+from fsw.autopilot.estimation.lasting_error import lasting_error
+from fsw.autopilot.estimation.sensor_fusion import SensorFusion
+from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector
+from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from sitl.scenario import Hold, Scenario
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, Flight, command

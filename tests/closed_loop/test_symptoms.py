@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.signals import ConstraintKind, Mode, SensorFrame
+from fsw.autopilot.signals import ConstraintKind, Mode, SensorFrame
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, LAND, Flight, command, hover, on_the_ground
 from tests.fsw.records import with_record

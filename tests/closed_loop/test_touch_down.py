@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.flight.modes import MODES
-from fsw.measurements import ImuSample, Sample, Vec3
-from fsw.signals import Mode
+from fsw.autopilot.flight.modes import MODES
+from fsw.autopilot.measurements import ImuSample, Sample, Vec3
+from fsw.autopilot.signals import Mode
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, LAND, Flight, command, hover

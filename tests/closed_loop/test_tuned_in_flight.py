@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.parameters.contradictions import contradictions
-from fsw.parameters.flight_config import flight_config
-from fsw.parameters.registry import PARAMETERS
-from fsw.signals import Mode, Plan
-from fsw.tuning import Tuning, part, tuned
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.parameters.contradictions import contradictions
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.registry import PARAMETERS
+from fsw.autopilot.signals import Mode, Plan
+from fsw.autopilot.tuning import Tuning, part, tuned
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, Flight, command, hover, on_the_ground
 from tests.closed_loop.harness import real_planner as planner_of

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.flight.conditions import Condition
-from fsw.measurements import PoseSample
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.measurements import PoseSample
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode
 from sitl.scenario import Hold, Pilot, ScenarioWall
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, Flight, command

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.conditions import Condition
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
-from fsw.shapes.vertical_cylinder import vertical_cylinder
-from fsw.signals import (
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.shapes.vertical_cylinder import vertical_cylinder
+from fsw.autopilot.signals import (
     MessageSource,
     Mode,
     Plan,

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from fsw.geometry.rotation import matrix_from_quaternion
-from fsw.measurements import ImuSample
-from fsw.signals import Mode
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.measurements import ImuSample
+from fsw.autopilot.signals import Mode
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, Flight, command, hover
 from tests.closed_loop.test_real_sensors import changed

@@ -16,7 +16,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fsw.geometry.geodesy import to_local
+from fsw.autopilot.geometry.geodesy import to_local
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.store import ParameterStore
+from fsw.autopilot.ports import LoopHealth
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
@@ -32,9 +35,6 @@ from fsw.link.services.time_service import TimeService
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.store import ParameterStore
-from fsw.ports import LoopHealth
 from fsw.runtime.assembly import vehicle_facts
 from messages import dialect
 from messages.frames import as_version_1

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.param_type import field_of, value_of
 from fsw.link.files.flight_logs import MARK
 from fsw.link.files.ftp_message import Opcode
-from fsw.parameters.flight_config import flight_config
-from fsw.parameters.param_type import field_of, value_of
 from messages import dialect as d
 from tests.conversations.connected import PARAMETER_FILE, Connected, Message, connected
 from tests.conversations.table import Must, Turn, ack, play

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.param_type import value_of
+from fsw.autopilot.signals import MissionState, Mode
 from fsw.link.files.flight_logs import MARK
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
-from fsw.parameters.flight_config import flight_config
-from fsw.parameters.param_type import value_of
-from fsw.signals import MissionState, Mode
 from messages import dialect as d
 from tests.conversations.connected import PARAMETER_FILE, Connected, connected
 from tests.conversations.qgroundcontrol import (

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fsw.parameters.facts import FACTS
-from fsw.parameters.registry import PARAMETERS
+from fsw.autopilot.parameters.facts import FACTS
+from fsw.autopilot.parameters.registry import PARAMETERS
 from messages import dialect
 from tests.docs.fences import DOCS, PAGES, ROOT, named, without_fences
 

@@ -14,11 +14,11 @@ from docs.pages.parameters import reference as parameter_reference
 from docs.pages.sensors import TABLES
 from docs.pages.sensors import inserted as with_sensors
 from docs.pages.topics import inserted
+from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.telemetry.streams import STREAMS
 from fsw.link.wire import message_ids as ids
-from fsw.mpc.planner_config import PlannerConfig
 from messages import dialect
 from pandion.result import FlightReports, as_json
 from sitl.sensors.keys import Timing

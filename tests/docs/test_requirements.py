@@ -20,12 +20,12 @@ from docs.pages.requirements import (
     shown_by_tests,
 )
 from docs.pages.safety_manual import inserted, reference
-from fsw.control.tube import all_axes, all_axes_up_to
-from fsw.flight.conditions import Condition
-from fsw.flight.failsafe import ROWS
-from fsw.parameters.consistency import loop_tube
-from fsw.parameters.flight_config import flight_config
-from fsw.parameters.registry import BY_NAME
+from fsw.autopilot.control.tube import all_axes, all_axes_up_to
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.parameters.consistency import loop_tube
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.registry import BY_NAME
 from tests.docs.fences import DOCS
 
 PAGE = (DOCS / "reference" / "safety-manual.md").read_text(encoding="utf-8")
@@ -65,7 +65,7 @@ conditions = ["BATTERY_LOW"]
 id = "REQ-BAT-2"
 shall = "It shall not be armed."
 checks = ["Empty"]
-by = ["fsw/flight/arming.py"]
+by = ["fsw/autopilot/flight/arming.py"]
 [not_shown]
 REQ-BAT-2 = "nothing measures it"
 """

@@ -17,30 +17,30 @@ DIFFS = re.findall(r"\*\*(.+?)\*\*:.*?```diff\n(.*?)```", PAGE, re.DOTALL)
 MOST_FILES = 2
 
 NEW_MODE = """
-from fsw.flight.modes import MODES
+from fsw.autopilot.flight.modes import MODES
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
-from fsw.signals import CommandResult, Mode
-from tests.fsw.flight.asked import ask
-from tests.fsw.flight.contexts import flying
+from fsw.autopilot.signals import CommandResult, Mode
+from tests.fsw.autopilot.flight.asked import ask
+from tests.fsw.autopilot.flight.contexts import flying
 assert ask(flying(), 176, 1.0, 4.0, 12.0).mode is Mode.STOW
 refused = ask(flying(landed=True), 176, 1.0, 4.0, 12.0)
 assert refused.result == CommandResult.TEMPORARILY_REJECTED
 assert "ground" in refused.reason
 assert "Stow" in [one.name for one in AVAILABLE_MODES]
-assert MODES[Mode.STOW].__module__ == "fsw.flight.modes.stow"
+assert MODES[Mode.STOW].__module__ == "fsw.autopilot.flight.modes.stow"
 """
 NEW_CONDITION = """
 from dataclasses import replace
-from fsw.flight.commander import Commander
-from fsw.flight.state import FlightState, VehicleMemory
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import Mode
+from fsw.autopilot.flight.commander import Commander
+from fsw.autopilot.flight.state import FlightState, VehicleMemory
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode
 from tests.fsw.random_states import random_estimate
 import numpy
 level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 estimate = random_estimate(numpy.random.default_rng(1))._replace(R_WB=level)
 vehicle = VehicleMemory(mode=Mode.TRAJECTORY, landed=False)
-state = FlightState(vehicle=vehicle, estimate=estimate, t_us=estimate.t_us)
+state = FlightState(vehicle=vehicle, t_us=estimate.t_us)
 state = replace(state, plan=replace(state.plan, since_us=estimate.t_us))
 commander = Commander(flight_config())
 for rate, mode in ((5.9, Mode.TRAJECTORY), (-6.1, Mode.HOLD)):
@@ -53,10 +53,10 @@ assert "the arm swings" in texts[0].text
 """
 NEW_TILT = """
 import math
-from fsw.control.braking import Brake
-from fsw.model.airframe import AIRFRAME, GRAVITY
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import PredictionState
+from fsw.autopilot.control.braking import Brake
+from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import PredictionState
 limit = flight_config().planner.limits.tilt
 assert limit == math.pi / 12.0
 level, still = (0.0, 0.0), (0.0, 0.0, 0.0)
@@ -75,7 +75,6 @@ def test_there_is_an_example_of_each() -> None:
     assert [title for title, _ in DIFFS] == list(CHECKS)
 
 
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("title", "diff"), DIFFS, ids=[title for title, _ in DIFFS])
 def test_the_example_applies_and_does_what_it_says(title: str, diff: str, tmp_path: Path) -> None:
     files = set(re.findall(r"^\+\+\+ b/(.+)$", diff, re.MULTILINE))

@@ -7,8 +7,20 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fsw.model.prediction import Q_ARM, QD_ARM, STATES, YAW, YAW_RATE, A, Array, J, P, S, V
-from fsw.signals import Mat3, PredictionState, StateEstimate, Vec2, Vec3
+from fsw.autopilot.model.prediction import (
+    Q_ARM,
+    QD_ARM,
+    STATES,
+    YAW,
+    YAW_RATE,
+    A,
+    Array,
+    J,
+    P,
+    S,
+    V,
+)
+from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec2, Vec3
 
 
 def prediction_vector(random: np.random.Generator) -> Array:

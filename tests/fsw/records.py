@@ -7,12 +7,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fsw.control import tracking
-from fsw.control.gains import TrackingTuning
-from fsw.flight.state import FlightState
+from fsw.autopilot.control import tracking
+from fsw.autopilot.control.gains import TrackingTuning
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec3
+from fsw.autopilot.tick_record import Observed, Tick
 from fsw.record import Record
-from fsw.signals import PlanInput, PredictionState, StateEstimate, Vec3
-from fsw.tick_record import Observed, Tick
 
 Kind = TypeVar("Kind", bound=Record)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fsw.model.airframe import AIRFRAME
-from fsw.model.prediction import Array
-from fsw.signals import StateEstimate
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.signals import StateEstimate
 
 
 def placed(estimate: StateEstimate) -> dict[int, tuple[Array, Rotation]]:

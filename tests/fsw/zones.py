@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.signals import SafeSet, Zone
+from fsw.autopilot.signals import SafeSet, Zone
 
 
 def walls_of(safe_set: SafeSet) -> tuple[Zone, ...]:

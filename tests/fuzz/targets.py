@@ -15,6 +15,9 @@ from pathlib import Path
 import fastcrc
 
 from docs.pages.messages import heard
+from fsw.autopilot.parameters import storage
+from fsw.autopilot.parameters.control_choice import choice_of
+from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.link.inbox import Inbox
 from fsw.link.signing.key_file import KeyFile
 from fsw.link.sim_link import SimLink
@@ -23,9 +26,6 @@ from fsw.link.udp_endpoint import LinkError
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.message_ids import SYSTEM_ID
 from fsw.log.reader import open_flight
-from fsw.parameters import storage
-from fsw.parameters.control_choice import choice_of
-from fsw.parameters.registry import PARAMETERS
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
 from fsw.runtime.replay import fact, other_numbers, replay

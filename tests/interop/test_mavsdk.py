@@ -19,8 +19,8 @@ from mavsdk.plugins.mavlink_direct import MavlinkDirect
 from mavsdk.plugins.param import Param, ParamError
 from mavsdk.plugins.telemetry import Telemetry
 
-from fsw.parameters.metadata import parameter_document
-from fsw.parameters.registry import PARAMETERS
+from fsw.autopilot.parameters.metadata import parameter_document
+from fsw.autopilot.parameters.registry import PARAMETERS
 from messages.generate import DEFINITION
 from tests.interop.mavsdk_client import connected, eventually, finished, seconds
 from tests.interop.vehicle import FAST, PATIENT, Vehicle

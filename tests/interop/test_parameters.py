@@ -18,9 +18,9 @@ from mavsdk.plugins.param.param import Param, ParamError, ParamResult
 from pymavlink import mavutil
 from pymavlink.mavparm import MAVParmDict
 
-from fsw.parameters.param_type import value_of
-from fsw.parameters.registry import BY_NAME
-from fsw.parameters.storage import load
+from fsw.autopilot.parameters.param_type import value_of
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.parameters.storage import load
 from pandion import param
 from pandion.param_vehicle import NoAnswer, ParameterClient
 from tests.interop.vehicle import REAL_TIME, Vehicle, parameter_file

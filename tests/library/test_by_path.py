@@ -20,8 +20,8 @@ from tests.cli.command import environment
 
 MODULE = '''
 import numpy as np
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
 
 class Ours:
     def __init__(self):

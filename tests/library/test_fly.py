@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import pandion
-from fsw.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.flight_config import flight_config
 from pandion.result import table_rows
 from sitl.scenario_file import load_scenario
 from studies.campaign.plan import load_plan

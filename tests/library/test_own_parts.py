@@ -12,9 +12,9 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 import pandion
-from fsw.mpc.planner import Planner
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import PlanFailure, PlanRequest, SolverStatus
+from fsw.autopilot.mpc.planner import Planner
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import PlanFailure, PlanRequest, SolverStatus
 from studies.flight.closed_loop import RefusedError
 from studies.flight.own_parts import OwnParts, named_part
 from studies.flight.result import processor_time_us

@@ -6,12 +6,12 @@ import dataclasses
 from dataclasses import field
 from pathlib import Path
 
+from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.ports import GroupTiming
+from fsw.autopilot.signals import Command, TickInputs, TickOutputs
+from fsw.autopilot.tuning import flat
 from fsw.log.flight_log import FlightLog, LogSubject
-from fsw.parameters.control_choice import ControlChoice
-from fsw.parameters.flight_config import flight_config
-from fsw.ports import GroupTiming
-from fsw.signals import Command, TickInputs, TickOutputs
-from fsw.tuning import flat
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from fsw.autopilot.signals import TickInputs
 from fsw.log.json_codec import JsonCodec
 from fsw.log.topics import SENSOR_FRAME, TOPICS
-from fsw.signals import TickInputs
 from messages import ulog
 from messages.ulog_reader import open_log
 from pandion import export, replay

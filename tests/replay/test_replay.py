@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.signals import TickInputs, TickOutputs
+from fsw.autopilot.tuning import flat
 from fsw.log import topics
 from fsw.log.flight_log import LogSubject, definitions
 from fsw.log.reader import open_flight
 from fsw.log.topics import TOPICS
-from fsw.parameters.flight_config import FlightConfig, flight_config
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.replay import Replayed, other_numbers, replay
-from fsw.signals import TickInputs, TickOutputs
-from fsw.tuning import flat
 from messages import ulog
 from messages.ulog import Topic
 from messages.ulog_reader import UlogError

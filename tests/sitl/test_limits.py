@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME
 from sitl.limits import LimitRecord, limits, record_use
 from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import ARM, at_rest

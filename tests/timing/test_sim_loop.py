@@ -14,23 +14,13 @@ from typing import Any, cast
 import pytest
 
 from command_line.process import StopRequest
-from fsw.control.control_metrics import ControlMetrics
-from fsw.flight.autopilot import Autopilot
-from fsw.flight.state import FlightState
-from fsw.link.inbox import Inbox
-from fsw.link.sim_link import Pacing
-from fsw.link.wire import message_ids
-from fsw.log.flight_log import FlightLog
-from fsw.log.reader import LoggedTick, open_flight, ticks
-from fsw.parameters.flight_config import flight_config
-from fsw.parameters.registry import ACCEL_RANGE
-from fsw.ports import LinkLosses, LoopHealth
-from fsw.runtime.planner_service import PlannerRecord
-from fsw.runtime.program import FlightProgram
-from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
-from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
-from fsw.runtime.timing import GroupTimer
-from fsw.signals import (
+from fsw.autopilot.control.control_metrics import ControlMetrics
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.registry import ACCEL_RANGE
+from fsw.autopilot.ports import LinkLosses, LoopHealth
+from fsw.autopilot.signals import (
     CommandAck,
     CommandRequest,
     CommandResult,
@@ -43,6 +33,16 @@ from fsw.signals import (
     TickInputs,
     TickOutputs,
 )
+from fsw.link.inbox import Inbox
+from fsw.link.sim_link import Pacing
+from fsw.link.wire import message_ids
+from fsw.log.flight_log import FlightLog
+from fsw.log.reader import LoggedTick, open_flight, ticks
+from fsw.runtime.planner_service import PlannerRecord
+from fsw.runtime.program import FlightProgram
+from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
+from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
+from fsw.runtime.timing import GroupTimer
 from messages import dialect
 from messages.block_file import BlockFile
 from messages.frames import FrameWriter, split

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from fsw.signals import SensorFrame
+from fsw.autopilot.signals import SensorFrame
 
 PERIOD_US = 2_000
 FIRST_US = 1_000_000

@@ -8,13 +8,13 @@ import struct
 from pathlib import Path
 from typing import Any
 
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.shapes.ball import ball
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.signals import MessageSource, SafeSet, SafeSetAnnouncement, TickInputs, Zone
+from fsw.autopilot.tuning import flat
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
-from fsw.parameters.flight_config import flight_config
-from fsw.shapes.ball import ball
-from fsw.shapes.half_space import wall
-from fsw.signals import MessageSource, SafeSet, SafeSetAnnouncement, TickInputs, Zone
-from fsw.tuning import flat
 from messages import ulog
 from messages.ground_truth import FIRST_NUMBER, SIM_GROUND_TRUTH, SIM_TRACKING, TRUTH_TOPICS
 from messages.ulog import Topic

@@ -14,8 +14,8 @@ import pytest
 from mcap.reader import make_reader
 from pyulog import ULog
 
-from fsw.geometry.quaternion import normalised
-from fsw.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.geometry.quaternion import normalised
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
 from pandion.export import main
 from tests.view import flights
 from tests.view.flights import BALL, HEIGHT, OFFSET_M, TEXT, north, write_flight

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsw.model.airframe import AIRFRAME
-from fsw.signals import PlanInput, PredictionState
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.signals import PlanInput, PredictionState
 from tests.view.flights import BALL, HEIGHT, OFFSET_M, SPIKE_N, WORST_M, WORST_S, write_flight
 from view.flight_data import UlogError
 from view.log_flight import LogFlight

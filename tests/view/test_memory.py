@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from fsw.model.airframe import AIRFRAME
-from fsw.shapes.ball import ball
-from fsw.signals import SafeSet, Zone
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.shapes.ball import ball
+from fsw.autopilot.signals import SafeSet, Zone
 from view.flight import Trail
 from view.page import open_server
 from view.scene import Posture, Scene

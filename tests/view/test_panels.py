@@ -2,9 +2,9 @@
 
 import math
 
-from fsw.flight import damage_watch
-from fsw.model.airframe import AIRFRAME
-from fsw.signals import SafeSet
+from fsw.autopilot.flight import damage_watch
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.signals import SafeSet
 from view import colours, panels
 from view.scene import Battery, Event, Margin, Posture, Scene, Solver, Timing, Worst
 from view.vehicle import ROTORS

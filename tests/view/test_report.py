@@ -18,7 +18,7 @@ import pytest
 
 from docs.figures.browser import chromium
 from docs.figures.browser import page as browser_page
-from fsw.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME
 from messages import ulog
 from pandion.report import labels, main, write_report
 from tests.cli.command import one_sentence

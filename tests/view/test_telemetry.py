@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsw.flight.conditions import Action, Condition
+from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.shapes.ball import ball
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
 from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
-from fsw.shapes.ball import ball
-from fsw.shapes.half_space import wall
-from fsw.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
 from view import tlog_flight

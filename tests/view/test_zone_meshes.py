@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial import QhullError
 
-from fsw.shapes.ball import ball
-from fsw.shapes.box import box
-from fsw.shapes.cylinder import cylinder
-from fsw.shapes.half_space import half_space
-from fsw.shapes.target_sphere import target_sphere
-from fsw.shapes.vertical_cylinder import column, vertical_cylinder
-from fsw.shapes.zones import all_planes
-from fsw.signals import SafeSet, Shape, Zone
+from fsw.autopilot.shapes.ball import ball
+from fsw.autopilot.shapes.box import box
+from fsw.autopilot.shapes.cylinder import cylinder
+from fsw.autopilot.shapes.half_space import half_space
+from fsw.autopilot.shapes.target_sphere import target_sphere
+from fsw.autopilot.shapes.vertical_cylinder import column, vertical_cylinder
+from fsw.autopilot.shapes.zones import all_planes
+from fsw.autopilot.signals import SafeSet, Shape, Zone
 from view import zone_meshes
 from view.zone_meshes import moved, zone_mesh
 

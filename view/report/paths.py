@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.signals import Vec3, Zone
+from fsw.autopilot.signals import Vec3, Zone
 from view.flight_data import UlogError
 from view.report.chart import COLOURS, LIMIT, REFERENCE, Chart, Trace
 from view.report.reported import Reported

@@ -14,8 +14,8 @@ from typing import Final
 
 from command_line.html_page import table
 from command_line.options import as_words
-from fsw.parameters.control_choice import choice_of
-from fsw.parameters.registry import PARAMETERS
+from fsw.autopilot.parameters.control_choice import choice_of
+from fsw.autopilot.parameters.registry import PARAMETERS
 from view.report.reported import Reported
 
 _FACTS: Final = {

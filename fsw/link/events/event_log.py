@@ -6,9 +6,9 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.autopilot.signals import ArmingReport, Order, Severity, TickInputs, TickOutputs
 from fsw.link.events.event_table import Event, arming_events, failsafe_event
 from fsw.link.text_limiter import REPEAT_US
-from fsw.signals import ArmingReport, Order, Severity, TickInputs, TickOutputs
 
 _KEPT: Final = 64  # events; a client that missed more is told so
 _BETWEEN_US: Final = 2_000_000  # two reports of the arming checks that no client asked for

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from fsw.flight.ailments import AILMENTS
-from fsw.flight.arming import CHECKS, Subject
-from fsw.flight.conditions import Action, Condition
-from fsw.flight.failsafe import ROWS
+from fsw.autopilot.flight.ailments import AILMENTS
+from fsw.autopilot.flight.arming import CHECKS, Subject
+from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.signals import ArmingReport, FailsafeEvent, Mode, Severity
 from fsw.link.wire.px4_mode import custom_mode
-from fsw.signals import ArmingReport, FailsafeEvent, Mode, Severity
 
 ARGUMENTS: Final = 40  # bytes of an event
 _COMPONENT: Final = 1  # of the ids: the autopilot

@@ -10,13 +10,13 @@ from functools import cache
 from typing import Final
 
 from command_line.version import version
+from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.events.event_table import event_document
 from fsw.link.files.ftp_tree import Node
 from fsw.link.files.served_file import MemoryFile
 from fsw.link.wire import message_ids
 from fsw.link.wire.outgoing import Outgoing
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot
 
 _GENERAL: Final = "general.json"
 _PARAMETERS: Final = "parameters.json"
@@ -50,7 +50,7 @@ def _uri(name: str) -> str:
 # before the command line has been found right.
 @cache
 def _parameters() -> bytes:
-    from fsw.parameters.metadata import parameter_document
+    from fsw.autopilot.parameters.metadata import parameter_document
 
     return parameter_document()
 
@@ -58,7 +58,7 @@ def _parameters() -> bytes:
 @cache
 def _general() -> tuple[bytes, int]:
     """The general document and its checksum."""
-    from fsw.parameters.metadata import general_document, metadata_crc
+    from fsw.autopilot.parameters.metadata import general_document, metadata_crc
 
     events = (_uri(_EVENTS), event_document())
     document = general_document(_uri(_PARAMETERS), events, version())

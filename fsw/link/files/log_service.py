@@ -13,12 +13,12 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final, NamedTuple, cast
 
+from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput
-from fsw.signals import Severity, StatusText
 from messages.frames import Frame
 
 CHUNK: Final = 90  # bytes of a log in one LOG_DATA

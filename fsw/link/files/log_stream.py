@@ -14,13 +14,13 @@ import struct
 from collections.abc import Sequence
 from typing import Final, cast
 
+from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.served_file import DiskFile, OpenFile
 from fsw.link.services.service import Outcome
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
-from fsw.signals import CommandRequest, CommandResult, Severity, StatusText
 from messages.frames import Frame
 
 _START, _STOP = 2510, 2511  # MAV_CMD

@@ -9,11 +9,11 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from fsw.flight import mission_sequencer
+from fsw.autopilot.flight import mission_sequencer
+from fsw.autopilot.shapes.half_space import KIND as HALF_SPACE
+from fsw.autopilot.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
+from fsw.autopilot.signals import FlightSnapshot, MissionAction, MissionStep, SafeSet, Vec2, Zone
 from fsw.link.wire.mission_items import SKIPPED, MissionItem, command_name
-from fsw.shapes.half_space import KIND as HALF_SPACE
-from fsw.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
-from fsw.signals import FlightSnapshot, MissionAction, MissionStep, SafeSet, Vec2, Zone
 
 _NAMED: Final = 4  # of a kind; the others are counted
 _PLACES: Final = (MissionAction.GO, MissionAction.CIRCLE, MissionAction.LAND)

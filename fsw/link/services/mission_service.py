@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, cast
 
+from fsw.autopilot.signals import MessageSource, Severity, StatusText
 from fsw.link.services.mission_store import ALL_KINDS, ROOM, Kind, Meaning, MissionStore
 from fsw.link.services.mission_wire import (
     Peer,
@@ -29,7 +30,6 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
-from fsw.signals import MessageSource, Severity, StatusText
 from messages.frames import Frame
 
 _ReadItem = Callable[[Numbers], MissionItem]

@@ -14,9 +14,20 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
-from fsw.flight.bounds import mission_problem, safe_set_problem
-from fsw.flight.safe_set import may_grow_fence
-from fsw.flight.safe_set_change import growth
+from fsw.autopilot.flight.bounds import mission_problem, safe_set_problem
+from fsw.autopilot.flight.safe_set import may_grow_fence
+from fsw.autopilot.flight.safe_set_change import growth
+from fsw.autopilot.shapes.zones import surfaces
+from fsw.autopilot.signals import (
+    FlightSnapshot,
+    MessageSource,
+    MissionProgress,
+    MissionStep,
+    MissionUpdate,
+    Mode,
+    SafeSet,
+    Vec2,
+)
 from fsw.link.services.mission_remarks import fence_remarks, mission_remarks
 from fsw.link.wire.fence_items import check_fence_item, read_fence
 from fsw.link.wire.mission_items import (
@@ -27,17 +38,6 @@ from fsw.link.wire.mission_items import (
     MissionItem,
     read_rally,
     read_step,
-)
-from fsw.shapes.zones import surfaces
-from fsw.signals import (
-    FlightSnapshot,
-    MessageSource,
-    MissionProgress,
-    MissionStep,
-    MissionUpdate,
-    Mode,
-    SafeSet,
-    Vec2,
 )
 
 SafeSetCheck = Callable[[SafeSet], tuple[str, ...]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, cast
 
+from fsw.autopilot.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.mission_items import (
@@ -16,7 +17,6 @@ from fsw.link.wire.mission_items import (
 )
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
-from fsw.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
 
 Peer = tuple[int, int]
 """System and component of a client."""

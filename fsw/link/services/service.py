@@ -11,8 +11,8 @@ import traceback
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol, runtime_checkable
 
+from fsw.autopilot.signals import CommandRequest, MessageSource
 from fsw.link.wire.outgoing import ServiceOutput
-from fsw.signals import CommandRequest, MessageSource
 from messages.frames import Frame
 
 

@@ -14,12 +14,12 @@ from enum import Enum
 from hashlib import sha256
 from typing import Final, cast
 
+from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.signing.signed_times import TOLERANCE, SignedTimes
 from fsw.link.udp_endpoint import Address, is_loopback
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
-from fsw.signals import Severity, StatusText
 from messages.frames import Frame, announcing_signature, is_signed, is_version_1
 
 _HASH_SIZE: Final = 6  # bytes, the first of SHA-256

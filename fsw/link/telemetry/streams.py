@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.files.component_metadata import component_metadata
 from fsw.link.services import mission_wire
 from fsw.link.wire import (
@@ -22,7 +23,6 @@ from fsw.link.wire import (
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot
 
 Encoder = Callable[[FlightSnapshot, TelemetryContext], WireValues | None]
 Answerer = Callable[[float, FlightSnapshot, TelemetryContext], Sequence[Outgoing]]

@@ -1,9 +1,9 @@
 """From wire values to the boundary types; pure.
 
 A MAVLink payload that is no setpoint, shape or place in a set is refused here by returning None,
-and one with numbers out of ``fsw.flight.bounds`` by ``RefusedError``, which says why; the caller
-counts both. NaN in a COMMAND_LONG is normal: clients put it into every parameter that they do not
-use.
+and one with numbers out of ``fsw.autopilot.flight.bounds`` by ``RefusedError``, which says why; the
+caller counts both. NaN in a COMMAND_LONG is normal: clients put it into every parameter that they
+do not use.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final, cast
 
-from fsw.flight.bounds import point_problem, zone_problem
-from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
-from fsw.shapes import BY_NUMBER, kind_of
-from fsw.shapes.ball import point
-from fsw.shapes.half_space import wall
-from fsw.shapes.target_sphere import target_sphere
-from fsw.signals import (
+from fsw.autopilot.flight.bounds import point_problem, zone_problem
+from fsw.autopilot.shapes import BY_NUMBER, kind_of
+from fsw.autopilot.shapes.ball import point
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.shapes.target_sphere import target_sphere
+from fsw.autopilot.signals import (
     CommandRequest,
     EndEffectorTarget,
     SensorFrame,
@@ -27,6 +26,7 @@ from fsw.signals import (
     Vec3,
     Zone,
 )
+from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from messages.frames import Frame, wire_fields
 
 Numbers = tuple[float, ...]  # a payload without text, in wire order

@@ -1,7 +1,8 @@
 """Decodes MAVLink commands: parameters in, a typed action out; pure.
 
 Invalid parameters are refused here with a sentence; NaN means the vehicle's default, and infinity
-nothing. What depends on the state of the vehicle is decided in ``fsw.flight.command_handlers``.
+nothing. What depends on the state of the vehicle is decided in
+``fsw.autopilot.flight.command_handlers``.
 """
 
 from __future__ import annotations
@@ -10,17 +11,9 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.flight.bounds import CIRCLE_RADII, MAX_SPEED, MAX_YAW
-from fsw.flight.command_handlers import MIN_SPEED
-from fsw.link.wire.mission_items import (
-    GLOBAL_FRAMES,
-    HOME_FRAMES,
-    LOCAL_NED,
-    USUAL_RADIUS,
-    Locate,
-)
-from fsw.link.wire.px4_mode import MODE_BY_PX4, MODE_BY_STANDARD
-from fsw.signals import (
+from fsw.autopilot.flight.bounds import CIRCLE_RADII, MAX_SPEED, MAX_YAW
+from fsw.autopilot.flight.command_handlers import MIN_SPEED
+from fsw.autopilot.signals import (
     Arm,
     ChangeSpeed,
     Command,
@@ -44,6 +37,14 @@ from fsw.signals import (
     SwitchMode,
     TakeOff,
 )
+from fsw.link.wire.mission_items import (
+    GLOBAL_FRAMES,
+    HOME_FRAMES,
+    LOCAL_NED,
+    USUAL_RADIUS,
+    Locate,
+)
+from fsw.link.wire.px4_mode import MODE_BY_PX4, MODE_BY_STANDARD
 
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks

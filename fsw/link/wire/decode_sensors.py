@@ -9,9 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Final, cast
 
-from fsw.link.wire import message_ids
-from fsw.link.wire.decode import Numbers
-from fsw.measurements import (
+from fsw.autopilot.measurements import (
     GnssSample,
     ImuSample,
     JointSample,
@@ -23,7 +21,9 @@ from fsw.measurements import (
     Vec3,
     Vec4,
 )
-from fsw.signals import BatteryReading
+from fsw.autopilot.signals import BatteryReading
+from fsw.link.wire import message_ids
+from fsw.link.wire.decode import Numbers
 from messages.frames import Frame
 
 Locate = Callable[[float, float, float], Vec3]

@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 from typing import Final, cast
 
-from fsw.flight.bounds import motion_refusal
-from fsw.flight.offboard_setpoints import attitude_refusal
-from fsw.link.wire.decode import Numbers, RefusedError
-from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, Locate
-from fsw.signals import (
+from fsw.autopilot.flight.bounds import motion_refusal
+from fsw.autopilot.flight.offboard_setpoints import attitude_refusal
+from fsw.autopilot.signals import (
     AttitudeSetpoint,
     JointSetpoint,
     MotionSetpoint,
@@ -22,6 +20,8 @@ from fsw.signals import (
     Vec3,
     Vec4,
 )
+from fsw.link.wire.decode import Numbers, RefusedError
+from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, Locate
 
 # MAV_FRAME, with what a position counts from there; the others have no meaning for a setpoint.
 _LOCAL_NED: Final = 1

@@ -10,14 +10,14 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.ports import GroupTiming
+from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 from fsw.link.wire import message_ids
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.model.kinematics import point_in_flight
-from fsw.ports import GroupTiming
-from fsw.shapes import kind_of
-from fsw.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16

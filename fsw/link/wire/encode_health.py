@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.estimation.sensor_fault import Sensor, SensorFault, fault_name
-from fsw.flight.conditions import Condition
+from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, fault_name
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.signals import (
+    BatteryState,
+    Charge,
+    EstimatorReport,
+    FlightSnapshot,
+    SensorReport,
+)
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import BatteryState, Charge, EstimatorReport, FlightSnapshot, SensorReport
 
 # MAV_SYS_STATUS_SENSOR bits of what every vehicle has. The bits of the magnetometer and of the
 # receiver say whether heading and position are known, which is what clients ask them for; where

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.flight.conditions import Condition
-from fsw.geometry.geodesy import to_global
-from fsw.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.geometry.geodesy import to_global
+from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.signals import FlightSnapshot, SatelliteFix, Vec3
 from fsw.link.wire.encode_standard import boot_ms
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot, SatelliteFix, Vec3
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.autopilot.signals import ActuatorCommand, CommandAck
 from fsw.link.wire.outgoing import WireValues
-from fsw.signals import ActuatorCommand, CommandAck
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1

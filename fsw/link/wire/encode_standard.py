@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.control.attitude import attitude_reference
-from fsw.geometry.geodesy import to_global
-from fsw.geometry.rotation import euler_zyx, quaternion_from_euler, quaternion_from_matrix
+from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.geometry.geodesy import to_global
+from fsw.autopilot.geometry.rotation import euler_zyx, quaternion_from_euler, quaternion_from_matrix
+from fsw.autopilot.signals import FlightSnapshot, Mode, MotionSetpoint, SetpointKind, Vec3
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.signals import FlightSnapshot, Mode, MotionSetpoint, SetpointKind, Vec3
 
 _QUADROTOR: Final = 2  # MAV_TYPE
 _ARMED: Final = 128  # MAV_MODE_FLAG

@@ -23,6 +23,12 @@ import math
 from itertools import pairwise
 from typing import Final
 
+from fsw.autopilot.shapes.half_space import KIND as HALF_SPACE
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.shapes.target_sphere import target_sphere
+from fsw.autopilot.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
+from fsw.autopilot.shapes.vertical_cylinder import column
+from fsw.autopilot.signals import TARGET_SPHERE, SafeSet, Vec2, Zone
 from fsw.link.wire.mission_items import (
     INVALID,
     INVALID_PARAM1,
@@ -34,12 +40,6 @@ from fsw.link.wire.mission_items import (
     command_name,
     horizontal_place,
 )
-from fsw.shapes.half_space import KIND as HALF_SPACE
-from fsw.shapes.half_space import wall
-from fsw.shapes.target_sphere import target_sphere
-from fsw.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
-from fsw.shapes.vertical_cylinder import column
-from fsw.signals import TARGET_SPHERE, SafeSet, Vec2, Zone
 
 RETURN_POINT: Final = 5000  # MAV_CMD_NAV_FENCE_RETURN_POINT
 POLYGON_INCLUSION: Final = 5001

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fsw.autopilot.signals import StatusText
 from fsw.link.wire.message_ids import AUTOPILOT
-from fsw.signals import StatusText
 
 WireValues = tuple[float | bytes, ...]
 """Every field of a message in wire order, see ``messages.frames.wire_fields``."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from fsw.flight.modes import MODES
-from fsw.signals import FlightSnapshot, Mode
+from fsw.autopilot.flight.modes import MODES
+from fsw.autopilot.signals import FlightSnapshot, Mode
 
 _NOT_SELECTABLE: Final = 2  # MAV_MODE_PROPERTY: entered by a command of its own
 # A disarmed vehicle has no flight mode of its own; PX4 shows the one it would start in. Terminated,

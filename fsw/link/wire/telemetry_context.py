@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fsw.geometry.geodesy import DEFAULT_ORIGIN
-from fsw.ports import LoopHealth, VehicleFacts
-from fsw.signals import Origin
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.autopilot.ports import LoopHealth, VehicleFacts
+from fsw.autopilot.signals import Origin
 
 GENERIC, PX4 = 0, 12  # MAV_AUTOPILOT
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.ports import GroupTiming, LoopHealth, VehicleFacts
-from fsw.signals import (
+from fsw.autopilot.ports import GroupTiming, LoopHealth, VehicleFacts
+from fsw.autopilot.signals import (
     ActuatorCommand,
     BatteryState,
     ConstraintKind,
@@ -34,6 +33,7 @@ from fsw.signals import (
     TestRatios,
     TickOutputs,
 )
+from fsw.link.wire.telemetry_context import TelemetryContext
 
 FACTS = VehicleFacts(
     rotor_thrust_max=16.0,

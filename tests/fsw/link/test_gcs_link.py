@@ -16,6 +16,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v10 import common as old_protocol
 
+from fsw.autopilot.ports import LinkLosses
+from fsw.autopilot.signals import BatteryState, CommandAck, Mode, Severity, StatusText
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
@@ -24,8 +26,6 @@ from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
-from fsw.ports import LinkLosses
-from fsw.signals import BatteryState, CommandAck, Mode, Severity, StatusText
 from messages import dialect
 from messages.frames import Frame, FrameWriter, as_version_1, split
 from tests.fsw.link.ground import Ground, ground_station, station_socket

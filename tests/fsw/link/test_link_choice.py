@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from command_line.options import as_words, read
-from fsw.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
+from fsw.autopilot.signals import Origin
 from fsw.link.link_choice import LinkChoice, parse_origin
-from fsw.signals import Origin
 
 
 def chosen(*words: str) -> LinkChoice:

@@ -9,11 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from fsw.link.inbox import Inbox
-from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.wire import message_ids as ids
-from fsw.link.wire.decode_sensors import SampleDecoder
-from fsw.measurements import (
+from fsw.autopilot.measurements import (
     GnssSample,
     ImuSample,
     JointSample,
@@ -23,8 +19,12 @@ from fsw.measurements import (
     RangeSample,
     Sample,
 )
+from fsw.autopilot.signals import Origin, SensorFrame
+from fsw.link.inbox import Inbox
+from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.decode_sensors import SampleDecoder
 from fsw.runtime.clock import now_us
-from fsw.signals import Origin, SensorFrame
 from messages.frames import FrameWriter, split
 from sitl import earth
 from sitl.link.encode import StepEncoder

@@ -8,19 +8,19 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from fsw.flight.state import FlightState
-from fsw.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import MessageSource, SensorFrame, Severity, TickOutputs
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import SimLink
 from fsw.link.wire import message_ids as ids
-from fsw.parameters.flight_config import flight_config
 from fsw.runtime.clock import now_us
-from fsw.signals import MessageSource, SensorFrame, Severity, TickOutputs
 from messages.frames import FrameWriter
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import Announce
-from tests.fsw.flight.asked import command
-from tests.fsw.flight.test_autopilot import frame
+from tests.fsw.autopilot.flight.asked import command
+from tests.fsw.autopilot.flight.test_autopilot import frame
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import FACTS
 from tests.fsw.link.test_sim_link import readings

@@ -11,13 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fsw.link.inbox import Inbox
-from fsw.link.routed_commands import RoutedCommands
-from fsw.link.sim_link import Pacing, SimLink
-from fsw.link.text_limiter import TextLimiter
-from fsw.link.wire import message_ids as ids
-from fsw.measurements import ImuSample, JointSample, PressureSample
-from fsw.signals import (
+from fsw.autopilot.measurements import ImuSample, JointSample, PressureSample
+from fsw.autopilot.signals import (
     BatteryReading,
     CommandAck,
     CommandRequest,
@@ -28,6 +23,11 @@ from fsw.signals import (
     Shape,
     StatusText,
 )
+from fsw.link.inbox import Inbox
+from fsw.link.routed_commands import RoutedCommands
+from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.text_limiter import TextLimiter
+from fsw.link.wire import message_ids as ids
 from messages import status_text
 from messages.frames import FrameWriter, split
 from sitl.earth import DEFAULT_ORIGIN

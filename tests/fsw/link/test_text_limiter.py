@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from fsw.autopilot.signals import FailsafeEvent, Severity, StatusText
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
-from fsw.signals import FailsafeEvent, Severity, StatusText
 
 REFUSED = StatusText(Severity.CRITICAL, "no takeoff: the vehicle is in the air already")
 S = 1_000_000

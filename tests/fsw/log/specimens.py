@@ -10,7 +10,7 @@ import types
 import typing
 from typing import Any
 
-from fsw.signals import TickInputs
+from fsw.autopilot.signals import TickInputs
 
 
 def specimen(hint: Any, dice: random.Random, nothing: float = 0.2) -> Any:

@@ -18,10 +18,10 @@ from pathlib import Path
 import pytest
 from pyulog import ULog
 
+from fsw.autopilot.signals import SensorFrame, TickInputs
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import Gap, LoggedTick, open_flight, ticks
 from fsw.log.run_files import RunFiles
-from fsw.signals import SensorFrame, TickInputs
 from messages.block_file import BlockFile
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.autopilot.signals import PlanTimings
 from fsw.log import json_codec
 from fsw.log.encoder import LogEncoder
 from fsw.log.json_codec import JsonCodec
-from fsw.signals import PlanTimings
 from tests.fsw.link.snapshots import PLAN
 
 

@@ -15,15 +15,11 @@ from pyulog import ULog
 from pyulog.px4 import PX4ULog
 from scipy.spatial.transform import Rotation
 
-from fsw.control.attitude import attitude_reference
-from fsw.flight.conditions import Condition
-from fsw.geometry.geodesy import to_local
-from fsw.log.encoder import FULL, THIN
-from fsw.log.flight_log import FlightLog, LogSubject
-from fsw.log.px4_records import planned_rates
-from fsw.log.reader import LoggedTick, open_flight, ticks
-from fsw.measurements import ImuSample
-from fsw.signals import (
+from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.geometry.geodesy import to_local
+from fsw.autopilot.measurements import ImuSample
+from fsw.autopilot.signals import (
     BatteryState,
     Charge,
     FlightSnapshot,
@@ -33,6 +29,10 @@ from fsw.signals import (
     SensorFrame,
     TickInputs,
 )
+from fsw.log.encoder import FULL, THIN
+from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.log.px4_records import planned_rates
+from fsw.log.reader import LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
 
 ORIGIN = Origin(47.0, 8.0, 400.0)
@@ -218,7 +218,7 @@ def test_whatever_is_not_known_leaves_every_record_readable(tmp_path: Path) -> N
 
 
 def test_the_load_is_written_where_it_is_measured(tmp_path: Path) -> None:
-    from fsw.ports import GroupTiming
+    from fsw.autopilot.ports import GroupTiming
 
     timing = GroupTiming(2_000, 500, 0, 0, 500.0, 800.0, 900.0, 1.0, 2.0, 3.0, 0.1)
     for lockstep in (True, False):

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
+from fsw.autopilot.measurements import Sample
+from fsw.autopilot.signals import Mode, PlanTimings, SensorFrame, TickInputs
 from fsw.log import topics
 from fsw.log.encoder import NAV_STATES, SAMPLES, TYPED, LogEncoder
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.json_codec import JsonCodec
 from fsw.log.reader import LoggedTick, open_flight, ticks
-from fsw.measurements import Sample
-from fsw.signals import Mode, PlanTimings, SensorFrame, TickInputs
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.conditions import Condition
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.signals import FailsafeEvent, Severity, StatusText
 from fsw.runtime.console import Console
-from fsw.signals import FailsafeEvent, Severity, StatusText
 from tests.waiting import becomes
 
 SECOND = 1_000_000

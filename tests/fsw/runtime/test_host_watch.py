@@ -8,8 +8,8 @@ from typing import Any, cast
 
 import pytest
 
+from fsw.autopilot.signals import HostHealth
 from fsw.runtime.host_watch import HostWatch
-from fsw.signals import HostHealth
 
 WELL = HostHealth()
 SECOND = 1_000_000

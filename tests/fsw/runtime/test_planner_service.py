@@ -10,14 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.runtime.planner_service import (
-    ANSWER_TIMEOUT_US,
-    InlinePlanner,
-    PlannerRecord,
-    ProcessPlanner,
-)
-from fsw.runtime.timing import GroupTimer
-from fsw.signals import (
+from fsw.autopilot.signals import (
     Plan,
     PlanFailure,
     PlanRequest,
@@ -26,6 +19,13 @@ from fsw.signals import (
     SafeSet,
     SolverStatus,
 )
+from fsw.runtime.planner_service import (
+    ANSWER_TIMEOUT_US,
+    InlinePlanner,
+    PlannerRecord,
+    ProcessPlanner,
+)
+from fsw.runtime.timing import GroupTimer
 from tests.waiting import wait_for
 
 REST = PredictionState(

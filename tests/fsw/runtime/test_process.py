@@ -38,7 +38,7 @@ def test_work_that_fails_in_a_child_is_silent(
 # In a process of its own: kernels that are compiled afterwards could not call those of before.
 SETTLE = """
 from pathlib import Path
-from fsw.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.process import settle_memory
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from fsw.periods import PLANNING_US, TICK_US
+from fsw.autopilot.periods import PLANNING_US, TICK_US
 from fsw.runtime.rate_groups import INNER, MPC, STAGES_EVERY, Member, RateGroup, RateGroupRunner
 
 _PLACES = PLANNING_US // TICK_US

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fsw.runtime.sim_loop import to_route
-from fsw.signals import (
+from fsw.autopilot.signals import (
     Command,
     CommandAck,
     CommandAction,
@@ -15,6 +14,7 @@ from fsw.signals import (
     Mode,
     SwitchMode,
 )
+from fsw.runtime.sim_loop import to_route
 
 INJECT_FAILURE = 420
 GOES_ON, DENIED = CommandResult.IN_PROGRESS, CommandResult.DENIED

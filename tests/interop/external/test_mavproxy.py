@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.parameters.registry import PARAMETERS
+from fsw.autopilot.parameters.registry import PARAMETERS
 from messages.export import write_definitions
 from tests.interop.external.environments import environment_of, only_where_installed
 from tests.interop.mavsdk_client import eventually

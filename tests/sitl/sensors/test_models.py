@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fsw.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
 from sitl.sensors.barometer import SEA_LEVEL_PA, BarometerSensor, standard_pressure
 from sitl.sensors.encoders import EncoderSensor
 from sitl.sensors.gnss import GnssSensor

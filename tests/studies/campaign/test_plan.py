@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.parameters.registry import BY_NAME
+from fsw.autopilot.parameters.registry import BY_NAME
 from sitl.scenario_file import PACKAGED
 from sitl.sensors.keys import MeasuredSensors
 from studies.campaign.flight import CampaignFlights

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.modes import MODES
-from fsw.signals import ActuatorCommand, Mode, Severity
+from fsw.autopilot.flight.modes import MODES
+from fsw.autopilot.signals import ActuatorCommand, Mode, Severity
 from pandion.faults import main
 from sitl.faults.keys import KINDS, Fault
 from studies.fault_matrix import matrix

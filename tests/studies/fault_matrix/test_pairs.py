@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.signals import Severity
+from fsw.autopilot.signals import Severity
 from pandion.faults import main
 from sitl.faults.keys import KINDS, SENSORS, Fault
 from sitl.scenario_file import PERFECT, SUITE_NAMES

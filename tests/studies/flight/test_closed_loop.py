@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.control.control_metrics import ControlMetrics
-from fsw.parameters.flight_config import flight_config
-from fsw.signals import PlanInput
+from fsw.autopilot.control.control_metrics import ControlMetrics
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import PlanInput
 from sitl.scenario_file import ScenarioError, load_scenario
 from studies.flight import closed_loop
 from studies.flight.job import Job, fly_job

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.model.airframe import AIRFRAME, AttitudeLag
-from fsw.model.kinematics import arm_points
-from fsw.model.nominal import REST_STATE
-from fsw.model.prediction import discretise, to_vector
-from fsw.signals import PlanInput
+from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
+from fsw.autopilot.model.kinematics import arm_points
+from fsw.autopilot.model.nominal import REST_STATE
+from fsw.autopilot.model.prediction import discretise, to_vector
+from fsw.autopilot.signals import PlanInput
 from sitl.scenario import Uniform, Wind
 from studies.flight.double_integrator import DoubleIntegrator, after, points
 from studies.paper.cases import scenario

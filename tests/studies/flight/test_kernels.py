@@ -19,7 +19,7 @@ from tests.waiting import wait_for
 
 FLY = """
 from dataclasses import replace
-from fsw.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.flight_config import flight_config
 from sitl.scenario_file import load_scenario
 from studies.flight.closed_loop import simulate
 for name, suite in (("walls", "perfect"), ("workspace", "mocap"), ("field", "rtk")):

@@ -6,9 +6,9 @@ import dataclasses
 
 import pytest
 
+from fsw.autopilot.measurements import GnssSample, RangeSample, Sample
 from fsw.link.inbox import Inbox
 from fsw.link.wire.decode_sensors import SampleDecoder
-from fsw.measurements import GnssSample, RangeSample, Sample
 from messages.frames import split
 from sitl.link.encode import StepEncoder
 from sitl.scenario_file import load_scenario

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fsw.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME
 from sitl.scenario_file import load_scenario
 from studies.paper.inverse_workspace import BOTH_ELBOWS, InverseWorkspace
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.control.tube import beyond_covered
-from fsw.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.measurements import ImuSample, JointSample, PoseSample, Sample
-from fsw.parameters.consistency import base_reach, loop_tube, stand_off
-from fsw.parameters.registry import BY_NAME
-from fsw.signals import SensorFrame
+from fsw.autopilot.control.tube import beyond_covered
+from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.signals import SensorFrame
 from sitl.mission_clock import MissionClock
 from sitl.scenario import AirKeys
 from sitl.scenario_file import load_scenario, scenario_names, suite_of

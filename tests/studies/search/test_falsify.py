@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fsw.control.tube import WIND_COVERED
-from fsw.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.control.tube import WIND_COVERED
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.scenario_text import scenario_text
 from studies.flight.closed_loop import simulate

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from fsw.parameters.registry import BY_NAME
-from fsw.parameters.storage import load
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.parameters.storage import load
 from pandion import tune as command
 from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.keys import CampaignError

@@ -9,9 +9,20 @@ from typing import Any, cast
 
 import pytest
 
-from fsw.flight.ailments import AILMENTS
-from fsw.flight.arming import CHECKS, Subject
-from fsw.flight.conditions import Action, Condition
+from fsw.autopilot.flight.ailments import AILMENTS
+from fsw.autopilot.flight.arming import CHECKS, Subject
+from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.signals import (
+    ArmingReport,
+    Command,
+    CommandRequest,
+    FailsafeEvent,
+    Order,
+    SensorFrame,
+    Severity,
+    StatusText,
+    TickInputs,
+)
 from fsw.link.events.event_log import EventLog
 from fsw.link.events.event_service import EventService
 from fsw.link.events.event_table import (
@@ -24,17 +35,6 @@ from fsw.link.events.event_table import (
 )
 from fsw.link.wire import message_ids
 from fsw.link.wire.outgoing import Outgoing
-from fsw.signals import (
-    ArmingReport,
-    Command,
-    CommandRequest,
-    FailsafeEvent,
-    Order,
-    SensorFrame,
-    Severity,
-    StatusText,
-    TickInputs,
-)
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import outputs_at
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fsw.autopilot.signals import StatusText
 from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput, WireValues
-from fsw.signals import StatusText
 from messages.frames import FrameWriter, split
 
 

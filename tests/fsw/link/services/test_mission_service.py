@@ -11,15 +11,11 @@ from typing import Any
 
 import pytest
 
-from fsw.flight.tuned_autopilot import TunedAutopilot
-from fsw.link.services.mission_remarks import fence_remarks, mission_remarks
-from fsw.link.services.mission_service import MissionService
-from fsw.link.services.mission_store import Kind, MissionStore, Site
-from fsw.link.wire.mission_items import MissionItem
-from fsw.parameters.flight_config import flight_config
-from fsw.shapes.half_space import wall
-from fsw.shapes.vertical_cylinder import column
-from fsw.signals import (
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.shapes.vertical_cylinder import column
+from fsw.autopilot.signals import (
     TARGET_SPHERE,
     Home,
     MissionAction,
@@ -30,6 +26,10 @@ from fsw.signals import (
     SafeSet,
     Vec3,
 )
+from fsw.link.services.mission_remarks import fence_remarks, mission_remarks
+from fsw.link.services.mission_service import MissionService
+from fsw.link.services.mission_store import Kind, MissionStore, Site
+from fsw.link.wire.mission_items import MissionItem
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.services.mission_client import Client, Item, Weather
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at

@@ -10,10 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.flight.safe_set import SafeSetCheck
-from fsw.flight.safety_watch import SafetyWatch
-from fsw.flight.state import SafetyMemory
-from fsw.flight.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safe_set import SafeSetCheck
+from fsw.autopilot.flight.safety_watch import SafetyWatch
+from fsw.autopilot.flight.state import SafetyMemory
+from fsw.autopilot.flight.uncertain_clearance import KeptSet
+from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import EndEffectorTarget, StateEstimate, Vec2
 from fsw.link.services.mission_store import Kind, MissionStore
 from fsw.link.wire.fence_items import (
     CIRCLE_EXCLUSION,
@@ -23,10 +26,7 @@ from fsw.link.wire.fence_items import (
     read_fence,
 )
 from fsw.link.wire.mission_items import LOCAL_OFFSET_NED, BadItem, MissionItem
-from fsw.parameters.control_choice import ControlChoice
-from fsw.parameters.flight_config import flight_config
 from fsw.runtime.assembly import flight_software
-from fsw.signals import EndEffectorTarget, StateEstimate, Vec2
 from tests.fsw.link.snapshots import SNAPSHOT
 from tests.fsw.random_states import estimate_of
 

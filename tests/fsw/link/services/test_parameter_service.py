@@ -7,19 +7,19 @@ from collections.abc import Iterable
 
 import pytest
 
+from fsw.autopilot.parameters.facts import FACT_BY_NAME
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.param_type import field_of, value_of
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.parameters.store import ParameterStore
+from fsw.autopilot.signals import CommandRequest, StatusText
 from fsw.link.services.parameter_service import BURST, ParameterService
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
-from fsw.parameters.facts import FACT_BY_NAME
-from fsw.parameters.flight_config import FlightConfig
-from fsw.parameters.param_type import field_of, value_of
-from fsw.parameters.registry import BY_NAME
-from fsw.parameters.store import ParameterStore
-from fsw.signals import CommandRequest, StatusText
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
-from tests.fsw.parameters.test_store import ticks
-from tests.fsw.parameters.threads import AtOnce
+from tests.fsw.autopilot.parameters.test_store import ticks
+from tests.fsw.autopilot.parameters.threads import AtOnce
 from tests.parameters_on_the_wire import LISTED
 
 NAMES = sorted([*BY_NAME, *FACT_BY_NAME])

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
+from fsw.autopilot.shapes import BY_NAME, KINDS
+from fsw.autopilot.signals import Arm, MessageSource, Mode, Rejected, SensorFrame, SwitchMode
 from fsw.link.inbox import Inbox
 from fsw.link.wire import message_ids as ids
-from fsw.shapes import BY_NAME, KINDS
-from fsw.signals import Arm, MessageSource, Mode, Rejected, SensorFrame, SwitchMode
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
 

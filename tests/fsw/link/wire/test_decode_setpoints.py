@@ -6,9 +6,15 @@ import math
 
 import pytest
 
+from fsw.autopilot.signals import (
+    AttitudeSetpoint,
+    JointSetpoint,
+    MotionSetpoint,
+    Origin,
+    PositionFrom,
+)
 from fsw.link.inbox import Inbox, Received
 from fsw.link.wire import message_ids as ids
-from fsw.signals import AttitudeSetpoint, JointSetpoint, MotionSetpoint, Origin, PositionFrom
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
 NAN = math.nan

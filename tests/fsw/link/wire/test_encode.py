@@ -8,13 +8,9 @@ from typing import Any
 
 import pytest
 
-from fsw.estimation.sensor_fault import Sensor
-from fsw.flight.conditions import Condition
-from fsw.link.telemetry.streams import STREAMS, Stream
-from fsw.link.wire import encode_replies, encode_standard
-from fsw.link.wire import message_ids as ids
-from fsw.link.wire.telemetry_context import GENERIC
-from fsw.signals import (
+from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.signals import (
     AttitudeSetpoint,
     Charge,
     ConstraintKind,
@@ -29,6 +25,10 @@ from fsw.signals import (
     SetpointKind,
     Severity,
 )
+from fsw.link.telemetry.streams import STREAMS, Stream
+from fsw.link.wire import encode_replies, encode_standard
+from fsw.link.wire import message_ids as ids
+from fsw.link.wire.telemetry_context import GENERIC
 from messages import dialect, status_text
 from messages.frames import FrameWriter
 from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, REPORT, SNAPSHOT

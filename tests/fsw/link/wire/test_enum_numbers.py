@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import pytest
 
-from fsw import measurements
-from fsw.flight import estimator_report
+from fsw.autopilot import measurements
+from fsw.autopilot.flight import estimator_report
 from fsw.link.wire import (
     decode,
     decode_commands,

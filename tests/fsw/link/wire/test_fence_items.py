@@ -10,6 +10,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from matplotlib.path import Path
 
+from fsw.autopilot.shapes.target_sphere import target_sphere
+from fsw.autopilot.shapes.vertical_cylinder import column
+from fsw.autopilot.shapes.zones import surfaces
+from fsw.autopilot.signals import SafeSet, Vec3, Zone
 from fsw.link.wire.fence_items import (
     CIRCLE_EXCLUSION,
     CIRCLE_INCLUSION,
@@ -20,10 +24,6 @@ from fsw.link.wire.fence_items import (
     read_fence,
 )
 from fsw.link.wire.mission_items import BadItem, MissionItem
-from fsw.shapes.target_sphere import target_sphere
-from fsw.shapes.vertical_cylinder import column
-from fsw.shapes.zones import surfaces
-from fsw.signals import SafeSet, Vec3, Zone
 from tests.fsw.zones import walls_of
 
 Corners = list[tuple[float, float]]

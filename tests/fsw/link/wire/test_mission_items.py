@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from fsw.autopilot.signals import MissionAction, MissionStep, Vec3, Vec4
 from fsw.link.wire import mission_items as items
 from fsw.link.wire.mission_items import BadItem, MissionItem, read_rally, read_step
-from fsw.signals import MissionAction, MissionStep, Vec3, Vec4
 
 NAN = math.nan
 GLOBAL, LOCAL, RELATIVE, MISSION = 5, 1, 6, 2

@@ -1,0 +1,1 @@
+"""A pure function (state, inputs) → (state, outputs); read ``flight/autopilot.py`` first."""

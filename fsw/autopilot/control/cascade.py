@@ -1,0 +1,429 @@
+"""One fast cycle: from the plan and the estimate to rotors and joints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.control.allocation import allocate
+from fsw.autopilot.control.arm_compensation import compensated_joints, lately_off_plan
+from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
+from fsw.autopilot.control.gains import LoopGains, tracking_gains
+from fsw.autopilot.control.height import height_pid
+from fsw.autopilot.control.joint_reference import joint_reference
+from fsw.autopilot.control.joints import (
+    accelerations_of,
+    arm_dynamics,
+    joint_torques,
+    observe_disturbance,
+    rest_joints,
+    torques_of_failed,
+)
+from fsw.autopilot.control.safety_filter import (
+    FilterLaw,
+    FilterTuning,
+    filter_law,
+    filter_probes,
+    filtered,
+)
+from fsw.autopilot.control.tilt_limit import limited_turn
+from fsw.autopilot.control.tracking import (
+    TrackingLaw,
+    follow_plan,
+    observe,
+    velocity_of_mass,
+    wanted_accelerations,
+)
+from fsw.autopilot.control.tube import NO_TUBE, TubeAround, beyond_covered
+from fsw.autopilot.geometry.rotation import rotate_back, wrap_angle
+from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
+from fsw.autopilot.model.actuator_health import (
+    HEALTHY,
+    SOUND,
+    ActuatorHealth,
+    commanded_for,
+    given,
+    note_health,
+)
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.body import Body, body_of
+from fsw.autopilot.model.rotors import (
+    MotionState,
+    estimate_mass,
+    hanging_arm,
+    lag_rotors,
+    motion_state,
+    rotor_decay,
+)
+from fsw.autopilot.shapes.zones import NO_ZONES
+from fsw.autopilot.signals import Mat3, StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.tick_record import (
+    BREACH,
+    FILTER_ACTED,
+    FLOWN_ROTORS,
+    GATE_NEEDED,
+    IMPAIRED,
+    OFF_PLAN,
+    Estimate,
+    Tick,
+    new_tick,
+)
+from fsw.compiled import compilable, compiled, kernel, machine_code, packed
+from fsw.record import Floats
+
+Inner = Literal["tracking", "pid"]
+Model = Vec4
+"""What rotors make of it: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
+
+_NONE: Vec3 = (0.0, 0.0, 0.0)
+_LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def at_rest(airframe: Airframe, estimate: StateEstimate, before: Tick | None = None) -> Tick:
+    """Record of a vehicle whose rotors stand still; ``before`` had its plan and its actuators."""
+    r = new_tick(airframe.mass)
+    if before is not None:
+        r.take_given(before)
+        r.watch = before.watch
+    r.known = estimate
+    r.observed.v[:] = estimate.v_WB
+    rest_joints(r.joints, airframe, estimate)
+    return r
+
+
+def in_hover(airframe: Airframe, estimate: StateEstimate, before: Tick | None = None) -> Tick:
+    """Record of a vehicle taken over in hover."""
+    r = at_rest(airframe, estimate, before)
+    r.rotors[:FLOWN_ROTORS] = r.sent.rotor_thrust[:FLOWN_ROTORS] = 0.25 * airframe.mass * GRAVITY
+    return r
+
+
+@dataclass(frozen=True, slots=True)
+class KeepClear:
+    """What the safety filter keeps off zones, and how."""
+
+    body: Body
+    barriers: tuple[BarrierTuning, BarrierTuning] = (BarrierTuning(), BarrierTuning())
+    tuning: FilterTuning = field(default_factory=FilterTuning)
+    speed: float = math.inf  # m/s, up to which it pushes
+
+
+@dataclass(frozen=True, slots=True)
+class CascadeLaw:
+    """Everything the loops need that does not change in flight."""
+
+    airframe: Airframe
+    tuning: LoopGains
+    tracking: TrackingLaw
+    follows_plan: bool  # or only the plan's acceleration
+    filter: FilterLaw
+    rotor_decay: float  # share of a rotor's error left after a tick
+    dt: float  # s, tick length
+
+
+class Cascade:
+    """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        tuning: LoopGains,
+        inner: Inner,
+        dt: float,
+        keep_clear: KeepClear | None = None,
+    ) -> None:
+        """Choose the inner loop and design its gains for a tick of ``dt`` [s], before flight.
+
+        The loop ``tracking`` follows the plan's state, ``pid`` only its acceleration.
+        """
+        clear = keep_clear or KeepClear(body=body_of("points", airframe))
+        gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
+        self.law = CascadeLaw(
+            airframe,
+            tuning,
+            TrackingLaw(airframe.attitude_lag, tuning.tracking, gains),
+            inner == "tracking",
+            filter_law(
+                clear.tuning,
+                clear.barriers,
+                airframe.link_length,
+                gains.k[3] / gains.k[2],
+                tuning.tracking.acceleration_limit,
+                clear.speed,
+            ),
+            rotor_decay(airframe, dt),
+            dt,
+        )
+        self.probes = filter_probes(clear.body)
+        self.packed = packed(self.law)
+        example = self.packed, new_tick(airframe.mass).array
+        rest = NO_ZONES, self.probes, NO_TUBE
+        self._close_loops = machine_code(_close_loops, *example, 1, *rest)
+        self._expected = machine_code(_expected, *example)
+
+    def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
+        """Acceleration to snap right now, from the rotor model."""
+        sent, effectiveness = r.commanded, r.health.effectiveness.tolist()
+        settling_at = given(HEALTHY._replace(effectiveness=effectiveness), sent.rotor_thrust)
+        rotors = lag_rotors(r.rotors.tolist(), settling_at, self.law.rotor_decay)
+        return motion_state(self.law.airframe, r.mass, estimate, rotors, sent.joint_torque[0])
+
+    def expected(self, r: Tick) -> tuple[Vec2, Model]:
+        """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
+        return self._expected(self.packed, r.array)
+
+    def joint_acceleration(self, r: Tick) -> Vec2:
+        """The joints' part of ``expected`` [rad/s^2]."""
+        return self.expected(r)[0]
+
+    def step(
+        self,
+        r: Tick,
+        ticks: int = 1,
+        zones: NDArray[np.float64] = NO_ZONES,
+        health: ActuatorHealth = HEALTHY,
+        tube: TubeAround = NO_TUBE,
+    ) -> None:
+        """Close the loops of a record; see ``close_loops``, ``zones`` (zones, k) [SI]."""
+        if health is not HEALTHY or r.flags & IMPAIRED:
+            note_health(r.health, health)
+            r.flags = 0 if health is HEALTHY else IMPAIRED
+        self._close_loops(self.packed, r.array, ticks, zones, self.probes, tube)
+
+
+@compilable
+def close_loops(
+    r: Tick,
+    law: CascadeLaw,
+    ticks: int,
+    zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
+) -> None:
+    """One tick, or several at once where some were missed: from estimate and plan to a command.
+
+    Each law writes what those after it read; ``sent`` is the last command until the end, where the
+    new one takes its place, not yet gated. The safety filter keeps the ``probes`` (probes, 12) [SI]
+    of ``filter_probes`` off the ``zones`` (zones, k) [SI] of ``moving_zones``.
+    """
+    airframe, tuning, dt = law.airframe, law.tuning, law.dt
+    estimate = r.estimate
+    settle_rotors(r, law, ticks)
+    r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks)
+    motion = motion_state(airframe, r.mass, estimate, r.rotors, r.sent.joint_torque[0])
+    arm = hanging_arm(airframe, estimate.q_arm)
+    v = velocity_of_mass(estimate, arm.depth)
+    for _ in range(ticks):
+        observe(r.observed, v, motion.a, tuning.tracking, dt)
+    keep_off_zones(r, law, motion, zones, probes)
+    if law.follows_plan:
+        turn, thrust = turn_to_plan(r, law, motion, arm.depth)
+        roll_inertia = arm.roll_inertia
+    else:
+        turn, thrust = turn_by_pid(r, law)
+        roll_inertia = airframe.inertia[0]  # the paper's loop knows no arm
+    turn = limited_turn(airframe, estimate, motion.turning, turn)
+    refer_joints(r, law, dt * ticks)
+    torques = drive_joints(r, law, motion, ticks)
+    torque = _body_torque(airframe, roll_inertia, estimate, turn, torques[0])
+    thrusts = allocate(airframe, torque, thrust, tuning.yaw_thrust_limit, r.health)
+    send(r, airframe, commanded_for(r.health, thrusts), torques)
+
+
+@compilable
+def settle_rotors(r: Tick, law: CascadeLaw, ticks: int) -> None:
+    """Where the rotors are by now. Reads sent, health; writes rotors."""
+    settling_at = given(r.health, r.sent.rotor_thrust)
+    for _ in range(ticks):
+        f = lag_rotors(r.rotors, settling_at, law.rotor_decay)
+        for i in range(FLOWN_ROTORS):
+            r.rotors[i] = f[i]
+
+
+@compilable
+def keep_off_zones(
+    r: Tick,
+    law: CascadeLaw,
+    motion: MotionState,
+    zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
+) -> None:
+    """What is flown: plan and input such that the loops ask for a filtered acceleration.
+
+    ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as of ``close_loops``. Reads
+    estimate, plan, u, observed; writes flown, flown_u, margin, flags.
+    """
+    r.flown, r.flown_u = r.plan, r.u
+    r.flags, r.margin = r.flags & IMPAIRED, math.inf
+    if zones.shape[0] == 0 or not law.filter.tuning.enabled > 0:
+        return
+    asked = (r.u.a[0], r.u.a[1], r.u.a[2])
+    if law.follows_plan:
+        asked = wanted_accelerations(law.tracking, r.estimate, motion, r.observed, r.plan, r.u)
+    level = law.filter.level
+    wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
+    a = add_scaled(motion.a, r.observed.d, 1.0)
+    safe, changed, margin = filtered(law.filter, probes, zones, r.estimate, r.observed.v, a, wanted)
+    r.margin = margin
+    if not margin >= 0.0:
+        r.flags |= BREACH
+    if changed:
+        r.flags |= FILTER_ACTED
+        push = subtract(safe, asked)
+        for axis in range(2):
+            r.flown.a[axis] += push[axis]
+        for axis in range(3):
+            r.flown_u.a[axis] += push[axis]
+
+
+@compilable
+def turn_to_plan(r: Tick, law: CascadeLaw, motion: MotionState, depth: float) -> tuple[Vec3, float]:
+    """Angular acceleration [rad/s^2, FRD] and thrust [N] that follow the plan's state.
+
+    The centre of mass is ``depth`` [m] below the origin.
+    """
+    (x, y), thrust = follow_plan(
+        law.tracking, r.mass, depth, r.estimate, motion, r.observed, r.flown, r.flown_u
+    )
+    gains, plan = law.tuning.yaw, r.flown
+    error = wrap_angle(plan.yaw - r.estimate.yaw)
+    raw = gains.kp * error + gains.kd * (plan.yaw_rate - r.estimate.w_WB_B[2])
+    return (x, y, r.flown_u.yaw_acc + clamp_magnitude(raw, gains.limit)), thrust
+
+
+@compilable
+def turn_by_pid(r: Tick, law: CascadeLaw) -> tuple[Vec3, float]:
+    """The same by the paper's loops, of the plan's acceleration. Writes attitude, height."""
+    tuning, reference = law.tuning, attitude_reference(r.flown_u.a, r.flown.yaw)
+    turn, kept = attitude_pid(tuning.attitude, r.attitude, r.estimate, reference, law.dt)
+    for axis in range(3):
+        r.attitude[axis] = kept[axis]
+    thrust, r.height = height_pid(
+        law.airframe, tuning.height, r.height, r.estimate, r.flown, r.flown_u, law.dt
+    )
+    return turn, thrust
+
+
+@compilable
+def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
+    """What the joints are to do, ``seconds`` [s] later. Writes off_plan, joints.reference."""
+    airframe, tuning, k, plan = law.airframe, law.tuning, r.joints, r.flown
+    wanted = (plan.q_arm[0], plan.q_arm[1]), (plan.qd_arm[0], plan.qd_arm[1])
+    if law.follows_plan and tuning.compensate and _joints_are_sound(r):
+        r.off_plan = lately_off_plan(tuning.compensation, r.off_plan, r.estimate, plan, seconds)
+        wanted = compensated_joints(
+            airframe, tuning.compensation, tuning.joint_limits, r.off_plan, r.estimate, plan
+        )
+    last = (k.reference[0], k.reference[1]), (k.reference_rate[0], k.reference_rate[1])
+    q, qd = joint_reference(airframe, tuning.joint_limits, last, wanted, seconds)
+    for i in range(len(q)):
+        k.reference[i], k.reference_rate[i] = q[i], qd[i]
+
+
+@compilable
+def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> Vec2:
+    """Joint torques [N m] for the reference. Reads sent, mass, observed, health; writes joints."""
+    airframe, estimate = law.airframe, r.estimate
+    arm = arm_dynamics(airframe, estimate, _field(estimate, motion.thrust / r.mass, r.observed.d))
+    for _ in range(ticks):
+        observe_disturbance(r.joints, arm, r.sent.joint_torque, law.dt)
+    # Not what is commanded: the rotors take 40 ms to give it.
+    pitching = motion.turning[1]
+    torques = joint_torques(
+        r.joints, airframe, law.tuning.joint, estimate, r.flown_u.qdd_arm, arm, pitching, law.dt
+    )
+    if _joints_are_sound(r):
+        return torques
+    return torques_of_failed(airframe, r.health.joints, torques, arm, pitching)
+
+
+@compilable
+def send(r: Tick, airframe: Airframe, thrust: Vec4, torque: Vec2) -> None:
+    """The new command: ``thrust`` [N] and ``torque`` [N m]. Writes sent, flags."""
+    top, most = airframe.rotor_thrust_max, airframe.joint_torque_max
+    for i in range(len(thrust)):
+        r.sent.rotor_thrust[i] = thrust[i]
+        if not 0.0 <= thrust[i] <= top:
+            r.flags |= GATE_NEEDED
+    for j in range(len(torque)):
+        r.sent.joint_torque[j] = torque[j]
+        if not -most <= torque[j] <= most:
+            r.flags |= GATE_NEEDED
+
+
+@compilable
+def compare_with_plan(r: Tick, tube: TubeAround) -> None:
+    """Whether the base has left the tube around its plan. Reads estimate, plan, observed."""
+    bias = r.observed.disturbance_bias
+    aside = beyond_covered(tube, (bias[0], bias[1]))
+    most = tube.radius + max(aside[0], aside[1]) + tube.unsure
+    for i in range(3):
+        if not -most <= r.estimate.p_WB[i] - r.plan.p[i] <= most:
+            r.flags |= OFF_PLAN
+
+
+@compilable
+def _joints_are_sound(r: Tick) -> bool:
+    return bool(r.health.joints[0] == SOUND and r.health.joints[1] == SOUND)
+
+
+@compiled
+def _close_loops(
+    law: NDArray[Any],
+    ticks: NDArray[Any],
+    count: int,
+    zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
+    tube: TubeAround,
+) -> None:
+    close_loops(ticks[0], law[0], count, zones, probes)
+    compare_with_plan(ticks[0], tube)
+
+
+@kernel
+def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
+    airframe, r = laws[0].airframe, ticks[0]
+    x, torque = r.estimate, r.sent.joint_torque
+    rate, specific_force = (x.w_WB_B[0], x.w_WB_B[1], x.w_WB_B[2]), x.specific_force
+    q_arm, qd_arm = (x.q_arm[0], x.q_arm[1]), (x.qd_arm[0], x.qd_arm[1])
+    f = lag_rotors(r.rotors, given(r.health, r.sent.rotor_thrust), laws[0].rotor_decay)
+    rolling = airframe.rotor_arm * (f[1] - f[3]) / hanging_arm(airframe, q_arm).roll_inertia
+    yawing = airframe.yaw_per_thrust * (f[0] - f[1] + f[2] - f[3]) / airframe.inertia[2]
+    pitching = (airframe.rotor_arm * (f[2] - f[0]) - torque[0]) / airframe.inertia[1]
+    arm = StateEstimate(0, _NONE, _NONE, _LEVEL, rate, 0.0, q_arm, qd_arm, specific_force)
+    # The accelerometer knows of gusts, and of the ground.
+    dynamics = arm_dynamics(airframe, arm, (0.0, specific_force))
+    carried = airframe.joint_armature * pitching
+    first, second = accelerations_of(dynamics, (torque[0] + carried, torque[1]))
+    model = rolling, pitching, yawing, (f[0] + f[1] + f[2] + f[3]) / r.mass
+    return (first - pitching, second), model
+
+
+@compilable
+def _field(estimate: Estimate, specific_thrust: float, d: Floats) -> Vec2:
+    """Gravity minus the base's acceleration [m/s^2] along body x and z."""
+    pushed_x, _, pushed_z = rotate_back(estimate.R_WB, d)
+    return -pushed_x, specific_thrust - pushed_z
+
+
+@compilable
+def _body_torque(
+    airframe: Airframe,
+    roll_inertia: float,
+    estimate: Estimate,
+    wd: Vec3,
+    joint1_torque: float,
+) -> Vec3:
+    """Rotor torque for an angular acceleration: inertia, gyroscopic part, arm's reaction."""
+    inertia = airframe.inertia
+    ix, iy, iz = inertia[0], inertia[1], inertia[2]
+    wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
+    return (
+        roll_inertia * wd[0] + (iz - iy) * wy * wz,
+        iy * wd[1] + (ix - iz) * wz * wx + joint1_torque,
+        iz * wd[2] + (iy - ix) * wx * wy,
+    )

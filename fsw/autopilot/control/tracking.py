@@ -1,0 +1,230 @@
+r"""The loop that follows the plan: LQR on position through snap, every tick.
+
+For each horizontal axis, with e = plan - vehicle and the plan's own snap command as
+feed-forward, the commanded snap is
+
+.. math:: w = k_p(u - a_p) - k_d j_p + K_5 e_s + K_4 (J - j), \quad
+          J = j_p + \frac{K_3}{K_4}(A - a), \quad
+          A = a_p + \frac{K_1 e_p + K_2 e_v - K_d (\hat d - \bar d)}{K_3} - \bar d
+
+which is the LQR law in cascade form, so that acceleration (tilt) and jerk (tilt rate) can
+be limited on the way. The gain on the disturbance is for one that is forgotten within
+milliseconds; of what lasts, wind, :math:`\bar d` keeps the mean and all of it is cancelled.
+The body's angular acceleration then solves
+:math:`-f(\dot\omega_y b_1 - \dot\omega_x b_2) = w`. Height is the same with one stage.
+
+Across the arm's plane the point that accelerates as the thrust leans is the centre of mass, a
+little below the body origin: position and velocity of the laws are those of that point.
+
+Source: docs/equations.md T2; docs/decisions/0005-tracking-inner-loop.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
+from fsw.autopilot.geometry.vectors import clamp_magnitude
+from fsw.autopilot.model.airframe import GRAVITY, AttitudeLag
+from fsw.autopilot.model.rotors import MotionState
+from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
+from fsw.autopilot.tick_record import Accelerations, Estimate, Observed, PlanState
+from fsw.compiled import compilable
+from fsw.record import Floats
+
+_LEAST_SPECIFIC_THRUST = 2.0  # m/s^2; below it tilt hardly accelerates the vehicle
+_RECENT_S = 2.0  # in which a disturbance fades that is not seen again
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingLaw:
+    """Everything the law needs that does not change in flight."""
+
+    lag: AttitudeLag
+    tuning: TrackingTuning
+    gains: TrackingGains
+
+
+@compilable
+def observe(k: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) -> None:
+    """Velocity and disturbance a tick of ``dt`` [s] later, in what is ``k`` (known).
+
+    A second-order observer with both poles at ``observer_bandwidth``: as quick as differencing the
+    measured velocity ``v`` [m/s, NED], but the disturbance is a state and does not carry the
+    reading's noise straight into the rotors, which produce ``a`` [m/s^2, NED].
+    """
+    bandwidth = tuning.observer_bandwidth
+    for axis in range(3):
+        predicted = k.v[axis] + dt * (a[axis] + k.d[axis])
+        surprise = v[axis] - predicted
+        k.v[axis] = predicted + 2.0 * bandwidth * dt * surprise
+        k.d[axis] += bandwidth * bandwidth * dt * surprise
+    share = min(dt / tuning.wind_time, 1.0)
+    for axis in range(2):
+        grown = k.disturbance_bias[axis] + share * (k.d[axis] - k.disturbance_bias[axis])
+        k.disturbance_bias[axis] = clamp_magnitude(grown, tuning.wind_limit)
+    faded = k.recent * (1.0 - min(dt / _RECENT_S, 1.0))
+    k.recent = max(math.sqrt(k.d[0] * k.d[0] + k.d[1] * k.d[1]), faded)
+
+
+class AxisState(NamedTuple):
+    """One horizontal axis of the vehicle or of the plan, world."""
+
+    p: float  # m
+    v: float  # m/s
+    a: float  # m/s^2
+    j: float  # m/s^3
+    s: float  # m/s^4
+
+
+@compilable
+def wanted_acceleration(
+    law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState
+) -> float:
+    """Acceleration [m/s^2] of one horizontal axis that the law asks for, before its limit.
+
+    ``d`` [m/s^2] and ``bias`` [m/s^2] are those of ``snap_command``.
+    """
+    k = law.gains.k
+    k1, k2, k3 = k[0], k[1], k[2]
+    e_p = clamp_magnitude(plan.p - vehicle.p, law.tuning.position_error_limit)
+    e_v = plan.v - vehicle.v
+    feedback = k1 * e_p + k2 * e_v - law.gains.k_disturbance * (d - bias)
+    return plan.a + feedback / k3 - bias
+
+
+@compilable
+def snap_command(
+    law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState, u: float
+) -> float:
+    """Commanded snap [m/s^4] of one horizontal axis, for the plan's acceleration ``u`` [m/s^2].
+
+    ``d`` [m/s^2] is the observed disturbance, ``bias`` [m/s^2] its slow part, wind, which is
+    cancelled whole.
+    """
+    tuning, lag = law.tuning, law.lag
+    k = law.gains.k
+    k3, k4, k5 = k[2], k[3], k[4]
+    e_s = plan.s - vehicle.s
+    wanted = wanted_acceleration(law, vehicle, d, bias, plan)
+    a_ref = clamp_magnitude(wanted, tuning.acceleration_limit)
+    j_ref = plan.j + k3 / k4 * (a_ref - vehicle.a)
+    # A jerk that can still be stopped before the acceleration overshoots.
+    stoppable = math.sqrt(2.0 * tuning.stopping_snap * (abs(a_ref - vehicle.a) + 0.15))
+    j_ref = clamp_magnitude(j_ref, min(tuning.jerk_limit, stoppable))
+    return lag.kp * (u - plan.a) - lag.kd * plan.j + k5 * e_s + k4 * (j_ref - vehicle.j)
+
+
+@compilable
+def vertical_acceleration(
+    law: TrackingLaw,
+    p: Vec3 | Floats,
+    v: Vec3 | Floats,
+    a: Vec3,
+    d: float,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
+) -> float:
+    """Acceleration down [m/s^2] that the law asks for.
+
+    ``p`` [m, NED], ``v`` [m/s, NED] and ``a`` [m/s^2, NED] are the body's, ``d`` [m/s^2] is the
+    observed disturbance downwards.
+    """
+    k_z = law.gains.k_vertical
+    k1, k2, k3 = k_z[0], k_z[1], k_z[2]
+    a_z = u.a[2] + k1 * (plan.p[2] - p[2]) + k2 * (plan.v[2] - v[2]) + k3 * (plan.a[2] - a[2])
+    d_z = clamp_magnitude(d, law.tuning.vertical_disturbance_limit)
+    return a_z - law.gains.k_vertical_disturbance * d_z
+
+
+@compilable
+def wanted_accelerations(
+    law: TrackingLaw,
+    estimate: StateEstimate | Estimate,
+    motion: MotionState,
+    observed: Observed,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
+) -> Vec3:
+    """What ``follow_plan`` asks for on all axes [m/s^2, NED]."""
+    p, v, a, j, s = estimate.p_WB, observed.v, motion.a, motion.j, motion.s
+    x = wanted_acceleration(
+        law,
+        AxisState(p[0], v[0], a[0], j[0], s[0]),
+        observed.d[0],
+        observed.disturbance_bias[0],
+        AxisState(plan.p[0], plan.v[0], plan.a[0], plan.j[0], plan.s[0]),
+    )
+    y = wanted_acceleration(
+        law,
+        AxisState(p[1], v[1], a[1], j[1], s[1]),
+        observed.d[1],
+        observed.disturbance_bias[1],
+        AxisState(plan.p[1], plan.v[1], plan.a[1], plan.j[1], plan.s[1]),
+    )
+    return x, y, vertical_acceleration(law, p, v, a, observed.d[2], plan, u)
+
+
+@compilable
+def velocity_of_mass(estimate: StateEstimate | Estimate, depth: float) -> Vec3:
+    """Velocity [m/s, NED] ``depth`` [m] below the origin, as far as rolling makes it another."""
+    R, v, swing = estimate.R_WB, estimate.v_WB, depth * estimate.w_WB_B[0]
+    return v[0] - swing * R[1], v[1] - swing * R[4], v[2]
+
+
+@compilable
+def follow_plan(
+    law: TrackingLaw,
+    mass: float,
+    depth: float,
+    estimate: StateEstimate | Estimate,
+    motion: MotionState,
+    observed: Observed,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
+) -> tuple[Vec2, float]:
+    """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
+
+    ``mass`` [kg] is the whole vehicle's, as estimated in flight, its centre ``depth`` [m] below the
+    origin; the observed velocity is that of the centre, without the reading's noise.
+    """
+    p, v, R = estimate.p_WB, observed.v, estimate.R_WB
+    north, east = -math.sin(estimate.yaw), math.cos(estimate.yaw)  # to the right, level
+    # How much further to the right than the plan's the centre of mass hangs, and goes.
+    lean = north * (R[2] + plan.a[0] / GRAVITY) + east * (R[5] + plan.a[1] / GRAVITY)
+    drift = (north * plan.j[0] + east * plan.j[1]) / GRAVITY
+    aside = (depth * lean, depth * drift)
+    wx = _horizontal_snap(law, 0, estimate, motion, observed, plan, u, aside, north)
+    wy = _horizontal_snap(law, 1, estimate, motion, observed, plan, u, aside, east)
+    f = max(motion.thrust / mass, _LEAST_SPECIFIC_THRUST)
+    # -f [b1_xy, -b2_xy] [wdy; wdx] = w_xy; the determinant is -R33, far from zero in flight.
+    determinant = R[0] * -R[4] + R[1] * R[3]
+    wdy = (wx * -R[4] + R[1] * wy) / (-f * determinant)
+    wdx = (R[0] * wy - R[3] * wx) / (-f * determinant)
+
+    a_z = vertical_acceleration(law, p, v, motion.a, observed.d[2], plan, u)
+    thrust = mass * (GRAVITY - a_z) / max(R[8], 0.5)
+    return (wdx, wdy), thrust
+
+
+@compilable
+def _horizontal_snap(
+    law: TrackingLaw,
+    axis: int,
+    estimate: StateEstimate | Estimate,
+    motion: MotionState,
+    observed: Observed,
+    plan: PredictionState | PlanState,
+    u: PlanInput | Accelerations,
+    aside: Vec2,
+    share: float,
+) -> float:
+    v, a, j, s = observed.v, motion.a, motion.j, motion.s
+    p = estimate.p_WB[axis] + share * aside[0]
+    vehicle = AxisState(p, v[axis] + share * aside[1], a[axis], j[axis], s[axis])
+    planned = AxisState(plan.p[axis], plan.v[axis], plan.a[axis], plan.j[axis], plan.s[axis])
+    return snap_command(
+        law, vehicle, observed.d[axis], observed.disturbance_bias[axis], planned, u.a[axis]
+    )

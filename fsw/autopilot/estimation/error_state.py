@@ -1,0 +1,525 @@
+r"""The error-state Kalman filter: nominal state, its prediction by the IMU, and a correction.
+
+The nominal state is integrated from the IMU; the filter estimates its small error
+
+.. math:: \delta x = (\delta p, \delta v, \delta\theta, \delta a_b, \delta\omega_b,
+          \delta b, \delta\tau)
+
+with the attitude's error in body axes, :math:`q_t = q \otimes \mathrm{Exp}(\delta\theta)`, the
+biases of accelerometer and gyro, that of the barometer b, and the pose's further delay tau. A
+correction moves the error into the nominal state.
+
+The state lies a fixed time behind the present, so that measurements are fused at their own time.
+The present follows from it by integrating the IMU's readings since (``present``).
+
+Source: J. Solà, Quaternion kinematics for the error-state Kalman filter, 2017 (arXiv 1711.02508),
+section 5; docs/decisions/0030-an-estimate-of-the-present.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.autopilot.geometry.quaternion import turned
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.signals import Mat3, Vec3, Vec4
+from fsw.compiled import compilable
+
+Array = NDArray[np.float64]
+# Entries of the error.
+P, V, TH, BA, BG, BARO, DELAY = 0, 3, 6, 9, 12, 15, 16
+ERRORS: Final = 17
+FRAME: Final = 4  # errors of an odometry's frame: north, east, down [m], heading [rad]
+FIELD: Final = 3  # errors of a magnetometer that stay: its offset [Gauss, FRD]
+ROWS: Final = 3  # of a measurement, at most
+IMU_CAPACITY: Final = 256  # readings since the filter's time
+# Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and which of
+# both are of no use: an older reading's, or one that repeats itself.
+TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
+NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
+ON_TRIAL = 8
+MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
+FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
+MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
+WITNESS: Final = 28  # integrals: see redundancy.py
+PUSHES: Final = 160  # ticks that the joints' state may lie behind
+
+FILTER: Final = np.dtype(
+    [
+        ("time", float),  # s, of the state
+        ("p", float, (3,)),  # m, NED
+        ("v", float, (3,)),  # m/s, NED
+        ("q", float, (4,)),  # body to NED
+        ("accel_bias", float, (3,)),  # m/s^2, body
+        ("gyro_bias", float, (3,)),  # rad/s, body
+        ("baro_bias", float),  # m
+        ("pose_delay", float),  # s
+        ("covariance", float, (ERRORS, ERRORS)),
+        ("rate", float, (3,)),  # rad/s, body, at the state's time
+        ("acceleration", float, (3,)),  # m/s^2, NED, there
+        ("imu", float, (IMU_CAPACITY, COLUMNS)),  # ring
+        ("first", np.int64),  # of the readings after the state's time, counted from the start
+        ("end", np.int64),  # behind the newest reading
+        # Of accelerometer and gyro, in this order (imu.py).
+        ("newest", float, (6,)),  # m/s^2 and rad/s, as they came, believed or not
+        ("same", np.int64, (6,)),  # how often each number of the newest came in a row
+        ("steady", np.int64, (2,)),  # how many in a row were near the one before
+        ("calm", np.int64, (2,)),  # how many in a row were believed
+        ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
+        # Of the law for who is wrong (redundancy.py): which halves are not used, and of which the
+        # bias may be anything; what both and the rotors have made of the vehicle since it flies;
+        # and how quickly a force [m/s^3/sqrt(Hz)] and a rate [rad/s^2/sqrt(Hz)] may be off that
+        # the rotors' model gives, or is compared with.
+        ("out", np.int64),
+        ("suspect", np.int64),  # and ON_TRIAL where sensors contradict each other
+        ("believed", np.int64),  # halves whose jumps are the truth
+        ("witness", float, (WITNESS,)),
+        ("baseline", float, (9,)),  # SI: biases, and what is felt beside the model
+        ("model_walk", float, (2,)),
+        # By how much more than it states a pose's and a receiver's variance is, and their last
+        # innovations (fusion.py).
+        ("noise_scale", float, (4,)),
+        ("innovated_last", float, (4, ROWS)),
+        ("lost", np.int64),  # which halves of the state's own reading are of no use
+        # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
+        ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
+        ("joint_variance", float, (3, 3)),  # [SI], of either
+        ("joint_time", float),  # s
+        ("pushes", float, (PUSHES, 3)),  # ring: up to a time [s], accelerations [rad/s^2]
+        ("pushed", np.int64),  # the first of them after the joints' time, counted from the start
+        ("pushes_end", np.int64),  # behind the last one
+        # Encoders: the newest reading [rad] and its time [s], and as above.
+        ("encoders", float, (3,)),
+        ("encoder_steady", np.int64),
+        ("encoder_calm", np.int64),
+        ("encoder_doubted", np.int64),
+        ("encoder_zero", float, (2,)),  # rad, by which readings have leapt so far
+        # Of what is doubted: how far readings have leapt [rad], and in which time [s].
+        ("encoder_leap", float, (2,)),
+        ("encoder_leapt", float),
+        ("encoder_scale", float),  # by how much their variance is larger than stated
+        ("encoder_surprise", float, (2,)),  # rad, of the last one that was believed
+        # What is known of the biases while the readings are of no use.
+        ("kept_bias", float, (6,)),
+        ("kept_variance", float, (6,)),
+        # Of the measurement that is being fused.
+        ("H", float, (ROWS, ERRORS)),
+        ("residual", float, (ROWS,)),
+        ("variance", float, (ROWS,)),
+        ("innovation", float, (2, ROWS)),  # of both parts of a measurement, as it came
+        ("gain", float, (ERRORS, ROWS)),
+        ("factor", float, (ROWS, ROWS)),
+        ("error", float, (ERRORS,)),
+        # Of an odometry's frame (drift.py): whether it drifts, and its covariance with the error.
+        ("drifts", np.int64),
+        ("shared", float, (ERRORS, FRAME)),
+        ("innovated", float, (ROWS,)),
+        # Of a magnetometer's offset (compass.py): whether one was used, its covariance with the
+        # error, and the slope over it of the heading that is being fused.
+        ("compass", np.int64),
+        ("with_offset", float, (ERRORS, FIELD)),
+        ("offset_slope", float, (FIELD,)),
+    ],
+    align=True,
+)
+Filter = NDArray[Any]  # (1,) of FILTER
+Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
+
+
+@compilable
+def vec3(row: Array, first: int) -> Vec3:
+    """Three entries of a ``row`` (n,) [any unit], from ``first`` on."""
+    return row[first], row[first + 1], row[first + 2]
+
+
+@compilable
+def vec4(row: Array) -> Vec4:
+    """Four entries of a ``row`` (4,) [any unit]."""
+    return row[0], row[1], row[2], row[3]
+
+
+@compilable
+def integrated(
+    p: Vec3, v: Vec3, q: Vec4, f: Vec3, w: Vec3, dt: float
+) -> tuple[Vec3, Vec3, Vec4, Vec3]:
+    """Position, velocity, attitude ``dt`` [s] later, and the acceleration meanwhile.
+
+    ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1]; specific force ``f`` [m/s^2, FRD] and rate ``w``
+    [rad/s, FRD] are means over the step. Solà, eq 260, with the force turned by half the step.
+    """
+    h = 0.5 * dt
+    half = (
+        f[0] + h * (w[1] * f[2] - w[2] * f[1]),
+        f[1] + h * (w[2] * f[0] - w[0] * f[2]),
+        f[2] + h * (w[0] * f[1] - w[1] * f[0]),
+    )
+    ax, ay, az = rotate(matrix_from_quaternion(q), half)
+    az += GRAVITY
+    placed = (
+        p[0] + dt * (v[0] + h * ax),
+        p[1] + dt * (v[1] + h * ay),
+        p[2] + dt * (v[2] + h * az),
+    )
+    moving = (v[0] + dt * ax, v[1] + dt * ay, v[2] + dt * az)
+    return placed, moving, turned(q, dt * w[0], dt * w[1], dt * w[2]), (ax, ay, az)
+
+
+@compilable
+def transition(R: Mat3, f: Vec3, w: Vec3, dt: float) -> tuple[Mat3, Mat3, Mat3]:
+    """Blocks of F, ``dt`` [s] long: velocity over attitude and bias, and attitude over attitude.
+
+    ``R`` [1, body to NED] and the means ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD] are of the step.
+    """
+    # -R [f]x dt, Solà's slope of the velocity over the attitude.
+    fx, fy, fz = dt * f[0], dt * f[1], dt * f[2]
+    a00, a01, a02 = R[2] * fy - R[1] * fz, R[0] * fz - R[2] * fx, R[1] * fx - R[0] * fy
+    a10, a11, a12 = R[5] * fy - R[4] * fz, R[3] * fz - R[5] * fx, R[4] * fx - R[3] * fy
+    a20, a21, a22 = R[8] * fy - R[7] * fz, R[6] * fz - R[8] * fx, R[7] * fx - R[6] * fy
+    r00, r01, r02 = dt * R[0], dt * R[1], dt * R[2]
+    r10, r11, r12 = dt * R[3], dt * R[4], dt * R[5]
+    r20, r21, r22 = dt * R[6], dt * R[7], dt * R[8]
+    x, y, z = dt * w[0], dt * w[1], dt * w[2]
+    # Exp(-w dt) to second order.
+    e00, e01, e02 = 1.0 - 0.5 * (y * y + z * z), z + 0.5 * x * y, -y + 0.5 * x * z
+    e10, e11, e12 = -z + 0.5 * x * y, 1.0 - 0.5 * (x * x + z * z), x + 0.5 * y * z
+    e20, e21, e22 = y + 0.5 * x * z, -x + 0.5 * y * z, 1.0 - 0.5 * (x * x + y * y)
+    return (
+        (a00, a01, a02, a10, a11, a12, a20, a21, a22),
+        (r00, r01, r02, r10, r11, r12, r20, r21, r22),
+        (e00, e01, e02, e10, e11, e12, e20, e21, e22),
+    )
+
+
+@compilable
+def carry(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
+    """Replace ``M`` (17, n) [SI] by F M, with the ``blocks`` of F [SI], ``dt`` [s] later."""
+    a00, a01, a02, a10, a11, a12, a20, a21, a22 = blocks[0]
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = blocks[1]
+    e00, e01, e02, e10, e11, e12, e20, e21, e22 = blocks[2]
+    for j in range(M.shape[1]):
+        t0, t1, t2 = M[6, j], M[7, j], M[8, j]
+        b0, b1, b2 = M[9, j], M[10, j], M[11, j]
+        M[0, j] += dt * M[3, j]
+        M[1, j] += dt * M[4, j]
+        M[2, j] += dt * M[5, j]
+        M[3, j] += a00 * t0 + a01 * t1 + a02 * t2 - (r00 * b0 + r01 * b1 + r02 * b2)
+        M[4, j] += a10 * t0 + a11 * t1 + a12 * t2 - (r10 * b0 + r11 * b1 + r12 * b2)
+        M[5, j] += a20 * t0 + a21 * t1 + a22 * t2 - (r20 * b0 + r21 * b1 + r22 * b2)
+        M[6, j] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[12, j]
+        M[7, j] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[13, j]
+        M[8, j] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[14, j]
+
+
+@compilable
+def propagate(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
+    """Replace the covariance ``M`` (17, 17) [SI] by F M F^T, ``dt`` [s] later. Solà, eq 270.
+
+    The ``blocks`` of F [SI] are those of ``transition``.
+    """
+    carry(M, blocks, dt)
+    a00, a01, a02, a10, a11, a12, a20, a21, a22 = blocks[0]
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = blocks[1]
+    e00, e01, e02, e10, e11, e12, e20, e21, e22 = blocks[2]
+    for i in range(ERRORS):
+        t0, t1, t2 = M[i, 6], M[i, 7], M[i, 8]
+        b0, b1, b2 = M[i, 9], M[i, 10], M[i, 11]
+        M[i, 0] += dt * M[i, 3]
+        M[i, 1] += dt * M[i, 4]
+        M[i, 2] += dt * M[i, 5]
+        M[i, 3] += a00 * t0 + a01 * t1 + a02 * t2 - (r00 * b0 + r01 * b1 + r02 * b2)
+        M[i, 4] += a10 * t0 + a11 * t1 + a12 * t2 - (r10 * b0 + r11 * b1 + r12 * b2)
+        M[i, 5] += a20 * t0 + a21 * t1 + a22 * t2 - (r20 * b0 + r21 * b1 + r22 * b2)
+        M[i, 6] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[i, 12]
+        M[i, 7] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[i, 13]
+        M[i, 8] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[i, 14]
+
+
+@compilable
+def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: Array) -> None:
+    """Add to the covariance ``M`` (17, 17) [SI] what ``dt`` [s] of noise add. Solà, eq 261-265.
+
+    Of what is ``lost`` [NO_FORCE, NO_RATE] the bias may be anything soon; where the rotors' model
+    stands in, ``model_walk`` (2,) [m/s^3/sqrt(Hz), rad/s^2/sqrt(Hz)].
+    """
+    force = law.accel_noise * law.accel_noise * dt
+    turn = law.gyro_noise * law.gyro_noise * dt
+    lost_accel_walk, lost_gyro_walk = law.lost_accel_walk, law.lost_gyro_walk
+    if lost & MODELLED:
+        lost_accel_walk, lost_gyro_walk = model_walk[0], model_walk[1]
+    accel_walk = lost_accel_walk if lost & NO_FORCE else law.accel_bias_walk
+    gyro_walk = lost_gyro_walk if lost & NO_RATE else law.gyro_bias_walk
+    for i in range(3):
+        M[V + i, V + i] += force
+        M[TH + i, TH + i] += turn
+        M[BA + i, BA + i] += accel_walk * accel_walk * dt
+        M[BG + i, BG + i] += gyro_walk * gyro_walk * dt
+    M[BARO, BARO] += law.baro_bias_walk * law.baro_bias_walk * dt
+    if law.pose_delay_sigma > 0.0:
+        M[DELAY, DELAY] += law.pose_delay_walk * law.pose_delay_walk * dt
+
+
+@compilable
+def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
+    """Mean force [m/s^2, FRD] and rate [rad/s, FRD] of two readings, without the biases.
+
+    The readings are ``row`` (8,) [SI] and the one ``before`` (8,) [SI], or the same.
+    """
+    b, g = x.accel_bias, x.gyro_bias
+    return (
+        (
+            0.5 * (row[1] + before[1]) - b[0],
+            0.5 * (row[2] + before[2]) - b[1],
+            0.5 * (row[3] + before[3]) - b[2],
+        ),
+        (
+            0.5 * (row[4] + before[4]) - g[0],
+            0.5 * (row[5] + before[5]) - g[1],
+            0.5 * (row[6] + before[6]) - g[2],
+        ),
+    )
+
+
+@compilable
+def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
+    """Predict to the time of the reading ``row`` (8,) [SI], which follows ``before`` (8,) [SI].
+
+    Covariance ``M`` (17, 17) [SI]. Where readings are missing, in steps short enough.
+    """
+    gap = max(row[TIME] - x.time, 0.0)
+    lost = NOTHING if gap > law.imu_gap else int(row[LOST])
+    watch_biases(x, M, lost)
+    f, w = mean_of(x, row, before)
+    steps = max(1, math.ceil(gap / law.imu_gap - 1e-6))
+    dt = gap / steps
+    p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
+    a = (0.0, 0.0, 0.0)
+    for _ in range(steps):
+        R = matrix_from_quaternion(q)
+        p, v, q, a = integrated(p, v, q, f, w, dt)
+        blocks = transition(R, f, w, dt)
+        propagate(M, blocks, dt)
+        add_noise(M, law, dt, lost, x.model_walk)
+        if x.drifts:
+            carry(x.shared, blocks, dt)
+        if x.compass:
+            carry(x.with_offset, blocks, dt)
+    if lost & FORCE_MADE:
+        _fade(x, M, math.exp(-gap / MADE_LASTS))
+    for i in range(3):
+        x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
+        x.rate[i] = row[RATE + i] - x.gyro_bias[i]
+    for i in range(4):
+        x.q[i] = q[i]
+    x.time = max(row[TIME], x.time)
+
+
+@compilable
+def _fade(x: Any, M: Array, left: float) -> None:
+    """Of what a modelled force is off a share [1] is ``left``: gusts do not last.
+
+    Else a tilt could not be told from it where satellites alone measure how the vehicle moves.
+    ``M`` (17, 17) [SI] is the covariance.
+    """
+    for i in range(BA, BA + 3):
+        x.accel_bias[i - BA] = x.kept_bias[i - BA] + left * (
+            x.accel_bias[i - BA] - x.kept_bias[i - BA]
+        )
+        for j in range(ERRORS):
+            M[i, j] *= left
+            M[j, i] *= left
+        for j in range(FRAME):
+            x.shared[i, j] *= left
+        for j in range(FIELD):
+            x.with_offset[i, j] *= left
+
+
+@compilable
+def watch_biases(x: Any, M: Array, lost: int) -> None:
+    """Keep the biases when readings are ``lost`` [NO_FORCE, NO_RATE], and take them up again.
+
+    ``M`` (17, 17) [SI] is the covariance. They are taken up when the readings are back.
+    """
+    changed = lost ^ x.lost
+    if not changed:
+        return
+    x.lost = lost
+    for i in range(6):
+        k, bias = BA + i, x.accel_bias if i < 3 else x.gyro_bias
+        half = NO_FORCE if i < 3 else NO_RATE
+        if not changed & half:
+            continue
+        if lost & half:
+            x.kept_bias[i], x.kept_variance[i] = bias[i % 3], M[k, k]
+        else:
+            restore_bias(x, M, i)
+
+
+@compilable
+def restore_bias(x: Any, M: Array, i: int) -> None:
+    """Bias ``i`` [1] of the six is what it was before its readings were lost.
+
+    ``M`` (ERRORS, ERRORS) [SI] is the covariance.
+    """
+    bias = x.accel_bias if i < 3 else x.gyro_bias
+    bias[i % 3] = x.kept_bias[i]
+    reset_covariance(x, M, BA + i, x.kept_variance[i])
+
+
+@compilable
+def reset_covariance(x: Any, M: Array, k: int, variance: float) -> None:
+    """Give error ``k`` [1] a ``variance`` [SI, of x] of its own, in ``M`` (ERRORS, ERRORS) [SI]."""
+    for j in range(ERRORS):
+        M[k, j] = 0.0
+        M[j, k] = 0.0
+    for j in range(FRAME):
+        x.shared[k, j] = 0.0
+    for j in range(FIELD):
+        x.with_offset[k, j] = 0.0
+    M[k, k] = variance
+
+
+@compilable
+def advance(x: Any, law: Any, until: float) -> None:
+    """Move the state on through all readings up to ``until`` [s]."""
+    while x.first < x.end:
+        row = x.imu[x.first % IMU_CAPACITY]
+        if row[TIME] > until and x.end - x.first < IMU_CAPACITY - 2:
+            return
+        step_to(x, law, row, x.imu[(x.first - 1) % IMU_CAPACITY], x.covariance)
+        x.first += 1
+
+
+@compilable
+def present(x: Any, now: float) -> tuple[Vec3, Vec3, Vec4, Vec3, Vec3]:
+    """Position, velocity, attitude, rate and specific force at ``now`` [s].
+
+    All readings since the state's time are integrated anew, with the newest biases. After the last
+    reading, that one is held.
+    """
+    p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
+    t, last = x.time, x.imu[(x.first - 1) % IMU_CAPACITY]
+    for k in range(x.first, x.end):
+        row = x.imu[k % IMU_CAPACITY]
+        f, w = mean_of(x, row, last)
+        p, v, q, _ = integrated(p, v, q, f, w, row[TIME] - t)
+        t, last = row[TIME], row
+    f, w = mean_of(x, last, last)
+    if now > t:
+        p, v, q, _ = integrated(p, v, q, f, w, now - t)
+    return p, v, q, w, f
+
+
+@compilable
+def distance(x: Any, rows: int) -> float:
+    """Chi-square of the residual: how unlikely the measurement is.
+
+    Leaves behind the Cholesky factor of its covariance and that part of the gain which needs it.
+    """
+    M, H, L, W = x.covariance, x.H, x.factor, x.gain
+    for i in range(ERRORS):
+        for k in range(rows):
+            total = 0.0
+            for j in range(ERRORS):
+                total += M[i, j] * H[k, j]
+            W[i, k] = total
+    for k in range(rows):
+        for m in range(k + 1):
+            total = x.variance[k] if k == m else 0.0
+            for j in range(ERRORS):
+                total += H[k, j] * W[j, m]
+            for j in range(m):
+                total -= L[k, j] * L[m, j]
+            L[k, m] = math.sqrt(total) if k == m else total / L[m, m]
+    squared = 0.0
+    for k in range(rows):
+        total = x.residual[k]
+        for j in range(k):
+            total -= L[k, j] * x.residual[j]
+        x.residual[k] = total / L[k, k]
+        squared += x.residual[k] * x.residual[k]
+    return squared
+
+
+@compilable
+def correct(x: Any, rows: int) -> None:
+    """Take in the measurement that ``distance`` has judged. Solà, eq 275, 276 and 283.
+
+    P - K S K^T is P - W W^T with W = P H^T L^-T. Of P, one half is computed and the other one set.
+    A difference between them, which rounding makes, would not become smaller by any measurement,
+    and grow with the fourth power of time.
+    """
+    M, L, W = x.covariance, x.factor, x.gain
+    for i in range(ERRORS):
+        error = 0.0
+        for k in range(rows):
+            total = W[i, k]
+            for j in range(k):
+                total -= L[k, j] * W[i, j]
+            W[i, k] = total / L[k, k]
+            error += W[i, k] * x.residual[k]
+        x.error[i] = error
+    if x.drifts:
+        _correct_considered(x, x.shared, rows)
+    if x.compass:
+        _correct_considered(x, x.with_offset, rows)
+    for i in range(ERRORS):
+        for j in range(i + 1):
+            total = M[i, j]
+            for k in range(rows):
+                total -= W[i, k] * W[j, k]
+            M[i, j] = M[j, i] = total
+        # Rounding must not make a variance negative.
+        M[i, i] = max(M[i, i], 0.0)
+    inject(x)
+
+
+@compilable
+def _correct_considered(x: Any, X: Array, rows: int) -> None:
+    """Multiply the covariance ``X`` (17, n) with what is considered by I - K H; K is W L^-1."""
+    H, L, W = x.H, x.factor, x.gain
+    for c in range(X.shape[1]):
+        for k in range(rows):
+            total = 0.0
+            for j in range(ERRORS):
+                total += H[k, j] * X[j, c]
+            for j in range(k):
+                total -= L[k, j] * x.innovated[j]
+            x.innovated[k] = total / L[k, k]
+        for i in range(ERRORS):
+            for k in range(rows):
+                X[i, c] -= W[i, k] * x.innovated[k]
+
+
+@compilable
+def varies(x: Any) -> bool:
+    """Whether every variance is one; NaN and less than nothing are none."""
+    found = 0
+    for i in range(ERRORS):
+        if x.covariance[i, i] >= 0.0:
+            found += 1
+    return found == ERRORS
+
+
+@compilable
+def inject(x: Any) -> None:
+    """Move the error into the nominal state. Solà, eq 283; the reset's Jacobian (287) is left out.
+
+    Half of the attitude's correction of 1e-3 rad would turn its covariance by as much.
+    """
+    error = x.error
+    for i in range(3):
+        x.p[i] += error[P + i]
+        x.v[i] += error[V + i]
+        x.accel_bias[i] += error[BA + i]
+        x.gyro_bias[i] += error[BG + i]
+        x.rate[i] -= error[BG + i]
+    x.baro_bias += error[BARO]
+    x.pose_delay += error[DELAY]
+    q = turned(vec4(x.q), error[TH], error[TH + 1], error[TH + 2])
+    for i in range(4):
+        x.q[i] = q[i]

@@ -1,0 +1,128 @@
+"""How the filter begins: from a pose, or from a position, gravity and the compass."""
+
+from __future__ import annotations
+
+import math
+from functools import reduce
+from typing import Any, Final
+
+import numpy as np
+
+from fsw.autopilot.estimation import fusion, kernels
+from fsw.autopilot.estimation.confirmation import Confirmation
+from fsw.autopilot.estimation.drift import FrameDrift, least
+from fsw.autopilot.estimation.error_state import IMU_CAPACITY, Filter
+from fsw.autopilot.estimation.fusion_memory import FusionMemory, Waiting
+from fsw.autopilot.estimation.stated_variance import StatedVariance
+from fsw.autopilot.estimation.tuning import EstimatorTuning
+from fsw.autopilot.geometry.quaternion import normalised
+from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample
+from fsw.autopilot.signals import Vec3, Vec4
+
+_LOOKED_AT: Final = 16  # samples
+_REST: Vec3 = (0.0, 0.0, 0.0)
+
+
+class FilterStart:
+    """Begins a filter as soon as its samples allow."""
+
+    def __init__(
+        self, tuning: EstimatorTuning, law: Any, stated: StatedVariance, confirmation: Confirmation
+    ) -> None:
+        self._tuning = tuning
+        self._law = law
+        self._stated = stated
+        self._confirmation = confirmation
+
+    def __call__(self, memory: FusionMemory) -> FusionMemory:
+        """Start from the newest pose that another one agrees with, for a first one may be wrong.
+
+        Without poses start from a GNSS position, gravity and the compass.
+        """
+        if not memory.numbers["end"][0]:
+            return memory._replace(waiting=())
+        for one in reversed(memory.waiting):
+            sample = one.sample
+            if isinstance(sample, MagneticSample) and memory.field is None:
+                memory = memory._replace(field=sample.field)
+        for one in reversed(memory.waiting):
+            sample = one.sample
+            if isinstance(sample, PoseSample):
+                others = [one.sample for one in memory.waiting if one.sample is not sample]
+                poses = [other for other in others if isinstance(other, PoseSample)]
+                if not any(self._confirmation.of_poses(other, sample) for other in poses):
+                    continue
+                memory = self._from_pose(memory, sample)
+                break
+            if isinstance(sample, GnssSample) and memory.field is not None:
+                self._from_gnss(memory, sample, memory.field)
+                break
+        else:
+            return memory._replace(waiting=memory.waiting[-_LOOKED_AT:])
+        return memory._replace(
+            started=True,
+            waiting=(),
+            delay_sigma=self._tuning.pose_delay_sigma,
+            began=float(memory.numbers["time"][0]),
+        )
+
+    def _from_pose(self, memory: FusionMemory, sample: PoseSample) -> FusionMemory:
+        stated = self._stated.of_pose(sample)
+        noise = self._least_stated(memory.waiting) if sample.drifts else stated
+        state = sample.position, _REST, normalised(sample.attitude)
+        self._begin(memory, sample.time, state, *noise)
+        if not sample.drifts:
+            return memory
+        return memory._replace(frame=FrameDrift.at_start(memory.numbers[0], noise, stated))
+
+    def _from_gnss(self, memory: FusionMemory, sample: GnssSample, field: Vec3) -> None:
+        x, tuning = memory.numbers, self._tuning
+        tilt = tuning.tilt**2
+        self._begin(
+            memory,
+            sample.time - tuning.gnss_delay,
+            (sample.position, sample.velocity, _levelled(x, field, tuning.declination)),
+            self._stated.of_gnss(sample)[0],
+            (tilt, tilt, tuning.start_heading**2),
+        )
+        kernels.couple_level(x, self._law)
+        # The heading was made of this field: what it does not know of it, with all of the tilt that
+        # it comes through, is what it does not know of the field.
+        fusion.fuse_heading(x, self._law, float(x["time"][0]), field, True)
+
+    def _begin(
+        self,
+        memory: FusionMemory,
+        time: float,
+        state: tuple[Vec3, Vec3, Vec4],
+        p_variance: Vec3,
+        q_variance: Vec3,
+    ) -> None:
+        slow = self._tuning.velocity**2
+        variances = p_variance, (slow, slow, slow), q_variance
+        kernels.begin(memory.numbers, self._law, time, *state, *variances)
+
+    def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
+        """The least variances of the poses so far: of a frame that drifts, the noise alone."""
+        poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
+        return reduce(least, (self._stated.of_pose(pose) for pose in poses))
+
+
+def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:
+    """The attitude in which the accelerometer points up and the compass north.
+
+    True at rest and in unaccelerated flight; the mean of the readings kept so far.
+    """
+    first, end = int(x["first"][0]), int(x["end"][0])
+    rows = x["imu"][0][[k % IMU_CAPACITY for k in range(first, end)]]
+    down = -rows[:, 1:4].mean(axis=0)
+    down /= np.linalg.norm(down)
+    north = np.asarray(field) - down * (down @ np.asarray(field))
+    north /= np.linalg.norm(north)
+    east = np.cross(down, north)
+    c, s = math.cos(declination), math.sin(declination)
+    # Rows of the rotation from body to NED: north, east and down in body components.
+    R = (*(c * north - s * east), *(s * north + c * east), *down)
+    w, i, j, k = quaternion_from_matrix(tuple(float(r) for r in R))  # type: ignore[arg-type]
+    return w, i, j, k

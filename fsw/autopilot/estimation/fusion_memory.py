@@ -1,0 +1,192 @@
+"""What the estimator carries from tick to tick: the filter, and what it knows of each sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from fsw.autopilot.estimation.confirmation import Run
+from fsw.autopilot.estimation.drift import FrameDrift
+from fsw.autopilot.estimation.error_state import FILTER, Filter
+from fsw.autopilot.estimation.pace import Pace
+from fsw.autopilot.estimation.redundancy import LEAST_WALKS, Verdict
+from fsw.autopilot.estimation.sensor_checks import Aiding, Health
+from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample, Sample
+from fsw.autopilot.signals import Vec2, Vec3, Vec4
+
+_REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
+_REST: Vec3 = (0.0, 0.0, 0.0)
+NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
+
+
+class Waiting(NamedTuple):
+    """A sample, and when the filter reaches it; a tie is broken by the order of arrival."""
+
+    time: float  # s
+    number: int
+    sample: Aiding
+    half: bool = False  # of a pose, only the place is used
+
+
+class Reset(NamedTuple):
+    """Jumps of the estimate, as PX4 reports them: how many there were, and the last one."""
+
+    number: int = 0
+    position: Vec3 = _REST  # m, NED, new minus old
+    velocity: Vec3 = _REST  # m/s, NED, new minus old
+    turn: Vec4 = NO_TURN  # new attitude times the inverse of the old one, NED
+
+
+class EncoderWatch(NamedTuple):
+    """Whether the joints' encoders still follow the joints."""
+
+    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
+    asked: Vec2 = (0.0, 0.0)  # rad, of the joints when it came first
+    repeats: int = 0  # readings in a row that were the same
+    stuck: bool = False
+
+    @property
+    def repeating(self) -> bool:
+        """Whether they have said the same for long enough to ask whether they are stuck."""
+        return self.repeats >= _REPEATS
+
+
+TickInputs = tuple[Sequence[Sample], float, Vec2, Vec4]
+"""Samples, now [s], the joints' acceleration and the rotors' model."""
+
+
+class Trail(NamedTuple):
+    """A memory, and the inputs of all ticks since: to go back, and do without a sensor."""
+
+    start: FusionMemory
+    began: float  # s
+    ticks: tuple[TickInputs, Any] | None = None  # the last one, and all before it
+
+    def inputs(self) -> list[TickInputs]:
+        """Of all ticks, in their order."""
+        found, left = [], self.ticks
+        while left is not None:
+            one, left = left
+            found.append(one)
+        return found[::-1]
+
+
+class FusionMemory(NamedTuple):
+    """What the estimator carries from tick to tick."""
+
+    numbers: Filter
+    now: float = -1.0  # s, of the last tick; negative: there was none
+    imu_came: float = -1.0  # s, when a reading came last; negative: never
+    joints_came: float = -1.0
+    encoders: EncoderWatch = EncoderWatch()
+    trail: Trail | None = None  # the newest one
+    waiting: tuple[Waiting, ...] = ()
+    health: tuple[Health, ...] = ()  # of each sensor heard so far
+    arrivals: int = 0
+    delay: float = 0.0  # s, that measurements have lately taken
+    gnss: GnssSample | None = None  # the newest one
+    pose: PoseSample | None = None  # the last one that the filter has reached
+    reset_counter: int | None = None  # of the last pose
+    runs: tuple[Run, ...] = ()  # of each kind the last samples that were refused
+    started: bool = False
+    field: Vec3 | None = None  # Gauss, body, the last one
+    frame: FrameDrift = FrameDrift()  # of poses that drift
+    reset: Reset = Reset()
+    delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
+    paces: tuple[Pace, ...] = ()  # how often sensors are heard
+    restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
+    began: float = -math.inf  # s, the filter's own time when it began
+    without_fix: GnssSample | None = None  # the newest one that has none
+    trail_before: Trail | None = None  # up to where the newest one began
+    newest_pose: PoseSample | None = None  # whether it is used or not
+    newest_field: MagneticSample | None = None
+    verdict: Verdict = Verdict()  # on who is wrong
+    replays: int = 0  # how often the filter went back to do without a sensor
+
+    def of(self, sensor: Sensor) -> Health:
+        """What is known of a sensor."""
+        for one in self.health:
+            if one.sensor is sensor:
+                return one
+        return Health(sensor)
+
+    def fault_at(self, sensor: Sensor) -> float:
+        """When a fault of a sensor was seen last [s]; minus infinity: never."""
+        for one in self.health:
+            if one.sensor is sensor:
+                return one.fault_at
+        return -math.inf
+
+    def came(self, sensor: Sensor) -> float:
+        """When a reading of a sensor came last [s]; negative: never."""
+        if sensor is Sensor.IMU:
+            return self.imu_came
+        return self.joints_came if sensor is Sensor.ENCODERS else self.of(sensor).came
+
+    def noting(self, health: Health) -> FusionMemory:
+        """The memory with the health of one sensor renewed."""
+        return self._replace(health=(*self.without(health.sensor), health))
+
+    def noting_fault(self, sensor: Sensor, fault: SensorFault, now: float) -> FusionMemory:
+        """The memory with a ``fault`` of a sensor that was seen at ``now`` [s]."""
+        return self.noting(self.of(sensor).with_fault(fault, now))
+
+    def noting_faults(self, of_imu: int, of_encoders: int, now: float) -> FusionMemory:
+        """The memory with faults that the filter has seen at ``now`` [s]; 0: none."""
+        memory = self
+        if of_imu:
+            memory = memory.noting_fault(Sensor.IMU, SensorFault(of_imu), now)
+        if of_encoders:
+            memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
+        return memory
+
+    def hearing(self, sample: Aiding) -> FusionMemory:
+        """The memory after a ``sample`` that is plausible, whether it is used or not."""
+        match sample:
+            case PoseSample():
+                return self._replace(newest_pose=sample)
+            case GnssSample():
+                return self._replace(gnss=sample)
+            case MagneticSample():
+                return self._replace(newest_field=sample)
+        return self
+
+    def after(self, one: Waiting, health: Health, runs: tuple[Run, ...]) -> FusionMemory:
+        """The memory after the first of the waiting samples was fused, or refused: see ``runs``."""
+        sample, pose, counter = one.sample, self.pose, self.reset_counter
+        if isinstance(sample, PoseSample):
+            pose, counter = sample, sample.reset_counter
+        known, waiting = (*self.without(health.sensor), health), self.waiting[1:]
+        return self._replace(
+            waiting=waiting, health=known, pose=pose, reset_counter=counter, runs=runs
+        )
+
+    def without(self, sensor: Sensor) -> list[Health]:
+        """What is known of the other sensors."""
+        return [one for one in self.health if one.sensor is not sensor]
+
+    def jumped(
+        self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = NO_TURN
+    ) -> FusionMemory:
+        """The memory after the estimate's ``position`` [m, NED] and all else have jumped.
+
+        ``velocity`` [m/s, NED] and ``turn`` [1] as in ``Reset``.
+        """
+        return self._replace(reset=Reset(self.reset.number + 1, position, velocity, turn))
+
+
+def copied(x: Filter) -> Filter:
+    """Another filter with the same numbers; as bytes in a fortieth of the time of an array."""
+    memory: Any = x.base
+    return np.ndarray(1, FILTER, bytearray(memory if type(memory) is bytearray else x.tobytes()))
+
+
+def at_start() -> FusionMemory:
+    """Memory before the first sample."""
+    x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
+    x["model_walk"] = LEAST_WALKS
+    return FusionMemory(x)

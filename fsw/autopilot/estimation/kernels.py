@@ -1,0 +1,318 @@
+"""The filter's machine code: what the estimator calls, each once for a reading or a tick."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+from numpy.typing import NDArray
+
+from fsw.autopilot.estimation import fusion, imu, joint_filter, redundancy
+from fsw.autopilot.estimation.error_state import (
+    BA,
+    BARO,
+    BG,
+    DELAY,
+    ERRORS,
+    FIELD,
+    FRAME,
+    IMU_CAPACITY,
+    LOST,
+    RATE,
+    TH,
+    TIME,
+    Array,
+    Filter,
+    Law,
+    P,
+    V,
+    add_noise,
+    advance,
+    carry,
+    integrated,
+    mean_of,
+    present,
+    propagate,
+    transition,
+    varies,
+    vec3,
+    vec4,
+)
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.signals import Mat3, Vec2, Vec3, Vec4
+from fsw.autopilot.tick_record import Estimate
+from fsw.compiled import compilable, kernel, machine_code
+from fsw.record import Four, Record, Three, Two
+
+# What ``tick`` does, in this order.
+PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
+# What came of it.
+FAULT, FINITE = 1, 2
+
+
+class Asked(Record):
+    """What the filter is asked to do in one call, and what it found."""
+
+    t_us: int  # now
+    dt: float  # s, length of the tick
+    u: Two  # rad/s^2, what torques made of the joints
+    model: Four  # SI, FRD: what rotors make of the vehicle, see ``imu.add_imu``
+    encoders: Three  # rad, rad, s: two angles and their age
+    time: float  # s, of a reading of the IMU
+    force: Three  # m/s^2, FRD
+    rate: Three  # rad/s, FRD
+    of_imu: int  # what is wrong with that, as ``SensorFault``
+    of_encoders: int
+    present: Estimate
+
+    def begin(self, now: float, dt: float, u: Vec2, model: Vec4) -> None:
+        """A tick of ``dt`` [s] that ends ``now`` [s].
+
+        Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle.
+        """
+        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *u, *model)
+
+    def read_joints(self, angles: Vec2, age: float) -> None:
+        """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
+        _ENCODERS.pack_into(self.memory, _ENCODERS_AT, *angles, age)
+
+    def read(self, time: float, force: Vec3, rate: Vec3) -> None:
+        """What the IMU says: ``time`` [s], ``force`` [m/s^2, FRD] and ``rate`` [rad/s, FRD]."""
+        _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
+
+
+_TICK = struct.Struct("<q7d")
+_ENCODERS = struct.Struct("<3d")
+_ENCODERS_AT = Asked.place("encoders")
+_READING = struct.Struct("<7d")
+_READING_AT = Asked.place("time")
+PRESENT_AT = Asked.place("present")
+
+
+@kernel
+def tick(
+    filters: Filter,
+    law: Law,
+    requests: NDArray[Any],
+    parts: int,
+    now: float,
+    until: float,
+) -> int:
+    """Do some ``parts`` [1] of a tick as asked by one of ``requests`` (1,) [SI]; what came of it.
+
+    ``PUSH``: note what torques made of the joints; take in encoders; take in a reading of the IMU;
+    ``ADVANCE`` ``until`` [s]; and at the ``END`` predict the present ``now`` [s] from there, which
+    may be no number.
+    """
+    x, t, a = filters[0], law[0].tuning, requests[0]
+    model = a.model[0], a.model[1], a.model[2], a.model[3]
+    if parts & PUSH:
+        joint_filter.push(x, t, now, a.dt, (a.u[0], a.u[1]))
+    a.of_imu, a.of_encoders = 0, 0
+    if parts & JOINTS:
+        angles = (a.encoders[0], a.encoders[1])
+        a.of_encoders = joint_filter.read(x, t, now, angles, a.encoders[2])
+    if parts & READING:
+        f, w = (a.force[0], a.force[1], a.force[2]), (a.rate[0], a.rate[1], a.rate[2])
+        a.of_imu = imu.add_imu(x, t, now, a.time, f, w, model)
+    found = FAULT if a.of_imu or a.of_encoders else 0
+    if parts & ADVANCE:
+        advance(x, t, until)
+    if parts & END:
+        a.present.t_us = a.t_us
+        finite, R = _predict(x, now, a.present)
+        if finite:
+            found |= FINITE
+        if a.dt > 0.0:
+            redundancy.witness(x, R, a.dt, model)
+    return found
+
+
+@compilable
+def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
+    """Write the present; whether it has numbers and variances, and its rotation."""
+    p, v, q, rate, force = present(x, now)
+    angles, rates = joint_filter.present_joints(x, now)
+    R = matrix_from_quaternion(q)
+    total = p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + R[0] + rate[0] + rate[1] + rate[2] + force[2]
+    finite = math.isfinite(total + angles[0] + angles[1] + rates[0] + rates[1])
+    for i in range(3):
+        known.p_WB[i], known.v_WB[i], known.w_WB_B[i] = p[i], v[i], rate[i]
+    for i in range(9):
+        known.R_WB[i] = R[i]
+    for i in range(2):
+        known.q_arm[i], known.qd_arm[i] = angles[i], rates[i]
+    known.yaw, known.specific_force = yaw_of(R), -force[2]
+    return finite and varies(x), R
+
+
+@machine_code
+@kernel
+def set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
+    """Start from an arm that stands still at ``angles`` [rad] at a ``time`` [s]."""
+    joint_filter.begin(x[0], law[0].tuning, time, angles)
+
+
+@machine_code
+@kernel
+def begin(
+    x: Filter,
+    law: Law,
+    time: float,
+    p: Vec3,
+    v: Vec3,
+    q: Vec4,
+    p_variance: Vec3,
+    v_variance: Vec3,
+    q_variance: Vec3,
+) -> None:
+    """Start the filter from a known state of ``time`` [s]; earlier readings are passed over.
+
+    ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1]; ``p_variance`` [m^2, NED], ``v_variance``
+    [m^2/s^2, NED], ``q_variance`` [rad^2, FRD].
+
+    Where the first reading came later than the state, the filter begins with that reading: until
+    then the vehicle moved as it did, but for what is not known of its velocity and its turning. To
+    take the first reading, with all its vibration, for those before it would make up a velocity.
+    """
+    s, t = x[0], law[0].tuning
+    M = s.covariance
+    for i in range(ERRORS):
+        for j in range(ERRORS):
+            M[i, j] = 0.0
+    for i in range(3):
+        s.p[i], s.v[i], s.accel_bias[i], s.gyro_bias[i] = p[i], v[i], 0.0, 0.0
+        M[P + i, P + i], M[V + i, V + i], M[TH + i, TH + i] = (
+            p_variance[i],
+            v_variance[i],
+            q_variance[i],
+        )
+        M[BA + i, BA + i] = t.accel_bias * t.accel_bias
+        M[BG + i, BG + i] = t.gyro_bias * t.gyro_bias
+        s.acceleration[i] = 0.0
+    for i in range(4):
+        s.q[i] = q[i]
+    M[BARO, BARO] = t.baro_bias * t.baro_bias
+    M[DELAY, DELAY] = t.pose_delay_sigma * t.pose_delay_sigma
+    s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose_delay, 0
+    s.noise_scale[fusion.POSE] = t.pose_noise_at_start * t.pose_noise_at_start
+    s.time = time - t.pose_delay
+    while s.first < s.end - 1 and s.imu[s.first % IMU_CAPACITY, TIME] <= s.time:
+        s.first += 1
+    before = s.imu[(s.first - 1) % IMU_CAPACITY]
+    for i in range(3):
+        s.rate[i] = before[4 + i]
+    missed = before[TIME] - s.time
+    if missed > t.imu_gap:
+        s.time = before[TIME]
+        for i in range(3):
+            s.p[i] += missed * v[i]
+            M[P + i, V + i] = M[V + i, P + i] = missed * v_variance[i]
+            M[P + i, P + i] += missed * missed * v_variance[i]
+            turned = missed * before[RATE + i]
+            M[TH + i, TH + i] += turned * turned
+
+
+@machine_code
+@kernel
+def couple_level(x: Filter, law: Law) -> None:
+    """What is wrong with an attitude that the accelerometer gave is what is wrong with it.
+
+    With d the vertical in body axes, a bias b turns it by -(d x b) / g.
+    """
+    s = x[0]
+    M, R = s.covariance, matrix_from_quaternion(vec4(s.q))
+    g, variance = GRAVITY, law[0].tuning.accel_bias * law[0].tuning.accel_bias
+    a, b, c = R[6] / g, R[7] / g, R[8] / g
+    rows = ((0.0, c, -b), (-c, 0.0, a), (b, -a, 0.0))
+    for i in range(3):
+        for j in range(3):
+            M[TH + i, BA + j] = rows[i][j] * variance
+            M[BA + j, TH + i] = rows[i][j] * variance
+            total = 0.0
+            for k in range(3):
+                total += rows[i][k] * rows[j][k]
+            M[TH + i, TH + j] += total * variance
+
+
+@machine_code
+@kernel
+def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
+    """Take ``p`` [m, NED] of ``time`` [s] as it is, ``variance`` [m^2, NED]; how far it jumped."""
+    s = x[0]
+    dt = time - s.time
+    jump = (
+        p[0] - s.p[0] - dt * s.v[0],
+        p[1] - s.p[1] - dt * s.v[1],
+        p[2] - s.p[2] - dt * s.v[2],
+    )
+    for i in range(3):
+        s.p[i] += jump[i]
+    fusion.forget(s, P, variance)
+    return jump
+
+
+@machine_code
+@kernel
+def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
+    """Take ``v`` [m/s, NED] as it is, ``variance`` [m^2/s^2, NED]; by how much it has jumped."""
+    s = x[0]
+    jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
+    for i in range(3):
+        s.v[i] = v[i]
+    fusion.forget(s, V, variance)
+    return jump
+
+
+@machine_code
+@kernel
+def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
+    """Take an attitude ``q`` [1] of ``variance`` [rad^2, FRD] as it is."""
+    s = x[0]
+    for i in range(4):
+        s.q[i] = q[i]
+    fusion.forget(s, TH, variance)
+
+
+@machine_code
+@kernel
+def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> None:
+    """Explain an ``altitude`` [m, up] of ``time`` [s], ``variance`` [m^2], by the bias."""
+    s = x[0]
+    s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
+    for j in range(FRAME):
+        s.shared[BARO, j] = 0.0
+    for j in range(FIELD):
+        s.with_offset[BARO, j] = s.with_offset[P + 2, j]
+    for j in range(ERRORS):  # what is wrong with the height is in it
+        s.covariance[BARO, j] = s.covariance[P + 2, j]
+        s.covariance[j, BARO] = s.covariance[j, P + 2]
+    s.covariance[BARO, BARO] = s.covariance[P + 2, P + 2] + variance
+
+
+@machine_code
+@kernel
+def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
+    """Write the covariance ``M`` (17, 17) [SI] at ``now`` [s] and a frame's ``X`` (17, 4) [SI]."""
+    s, t = x[0], law[0].tuning
+    for i in range(ERRORS):
+        for j in range(ERRORS):
+            M[i, j] = s.covariance[i, j]
+        for j in range(FRAME):
+            X[i, j] = s.shared[i, j]
+    q, time = vec4(s.q), s.time
+    p, v = vec3(s.p, 0), vec3(s.v, 0)
+    for k in range(s.first - 1, s.end):
+        row = s.imu[k % IMU_CAPACITY]
+        end = s.imu[(k + 1) % IMU_CAPACITY, TIME] if k + 1 < s.end else now
+        f, w = mean_of(s, row, row)
+        dt = end - time
+        if dt > 0.0:
+            blocks = transition(matrix_from_quaternion(q), f, w, dt)
+            propagate(M, blocks, dt)
+            carry(X, blocks, dt)
+            add_noise(M, t, dt, int(row[LOST]), s.model_walk)
+            p, v, q, _ = integrated(p, v, q, f, w, dt)
+            time = end

@@ -1,0 +1,589 @@
+"""The estimator: samples of all sensors in, the present state with its uncertainty out.
+
+A sample is looked at when it comes (``sensor_checks.py``), waits until the filter has reached the
+time at which it was measured, and is fused there. What the gate refuses for long is taken as it is,
+and the jump that this makes is reported, so that a plan can jump along.
+
+Memory goes in and comes out, as everywhere in the tick; kernels work on the copy that the tick
+makes of the filter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from fsw.autopilot.estimation import fusion, kernels, redundancy
+from fsw.autopilot.estimation.arbitration import Arbitration, begun
+from fsw.autopilot.estimation.confirmation import Confirmation, Run
+from fsw.autopilot.estimation.error_state import (
+    DELAY,
+    ERRORS,
+    FRAME,
+    TH,
+    Array,
+    Filter,
+)
+from fsw.autopilot.estimation.filter_start import FilterStart
+from fsw.autopilot.estimation.fusion_memory import (
+    EncoderWatch,
+    FusionMemory,
+    TickInputs,
+    Trail,
+    Waiting,
+    at_start,
+    copied,
+)
+from fsw.autopilot.estimation.imu import IMU_SILENT, IMU_TOO_OLD, STUCK_READINGS, TIME_TOLERANCE
+from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
+from fsw.autopilot.estimation.kernels import (
+    ADVANCE,
+    END,
+    FAULT,
+    FINITE,
+    JOINTS,
+    PRESENT_AT,
+    PUSH,
+    READING,
+    Asked,
+)
+from fsw.autopilot.estimation.measurement_update import MeasurementUpdate, attitude
+from fsw.autopilot.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
+from fsw.autopilot.estimation.sensor_checks import (
+    SENSOR_OF,
+    Aiding,
+    Health,
+    arrived,
+    is_attitude_stuck,
+)
+from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.stated_variance import StatedVariance
+from fsw.autopilot.estimation.tuning import EstimatorLaw, EstimatorTuning
+from fsw.autopilot.geometry.quaternion import conjugate, multiply
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
+from fsw.autopilot.geometry.vectors import add_scaled, norm
+from fsw.autopilot.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    MagneticSample,
+    PoseSample,
+    PressureSample,
+    RangeSample,
+    Sample,
+)
+from fsw.autopilot.signals import StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.tick_record import estimate_in
+from fsw.compiled import machine_code, packed
+
+_FARTHEST_BEHIND: Final = 0.1  # s, that the filter stays behind while there is nothing to fuse
+LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
+_MARGIN: Final = 0.003  # s, by which a measurement may take longer than lately
+_LONGEST_STEP: Final = 0.05  # s, by which joints are predicted at once
+# A pose that is refused by no more says nothing of itself at first: the inertial unit may have been
+# wrong by as much before it is found out.
+_SMALL_STEP: Final = 0.05  # m
+_SMALL_TURN: Final = 0.1  # rad
+# A frame that has been moved is level to so much, and the filter to so many deviations.
+_LEVEL: Final = 0.05  # rad
+_SIGMAS: Final = 3.0
+_JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
+_SOURCES: Final = {
+    PoseSample: Source.POSE | Source.ATTITUDE,
+    GnssSample: Source.GNSS,
+    MagneticSample: Source.COMPASS,
+}
+_REST: Vec3 = (0.0, 0.0, 0.0)
+UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
+_LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
+_OF_EVERY_TICK: Final = (ImuSample, JointSample)
+
+
+class SensorFusion:
+    """The estimator of one configuration; holds only what never changes in flight."""
+
+    def __init__(self, tuning: EstimatorTuning) -> None:
+        self.tuning = tuning
+        self.law = packed(EstimatorLaw(tuning, tuning.gates))
+        self._stated = StatedVariance(tuning)
+        self._confirmation = Confirmation(tuning, self._stated)
+        self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
+        self._update = MeasurementUpdate(tuning, self.law, self._stated)
+        self._arbitration = Arbitration(tuning, self._stated, self._update, self._again)
+        self._asked, x = Asked(), at_start().numbers  # written anew in each call
+        self._requests = self._asked.array
+        self._tick = machine_code(kernels.tick, x, self.law, self._requests, 0, 0.0, 0.0)
+
+    def warm_up(self) -> StateEstimate:
+        """Compile every kernel: stand for a while with every sensor, then take jumps."""
+        memory, estimate, t = at_start(), None, 0.0
+        for k in range(60):
+            t = 1.0 + 0.01 * k
+            memory, estimate = self.step(memory, _at_rest(t), t)
+        assert estimate is not None
+        for sample in _at_rest(t):
+            if isinstance(sample, PoseSample | GnssSample | PressureSample):
+                self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
+        fusion.doubt(memory.numbers, 0.0, 0.0, True)
+        redundancy.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
+        self.covariance(memory, t)
+        return estimate
+
+    def step(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        joint_acceleration: Vec2 = (0.0, 0.0),
+        watch: EncoderWatch | None = None,
+        model: Vec4 = UNKNOWN,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both.
+
+        ``joint_acceleration`` [rad/s^2, joints] and ``model`` [SI, FRD] are theirs.
+        """
+        memory, estimate = self.take_in(memory, samples, now, joint_acceleration, watch, model)
+        return self.catch_up(memory, samples, now, estimate)
+
+    def take_in(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        joint_acceleration: Vec2 = (0.0, 0.0),
+        watch: EncoderWatch | None = None,
+        model: Vec4 = UNKNOWN,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Take in what IMU and encoders measured since the last tick; the state at ``now`` [s].
+
+        Of the other ``samples`` it knows what ``catch_up`` has fused so far.
+        ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
+        its encoders is kept in the memory. Where the IMU is silent or of no use, the ``model``
+        [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``). None before there was
+        a pose, or a position and a heading, to start from, and a reading of the arm.
+        """
+        dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
+        x = copied(memory.numbers)
+        asked = self._asked
+        asked.begin(now, dt, joint_acceleration, model)
+        memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
+        silent = 0.0 <= imu_came < now - IMU_SILENT
+        if silent:
+            # In place of a reading what the model makes of the last one; it is no fault.
+            asked.read(now, _LOST, _LOST)
+            parts |= READING
+        ready = memory.started and joints_came >= 0.0
+        if ready:
+            parts |= END
+        found = self._tick(x, self.law, self._requests, parts, now, 0.0)
+        if found & FAULT:
+            memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
+        trail = memory.trail
+        if trail is not None:
+            tick = samples, now, joint_acceleration, model
+            trail = Trail(trail.start, trail.began, (tick, trail.ticks))
+        memory = memory._replace(
+            numbers=x,
+            now=now,
+            imu_came=imu_came,
+            joints_came=joints_came,
+            encoders=memory.encoders if watch is None else watch,
+            trail=trail,
+        )
+        if found & FINITE:
+            return memory, estimate_in(asked, PRESENT_AT)
+        return (_anew(memory) if ready else memory), None
+
+    def _take_each(
+        self, memory: FusionMemory, x: Filter, samples: Sequence[Sample], now: float
+    ) -> tuple[FusionMemory, int, float, float]:
+        """Ask for readings of IMU and encoders to be taken in, one after the other.
+
+        Also the parts that are asked for by then, and when each sensor came last [s]. Of a second
+        reading of a sensor the first is done at once.
+        """
+        asked, parts = self._asked, PUSH
+        imu_came, joints_came = memory.imu_came, memory.joints_came
+        for sample in samples:
+            if isinstance(sample, ImuSample):
+                if sample.time < now - IMU_TOO_OLD and memory.started:
+                    memory = memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, now)
+                    continue
+                if parts & READING:
+                    memory, parts = self._done(memory, x, parts, now), 0
+                asked.read(sample.time, sample.acceleration, sample.rate)
+                parts, imu_came = parts | READING, now
+            elif isinstance(sample, JointSample):
+                fault = _fault_of_encoders(sample, now, joints_came)
+                if fault:
+                    memory = memory.noting_fault(Sensor.ENCODERS, fault, now)
+                    if fault is not SensorFault.SELDOM:
+                        continue
+                if joints_came < 0.0 or parts & JOINTS:
+                    memory, parts = self._done(memory, x, parts, now), 0
+                if joints_came < 0.0:
+                    kernels.set_joints(x, self.law, sample.time, sample.angles)
+                else:
+                    asked.read_joints(sample.angles, now - sample.time)
+                    parts |= JOINTS
+                joints_came = now
+        return memory, parts, imu_came, joints_came
+
+    def catch_up(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        estimate: StateEstimate | None,
+        *,
+        aloft: bool = True,
+        flies: bool = True,
+        damaged: bool = False,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
+
+        The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
+        there is nothing to fuse the state is the ``estimate`` of ``take_in``. Every 20 ms it is
+        asked whether all sensors agree, unless the vehicle is so low that the ground may hold it.
+        Of a ``damaged`` one a rotor or a joint is known to have failed.
+        """
+        memory, found = self._caught_up(memory, samples, now, estimate)
+        if not memory.started:
+            return memory, found
+        if found is None:
+            return begun(memory), None
+        return self._arbitration.step(memory, now, found, aloft=aloft, flies=flies, damaged=damaged)
+
+    def _again(
+        self, memory: FusionMemory, tick: TickInputs
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        samples, now, u, model = tick
+        memory, found = self.take_in(memory, samples, now, u, None, model)
+        return self._caught_up(memory, samples, now, found)
+
+    def _caught_up(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        estimate: StateEstimate | None,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        for sample in samples:
+            if not isinstance(sample, _OF_EVERY_TICK):
+                memory = self.take(memory, sample, now)
+        if estimate is not None and _rests(memory, now):
+            return memory, estimate
+        x = copied(memory.numbers)
+        memory = memory._replace(numbers=x)
+        self._asked.begin(now, 0.0, (0.0, 0.0), UNKNOWN)
+        if not memory.started:
+            memory = self._start(memory)
+        if not (memory.started and memory.joints_came >= 0.0):
+            return memory, None
+        until = now - memory.delay - _MARGIN
+        while memory.waiting and memory.waiting[0].time <= until:
+            self._tick(x, self.law, self._requests, ADVANCE, now, memory.waiting[0].time)
+            memory = self._fuse_first(memory, now)
+        if self._tick(x, self.law, self._requests, ADVANCE | END, now, until) & FINITE:
+            return memory, estimate_in(self._asked, PRESENT_AT)
+        return _anew(memory), None
+
+    def _done(self, memory: FusionMemory, x: Filter, parts: int, now: float) -> FusionMemory:
+        """The memory once the filter has taken in ``parts`` of what is asked."""
+        asked = self._asked
+        if self._tick(x, self.law, self._requests, parts, now, 0.0) & FAULT:
+            memory = memory.noting_faults(asked.of_imu, asked.of_encoders, now)
+        return memory
+
+    def covariance(self, memory: FusionMemory, now: float) -> Array:
+        """Covariance (17, 17) [SI] of the error of the state at ``now`` [s]."""
+        found, shared = np.empty((ERRORS, ERRORS)), np.empty((ERRORS, FRAME))
+        kernels.present_covariance(memory.numbers, self.law, now, found, shared)
+        if not memory.numbers[0]["drifts"]:
+            return found
+        return memory.frame.in_world(found, shared, memory.numbers[0])
+
+    def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
+        """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
+        x, before = memory.numbers, memory.of(SENSOR_OF[type(sample)])
+        health, fault = arrived(
+            before,
+            sample,
+            now,
+            self.tuning,
+            lambda: bool(x["same"][0].min() >= STUCK_READINGS),
+        )
+        half = fault is SensorFault.STUCK and is_attitude_stuck(health)
+        if half:
+            fault = SensorFault.NONE
+        time = self._update.measured_at(memory, sample)
+        if not fault and memory.started and time < x["time"][0] - LATE:
+            fault = SensorFault.TOO_OLD
+            # Measured before the filter began, it came as soon as it could.
+            if time >= memory.began or now - time > self.tuning.longest_delay:
+                health = health.with_fault(fault, now)
+        delay = memory.delay
+        if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
+            delay = self._delay(delay, now - time, now - before.came)
+        others, used = memory.without(health.sensor), False
+        if not fault:
+            memory = memory.hearing(sample)
+            health, used, half = _as_judged(memory.verdict, sample, health, now, half)
+        if not used:
+            if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
+                memory = memory._replace(without_fix=sample)
+            return memory._replace(health=(*others, health), delay=delay)
+        waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample, half))
+        if len(waiting) > 1 and waiting[-2].time > time:
+            waiting = tuple(sorted(waiting))
+        arrivals, known = memory.arrivals + 1, (*others, health)
+        return memory._replace(waiting=waiting, health=known, arrivals=arrivals, delay=delay)
+
+    def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
+        """The memory after the parameters of the pose's delay may have changed in flight."""
+        x, sigma = memory.numbers[0], self.tuning.pose_delay_sigma
+        if not sigma:
+            x["pose_delay"] = self.tuning.pose_delay
+        if sigma == memory.delay_sigma or not memory.started:
+            return memory
+        M = x["covariance"]
+        M[DELAY], M[:, DELAY], x["shared"][DELAY] = 0.0, 0.0, 0.0
+        x["with_offset"][DELAY] = 0.0
+        M[DELAY, DELAY] = sigma**2
+        return memory._replace(delay_sigma=sigma)
+
+    def _delay(self, before: float, delay: float, apart: float) -> float:
+        """How long measurements take, after one did so, ``apart`` [s] from its sensor's last one.
+
+        ``before`` [s] and ``delay`` [s].
+        """
+        faded = before - self.tuning.delay_decay * min(apart, 1.0)
+        return min(max(delay, faded), self.tuning.longest_delay)
+
+    def _fuse_first(self, memory: FusionMemory, now: float) -> FusionMemory:
+        """Fuse the first of the waiting samples, whose time the filter has."""
+        one = memory.waiting[0]
+        sample = one.sample
+        announced, drifts = False, False
+        if isinstance(sample, PoseSample):
+            memory = self._with_delay_known(memory)
+            announced = memory.reset_counter not in (None, sample.reset_counter)
+            drifts = sample.drifts
+            if drifts:
+                memory = self._with_frame(memory, sample, announced)
+        refused = self._long_refused(memory, now) if isinstance(sample, PoseSample) else ()
+        kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
+        ratio = self._update.fuse(memory, one)
+        innovation = tuple(memory.numbers["innovation"].ravel().tolist())
+        if not (announced or any(refused)) and max(ratio) <= 1.0:  # as nearly always
+            health = memory.of(SENSOR_OF[type(sample)])
+            shown = innovation if len(ratio) > 1 else innovation[:1]
+            return memory.after(
+                one, health.with_fused((now,) * len(ratio), ratio, shown), memory.runs
+            )
+        passes = [r <= 1.0 and long for r, long in zip(ratio, refused, strict=False)]
+        if any(passes) and not _is_small(sample, innovation):
+            # By now the gate is so wide that of garbage some is within it: a run has to say so.
+            memory.numbers[0] = kept
+            ratio = tuple([max(r, _JUST_REFUSED) for r in ratio])
+        previous = kept if announced and drifts else None
+        return self._judged(
+            memory, one, ratio, innovation, now, announced=announced, previous=previous
+        )
+
+    def _long_refused(self, memory: FusionMemory, now: float) -> tuple[bool, ...]:
+        """Whether each half of the last pose was refused, and has been for long."""
+        health, most = memory.of(Sensor.POSE), self.tuning.reset_time
+        halves = zip(health.ratio, health.fused, strict=False)
+        return tuple([1.0 < ratio < math.inf and now - used > most for ratio, used in halves])
+
+    def _judged(
+        self,
+        memory: FusionMemory,
+        one: Waiting,
+        ratio: tuple[float, ...],
+        innovation: tuple[float, ...],
+        now: float,
+        *,
+        announced: bool = False,
+        previous: Any = None,
+    ) -> FusionMemory:
+        """The memory after the first of the waiting samples was fused, or refused.
+
+        Chi-square over gate and innovation are of each of its parts. The frame of a pose may have
+        jumped (``announced``), from the filter's ``previous`` state if it drifts. How far, two
+        poses must agree upon: the one that announces it may be wrong as well.
+        """
+        sample = one.sample
+        health = memory.of(SENSOR_OF[type(sample)])
+        # What is infinite says nothing here.
+        refused = any(1.0 < r < math.inf for r in ratio)
+        if refused and isinstance(sample, PressureSample) and not health.fused:
+            # The weather is not known until the first reading.
+            refused, ratio = False, (1.0,)
+            self._update.take_pressure(memory, one.time, sample)
+        runs, run = memory.runs, None
+        used = [at for at, r in zip(health.fused, ratio, strict=False) if r < math.inf]
+        long_refused = bool(used) and now - min(used) > self.tuning.reset_time
+        if refused:
+            run = self._run(memory, sample, innovation)
+            runs = (*[other for other in runs if other.kind is not run.kind], run)
+            little = _is_small(sample, innovation)
+            if announced or long_refused or not little:
+                health = health.with_fault(SensorFault.JUMP, now)
+            if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
+                fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN, max(ratio) < math.inf)
+                ratio = self._update.fuse_pose(memory, sample, half=one.half)
+        fused = health.fused or (now,) * len(ratio)
+        fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
+        shown = innovation if len(ratio) > 1 else innovation[:1]
+        health = health.with_fused(fused, ratio, shown)
+        counter, memory = memory.reset_counter, memory.after(one, health, runs)
+        believed = (
+            run is not None
+            and run.is_believable(self.tuning.reset_time, announced=announced)
+            and not _tilts(memory, sample, innovation, now)
+        )
+        if announced and run is not None and not believed:
+            memory = memory._replace(reset_counter=counter)
+        if believed and any(1.0 < r < math.inf for r in ratio):
+            memory = self._update.take(memory, one, ratio)
+            if not announced and isinstance(sample, PoseSample):
+                # Either the frame has moved, or the inertial unit lies.
+                fusion.doubt(memory.numbers, 0.0, 0.0, max(ratio) < math.inf)
+            taken = zip(fused, ratio, strict=True)
+            fused = tuple([now if r < math.inf else before for before, r in taken])
+            memory = memory.noting(health._replace(fused=fused))
+        elif previous is not None and not refused:
+            memory = memory.jumped(*_jump(previous, memory.numbers[0]))
+        return memory
+
+    def _run(self, memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...]) -> Run:
+        """The run of refused samples that this one goes on with, or begins."""
+        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0).tolist()
+        scales = scale[:2] if isinstance(sample, PoseSample) else scale[2:]
+        seldom = memory.of(SENSOR_OF[type(sample)]).apart >= 0.25
+        return self._confirmation.run(memory.runs, sample, innovation, tuple(scales), seldom)
+
+    def _with_frame(
+        self, memory: FusionMemory, sample: PoseSample, announced: bool
+    ) -> FusionMemory:
+        """The memory after a frame that drifts has moved, to where a pose says it is."""
+        moved = memory.frame.moved(memory.numbers[0], self._stated.of_pose(sample), announced)
+        return memory._replace(frame=moved)
+
+
+def _rests(memory: FusionMemory, now: float) -> bool:
+    """Whether there is nothing to fuse at ``now`` [s].
+
+    Then the filter may stay where it is: the state is made of the IMU's readings since.
+    """
+    if not memory.started:
+        return False
+    waits = memory.waiting
+    if waits:
+        return waits[0].time > now - memory.delay - _MARGIN
+    return bool(now - memory.numbers[0]["time"] < _FARTHEST_BEHIND)
+
+
+def _anew(memory: FusionMemory) -> FusionMemory:
+    """The memory with a filter that starts from the next samples, because it is no number."""
+    return memory._replace(
+        numbers=at_start().numbers,
+        joints_came=-1.0,
+        imu_came=-1.0,
+        started=False,
+        waiting=(),
+        pose=None,
+        restarts=memory.restarts + 1,
+        verdict=Verdict(),
+        trail=None,
+        trail_before=None,
+    )
+
+
+def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFault:
+    """What is wrong with a reading of the encoders at ``now`` [s]; ``came`` [s] the last one."""
+    first, second = sample.angles
+    if not sample.time <= now + TIME_TOLERANCE:
+        return SensorFault.FUTURE
+    if not (abs(first) < math.pi and abs(second) < math.pi):
+        return SensorFault.IMPLAUSIBLE
+    if came < 0.0:
+        return SensorFault.NONE
+    if sample.time < now - ENCODERS_TOO_OLD:
+        return SensorFault.TOO_OLD
+    return SensorFault.SELDOM if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
+
+
+def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
+    """Whether a pose is refused by so little that it need not be the pose that is wrong."""
+    if not isinstance(sample, PoseSample):
+        return False
+    x, y, z, a, b, c = innovation
+    return norm((x, y, z)) < _SMALL_STEP and norm((a, b, c)) < _SMALL_TURN
+
+
+def _as_judged(
+    verdict: Verdict, sample: Aiding, health: Health, now: float, half: bool
+) -> tuple[Health, bool, bool]:
+    """A sensor's health at ``now`` [s], whether its ``sample`` is used, and whether by ``half``.
+
+    Of a pose whose attitude repeats itself, or is named, the place is used alone.
+    """
+    if not (verdict.wrong or verdict.suspects):
+        return health, True, half
+    source = _SOURCES.get(type(sample), NOBODY)
+    wrong = verdict.wrong & source
+    if wrong:
+        health = health.with_fault(SensorFault.DISAGREES, now)
+    # A heading that may be wrong is not needed, and turns what else is measured.
+    if wrong & ~Source.ATTITUDE or verdict.suspects & source & Source.COMPASS:
+        return health, False, half
+    return health, True, half or bool(wrong)
+
+
+def _tilts(memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...], now: float) -> bool:
+    """Whether a pose has jumped in a way that no frame does: down stays where it is.
+
+    In flight the filter knows where, but for what a gyro may have turned it by that others
+    contradict at ``now`` [s].
+    """
+    x, evidence = memory.numbers[0], memory.verdict.evidence
+    if not isinstance(sample, PoseSample) or evidence is None or evidence[0]["began"] < 0.0:
+        return False
+    verdict, room = memory.verdict, 0.0
+    if verdict.is_on:  # what fires by chance has turned nothing so far
+        used = max(memory.of(Sensor.POSE).fused[1], verdict.since)
+        room = (now - used) * redundancy.size_of(evidence, Source.GYRO)
+    rx, ry, rz = innovation[3:]
+    down = rotate_back(matrix_from_quaternion(attitude(x)), (0.0, 0.0, 1.0))
+    along = rx * down[0] + ry * down[1] + rz * down[2]
+    known = math.sqrt(max(x["covariance"].diagonal()[TH : TH + 3].tolist()))
+    tilt = norm(add_scaled((rx, ry, rz), down, -along))
+    return bool(tilt > _LEVEL + _SIGMAS * known + room)
+
+
+def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
+    """Position [m, NED], velocity [m/s, NED] and turn [1] from one state to another."""
+    px, py, pz = (after["p"] - before["p"]).tolist()
+    vx, vy, vz = (after["v"] - before["v"]).tolist()
+    return (px, py, pz), (vx, vy, vz), multiply(attitude(after), conjugate(attitude(before)))
+
+
+def _at_rest(t: float) -> tuple[Sample, ...]:
+    """A reading of every sensor, of a vehicle that stands."""
+    none, fine, small = (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-4), 1e-3 * t
+    return (
+        ImuSample(t - 1e-3, (0.0, 0.0, -9.81), none),
+        ImuSample(t, (0.0, 0.0, -9.81 + small), none),
+        JointSample(t, (0.0, 0.0)),
+        PoseSample(t, (small, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), fine, fine),
+        GnssSample(t, (0.0, small, 0.0), none, fine, fine),
+        PressureSample(t, 0.0, 1.0),
+        MagneticSample(t, (0.2, 0.0, 0.4)),
+        RangeSample(t, 1.0, 1.0),
+    )

@@ -1,0 +1,706 @@
+"""One tick of the flight software, top to bottom: (state, inputs) -> (state, outputs).
+
+No clock, socket, thread or random number: real time, lockstep, replay and tests all call this.
+``Autopilot.tick`` reads in the order things happen.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fsw.autopilot.control.actuator_watch import pause
+from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
+from fsw.autopilot.control.safety_gate import gate
+from fsw.autopilot.control.tube import beyond_covered
+from fsw.autopilot.estimation.estimator import estimate_state
+from fsw.autopilot.estimation.fusion_memory import FusionMemory
+from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
+from fsw.autopilot.flight.before_estimate import nothing_known, nowhere, told
+from fsw.autopilot.flight.bounds import bounded_update, target_problem
+from fsw.autopilot.flight.calm_tick import CalmTick
+from fsw.autopilot.flight.commander import Commander
+from fsw.autopilot.flight.damage_watch import DamageWatch
+from fsw.autopilot.flight.descent import Descent
+from fsw.autopilot.flight.exact_state import ExactState
+from fsw.autopilot.flight.jump import moved_along
+from fsw.autopilot.flight.land_detector import with_range
+from fsw.autopilot.flight.missed_ticks import loops_resumed, plan_resumed
+from fsw.autopilot.flight.modes.mission import with_update
+from fsw.autopilot.flight.modes.offboard import accept_setpoints
+from fsw.autopilot.flight.plan_exchange import (
+    PlanExchange,
+    measured_state,
+    nominal_at_rest,
+    requested,
+    with_nominal,
+)
+from fsw.autopilot.flight.reference_horizon import ReferenceHorizon
+from fsw.autopilot.flight.restart import restarted
+from fsw.autopilot.flight.safe_set import SafeSetCheck
+from fsw.autopilot.flight.safety_watch import SafetyWatch
+from fsw.autopilot.flight.sensed_state import CaughtUp, SensedState
+from fsw.autopilot.flight.snapshot import Shown
+from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
+from fsw.autopilot.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
+from fsw.autopilot.flight.zone_room import ZoneRoom
+from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.model.actuator_health import SOUND
+from fsw.autopilot.model.battery import Levels, corrected, drained
+from fsw.autopilot.model.body import body_of
+from fsw.autopilot.model.nominal import REST_INPUT
+from fsw.autopilot.mpc.reference import merge
+from fsw.autopilot.parameters.consistency import Finding
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.shapes.zones import NO_ZONES, Array, moving_zones
+from fsw.autopilot.signals import (
+    STOPPED,
+    ActuatorCommand,
+    BatteryState,
+    CommandAck,
+    ConstraintKind,
+    EndEffectorTarget,
+    Mode,
+    Plan,
+    PlanFailure,
+    PlanRequest,
+    PredictionState,
+    SafeSet,
+    SensorFrame,
+    Severity,
+    StateEstimate,
+    StatusText,
+    TickInputs,
+    TickOutputs,
+    Vec2,
+)
+from fsw.autopilot.tick_record import BREACH, FILTER_ACTED, GATE_NEEDED, OFF_PLAN, Tick
+from fsw.frozen import replace
+
+_STILL = SensorFrame(
+    t_us=1_000_000,
+    p_WB=(0.0, 0.0, -1.0),
+    v_WB=(0.0, 0.0, 0.0),
+    q_WB=(1.0, 0.0, 0.0, 0.0),
+    gyro_B=(0.0, 0.0, 0.0),
+    accel_B=(0.0, 0.0, -9.81),
+    q_arm=(0.0, 0.0),
+    qd_arm=(0.0, 0.0),
+)
+# N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
+_ARM_DAMPING: Vec2 = (0.15, 0.04)
+_DESCEND = Mode.DESCEND  # found in a tenth of the time
+
+
+class Controlled(NamedTuple):
+    """A tick whose command is decided; ``Autopilot.conclude`` does the rest."""
+
+    outputs: TickOutputs  # so far
+    inputs: TickInputs
+    state: FlightState  # with what was received, commanded and decided
+    memory: Tick  # for the next tick
+    estimate: StateEstimate | None = None  # None: there has been none yet
+    fusion: FusionMemory | None = None
+    flown: bool = False  # the loops are closed
+    plan: PlanMemory = PlanMemory()
+    ticks: int = 1  # since the last one
+    replaced: bool = False  # the command, by the safety gate
+    caught: CaughtUp | None = None  # what else is known, where that had to be known at once
+    calm: bool = False  # nothing happened; ``memory`` and ``fusion`` are all that is new
+
+
+class Autopilot:
+    """The tick of one configuration; holds only what never changes in flight."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self.config = config
+        tick = config.tick_period_us * 1e-6
+        self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
+        self._safe_sets = SafeSetCheck(config)
+        self._commander = Commander(config)
+        self._horizon = ReferenceHorizon(config)
+        self._plans = PlanExchange(config)
+        self._watch = SafetyWatch(config, self._safe_sets.loop_tube)
+        self._cascade = Cascade(
+            config.airframe, config.tuning, config.inner, tick, keep_clear(config)
+        )
+        self._sensed = SensedState(config.estimator, self._cascade)
+        self._exact = ExactState(self._cascade)
+        self._descent = Descent(config)
+        reallocates = bool(config.limits.failed_rotor_mode)
+        self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
+        self._watches = bool(config.limits.watches_actuators)
+        self.calm = CalmTick(
+            *(config, self._cascade, self._plans.model, self._damage),
+            *(self._watch, self._sensed, self.zones_now),
+        )
+        self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
+        self._clearance = UncertainClearance(
+            config.limits.clearance_sigmas,
+            body_of(config.planner.body, config.airframe),
+            config.airframe.link_length,
+            config.planner.tunings,
+            # Half a period until one is asked for, what it takes then, and the loop's own lag.
+            0.5 * config.planner.period
+            + config.plan_delay_ticks * tick
+            + self._cascade.law.filter.lag,
+        )
+        self._room = ZoneRoom(config)
+        self._tick_us = config.tick_period_us
+        self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
+        self._most_us = config.catch_up_ticks * config.tick_period_us
+
+    def warm_up(self) -> None:
+        """Compile every kernel of the tick, before anything flies."""
+        estimate = estimate_state(_STILL)
+        assert estimate is not None
+        r = with_nominal(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
+        self._plans.model.move(r, 1)
+        self._cascade.step(r)
+        self._safe_sets.warm_up(estimate)
+        self._horizon.warm_up(estimate)
+        self._sensed.warm_up()
+        self._clearance.warm_up(estimate)
+
+    def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
+        """Findings on whether this configuration can keep a safe set."""
+        return self._safe_sets.analyse(safe_set)
+
+    def least_margin(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> float:
+        """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone."""
+        return self._safe_sets.least_margin(safe_set, estimate, target)
+
+    def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
+        """Everything the vehicle does at one instant: the next state, and everything it says."""
+        return self.conclude(self.control(state, inputs))
+
+    def control(self, state: FlightState, inputs: TickInputs) -> Controlled:
+        """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
+        calm = self.calm.fly(state, inputs)
+        if calm is not None:
+            r, fusion, estimate = calm
+            outputs = TickOutputs(r.commanded, state.vehicle.mode, True)
+            return Controlled(
+                outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
+            )
+        now_us = inputs.sensors.t_us
+        texts: list[StatusText] = []
+        if state.vehicle.restarts:
+            state = restarted(state)
+        came = inputs
+        if state.index >= 0 and inputs.samples:
+            state, inputs = self._sensed.take_missed(state, inputs)
+        state, r, estimate, fusion, caught = self._estimate(state, inputs, texts)
+        began = state.cascade
+        state = self._receive(state, came, texts)
+        if estimate is None:
+            return self._blind(state, r, inputs, texts)._replace(fusion=fusion, caught=caught)
+
+        acks: list[CommandAck] = []
+        if inputs.commands:
+            state, acks = self._commander.handle_commands(state, estimate, inputs.commands, texts)
+        state = self._with_evidence(state, estimate)
+        state = self._commander.check_failsafes(state, estimate, texts)
+        state = self._commander.check_mode_completion(state, estimate, texts)
+
+        ticks = looped = self._elapsed_ticks(state, now_us)
+        vehicle = state.vehicle
+        armed = vehicle.armed
+        flown = vehicle.flies and vehicle.unloaded is None and bool(state.cascade.has_plan)
+        if flown and now_us - state.t_us > self._most_us:
+            state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
+        if state.cascade is not began:  # loops or plan begin anew
+            r = state.cascade.copy()
+            r.known = estimate
+        plan = state.plan
+        if flown:
+            plan = self._follow(state, r, estimate, inputs.plan, looped)
+        else:
+            r.input = REST_INPUT
+        sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
+        outputs = TickOutputs(sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts))
+        return Controlled(
+            outputs, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
+        )
+
+    def _estimate(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> tuple[FlightState, Tick, StateEstimate | None, FusionMemory | None, CaughtUp | None]:
+        """The record of this tick, with its estimate or the last one, and the estimator's part."""
+        if not inputs.samples and state.fusion is None:
+            state, r = self._exact.estimate(state, inputs, texts)
+            return state, r, r.known, None, None
+        state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
+        r = state.cascade.copy()
+        if estimate is not None:
+            r.known = estimate
+        return state, r, estimate, fusion, caught
+
+    def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
+        """The rest of the tick, for which the actuators need not wait.
+
+        What it finds out is acted upon in the next tick.
+        """
+        c = controlled
+        outputs, inputs, state, r, estimate, fusion, flown = c[:7]
+        plan, texts, safety, reset = c.plan, outputs.texts, state.safety, None
+        flags = r.flags if flown else 0
+        if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
+            safety = self._watch.off_plan(
+                safety,
+                estimate,
+                r.nominal if flown else None,
+                state.accuracy.reach,
+                max(self._wind_room(r)),
+            )
+        if fusion is not None:
+            caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
+            fusion, found, reset, said = caught
+            texts = (*texts, *said) if said else texts
+            if reset is not None:
+                r = moved_along(r, reset)
+            if found is not None and found is not estimate:
+                r.known = found
+            estimate = found
+        if c.calm and texts is outputs.texts and reset is None:
+            damage = state.damage if fusion is None else self._see_damage(state, r, c)
+            state = self.calm.after(state, r, fusion)
+            if damage is not state.damage:
+                state = replace(state, damage=damage)
+            return state, replace(outputs, shown=Shown(state, inputs.sensors))
+        if c.estimate is None or estimate is None:
+            # Ticks are counted from the first estimate on; what looks now and then goes by time.
+            t_us = inputs.sensors.t_us
+            unknown = nothing_known(outputs, state, t_us, texts)
+            return replace(state, t_us=t_us, fusion=fusion), unknown
+        now_us, per_plan = inputs.sensors.t_us, self._ticks_per_plan
+        index = state.index + c.ticks
+        request = None
+        if index // per_plan != state.index // per_plan:
+            nominal = r.nominal if flown else None
+            state = replace(state, plan=plan, safety=safety, fusion=fusion)
+            state, request, news = self._each_period(state, estimate, nominal, now_us)
+            plan, safety, texts = state.plan, state.safety, (*texts, *news)
+        state = replace(
+            state,
+            index=index,
+            t_us=now_us,
+            output_replaced=c.replaced,
+            cascade=r,
+            plan=plan,
+            safety=self._filtered(state, safety, estimate, r.margin, flags),
+            fusion=fusion,
+            damage=self._see_damage(state, r, c),
+        )
+        shown = Shown(state, inputs.sensors)
+        return state, replace(outputs, shown=shown, plan_request=request, texts=texts)
+
+    def _each_period(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState | None,
+        now_us: int,
+    ) -> tuple[FlightState, PlanRequest | None, list[StatusText]]:
+        """What is looked at once a planning period, and the request for a plan of what is flown.
+
+        The record of the ``state`` is that of the tick before.
+        """
+        mission, fusion, request = state.mission, state.fusion, None
+        held = self._safe_sets.hold_silent_zones(mission, now_us)
+        if held is not mission:
+            state = replace(state, mission=held)
+        covariance = self._sensed.covariance(fusion)
+        pose = self._pose_error(state, estimate, fusion, covariance)
+        state = self._keep_clear(state, estimate, pose)
+        texts: list[StatusText] = []
+        if nominal is not None:
+            state, request = self._request_plan(state, estimate, nominal, now_us, texts)
+        state = self._report_slowly(state, estimate, now_us)
+        state = self._sensed.reported(state, fusion, estimate, covariance)
+        state = self._see_accuracy(state, estimate, covariance, pose, texts)
+        announced, safety = len(state.mission.announced.zones), state.safety
+        flies = nominal is not None
+        safety = self._watch.breach(safety, estimate, state.constraints, announced, flies=flies)
+        return replace(state, safety=safety), request, texts
+
+    def _blind(
+        self, state: FlightState, r: Tick, inputs: TickInputs, texts: list[StatusText]
+    ) -> Controlled:
+        """Before the first estimate: actuators off, and no command that needs one."""
+        state, acks = self._commander.handle_commands(
+            state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
+        )
+        texts += told(state, self._tick_us)
+        outputs = TickOutputs(STOPPED, Mode.DISARMED, False, acks=tuple(acks), texts=tuple(texts))
+        return Controlled(outputs, inputs, state, r)
+
+    def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """What the failsafe table looks at and what is not kept up to date elsewhere."""
+        safety, watch = state.safety, self._watch
+        tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
+        if tilted or not estimate.R_WB[8] > watch.upright:
+            safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
+        if self._jumped(state, estimate.t_us):
+            safety = watch.jumped(safety, estimate.t_us, estimate.t_us - state.t_us)
+        return state if safety is state.safety else replace(state, safety=safety)
+
+    def _follow(
+        self,
+        state: FlightState,
+        r: Tick,
+        estimate: StateEstimate,
+        answer: Plan | PlanFailure | None,
+        ticks: int,
+    ) -> PlanMemory:
+        """Write the plan's state now; in Descend it is none of a plan, though plans are asked for.
+
+        Reads plan; writes plan, u.
+        """
+        plan = self._plans.follow(state.plan, r, answer, estimate.t_us, ticks)
+        before = state.nominal if state.vehicle.mode is _DESCEND else None
+        if before is not None:
+            goal = state.setpoint.goal
+            place = None if goal is None else goal.motion.p
+            r.nominal, r.input = self._descent.step(before, estimate, state.aiding, ticks, place)
+        if state.damage.joint:
+            freeze_arm(r, estimate, state.damage.report.joints)
+        return plan
+
+    def _filtered(
+        self,
+        state: FlightState,
+        safety: SafetyMemory,
+        estimate: StateEstimate,
+        margin: float,
+        flags: int,
+    ) -> SafetyMemory:
+        """The memory with what the safety filter has done, and the negative ``margin`` [m] seen."""
+        if flags & FILTER_ACTED or safety.filter_us >= 0:
+            pushed = bool(flags & FILTER_ACTED)
+            safety = self._watch.filtered(safety, estimate.t_us, pushed=pushed)
+        if not flags & BREACH:
+            return safety
+        report = self._safe_sets.margins(state.kept, estimate, state.reference)
+        announced = len(state.mission.announced.zones)
+        return self._watch.breach(safety, estimate, report, announced, flies=True, seen=margin)
+
+    def _receive(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> FlightState:
+        """Store received targets, safe set, mission, setpoints and ground station heartbeat."""
+        now_us = inputs.sensors.t_us
+        if inputs.targets or inputs.announced or inputs.mission is not None or inputs.refused:
+            state = self._believe(state, inputs, texts)
+        ranges = [one for one in inputs.samples if type(one) is RangeSample]
+        if ranges:
+            state = replace(state, vehicle=with_range(state.vehicle, ranges[-1]))
+        if inputs.battery is not None:
+            levels = self._battery_levels
+            battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
+            state = replace(state, battery=battery)
+        if inputs.host is not None:
+            state = replace(state, host=inputs.host)
+        if inputs.sensor_clock_jump_us:
+            safety = self._watch.jumped(state.safety, now_us, inputs.sensor_clock_jump_us)
+            state = replace(state, safety=safety)
+        if inputs.ground_station_heard:
+            state = replace(state, vehicle=replace(state.vehicle, gcs_heard_us=now_us))
+        unheard = inputs.motion is None and inputs.attitude is None and inputs.joints is None
+        if not unheard or inputs.refused_setpoints:
+            offboard = accept_setpoints(state, inputs, self.config, texts)
+            state = replace(state, offboard=offboard)
+        return state
+
+    def _believe(
+        self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
+    ) -> FlightState:
+        """Store targets, safe set and mission, as far as they are within bounds."""
+        now_us, mission = inputs.sensors.t_us, state.mission
+        update, against = bounded_update(inputs.mission)
+        problems = [(target_problem(target, now_us), target) for target in inputs.targets]
+        believed = tuple([target for problem, target in problems if problem is None])
+        against += [f"target refused: {problem}" for problem, _ in problems if problem is not None]
+        against += inputs.refused
+        texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)]
+        stream = merge(mission.stream, believed, now_us)
+        refused_count = mission.refused_count + len(against)
+        vehicle, target = state.vehicle, state.reference
+        if target is None and vehicle.flies and state.estimate is not None:
+            mode = self._commander.mode(state)
+            target = self._horizon.target(mode, state, state.estimate, now_us)
+        mission = self._safe_sets.update(
+            replace(mission, stream=stream, refused_count=refused_count),
+            inputs if update is inputs.mission else replace(inputs, mission=update),
+            state.estimate,
+            texts,
+            flies=vehicle.flies,
+            armed=vehicle.armed,
+            target=target,
+        )
+        if mission.refused_count != state.mission.refused_count:
+            counters = replace(state.safety.counters, refusals=mission.refused_count)
+            state = replace(state, safety=replace(state.safety, counters=counters))
+        state = replace(state, mission=mission)
+        if mission.safe_set is not state.kept.source:
+            state = replace(state, kept=state.kept.of(mission.safe_set))
+            if state.estimate is not None:
+                state = self._with_room(state, state.estimate)
+        if update is not None:
+            state = with_update(state, update, self.config, now_us)
+        return state
+
+    def _jumped(self, state: FlightState, now_us: int) -> bool:
+        """Whether time did: on by more than is made up for, or not on at all."""
+        return state.index >= 0 and not 0 < now_us - state.t_us <= self._most_us
+
+    def _resumed(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """The state after a time without ticks: loops and plan go on from the measurement."""
+        motion = self._cascade.motion(state.cascade, estimate)
+        state = plan_resumed(self.config, state, estimate, motion)
+        return replace(state, cascade=loops_resumed(self.config, state.cascade, estimate))
+
+    def _until_plan(self, state: FlightState) -> int:
+        """Ticks from the last one to the next that asks for a plan."""
+        return self._ticks_per_plan - state.index % self._ticks_per_plan
+
+    def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
+        """Ticks since the last one: more than one where sensor frames were missed."""
+        elapsed = (now_us - state.t_us) // self._tick_us
+        if elapsed == 1 or state.index < 0:
+            return 1
+        return min(max(elapsed, 1), self.config.catch_up_ticks)
+
+    def _request_plan(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        nominal: PredictionState,
+        now_us: int,
+        texts: list[StatusText],
+    ) -> tuple[FlightState, PlanRequest]:
+        """Request a plan that takes effect after a fixed delay, from the vehicle to ``replan``.
+
+        Appends what is to be said of its reference.
+        """
+        config = self.config
+        apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
+        mode, limited = self._commander.mode(state), state.limited
+        state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
+        if state.limited and state.limited != limited:
+            texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
+        plan, safety = state.plan, state.safety
+        measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
+        start, from_nominal = self._plans.start(plan, nominal, measured, now_us, safety.replan)
+        request = PlanRequest(
+            plan_id=plan.next_id,
+            t_apply_us=apply_us,
+            start=start,
+            targets=targets,
+            safe_set=state.kept.safe_set,
+            from_nominal=from_nominal,
+            joint_targets=joints,
+            recent_disturbance=state.cascade.observed.recent,
+        )
+        if safety.replan:
+            safety = replace(safety, replan=False)
+        return replace(state, plan=requested(plan, apply_us), safety=safety), request
+
+    def _see_accuracy(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        covariance: Array | None,
+        pose: Array | None,
+        texts: list[StatusText],
+    ) -> FlightState:
+        """Say what the sensors' errors add to the tube, once that is known."""
+        if covariance is None or pose is None or state.accuracy.told:
+            return state
+        if state.aiding.unaided_us >= self.config.limits.aiding_loss_us:
+            # How sure it is without a position is no property of the sensors: look anew later.
+            begun = state.accuracy == AccuracyMemory()
+            return state if begun else replace(state, accuracy=AccuracyMemory())
+        safe_set, source = state.kept.source, state.aiding.pose.value
+        position = self._clearance.deviation(estimate, pose) if safe_set.zones else 0.0
+        sure = self._accuracy.see(
+            state.accuracy, state.t_us, safe_set, source, position, covariance, texts
+        )
+        return replace(state, accuracy=sure)
+
+    def _keep_clear(
+        self, state: FlightState, estimate: StateEstimate, pose: Array | None
+    ) -> FlightState:
+        """The state with clearances that have grown by what the estimate is uncertain about now."""
+        wind, whole = self._wind_room(state.cascade), state.kept.whole
+        kept = self._clearance.keep(whole, state.mission.safe_set, estimate, pose, wind)
+        state = state if kept is state.kept else replace(state, kept=kept)
+        return self._with_room(state, estimate)
+
+    def _with_room(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """The state with zones that take no more than their room, and their speed."""
+        kept, target = state.kept, state.reference
+        if not (state.vehicle.flies and kept.source.zones):
+            return state
+        report = self._safe_sets.margins(kept, estimate, target)
+        kept = self._room.limit(kept, report, estimate, target)
+        return state if kept is state.kept else replace(state, kept=kept)
+
+    def _wind_room(self, memory: Tick) -> Vec2:
+        """What the memory of wind in force can add to the tube [m, NED]."""
+        if self.config.inner != "tracking":
+            return 0.0, 0.0
+        return beyond_covered(self._safe_sets.loop_tube, memory.wind)
+
+    def _pose_error(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        fusion: FusionMemory | None,
+        covariance: Array | None,
+    ) -> Array | None:
+        """Covariance (6, 6) of position [m, NED] and attitude [rad, NED], as clearances grow by it.
+
+        ``covariance`` (17, 17) [SI] is that of the filter, if there is one; without, exact states
+        are uncertain while a part of them is missing. None: certain.
+        """
+        if covariance is not None and fusion is not None:
+            return pose_covariance(covariance, estimate, self._sensed.lasting_error(fusion))
+        if fusion is None and state.aiding is not AIDED:
+            position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
+            return np.diag((position**2,) * 3 + (attitude**2,) * 3)
+        return None
+
+    def _report_slowly(
+        self, state: FlightState, estimate: StateEstimate, now_us: int
+    ) -> FlightState:
+        """Reference, margins, arming checks and battery, once a planning period."""
+        target = self._horizon.target(self._commander.mode(state), state, estimate, now_us)
+        refusal, arming = self._commander.arming_report(state, estimate)
+        return replace(
+            state,
+            constraints=self._safe_sets.margins(state.kept, estimate, target),
+            reference=target if state.vehicle.flies else None,
+            arming_refusal=refusal,
+            arming=arming,
+            battery=self._battery(state),
+        )
+
+    def _battery(self, state: FlightState) -> BatteryState:
+        thrust = state.cascade.commanded.rotor_thrust
+        period = 1e-6 * self.config.mpc_period_us
+        levels = self._battery_levels
+        return drained(self.config.battery, levels, state.battery, thrust, period)
+
+    @property
+    def _battery_levels(self) -> Levels:
+        limits = self.config.limits
+        return limits.battery_low, limits.battery_critical, limits.battery_emergency
+
+    def _actuate(
+        self,
+        state: FlightState,
+        r: Tick,
+        estimate: StateEstimate,
+        ticks: int,
+        *,
+        armed: bool,
+        flown: bool,
+    ) -> tuple[ActuatorCommand, Tick, bool]:
+        """Close the loops of a record, idle or stay still; the safety gate is the last law.
+
+        Also the record for the next tick, and whether the gate replaced the command.
+        """
+        last, airframe = state.cascade, self.config.airframe
+        if flown:
+            tube = self._watch.tube(state)
+            self._cascade.step(r, ticks, self.zones_now(state), state.damage.health, tube)
+            wanted = r.commanded
+            if armed and not r.flags & GATE_NEEDED:
+                return wanted, r, False
+        elif armed:
+            idle = self.config.limits.idle_thrust
+            wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
+            r = at_rest(airframe, estimate, r)
+        else:
+            wanted = STOPPED
+        sent, replaced = gate(airframe, wanted, last.commanded, armed)
+        if replaced:
+            # The NaN is in the loops' new memory as well: discard that.
+            found, r = r, last.copy()
+            r.take_given(found)
+            r.flags, r.margin = found.flags, found.margin
+        r.commanded = sent
+        return sent, r, replaced
+
+    def _see_damage(self, state: FlightState, r: Tick, controlled: Controlled) -> Damage:
+        """What is known of the actuators. Reads estimate, joints; writes watch.
+
+        Without an inertial unit, how the vehicle moves shows nothing, and without encoders nothing
+        of the joints; nor does it after a jump of time: what was commanded has not been done
+        meanwhile.
+        """
+        lost = state.aiding.lost
+        blind = bool(lost) and state.aiding.has_lost(Sensor.IMU)
+        watches = controlled.flown and self._watches and not blind
+        if not watches or self._jumped(state, controlled.inputs.sensors.t_us):
+            pause(r.watch)
+            return state.damage
+        return self._damage.see(
+            state.damage,
+            state.cascade,
+            r,
+            controlled.ticks,
+            angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
+            angles_known=not lost,
+        )
+
+    def zones_now(self, state: FlightState) -> Array:
+        """The zones (zones, k) [SI] for the safety filter.
+
+        Made anew where they or their target changed.
+        None where the vehicle descends because it does not know where it is.
+        """
+        kept, target = state.kept, state.reference
+        blind = state.aiding.unaided_us >= self.config.limits.aiding_loss_us
+        if blind and state.vehicle.mode is Mode.DESCEND:
+            return NO_ZONES
+        known, known_target, zones = self._zones
+        if kept is not known or target is not known_target:
+            same = kept.safe_set is known.safe_set and kept.beyond == known.beyond
+            if not same or kept.safe_set.kind is ConstraintKind.WORKSPACE:
+                zones = moving_zones(kept.safe_set, target, kept.beyond)
+            self._zones = (kept, target, zones)
+        return zones
+
+
+def keep_clear(config: FlightConfig) -> KeepClear:
+    """What the safety filter keeps off zones; it works where the planner has barriers to rely on.
+
+    Controllers that are flown for comparison are to show what they do without it.
+    """
+    enabled = config.safety_filter.enabled and config.controller == "blf" and not config.soft
+    return KeepClear(
+        body_of(config.planner.body, config.airframe),
+        config.planner.tunings,
+        replace(config.safety_filter, enabled=int(enabled)),
+        config.steering.speed,
+    )
+
+
+def _let_down(estimate: StateEstimate) -> Vec2:
+    """Joint torques that let a folded arm hang without swinging through."""
+    (rate1, rate2), (damping1, damping2) = estimate.qd_arm, _ARM_DAMPING
+    return -damping1 * rate1, -damping2 * rate2
+
+
+def freeze_arm(r: Tick, estimate: StateEstimate, kinds: Vec2) -> None:
+    """Plan the failed joints, by their ``kinds`` [1], as they are. Writes plan, u."""
+    for i in range(len(kinds)):
+        if kinds[i] != SOUND:
+            r.plan.q_arm[i], r.plan.qd_arm[i] = estimate.q_arm[i], 0.0
+            r.u.qdd_arm[i] = 0.0

@@ -1,0 +1,454 @@
+"""The commander: commands, failsafes and completed modes move the vehicle between modes.
+
+Every function takes a state and returns one; almost every tick it is the same object.
+"""
+
+from __future__ import annotations
+
+from fsw.autopilot.control.cascade import at_rest, in_hover
+from fsw.autopilot.flight import arming
+from fsw.autopilot.flight.active_failsafes import active, quickly_active, surely_none
+from fsw.autopilot.flight.ailments import ailments
+from fsw.autopilot.flight.arming_health import arming_health
+from fsw.autopilot.flight.command_dedup import answered_before, remember, still_true
+from fsw.autopilot.flight.command_handlers import Decision, decide, decide_without_estimate
+from fsw.autopilot.flight.conditions import NOTHING_DONE, Action
+from fsw.autopilot.flight.failsafe import BLOCKING, SLOW_US
+from fsw.autopilot.flight.failsafe_evidence import FailsafeContext
+from fsw.autopilot.flight.failsafe_response import overridden, respond
+from fsw.autopilot.flight.land_detector import in_the_air, standing_unclear, stands
+from fsw.autopilot.flight.mission_sequencer import refusal as mission_refusal
+from fsw.autopilot.flight.modes import MODES
+from fsw.autopilot.flight.modes.base import CONTINUE, CommandContext, FlightMode, Handover
+from fsw.autopilot.flight.modes.hold import stop
+from fsw.autopilot.flight.modes.mission import left as mission_left
+from fsw.autopilot.flight.modes.mission import with_update
+from fsw.autopilot.flight.modes.offboard import current_problem, is_fresh
+from fsw.autopilot.flight.plan_exchange import without_plan
+from fsw.autopilot.flight.reference_horizon import ReferenceHorizon
+from fsw.autopilot.flight.restart import rests
+from fsw.autopilot.flight.retreat import retreat_place
+from fsw.autopilot.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
+from fsw.autopilot.flight.zone_room import within_room
+from fsw.autopilot.model.body import body_of
+from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.mpc.reference import still_at
+from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.autopilot.parameters.contradictions import contradictions
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import (
+    ArmingReport,
+    Command,
+    CommandAck,
+    CommandResult,
+    Home,
+    MissionUpdate,
+    Mode,
+    MotionSetpoint,
+    Severity,
+    StateEstimate,
+    StatusText,
+    Vec2,
+)
+from fsw.frozen import replace
+
+_DISARMED = Mode.DISARMED  # found in a tenth of the time
+_RESTARTS = "command refused: the flight software restarts; send it again"
+
+
+class Commander:
+    """Moves the vehicle of one configuration between modes."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._tube_radius = base_reach(loop_tube(config), config.surroundings)
+        self._body = body_of(config.planner.body, config.airframe)
+        self._generator = SetpointGenerator(config)
+        self._horizon = ReferenceHorizon(config)
+        self._modes: dict[Mode, FlightMode] = {mode: kind(config) for mode, kind in MODES.items()}
+        self._contradiction = "; ".join(contradictions(config))
+        self._no_mode = FlightMode(config)  # disarmed or terminated
+
+    def mode(self, state: FlightState) -> FlightMode:
+        """The current flight mode; without one, the vehicle stays where it is."""
+        return self._modes.get(state.vehicle.mode, self._no_mode)
+
+    def handle_commands(
+        self,
+        state: FlightState,
+        estimate: StateEstimate,
+        commands: tuple[Command, ...],
+        texts: list[StatusText],
+        *,
+        known: bool = True,
+    ) -> tuple[FlightState, list[CommandAck]]:
+        """Carry out commands in the order they came; a repeated one is acknowledged again only.
+
+        Before the first estimate nothing of it is ``known``, and what needs one is put off.
+        """
+        acks, judge = [], decide if known else decide_without_estimate
+        for command in commands:
+            request, memory = command.request, state.vehicle.answered
+            if state.vehicle.restarts:  # it would be undone
+                texts.append(StatusText(Severity.CRITICAL, _RESTARTS, prompt=True))
+                acks.append(acknowledgement(command, CommandResult.TEMPORARILY_REJECTED))
+                continue
+            before = answered_before(memory, request, estimate.t_us)
+            if before is not None:
+                result = before.result
+            else:
+                decision = judge(command, self.context(state, estimate), self._modes)
+                result = decision.result
+                texts += _reason(decision)
+                state = self._carry_out(state, decision, estimate, texts)
+                now_answered, changes = state.vehicle.answered, decision.changes
+                memory = remember(now_answered, request, result, estimate.t_us, changes)
+                state = replace(state, vehicle=replace(state.vehicle, answered=memory))
+            acks.append(acknowledgement(command, result))
+        return state, acks
+
+    def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
+        """The state that a decision may depend on."""
+        limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
+        setpoint_limits, goal = self._config.steering, state.setpoint.goal
+        asked = goal.joints if goal is not None else None
+        return CommandContext(
+            mode=vehicle.mode,
+            landed=vehicle.landed,
+            estimate_valid=state.invalid_ticks == 0,
+            targets_ahead=bool(stream) and stream[-1].t_us >= estimate.t_us,
+            standing_unclear=standing_unclear(self._config, estimate),
+            inconsistent="; ".join(state.mission.refusals),
+            mission=state.mission.flight.progress,
+            mission_refusal=mission_refusal(state.mission.flight, vehicle.landed),
+            setpoint_fresh=is_fresh(self._config, state, estimate.t_us),
+            setpoint_problem=current_problem(self._config, state, estimate.t_us),
+            position=estimate.p_WB,
+            yaw=estimate.yaw,
+            joints=asked or estimate.q_arm,
+            home=vehicle.home,
+            safe_set=state.mission.safe_set,
+            body=self._body,
+            now_us=estimate.t_us,
+            climb_range=(limits.airborne_height, limits.takeoff_climb_most),
+            airframe=self._config.airframe,
+            health=arming_health(self._config, state, estimate, self._contradiction),
+            blocked=_blocked(vehicle),
+            speed=vehicle.speed or setpoint_limits.cruise_speed,
+            max_speed=setpoint_limits.speed,
+            yaw_rate=setpoint_limits.yaw_rate,
+            acceleration=setpoint_limits.acceleration,
+            highest=setpoint_limits.highest,
+            failures_allowed=limits.failure_injection == 1,
+            rests=rests(state, estimate, limits.aiding_loss_us),
+        )
+
+    def arming_report(
+        self, state: FlightState, estimate: StateEstimate
+    ) -> tuple[str, ArmingReport]:
+        """Why the vehicle cannot be armed now, and which checks fail, for telemetry.
+
+        Empty if it could be armed, or is; of one that is armed, the report says what is ill.
+        """
+        if state.vehicle.armed:
+            sentence, report = "", ArmingReport(ill=ailments(state.vehicle.conditions))
+        else:
+            found = arming.failed(self.context(state, estimate))
+            report = ArmingReport(tuple([number for number, _ in found]))
+            sentence = arming.joined(found) if found else ""
+        return sentence, state.arming if report == state.arming else report
+
+    def check_failsafes(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Report each condition once, when it becomes active, and take its action."""
+        slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
+        if not slowly and surely_none(state, estimate, self._config):
+            return state
+        vehicle = state.vehicle
+        if vehicle.mode is Mode.FAULT:
+            return state  # what ended the flight stays on show
+        context = FailsafeContext(state, estimate, self._config, self._contradiction)
+        rows = active(context) if slowly else quickly_active(context)
+        before = vehicle.conditions
+        if not rows and not before:
+            return state
+        now = tuple([row.condition for row in rows])
+        if now == before and not slowly:
+            return state
+        response = respond(context, rows)
+        texts += response.reports
+        if now != before or response.memory != vehicle.failsafe:
+            vehicle = replace(vehicle, conditions=now, failsafe=response.memory)
+            state = replace(state, vehicle=vehicle)
+        if response.action.mode is not None:
+            state = self._fail_safe(state, response.action.mode, estimate, texts)
+        if response.action is Action.RETREAT:
+            state = replace(state, setpoint=self._retreating(state, estimate))
+        return state
+
+    def _fail_safe(
+        self, state: FlightState, mode: Mode, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Switch to the failsafe's mode; the pilot's next mode command ends it."""
+        if mode is Mode.FAULT:
+            return self._switch(state, mode, "terminate", estimate, texts)
+        before = state.vehicle.failsafe_from or state.vehicle.mode
+        state = self._switch(state, mode, "failsafe", estimate, texts)
+        return replace(state, vehicle=replace(state.vehicle, failsafe_from=before))
+
+    def _retreating(self, state: FlightState, estimate: StateEstimate) -> SetpointMemory:
+        """A setpoint off every zone by what a plan at rest keeps from it, and by the tube again.
+
+        What has pushed the vehicle out may go on to push it.
+        """
+        config = self._config
+        room = stand_off(config.planner.walls) + self._tube_radius
+        safe_set = within_room(state.kept.safe_set, estimate, self._body)
+        place = retreat_place(safe_set, estimate, self._body, config.airframe.link_length, room)
+        return self._towards(state, PositionGoal(MotionSetpoint(False, place)), estimate)
+
+    def check_mode_completion(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Update the mode; when it is complete, switch to the next one."""
+        vehicle = state.vehicle
+        if vehicle.home is None:
+            home = Home(estimate.p_WB, estimate.yaw)
+            return replace(state, vehicle=replace(vehicle, home=home))
+        if vehicle.mode is _DISARMED:
+            return self._check_intended_mode(state, estimate, texts)
+        state, result = self.mode(state).update(state, estimate)
+        if result is CONTINUE:
+            return state
+        texts += result.texts
+        if result.lift_off:
+            return replace(_lift_off(state, estimate), setpoint=SetpointMemory())
+        if result.next_mode is None:
+            return state
+        return self._switch(
+            state, result.next_mode, result.cause, estimate, texts, completed=result.completed
+        )
+
+    def _check_intended_mode(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Drop a mode chosen before arming when it times out or its conditions are lost."""
+        intended = self._modes[state.vehicle.intended_mode]
+        forgotten = intended.waits(state, estimate.t_us)
+        if forgotten is None:
+            return state
+        texts.append(StatusText(Severity.WARNING, forgotten))
+        vehicle = replace(state.vehicle, intended_mode=Mode.HOLD, answered=())
+        return replace(state, vehicle=vehicle)
+
+    def _carry_out(
+        self,
+        state: FlightState,
+        decision: Decision,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+    ) -> FlightState:
+        if decision.result != CommandResult.ACCEPTED:
+            return state
+        answered = still_true(state.vehicle.answered, decision.changes)
+        if answered is not state.vehicle.answered:
+            # Another sender's command is not done any more: it acts again if it is sent again.
+            state = replace(state, vehicle=replace(state.vehicle, answered=answered))
+        state = self._remember(state, decision, estimate)
+        if decision.arm:
+            state = self._arm(state, estimate, texts)
+        elif decision.mode is not None:
+            state = self._switch(state, decision.mode, "command", estimate, texts)
+        if decision.stop and state.setpoint.reference is not None:
+            state = replace(state, setpoint=stop(self._generator, state.setpoint, estimate))
+        if decision.goal is not None:
+            state = replace(state, setpoint=self._towards(state, decision.goal, estimate))
+        if decision.joints is not None:
+            state = replace(state, setpoint=self._with_joints(state, decision.joints, estimate))
+        return self._taken_over(state, decision, texts)
+
+    def _taken_over(
+        self, state: FlightState, decision: Decision, texts: list[StatusText]
+    ) -> FlightState:
+        """The state after a command of the pilot: it ends a failsafe whose mode it changes."""
+        vehicle, action = state.vehicle, state.vehicle.failsafe.action
+        commands = decision.mode is not None or decision.stop or decision.goal is not None
+        if action is Action.NONE or not commands or not vehicle.armed:
+            return state
+        cause = vehicle.failsafe.cause
+        if cause in vehicle.conditions:
+            assert cause is not None
+            text = f"failsafe overridden: {cause.value}"
+            texts.append(StatusText(Severity.WARNING, text))
+        memory = overridden(vehicle.failsafe, vehicle.conditions)
+        return replace(state, vehicle=replace(vehicle, failsafe=memory, failsafe_from=None))
+
+    def _remember(
+        self, state: FlightState, decision: Decision, estimate: StateEstimate
+    ) -> FlightState:
+        """Apply the effects of a decision."""
+        vehicle, limits = state.vehicle, self._config.limits
+        if decision.home is not None:
+            vehicle = replace(vehicle, home=decision.home)
+        if Mode.TAKEOFF in (decision.mode, decision.intended_mode):
+            climb = limits.takeoff_climb if decision.climb is None else decision.climb
+            vehicle = replace(vehicle, climb=climb)
+        if decision.intended_mode is not None:
+            intended = decision.intended_mode
+            vehicle = replace(vehicle, intended_mode=intended, intended_us=estimate.t_us)
+        if decision.look_at is not None:
+            vehicle = replace(vehicle, look_at=decision.look_at.place)
+        if decision.speed is not None:
+            vehicle = replace(vehicle, speed=decision.speed.speed)
+            flight = replace(state.mission.flight, speed=decision.speed.speed)
+            state = replace(state, mission=replace(state.mission, flight=flight))
+        if decision.restart:
+            vehicle = replace(vehicle, restarts=True)
+        if vehicle is not state.vehicle:
+            state = replace(state, vehicle=vehicle)
+        if decision.look_at is not None:
+            state = self._turnable(state, estimate)
+        if decision.mission_step is None:
+            return state
+        step = MissionUpdate(current=decision.mission_step)
+        return with_update(state, step, self._config, estimate.t_us)
+
+    def _turnable(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """Give a stationary hold a setpoint, so that it can turn."""
+        holds = state.vehicle.mode is Mode.HOLD and state.vehicle.flies
+        if not holds or state.setpoint.reference is not None:
+            return state
+        return replace(state, setpoint=self._staying(estimate))
+
+    def _staying(self, estimate: StateEstimate, q_arm: Vec2 | None = None) -> SetpointMemory:
+        """A setpoint of the body that stays where it is."""
+        reference = self._generator.begin(estimate)
+        return SetpointMemory(reference, PositionGoal(MotionSetpoint(False, reference.p), q_arm))
+
+    def _towards(
+        self, state: FlightState, goal: PositionGoal, estimate: StateEstimate
+    ) -> SetpointMemory:
+        """A setpoint of the body towards a goal; the arm stays as it was asked for."""
+        reference, last = state.setpoint.reference, state.setpoint.goal
+        if reference is None or reference.of_end_effector:
+            reference = self._generator.begin(estimate)
+        goal = replace(goal, joints=last.joints if last is not None else None)
+        if goal.orbit is not None:
+            goal = replace(goal, motion=replace(goal.motion, yaw=reference.yaw))
+        return SetpointMemory(reference, goal)
+
+    def _with_joints(
+        self, state: FlightState, q_arm: Vec2, estimate: StateEstimate
+    ) -> SetpointMemory:
+        """Hold the body where it is or on its way, and the arm as asked, from now on."""
+        setpoint, goal = state.setpoint, state.setpoint.goal
+        if setpoint.reference is None or goal is None or setpoint.reference.of_end_effector:
+            return self._staying(estimate, q_arm)
+        return replace(setpoint, goal=replace(goal, joints=q_arm))
+
+    def _arm(
+        self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
+    ) -> FlightState:
+        """Close the loops, in Hold; then go on to the mode that was chosen before arming."""
+        airframe, landed = self._config.airframe, stands(self._config, estimate)
+        intended = state.vehicle.intended_mode
+        state = self._switch(state, Mode.HOLD, "arm", estimate, texts)
+        vehicle = replace(
+            state.vehicle,
+            home=Home(estimate.p_WB, estimate.yaw),
+            landed=landed,
+            look_at=None,
+            speed=None,
+            intended_mode=Mode.HOLD,
+            conditions=(),  # what is so is told again, and acted upon
+            failsafe=NOTHING_DONE,
+        )
+        state, begin = without_plan(state, estimate), at_rest if landed else in_hover
+        state = replace(
+            state,
+            vehicle=vehicle,
+            setpoint=SetpointMemory(),
+            cascade=begin(airframe, estimate, state.cascade),
+        )
+        if intended is Mode.HOLD:
+            return state
+        refusal = self._modes[intended].refusal(self.context(state, estimate))
+        if refusal is None:
+            return self._switch(state, intended, "chosen before arming", estimate, texts)
+        texts.append(StatusText(Severity.CRITICAL, refusal))
+        return state
+
+    def _switch(
+        self,
+        state: FlightState,
+        mode: Mode,
+        cause: str,
+        estimate: StateEstimate,
+        texts: list[StatusText],
+        *,
+        completed: bool = False,
+    ) -> FlightState:
+        """Begin another mode; a failsafe's mark stays if the one that is left was ``completed``."""
+        before, vehicle = state.vehicle.mode, state.vehicle
+        texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
+        follower = self._modes.get(mode, self._no_mode)
+        p_WE = point_in_flight(estimate, self._config.airframe.link_length)[0]
+        here = still_at(p_WE, estimate.t_us, estimate.yaw)
+        last = here
+        if vehicle.flies:
+            last = self._horizon.target(self.mode(state), state, estimate, estimate.t_us)
+        handover = Handover(last, completed)
+        origin = last if completed or follower.continues_reference else here
+        state = follower.activate(mission_left(state, mode), estimate, handover)
+        if follower.lifts_off and vehicle.landed:
+            state = _lift_off(state, estimate)
+        state = in_the_air(state, estimate)
+        vehicle = replace(
+            state.vehicle,
+            mode=mode,
+            # What follows from a mode that was completed is what its command led to.
+            answered=state.vehicle.answered if completed else (),
+            mode_origin=origin.p_WE,
+            mode_yaw=origin.yaw,
+            mode_begin_us=estimate.t_us,
+            is_up=False,
+            failsafe_from=vehicle.failsafe_from if completed else None,
+        )
+        if not vehicle.armed:
+            memory = overridden(vehicle.failsafe, ())
+            vehicle = replace(vehicle, failsafe_from=None, failsafe=memory)
+            # On the ground another source may own the safe set from now on.
+            state = replace(state, mission=replace(state.mission, owner_heard_us=-1))
+        return replace(state, vehicle=vehicle)
+
+
+def acknowledgement(command: Command, result: int) -> CommandAck:
+    """The answer to its sender."""
+    request = command.request
+    return CommandAck(request.command, result, request.source_system, request.source_component)
+
+
+def _blocked(vehicle: VehicleMemory) -> str:
+    """Why nothing but Descend can be flown now; empty: other modes can be."""
+    if not vehicle.flies or vehicle.mode is not Mode.DESCEND:
+        return ""
+    reasons = [c.value for c in vehicle.conditions if c in BLOCKING]
+    return f"{reasons[0]}; the vehicle descends" if reasons else ""
+
+
+def _lift_off(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """Fly from now on, with the plan's state where the vehicle is."""
+    state = in_the_air(state, estimate)
+    vehicle = replace(state.vehicle, landed=False)
+    return without_plan(replace(state, vehicle=vehicle), estimate)
+
+
+def _reason(decision: Decision) -> tuple[StatusText, ...]:
+    """A decision's reason as a text for the operator."""
+    if not decision.reason:
+        return ()
+    harmless = decision.result == CommandResult.ACCEPTED and not decision.alarming
+    severity = Severity.INFO if harmless else Severity.CRITICAL
+    return (StatusText(severity, decision.reason, prompt=True),)

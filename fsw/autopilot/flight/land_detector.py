@@ -1,0 +1,156 @@
+"""Whether the vehicle stands on the ground: before arming by height and speed, in flight by thrust.
+
+In a landing the stages are those of PX4's detector: ground contact, maybe landed, landed. An
+accelerometer that is wrong makes height and velocity of the estimate wrong as well, so these alone
+must not stop the rotors. What cannot be feigned is that nothing falls: on contact, when rotors
+carry less than the weight, the loops open and rotors idle. In the air the vehicle then falls, and
+its velocity shows it within 0.1 s: even an accelerometer that is wrong by 3 m/s^2 shows 6.8 of
+free fall's 9.8, and on the ground no more than 3. Then the loops close again.
+
+Where rotors' torques stand in for the gyro the ground must not carry any of the weight:
+what the legs feel would be taken for a tilt. Then rotors stop as soon as the legs are close above
+the ground, and the vehicle falls less far than its legs stand.
+
+Source: docs/concepts/failsafes.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.autopilot.flight.plan_exchange import without_plan
+from fsw.autopilot.flight.state import FlightState, VehicleMemory
+from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import StateEstimate, Vec2
+from fsw.frozen import replace
+
+_CONTACT: Final = 0.7  # of the weight as configured; what flies is at most so much lighter
+_SINKS: Final = 0.15  # m/s; slower than a landing, faster than the rebound of the legs
+_FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free fall, at worst
+_SIGMAS: Final = 3.0  # by which a height may be wrong
+_CLOSE: Final = 0.1  # m of the legs above the ground; from there it falls at 1.4 m/s
+_RANGE_AGE: Final = 0.3  # s, in which a distance is one of now
+_CONTACT_US: Final = 100_000  # of contact before loops open
+_DOUBTED_US: Final = 1_000_000  # the same where height or velocity say that there is no ground
+_SURE_US: Final = 200_000  # with open loops, in which a fall is seen
+
+
+def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
+    """Height of the vehicle above its standing height at the origin [m]."""
+    return -estimate.p_WB[2] - config.airframe.leg_length
+
+
+def with_range(vehicle: VehicleMemory, sample: RangeSample) -> VehicleMemory:
+    """The vehicle after a ``sample`` of the rangefinder; one that is too short does not count."""
+    last, used = vehicle.range_newest, sample
+    if last is not None and 0.0 <= sample.time - last.time < _RANGE_AGE:
+        used = replace(sample, distance=max(last.distance, sample.distance))
+    return replace(vehicle, range=used, range_newest=sample)
+
+
+def stands(config: FlightConfig, estimate: StateEstimate) -> bool:
+    """Near standing height and hardly moving."""
+    vx, vy, vz = estimate.v_WB
+    slow = vx * vx + vy * vy + vz * vz < config.limits.landed_speed**2
+    return height_above_ground(config, estimate) < config.limits.landed_height and slow
+
+
+def standing_unclear(config: FlightConfig, estimate: StateEstimate) -> bool:
+    """Neither at rest on the ground nor clearly in the air."""
+    low = height_above_ground(config, estimate) < config.limits.airborne_height
+    return low and not stands(config, estimate)
+
+
+def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether the vehicle may be as low as where it stands.
+
+    By the rangefinder where there is one, else by the estimate, as far as that knows its height.
+    """
+    limits, aiding = config.limits, state.aiding
+    measured = _measured_now(config, state, estimate)
+    if measured is not None:
+        height, sigma = measured
+    elif aiding.unaided_us >= limits.aiding_loss_us:
+        return True
+    else:
+        height, sigma = height_above_ground(config, estimate), aiding.height_sigma
+    return height - _SIGMAS * sigma < limits.landed_height
+
+
+def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
+    """Whether legs are less than 0.1 m above the ground: nothing that is known says otherwise."""
+    height, sigma = height_above_ground(config, estimate), state.aiding.height_sigma
+    measured = _measured_now(config, state, estimate)
+    if measured is None:
+        return height < _CLOSE and _SIGMAS * sigma < _CLOSE
+    return measured[0] < _CLOSE and height - _SIGMAS * sigma < _CLOSE
+
+
+def _measured_now(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> Vec2 | None:
+    now, legs = 1e-6 * estimate.t_us, config.airframe.leg_length
+    return _measured_height(state.vehicle.range, now, estimate.R_WB[8], legs, _RANGE_AGE)
+
+
+def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool:
+    """Whether the vehicle flies so high at ``now`` [s] that its ``legs`` [m] cannot touch anything.
+
+    By the rangefinder's reading, if that is not ``oldest`` [s], because the estimate may be what is
+    wrong; else by that, as far as it knows its height.
+    """
+    r, vehicle = state.cascade, state.vehicle
+    if not (r.has_estimate and vehicle.flies):
+        return False
+    measured = _measured_height(vehicle.range, now, r.upright, legs, oldest)
+    if measured is not None:
+        return measured[0] > _CLOSE
+    return -r.down - legs - _SIGMAS * state.aiding.height_sigma > _CLOSE
+
+
+def _measured_height(
+    seen: RangeSample | None, now: float, upright: float, legs: float, oldest: float
+) -> Vec2 | None:
+    """Height of the ``legs`` [m, long] above the ground [m], and its deviation [m].
+
+    By what the rangefinder has ``seen``; None if that is ``oldest`` [s] or more at ``now`` [s].
+    The cosine of the tilt is ``upright`` [1].
+    """
+    if seen is None or not 0.0 <= now - seen.time < oldest:
+        return None
+    return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
+
+
+def feel_ground(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate
+) -> tuple[FlightState, bool]:
+    """The land detector's memory a tick on, and whether the vehicle has landed.
+
+    To be asked where a descent is commanded.
+    """
+    vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
+    if state.aiding.gyro_lost and is_close(config, state, estimate):
+        return state, True
+    if vehicle.unloaded is None:
+        if not sum(state.cascade.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY:
+            return in_the_air(state, estimate), False
+        blind = state.aiding.unaided_us >= config.limits.aiding_loss_us
+        expected = may_be_low(config, state, estimate) and (blind or sinking < _SINKS)
+        if now_us - vehicle.moved_us >= (_CONTACT_US if expected else _DOUBTED_US):
+            state = replace(state, vehicle=replace(vehicle, unloaded=(now_us, sinking)))
+        return state, False
+    since_us, before = vehicle.unloaded
+    if not sinking - before < _SINKS + _FALLS * 1e-6 * (now_us - since_us):
+        return in_the_air(state, estimate), False
+    sure_us = max(config.limits.landed_time_us - _CONTACT_US, _SURE_US)
+    return state, now_us - since_us >= sure_us
+
+
+def in_the_air(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """The state without contact: loops that were open for it are closed again."""
+    vehicle = state.vehicle
+    if vehicle.unloaded is not None:
+        state = without_plan(state, estimate)
+    vehicle = replace(vehicle, moved_us=estimate.t_us, unloaded=None)
+    return replace(state, vehicle=vehicle)

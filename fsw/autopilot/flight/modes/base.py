@@ -1,0 +1,190 @@
+"""The interface of a flight mode.
+
+A flight mode is one file in this folder: a subclass of ``FlightMode`` and a name in
+``fsw.autopilot.signals.Mode``. Disarmed and terminated vehicles are in no flight mode.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from fsw.autopilot.flight.arming_health import ArmingHealth
+from fsw.autopilot.flight.land_detector import feel_ground
+from fsw.autopilot.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.state import FlightState, SetpointMemory
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.body import Body
+from fsw.autopilot.mpc.reference import still_at
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import (
+    EndEffectorTarget,
+    Home,
+    MissionProgress,
+    Mode,
+    SafeSet,
+    StateEstimate,
+    StatusText,
+    Vec2,
+    Vec3,
+)
+from fsw.frozen import replace
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Mode:
+    """A mode in PX4's numbers, so that ground stations name it and offer their buttons."""
+
+    main: int  # PX4_CUSTOM_MAIN_MODE
+    sub: int = 0  # PX4_CUSTOM_SUB_MODE_*
+    standard: int = 0  # MAV_STANDARD_MODE as announced; 0: none
+    also_standard: int = 0  # MAV_STANDARD_MODE that is understood though not announced
+    selectable: bool = True  # offered to the operator; else entered by a command of its own
+    offered: bool = True  # announced at all; else no command enters it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandContext:
+    """What commands, arming checks and the needs of a mode are decided on."""
+
+    mode: Mode
+    landed: bool
+    estimate_valid: bool
+    targets_ahead: bool  # the stream holds a point at or after now
+    standing_unclear: bool  # too high to stand, too low to be surely in the air
+    inconsistent: str  # why the configuration cannot keep the safe set
+    mission: MissionProgress
+    mission_refusal: str | None  # None: it can be flown
+    setpoint_fresh: bool  # an offboard setpoint came within the last 0.5 s
+    setpoint_problem: str  # why those of the last 0.5 s are refused; empty: none was
+    position: Vec3  # m, of the body
+    yaw: float  # rad
+    joints: Vec2  # rad, asked for last or as they are
+    home: Home | None
+    safe_set: SafeSet
+    body: Body
+    now_us: int
+    climb_range: Vec2  # m, of a takeoff
+    airframe: Airframe
+    health: ArmingHealth
+    blocked: str  # why nothing but Descend can be flown now; empty: other modes can be
+    speed: float  # m/s, on the way to places
+    max_speed: float  # m/s, that can be asked for
+    yaw_rate: float  # rad/s, at most
+    acceleration: float  # m/s^2, of a generated setpoint
+    failures_allowed: bool = False  # to be injected
+    rests: bool = True  # it lies or stands still
+    highest: float = math.inf  # m above the origin, of the base
+
+
+@dataclass(frozen=True, slots=True)
+class ModeResult:
+    """Result of a mode's tick."""
+
+    next_mode: Mode | None = None  # None: the mode goes on
+    cause: str = ""  # of the change, for the operator
+    texts: tuple[StatusText, ...] = ()
+    completed: bool = True  # the mode is done; False: it cannot go on
+    lift_off: bool = False  # a vehicle that stands is to fly, in the same mode
+
+
+CONTINUE = ModeResult()
+
+
+@dataclass(frozen=True, slots=True)
+class Handover:
+    """How one mode takes over from another."""
+
+    reference: EndEffectorTarget  # of the mode that is left, now
+    completed: bool  # that mode was done; it was neither commanded nor a failsafe
+
+
+class FlightMode:
+    """One flight mode of one configuration; holds nothing that changes in flight.
+
+    ``refusal`` is what it needs, ``activate`` how it begins, ``update`` what it does each tick and
+    which mode follows when it is done, ``reference`` where the end-effector should be.
+    """
+
+    mode: ClassVar[Mode]
+    px4: ClassVar[Px4Mode]
+    enter_from: ClassVar[frozenset[Mode] | None] = None  # None: from every interruptible mode
+    interruptible: ClassVar[bool] = True  # by any other mode
+    interrupts_landing: ClassVar[bool] = False
+    before_arming: ClassVar[bool] = False  # can be chosen while disarmed, and is flown on arming
+    lifts_off: ClassVar[bool] = False  # closes the loops of a vehicle that stands
+    continues_reference: ClassVar[bool] = False  # begins where the last reference was
+    manual: ClassVar[bool] = False  # flown by an operator, whose loss is acted upon
+    external_reference: ClassVar[bool] = False  # targets from outside pass the governor
+
+    def __init__(self, config: FlightConfig) -> None:
+        self.config = config
+        self.generator = SetpointGenerator(config)
+
+    def can_follow(self, current: FlightMode) -> bool:
+        """Whether this mode can take over from another."""
+        if self.enter_from is not None:
+            return current.mode in self.enter_from
+        return current.interruptible or self.interrupts_landing
+
+    def refusal(self, context: CommandContext) -> str | None:
+        """Why the mode cannot be entered now: a condition that it needs is missing."""
+        return None
+
+    def denial(self, context: CommandContext) -> str | None:
+        """Why this configuration never allows the mode."""
+        return None
+
+    def activate(
+        self, state: FlightState, estimate: StateEstimate, handover: Handover
+    ) -> FlightState:
+        """Begin, in the state of the mode that is left: that is still ``state.vehicle.mode``."""
+        return replace(state, setpoint=SetpointMemory())
+
+    def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
+        """What the mode does in each tick, and the mode that follows when it is done."""
+        return state, CONTINUE
+
+    def waits(self, state: FlightState, now_us: int) -> str | None:
+        """Why the mode chosen before arming is dropped now; None if it stays chosen."""
+        return None
+
+    def aim(self, state: FlightState, estimate: StateEstimate) -> FlightState:
+        """Bring the setpoint's goal up to date; called once a planning period."""
+        return state
+
+    def guided(self, goal: PositionGoal, state: FlightState) -> PositionGoal:
+        """The goal with the speed and the heading that commands asked for."""
+        vehicle = state.vehicle
+        if vehicle.look_at is None and (vehicle.speed is None or goal.speed is not None):
+            return goal
+        return replace(goal, speed=goal.speed or vehicle.speed, look_at=vehicle.look_at)
+
+    def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        """Where the end-effector should be at an instant, where no setpoint is generated."""
+        vehicle = state.vehicle
+        return still_at(vehicle.mode_origin, t_us, vehicle.mode_yaw)
+
+    def target(self, state: FlightState, t_us: int) -> EndEffectorTarget:
+        """Where the end-effector should be at an instant."""
+        reference = state.setpoint.reference
+        if reference is None:
+            return self.reference(state, t_us)
+        return self.generator.target(reference, t_us)
+
+
+def moved(state: FlightState, estimate: StateEstimate) -> FlightState:
+    """The state of a vehicle that moves: the land detector begins anew."""
+    return replace(state, vehicle=replace(state.vehicle, moved_us=estimate.t_us))
+
+
+def touch_down(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate
+) -> tuple[FlightState, ModeResult]:
+    """The end of every landing: once the ground carries the vehicle, it disarms."""
+    state, landed = feel_ground(config, state, estimate)
+    if not landed:
+        return state, CONTINUE
+    state = replace(state, vehicle=replace(state.vehicle, landed=True))
+    return state, ModeResult(Mode.DISARMED, "touched down")

@@ -1,0 +1,143 @@
+"""The prediction model at the tick's rate, in plain floats: where the plan is now.
+
+Source: docs/equations.md E16.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.prediction import A, P, S, discretise
+from fsw.autopilot.signals import PlanInput, PredictionState, Vec3
+from fsw.autopilot.tick_record import Accelerations, PlanState, Tick
+from fsw.compiled import compilable, kernel, machine_code, packed
+
+REST_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
+REST_STATE = PredictionState(
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0),
+    (0.0, 0.0),
+    0.0,
+    0.0,
+    (0.0, 0.0),
+    (0.0, 0.0),
+)
+
+_Row = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TickModel:
+    """The discrete model, its zeros left out."""
+
+    dt: float  # s
+    horizontal: tuple[_Row, ...]  # of p, v, a, j, s: on all of them and on u
+    vertical: tuple[_Row, ...]  # of p, v, a: on all of them and on u
+
+
+class NominalModel:
+    """Moves a PredictionState on by ticks under a held input."""
+
+    def __init__(self, airframe: Airframe, dt: float) -> None:
+        a, b = discretise(airframe, dt)
+        horizontal = [P, P + 3, A, 9, S]  # p, v, a, j, s along x
+        vertical = [P + 2, P + 5, A + 2]
+        self.model = TickModel(
+            dt,
+            tuple((*a[row, horizontal].tolist(), float(b[row, 0])) for row in horizontal),
+            tuple((*a[row, vertical].tolist(), float(b[row, 2])) for row in vertical),
+        )
+        self.packed = packed(self.model)
+        self._move = machine_code(_move, self.packed, Tick().array, 1)
+
+    def move(self, r: Tick, ticks: int) -> None:
+        """Bring the plan's state of a record some ticks on. Reads plan, u; writes plan."""
+        self._move(self.packed, r.array, ticks)
+
+    def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
+        """The state one tick later."""
+        return self.advance(x, u, 1)
+
+    def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
+        """The state some ticks later under one input."""
+        r = Tick()
+        r.nominal, r.input = x, u
+        self.move(r, ticks)
+        moved = r.nominal
+        assert moved is not None
+        return moved
+
+
+@compilable
+def put_plan(into: PlanState, x: PredictionState) -> None:
+    """Write a state down."""
+    for i in range(3):
+        into.p[i], into.v[i], into.a[i] = x.p[i], x.v[i], x.a[i]
+    for i in range(2):
+        into.j[i], into.s[i] = x.j[i], x.s[i]
+    for i in range(len(x.q_arm)):
+        into.q_arm[i], into.qd_arm[i] = x.q_arm[i], x.qd_arm[i]
+    into.yaw, into.yaw_rate = x.yaw, x.yaw_rate
+
+
+@kernel
+def _move(models: NDArray[Any], ticks: NDArray[Any], count: int) -> None:
+    """Bring the plan's state ``count`` ticks on."""
+    model, r = models[0], ticks[0]
+    for _ in range(count):
+        put_plan(r.plan, next_state(model, r.plan, r.u))
+
+
+@compilable
+def next_state(
+    model: TickModel, x: PredictionState | PlanState, u: PlanInput | Accelerations
+) -> PredictionState:
+    """The state one tick later."""
+    rows = model.horizontal
+    px, vx, ax, jx, sx = _axis(rows, x.p[0], x.v[0], x.a[0], x.j[0], x.s[0], u.a[0])
+    py, vy, ay, jy, sy = _axis(rows, x.p[1], x.v[1], x.a[1], x.j[1], x.s[1], u.a[1])
+    pz, vz, az = _climb(model.vertical, x.p[2], x.v[2], x.a[2], u.a[2])
+    dt = model.dt
+    half = 0.5 * dt * dt
+    q, qd, qdd = x.q_arm, x.qd_arm, u.qdd_arm
+    return PredictionState(
+        (px, py, pz),
+        (vx, vy, vz),
+        (ax, ay, az),
+        (jx, jy),
+        (sx, sy),
+        x.yaw + dt * x.yaw_rate + half * u.yaw_acc,
+        x.yaw_rate + dt * u.yaw_acc,
+        (q[0] + dt * qd[0] + half * qdd[0], q[1] + dt * qd[1] + half * qdd[1]),
+        (qd[0] + dt * qdd[0], qd[1] + dt * qdd[1]),
+    )
+
+
+@compilable
+def _axis(
+    rows: tuple[_Row, ...], p: float, v: float, a: float, j: float, s: float, u: float
+) -> tuple[float, float, float, float, float]:
+    rp, rv, ra, rj, rs = rows[0], rows[1], rows[2], rows[3], rows[4]
+    return (
+        rp[0] * p + rp[1] * v + rp[2] * a + rp[3] * j + rp[4] * s + rp[5] * u,
+        rv[1] * v + rv[2] * a + rv[3] * j + rv[4] * s + rv[5] * u,
+        ra[2] * a + ra[3] * j + ra[4] * s + ra[5] * u,
+        rj[2] * a + rj[3] * j + rj[4] * s + rj[5] * u,
+        rs[2] * a + rs[3] * j + rs[4] * s + rs[5] * u,
+    )
+
+
+@compilable
+def _climb(rows: tuple[_Row, ...], p: float, v: float, a: float, u: float) -> Vec3:
+    rp, rv, ra = rows[0], rows[1], rows[2]
+    return (
+        rp[0] * p + rp[1] * v + rp[2] * a + rp[3] * u,
+        rv[1] * v + rv[2] * a + rv[3] * u,
+        ra[2] * a + ra[3] * u,
+    )

@@ -1,0 +1,239 @@
+r"""The paper's costs (eqs 18, 20, 21) and an input cost, as one Gauss-Newton quadratic.
+
+.. math:: \sum_i \|e_e\|^2_{W_1} + \|v_e - v_d\|^2_{W_2} + \|p_{G,x}\|^2_{W_3}
+          + w_\psi(\psi - \psi_d)^2 + \|u_i\|^2_R
+
+over nodes 1..n-1, with the terminal weights at node n (node 0 is measured and constant).
+
+The paper penalises :math:`v_e` itself, which pulls a moving end-effector back; by default
+the target's velocity is subtracted (docs/equations.md E20 gives both figures).
+
+Source: docs/equations.md E18, E20, E21.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from fsw.autopilot.barriers.constraint_block import TargetPoints
+from fsw.autopilot.model.linearisation import Linearisation, Tracked
+from fsw.autopilot.model.prediction import INPUTS, Q_ARM, Array
+from fsw.autopilot.signals import Vec4
+from fsw.compiled import compiled, machine_code
+
+
+@dataclass(frozen=True, slots=True)
+class CostWeights:
+    """Weights of Table II and ours for the inputs."""
+
+    tracking: float = 10.0  # w_1
+    tracking_terminal: float = 50.0  # w_s1
+    velocity: float = 2.0  # w_2
+    velocity_terminal: float = 10.0  # w_s2
+    arm_com: float = 1.0  # w_3
+    arm_com_terminal: float = 5.0  # w_s3
+    # Ours: with base and arm both free to reach a point, nothing in the paper's cost says where
+    # to look, and beside walls the vehicle wandered through half a turn.
+    yaw: float = 0.05
+    # Added to the yaw is what its rate makes of it in this time: the horizon is too short for the
+    # planner to see that what turns must be stopped as well, and the vehicle swung for ever.
+    yaw_lead: float = 2.0  # s
+    posture: float = 2.0  # on joint angles that a ground station asks for
+    inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
+    relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
+
+
+class Quadratic(NamedTuple):
+    """``1/2 U' hessian U + gradient' U``, refilled in place."""
+
+    guess: Array  # (6 n,) inputs of the linearisation
+    hessian: Array  # (6 n, 6 n), upper triangle
+    gradient: Array  # (6 n,)
+
+
+class Cost(Protocol):
+    """Something the planner minimises, as a quadratic around a guess of the inputs."""
+
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
+        """Add this cost, around ``quadratic.guess``; returns the cost at the guess."""
+        ...
+
+
+class _TrackingWeights(NamedTuple):
+    node: Array  # (2, 3): running and terminal; position, velocity, centre of mass
+    inputs: float
+    yaw: float
+    yaw_lead: float  # s
+    target_velocity: float  # share of the target's velocity that is subtracted, 0 or 1
+
+
+class _Target(NamedTuple):
+    yaw: Array  # (n + 1,) rad
+    position: Array  # (n + 1, 3) m
+    velocity: Array  # (n + 1, 3) m/s
+
+
+class TrackingCost:
+    """Eqs 18, 20 and 21 and the inputs: what all of the paper's controllers minimise."""
+
+    def __init__(self, weights: CostWeights) -> None:
+        self._weights = _TrackingWeights(
+            node=np.array(
+                (
+                    (weights.tracking, weights.velocity, weights.arm_com),
+                    (
+                        weights.tracking_terminal,
+                        weights.velocity_terminal,
+                        weights.arm_com_terminal,
+                    ),
+                )
+            ),
+            inputs=weights.inputs,
+            yaw=weights.yaw,
+            yaw_lead=weights.yaw_lead,
+            target_velocity=1.0 if weights.relative_velocity else 0.0,
+        )
+        self._add_tracking = machine_code(_add_tracking)
+
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
+        """See ``Cost``."""
+        target = _Target(targets.yaw, targets.position, targets.velocity)
+        return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
+
+
+class PostureCost:
+    """Ours: joints that are asked for. Body and end-effector can then both be given."""
+
+    def __init__(self, weights: CostWeights) -> None:
+        self._weight = weights.posture
+
+    def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
+        """See ``Cost``; nothing where no joints are asked for."""
+        if targets.q_arm is None:
+            return 0.0
+        return _add_posture(
+            self._weight,
+            horizon.states[:, Q_ARM : Q_ARM + 2],
+            horizon.model.gamma[:, Q_ARM : Q_ARM + 2],
+            targets.q_arm,
+            quadratic,
+        )
+
+
+@compiled
+def _add_posture(
+    weight: float,
+    q_arm: Array,
+    d_q_arm: Array,
+    targets: Array,
+    quadratic: Quadratic,
+) -> float:
+    cost = 0.0
+    for i in range(1, q_arm.shape[0]):
+        for joint in range(2):
+            value = q_arm[i, joint] - targets[i, joint]
+            cost += weight * value * value
+            row = d_q_arm[i, joint]
+            add_square(weight, value, row, INPUTS * i, quadratic)
+    return cost
+
+
+@compiled
+def add_square(weight: float, value: float, row: Array, columns: int, quadratic: Quadratic) -> None:
+    """Add ``weight`` [1 / unit of value^2] times ``(value + row (U - guess))^2``.
+
+    ``value`` [any unit] is the residual at the guess and ``row`` (6 n,) [value / input] its
+    gradient, of which only the first ``columns`` count.
+    """
+    guess, hessian, gradient = quadratic
+    at_zero = value
+    for k in range(columns):
+        at_zero -= row[k] * guess[k]
+    for k in range(columns):
+        scaled = 2.0 * weight * row[k]
+        if scaled != 0.0:
+            gradient[k] += scaled * at_zero
+            for m in range(k, columns):
+                hessian[k, m] += scaled * row[m]
+
+
+_RESIDUALS = 8  # of a node: position and velocity of the end-effector, centre of mass, yaw
+
+
+@compiled
+def _add_tracking(
+    weights: _TrackingWeights, tracked: Tracked, target: _Target, quadratic: Quadratic
+) -> float:
+    guess, hessian = quadratic.guess, quadratic.hessian
+    n = tracked.position.shape[0] - 1
+    cost = 0.0
+    for k in range(INPUTS * n):
+        hessian[k, k] += 2.0 * weights.inputs
+        cost += weights.inputs * guess[k] * guess[k]
+    rows = np.zeros((_RESIDUALS, INPUTS * n))
+    values, weight = np.zeros(_RESIDUALS), np.zeros(_RESIDUALS)
+    weight[7] = weights.yaw
+    for i in range(1, n + 1):
+        w = weights.node[1 if i == n else 0]
+        # Entry by entry: for a slice numba compiles a text that says which shapes do not fit.
+        for axis in range(3):
+            weight[axis], weight[3 + axis] = w[0], w[1]
+            values[axis] = tracked.position[i, axis] - target.position[i, axis]
+            v_target = weights.target_velocity * target.velocity[i, axis]
+            values[3 + axis] = tracked.velocity[i, axis] - v_target
+            for k in range(INPUTS * i):
+                rows[axis, k] = tracked.d_position[i, axis, k]
+                rows[3 + axis, k] = tracked.d_velocity[i, axis, k]
+        for k in range(INPUTS * i):
+            rows[6, k] = tracked.d_arm_com[i, k]
+            rows[7, k] = tracked.d_yaw[i, 0, k] + weights.yaw_lead * tracked.d_yaw[i, 1, k]
+        weight[6], values[6] = w[2], tracked.arm_com[i]
+        # The short way round: a target half a turn away must not unwind whole turns.
+        turn = (tracked.yaw[i, 0] - target.yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        values[7] = turn + weights.yaw_lead * tracked.yaw[i, 1]
+        _add_squares(weight, values, rows, INPUTS * i, quadratic)
+        for residual in range(_RESIDUALS):
+            cost += weight[residual] * values[residual] * values[residual]
+    return cost
+
+
+@compiled
+def _add_squares(
+    weight: Array, value: Array, rows: Array, columns: int, quadratic: Quadratic
+) -> None:
+    """``add_square`` for all residuals of a node at once: the Hessian is walked through once."""
+    guess, hessian, gradient = quadratic
+    at_zero = np.empty((_RESIDUALS, 1))
+    for residual in range(_RESIDUALS):
+        at_zero[residual, 0] = value[residual]
+        for k in range(columns):
+            at_zero[residual, 0] -= rows[residual, k] * guess[k]
+    for k in range(columns):
+        a, b = _scaled(weight, rows, 0, k), _scaled(weight, rows, 4, k)
+        gradient[k] += _sum4(a, at_zero, 0, 0) + _sum4(b, at_zero, 4, 0)
+        h = hessian[k]
+        for m in range(k, columns):
+            # Two sums of four, which a processor computes side by side.
+            h[m] += _sum4(a, rows, 0, m) + _sum4(b, rows, 4, m)
+
+
+@compiled
+def _scaled(weight: Array, rows: Array, r: int, k: int) -> Vec4:
+    """Twice the weighted derivative of four residuals in one input."""
+    return (
+        2.0 * weight[r] * rows[r, k],
+        2.0 * weight[r + 1] * rows[r + 1, k],
+        2.0 * weight[r + 2] * rows[r + 2, k],
+        2.0 * weight[r + 3] * rows[r + 3, k],
+    )
+
+
+@compiled
+def _sum4(a: Vec4, rows: Array, r: int, k: int) -> float:
+    return float(
+        a[0] * rows[r, k] + a[1] * rows[r + 1, k] + a[2] * rows[r + 2, k] + a[3] * rows[r + 3, k]
+    )

@@ -1,0 +1,138 @@
+"""The end-effector reference between the points that were received."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from functools import cache
+from operator import attrgetter
+
+from fsw.autopilot.geometry.rotation import wrap_angle
+from fsw.autopilot.signals import EndEffectorTarget, Vec3
+from fsw.compiled import compilable, kernel, machine_code
+
+_REST: Vec3 = (0.0, 0.0, 0.0)
+_time = attrgetter("t_us")
+KEPT_POINTS = 256  # 25 s of a 10 Hz stream; a flood must not grow the memory
+
+
+def still_at(p_WE: Vec3, t_us: int = 0, yaw: float = 0.0) -> EndEffectorTarget:
+    """A target at rest at ``p_WE`` [m] with ``yaw`` [rad]."""
+    return EndEffectorTarget(t_us, p_WE, _REST, _REST, yaw)
+
+
+def merge(
+    stream: tuple[EndEffectorTarget, ...],
+    received: tuple[EndEffectorTarget, ...],
+    now_us: int,
+) -> tuple[EndEffectorTarget, ...]:
+    """Add points to the stream, sorted by time, a later point for the same instant wins.
+
+    Points before the last one already due are forgotten; points that are not numbers never
+    enter.
+    """
+    if not received:
+        return stream
+    new = tuple([point for point in received if _is_finite(point)])
+    if stream and len(new) == 1 and new[0].t_us > stream[-1].t_us:
+        points = stream + new  # the usual case, at a tenth of the cost
+    else:
+        by_time = {point.t_us: point for point in (*stream, *new)}
+        points = tuple([by_time[t] for t in sorted(by_time)])
+    due = bisect_right(points, now_us, key=_time)
+    return points[max(due - 1, 0) :][:KEPT_POINTS]
+
+
+def _is_finite(point: EndEffectorTarget) -> bool:
+    return math.isfinite(sum(point.p_WE) + sum(point.v_WE) + sum(point.a_WE) + point.yaw)
+
+
+def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarget:
+    """The reference at ``t_us``: cubic between points, sorted by time, at rest beyond the ends."""
+    after = bisect_right(stream, t_us, key=_time)
+    if after == 0:
+        return still_at(stream[0].p_WE, t_us, stream[0].yaw)
+    before = stream[after - 1]
+    if after == len(stream):
+        if before.t_us == t_us:
+            return before
+        return still_at(before.p_WE, t_us, before.yaw)
+    return _hermite(before, stream[after], t_us)
+
+
+def _hermite(first: EndEffectorTarget, last: EndEffectorTarget, t_us: int) -> EndEffectorTarget:
+    """Cubic through both points' positions and velocities."""
+    p, v, a, yaw = _between_points()(
+        *(first.p_WE, first.v_WE, first.yaw, first.t_us),
+        *(last.p_WE, last.v_WE, last.yaw, last.t_us, t_us),
+    )
+    return EndEffectorTarget(t_us, p, v, a, yaw)
+
+
+@kernel
+def _cubic(
+    p0: Vec3,
+    v0: Vec3,
+    yaw0: float,
+    t0_us: int,
+    p1: Vec3,
+    v1: Vec3,
+    yaw1: float,
+    t1_us: int,
+    t_us: int,
+) -> tuple[Vec3, Vec3, Vec3, float]:
+    """Position, velocity, acceleration and yaw of ``_hermite``."""
+    span = (t1_us - t0_us) * 1e-6
+    x = (t_us - t0_us) * 1e-6 / span
+    first = _cubic_of_axis(span, x, p0[0], v0[0], p1[0], v1[0])
+    second = _cubic_of_axis(span, x, p0[1], v0[1], p1[1], v1[1])
+    third = _cubic_of_axis(span, x, p0[2], v0[2], p1[2], v1[2])
+    yaw = wrap_angle(yaw0 + x * wrap_angle(yaw1 - yaw0))
+    return (
+        (first[0], second[0], third[0]),
+        (first[1], second[1], third[1]),
+        (first[2], second[2], third[2]),
+        yaw,
+    )
+
+
+@compilable
+def _cubic_of_axis(span: float, x: float, p0: float, v0: float, p1: float, v1: float) -> Vec3:
+    """Position, velocity and acceleration on one axis, at ``x`` of the ``span``."""
+    m0, m1 = span * v0, span * v1
+    c2 = 3.0 * (p1 - p0) - 2.0 * m0 - m1
+    c3 = -2.0 * (p1 - p0) + m0 + m1
+    return (
+        p0 + x * (m0 + x * (c2 + x * c3)),
+        (m0 + x * (2.0 * c2 + x * 3.0 * c3)) / span,
+        (2.0 * c2 + 6.0 * x * c3) / (span * span),
+    )
+
+
+@cache
+def _between_points() -> Callable[..., tuple[Vec3, Vec3, Vec3, float]]:
+    """``_cubic``, compiled when it is first wanted."""
+    return machine_code(_cubic, _REST, _REST, 0.0, 0, _REST, _REST, 0.0, 0, 0)
+
+
+def vertical_ramp(
+    start: EndEffectorTarget, climb: float, speed: float, t_us: int
+) -> EndEffectorTarget:
+    """Straight up or down from a point and its time on, then still.
+
+    ``climb`` [m] is the height to gain, ``speed`` [m/s] positive.
+    """
+    elapsed = max(t_us - start.t_us, 0) * 1e-6
+    x, y, z = start.p_WE
+    direction = 1.0 if climb >= 0.0 else -1.0
+    gained = speed * elapsed
+    if gained >= abs(climb):
+        return still_at((x, y, z - climb), t_us, start.yaw)
+    return EndEffectorTarget(
+        t_us,
+        (x, y, z - direction * gained),
+        (0.0, 0.0, -direction * speed),
+        _REST,
+        start.yaw,
+    )

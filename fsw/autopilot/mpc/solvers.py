@@ -1,0 +1,76 @@
+"""Optimisers of the planner, by name: one signature and one table.
+
+Another one is a function and a row in ``SOLVERS`` (and in
+``fsw.autopilot.parameters.control_choice``, which names it for the command line without importing
+it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fsw.autopilot.barriers.constraint_block import TargetPoints
+from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.mpc.slsqp_solver import NonlinearProgram, minimise
+from fsw.autopilot.mpc.solution import Solution
+
+Stopwatch = Callable[[], float]
+"""Monotonic time [us], for the reported stage times only."""
+
+
+class Question(NamedTuple):
+    """What is to be optimised for one request."""
+
+    ocp: Ocp  # of the safe set; holds the program around the optimum afterwards
+    start: Array  # (19,) SI, prediction state at node 0
+    targets: TargetPoints  # at the nodes
+    guess: Array  # (6 n,) SI, the last solution moved on by one period, or zeros
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How one request was answered; the plan is usable where the last solution is."""
+
+    solution: Solution
+    sqp_iterations: int
+    solver_iterations: int
+    linearise_us: float
+    solve_us: float
+
+
+def by_programs(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
+    """A fixed number of quadratic programs from the guess on."""
+    ocp, start, targets, inputs = asked
+    linearise_us = solve_us = 0.0
+    iterations = done = 0
+    while done < config.sqp_iterations:
+        mark = stopwatch_us()
+        ocp.linearise(start, inputs, targets)
+        linearised = stopwatch_us()
+        solution = ocp.solve()
+        linearise_us += linearised - mark
+        solve_us += stopwatch_us() - linearised
+        iterations += solution.iterations
+        done += 1
+        if not solution.usable:
+            break
+        inputs = solution.x[: len(inputs)]
+    return Search(solution, done, iterations, linearise_us, solve_us)
+
+
+def by_slsqp(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
+    """The paper's optimiser, from rest whatever was planned before."""
+    mark = stopwatch_us()
+    solution = minimise(NonlinearProgram(asked.ocp, asked.start, asked.targets))
+    solve_us = stopwatch_us() - mark
+    return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
+
+
+SOLVERS: dict[str, Callable[[Question, PlannerConfig, Stopwatch], Search]] = {
+    "clarabel": by_programs,
+    "slsqp": by_slsqp,
+}

@@ -1,0 +1,503 @@
+r"""Whether a configuration can keep its safe set at all, before anything flies.
+
+The paper's :math:`\lambda \in \{1, 5\}` cannot be met in its own workspace sphere: at the
+centre, at rest, :math:`h = S(r)`, which would have to be at least :math:`\lambda`. Such
+contradictions show in a few inequalities. Each finding states one of them, whether it
+holds, and the nearest value that is enough.
+
+Source: docs/equations.md T5.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fsw.autopilot.barriers.safe_approach import LOUD, BarrierTuning
+from fsw.autopilot.control.gains import tracking_gains
+from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
+from fsw.autopilot.control.tube import (
+    EstimateTube,
+    Tube,
+    all_axes,
+    all_axes_up_to,
+    base_after,
+    estimate_tube,
+    limits_used,
+    tube,
+)
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.model.body import body_of
+from fsw.autopilot.parameters.flight_config import FlightConfig, Surroundings
+from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.signals import SafeSet, Zone
+
+_SIGMAS = 3.0  # that count where clearances do not grow
+_SEEN_S = 0.02  # in which the observer sees what begins: two of its time constants
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One inequality of the analysis."""
+
+    name: str
+    holds: bool
+    statement: str  # with numbers, and what is enough where it does not hold
+    refuses: bool = True  # a finding that only warns says False
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """Standard deviations of an estimate, each of its worst axis."""
+
+    source: str  # of positions
+    position: float  # m, of the part of the body that is least certain
+    velocity: float  # m/s
+    tilt: float  # rad
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateReach:
+    """What an estimate that is not exact adds to the tube, and to clearances [m]."""
+
+    loop: float  # the base's way off its plan, besides the position's own error
+    clearance: float  # the position's error, by which clearances grow
+
+
+def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Finding, ...]:
+    """Every finding about a controller with barriers in a safe set; there is none for the others.
+
+    A zone needs what a wall needs: it lies behind its tangent plane, and going round it only takes
+    the vehicle off that plane. The loop is ``loop_tube(config)``, which takes a moment and
+    does not depend on the safe set.
+    """
+    surroundings, planner = config.surroundings, config.planner
+    if config.controller != "blf" or not safe_set.zones:
+        return ()
+    spheres = [zone for zone in safe_set.zones if kind_of(zone.shape).follows_target]
+    others = [zone for zone in safe_set.zones if zone not in spheres]
+    findings: list[Finding] = []
+    for sphere in spheres:
+        radius = sphere.shape.numbers[-1]
+        findings.append(_actuation(config, planner.workspace, surroundings, radius))
+        findings += _rooms_in_sphere(config, loop, radius)
+    if others:
+        findings.append(_actuation(config, planner.walls, surroundings, math.inf))
+        points = [zone.clearance for zone in others if _is_point(zone)]
+        if points and planner.body == "points":
+            findings.append(_links(config, min(points)))
+    for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
+        if not zones:
+            continue
+        if config.inner == "tracking":
+            kept = SafeSet(tuple(zones))
+            findings.append(_base_tube(tuning, loop, surroundings))
+            findings.append(_tube_of_all_axes(config, tuning, loop, kept))
+        else:
+            findings.append(_sampled(tuning, surroundings, planner.period))
+    if config.inner == "tracking":
+        if others:
+            findings += _tubes_of_parts(config, loop, others)
+            findings += _returns(config, loop)
+        findings.append(_limits(config, loop, surroundings))
+    return tuple(findings)
+
+
+def _is_point(zone: Zone) -> bool:
+    return zone.shape.kind == "ball" and zone.shape.numbers[-1] == 0.0
+
+
+def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+    """The statements that speak against flying."""
+    return tuple(f.statement for f in findings if f.refuses and not f.holds)
+
+
+def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+    """The statements an operator should know and may fly with."""
+    return tuple(f.statement for f in findings if not f.refuses and not f.holds)
+
+
+def loop_tube(config: FlightConfig) -> Tube:
+    """Tube of the configured tracking loop, per m/s^2 of disturbance."""
+    surroundings = config.surroundings
+    dt = config.tick_period_us * 1e-6
+    tracking = config.tuning.tracking
+    gains = tracking_gains(tracking, config.airframe.rotor_lag, dt)
+    return tube(
+        config.airframe, tracking, gains, surroundings.hanging, surroundings.disturbance_hold, dt
+    )
+
+
+def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
+    """How far an estimate of an accuracy leads the vehicle, at as many sigma as clearances grow by.
+
+    Errors of position, velocity and tilt are bounded however they change; what the gyro's noise
+    does is known by its spectrum.
+    """
+    dt, airframe, tracking = config.tick_period_us * 1e-6, config.airframe, config.tuning.tracking
+    gains = tracking_gains(tracking, airframe.rotor_lag, dt)
+    moved: EstimateTube = estimate_tube(airframe, tracking, gains, dt)
+    sigmas = config.limits.clearance_sigmas or _SIGMAS
+    noise = GRAVITY * config.estimator.gyro_noise / math.sqrt(dt)
+    loop = (
+        (moved.position - 1.0) * accuracy.position
+        + moved.velocity * accuracy.velocity
+        + moved.acceleration * GRAVITY * accuracy.tilt
+        + moved.jerk * noise
+    )
+    return EstimateReach(sigmas * loop, sigmas * accuracy.position)
+
+
+def estimate_findings(
+    config: FlightConfig, safe_set: SafeSet, loop: Tube, accuracy: Accuracy
+) -> tuple[Finding, ...]:
+    """Whether what a plan keeps is enough for an estimate of an accuracy as well.
+
+    The loop is ``loop_tube(config)``. Nothing without barriers, or of a loop that follows no state.
+    """
+    if config.controller != "blf" or config.inner != "tracking":
+        return ()
+    planner, follows = config.planner, [kind_of(z.shape).follows_target for z in safe_set.zones]
+    findings = []
+    if any(follows):
+        findings.append(_estimate(config, planner.workspace, loop, accuracy, inside=True))
+    if not all(follows):
+        findings.append(_estimate(config, planner.walls, loop, accuracy, inside=False))
+    return tuple(findings)
+
+
+def _estimate(
+    config: FlightConfig, tuning: BarrierTuning, loop: Tube, accuracy: Accuracy, *, inside: bool
+) -> Finding:
+    reach, room = estimate_reach(config, accuracy), stand_off(tuning)
+    sigmas = config.limits.clearance_sigmas or _SIGMAS
+    pushed = base_reach(loop, config.surroundings)
+    # The sphere that follows the target has no room to spare: it is hardly made smaller.
+    grows = config.limits.clearance_sigmas > 0.0 and not inside
+    needed = pushed + reach.loop + (0.0 if grows else reach.clearance)
+    more = 1e3 * (needed - room)
+    remedy = (
+        f"lambda >= {needed * tuning.slope:.3f} m/s and a radius {more:.0f} mm larger"
+        if inside
+        else f"a clearance {math.ceil(more):.0f} mm larger"
+    )
+    place = "for which clearances grow" if grows else "for which the zone does not shrink"
+    return _finding(
+        "estimate",
+        room >= needed,
+        f"estimate from {accuracy.source}, {sigmas:g} sigma: a place off by "
+        f"{1e3 * reach.clearance:.0f} mm, {place}; a velocity off by "
+        f"{1e3 * sigmas * accuracy.velocity:.0f} mm/s and a tilt off by "
+        f"{1e3 * sigmas * accuracy.tilt:.1f} mrad, which move the base by "
+        f"{1e3 * reach.loop:.0f} mm at most; with the tube {1e3 * needed:.0f} mm of the "
+        f"{1e3 * room:.0f} mm that the plan keeps",
+        f"{remedy} is enough",
+        refuses=False,
+    )
+
+
+def base_reach(loop: Tube, surroundings: Surroundings) -> float:
+    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis.
+
+    Without what clearances grow by while the memory of wind is in force.
+    """
+    return loop.base * surroundings.disturbance + loop.base_wind - loop.wind_beyond
+
+
+def stand_off(tuning: BarrierTuning) -> float:
+    """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
+    knee = tuning.alpha / tuning.slope**2
+    if tuning.lambda_ <= tuning.slope * knee:
+        return tuning.lambda_ / tuning.slope
+    return tuning.lambda_**2 / (2.0 * tuning.alpha) + 0.5 * knee
+
+
+def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float) -> float:
+    """Least lambda [m/s] that rejects a constant ``disturbance`` [m/s^2] along the normal.
+
+    In sampled data, with the planner's ``period`` [s].
+    """
+    return disturbance * (1.0 + 0.5 * tuning.slope * period) / tuning.gamma
+
+
+def _actuation(
+    config: FlightConfig, tuning: BarrierTuning, surroundings: Surroundings, radius: float
+) -> Finding:
+    available = GRAVITY * math.tan(config.planner.limits.tilt)
+    wanted = tuning.alpha + tuning.gamma * tuning.lambda_ + surroundings.target_acceleration
+    parts = "alpha + gamma lambda + |a_t|"
+    if radius < math.inf:
+        wanted += surroundings.tangential_speed**2 / radius
+        parts += " + w^2/r"
+    best = tuning.alpha - (wanted - available)
+    remedy = (
+        f"alpha <= {best:.2f} m/s^2 is enough"
+        if best > 0.0
+        else f"lambda <= {(available - wanted) / tuning.gamma + tuning.lambda_:.2f} m/s is enough"
+    )
+    return _finding(
+        "actuation",
+        wanted <= available,
+        f"braking needs {parts} = {wanted:.2f} m/s^2 and the tilt gives {available:.2f}",
+        remedy,
+    )
+
+
+def _rooms_in_sphere(config: FlightConfig, loop: Tube, radius: float) -> list[Finding]:
+    found = [_room_in_sphere(config.planner.workspace, radius)]
+    if config.inner == "tracking":
+        found.append(_wind_in_sphere(config.planner.workspace, loop, radius))
+    return found
+
+
+def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
+    at_centre = tuning.approach_speed(radius)
+    return _finding(
+        "sphere",
+        at_centre >= tuning.lambda_,
+        f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
+        f"{tuning.lambda_:.3f}",
+        f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m is enough",
+    )
+
+
+def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding:
+    """A sphere without room to spare cannot become smaller in wind."""
+    needed, spare = stand_off(tuning) + loop.wind_beyond, radius - stand_off(tuning)
+    return _finding(
+        "wind",
+        radius >= needed,
+        f"wind that is cancelled can push the base {loop.wind_beyond * 1e3:.0f} mm further off "
+        f"its plan when it turns, and the sphere has {spare * 1e3:.0f} mm to spare",
+        f"r >= {needed:.3f} m is enough",
+        refuses=False,
+    )
+
+
+def _links(config: FlightConfig, clearance: float) -> Finding:
+    """Both ends of a link keep off a point; the nearest place of the link is between them."""
+    longest = max(config.airframe.link_length)
+    left = math.sqrt(max(clearance**2 - 0.25 * longest**2, 0.0))
+    return _finding(
+        "links",
+        left > 0.0,
+        f"with both ends of a link {clearance * 1e3:.0f} mm from a point, the middle of the "
+        f"longest, {longest * 1e3:.0f} mm, keeps {left * 1e3:.0f} mm",
+        f"a clearance above {0.5 * longest * 1e3:.0f} mm is enough",
+        refuses=False,
+    )
+
+
+def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
+    reach, room = base_reach(loop, surroundings), stand_off(tuning)
+    return _finding(
+        "tube",
+        room >= reach,
+        f"no disturbance within {surroundings.disturbance:g} m/s^2 on one axis pushes the base "
+        f"further than {reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from "
+        f"the boundary: margin {(room - reach) * 1e3:+.0f} mm",
+        f"lambda >= {reach * tuning.slope:.3f} m/s is enough",
+    )
+
+
+def _returns(config: FlightConfig, loop: Tube) -> list[Finding]:
+    """Whether lambda is back before a sudden disturbance has used up what is kept meanwhile."""
+    least, tuning = config.planner.lambda_min, config.planner.walls
+    if not tuning.following(0.0, least) < tuning.lambda_:
+        return []
+    room, low, high = return_room(config, loop, least), least, tuning.lambda_
+    while not room >= 0.0 and high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        enough = return_room(config, loop, middle) >= 0.0
+        low, high = (low, middle) if enough else (middle, high)
+    kept = stand_off(replace(tuning, lambda_=least))
+    return [
+        _finding(
+            "return of lambda",
+            room >= 0.0,
+            f"after little disturbance the plan keeps {kept * 1e3:.0f} mm, and when "
+            f"{config.surroundings.disturbance:g} m/s^2 begin on one axis lambda is back with "
+            f"{room * 1e3:+.0f} mm left",
+            f"SAFE_LAMBDA_MIN >= {math.ceil(1e3 * high) / 1e3:.3f} m/s is enough, and 0 keeps "
+            "lambda whole",
+        )
+    ]
+
+
+def return_room(config: FlightConfig, loop: Tube, least: float) -> float:
+    """Least distance [m] of the base to a wall after a disturbance that begins in still air.
+
+    Lambda follows the disturbance down to ``least`` [m/s]. The worst of all instants, and of all
+    that may have been observed before, which has the base as far off its plan as the tube says.
+    What begins is seen, asked about and planned for, and rows of the first nodes hold nothing; then
+    h rises as eq 25 has it, and the distance follows h.
+    """
+    dt, planner, tuning = config.tick_period_us * 1e-6, config.planner, config.planner.walls
+    tracking, airframe = config.tuning.tracking, config.airframe
+    gains = tracking_gains(tracking, airframe.rotor_lag, dt)
+    after = base_after(airframe, tracking, gains, dt)
+    wind = loop.base_wind - loop.wind_beyond
+    begins = _SEEN_S + planner.period + config.plan_delay_ticks * dt
+    times = dt * np.arange(1, len(after) + 1)
+    periods = np.floor((times - begins) / planner.period)
+    periods[periods <= tuning.skipped_nodes] = 0.0
+    missing = (1.0 - tuning.gamma * planner.period) ** periods
+    faded = np.exp(-tuning.slope * times)
+    rest = []
+    for seen in np.linspace(0.0, LOUD, 5):
+        kept = tuning.following(float(seen), least)
+        h = tuning.lambda_ - (tuning.lambda_ - kept) * missing
+        # d' = h - k_S d from rest; k_S is the most that S rises by with d.
+        distance = stand_off(replace(tuning, lambda_=kept))
+        gained = faded * np.cumsum((h - kept) * dt / faded)
+        pushed = config.surroundings.disturbance * after + seen * (after[-1] - after) + wind
+        rest.append(float((distance + gained - pushed).min()))
+    return min(rest)
+
+
+def _tube_of_all_axes(
+    config: FlightConfig, tuning: BarrierTuning, loop: Tube, safe_set: SafeSet
+) -> Finding:
+    """A wall meets one axis of it, if it stands along one; a sphere meets all of them together.
+
+    Above what saturates the rotors there is no bound.
+    """
+    expected, room = config.surroundings.disturbance, stand_off(tuning)
+    most = all_axes_up_to(config.airframe, loop, expected)
+    whole = most > 0.99 * expected
+    across, up = all_axes(config.airframe, loop, most)
+    across -= loop.wind_beyond
+    reach = _reach(safe_set, across, up)
+    return _finding(
+        "tube of all axes",
+        room >= reach and whole,
+        f"pushed within {most:.2f} m/s^2 on all axes at once the base can be {across * 1e3:.0f} mm "
+        f"off its plan on a horizontal axis and {up * 1e3:.0f} mm vertically, {reach * 1e3:.0f} mm "
+        f"towards the boundary, and the plan keeps {room * 1e3:.0f} mm",
+        f"above {most:.2f} m/s^2 on all axes the rotors can saturate, and nothing is bounded"
+        if not whole
+        else f"lambda >= {reach * tuning.slope:.3f} m/s would be proof",
+        refuses=False,
+    )
+
+
+def _reach(safe_set: SafeSet, across: float, up: float) -> float:
+    """How far towards a boundary ``across`` [m] on x and on y and ``up`` [m] can lead [m]."""
+    corner = math.hypot(across, across, up)
+    flat = [zone.shape.numbers for zone in safe_set.zones if kind_of(zone.shape).flat]
+    if len(flat) < len(safe_set.zones):
+        return corner
+    return max(across * (abs(n[0]) + abs(n[1])) + up * abs(n[2]) for n in flat)
+
+
+def _tubes_of_parts(config: FlightConfig, loop: Tube, zones: list[Zone]) -> list[Finding]:
+    found = [_end_effector_tube(config, loop)]
+    return [*found, _part_tube(config, zones)] if config.planner.body == "full" else found
+
+
+def _end_effector_tube(config: FlightConfig, loop: Tube) -> Finding:
+    """Across the arm's plane the arm cannot compensate; along it, it does until it gives way."""
+    tuning, surroundings = config.planner.walls, config.surroundings
+    reach = loop.end_effector * surroundings.disturbance + loop.end_effector_wind
+    expected = loop.end_effector_expected * surroundings.disturbance
+    room, compensation = stand_off(tuning), config.tuning.compensation
+    along = (
+        f", and along it once the base is {compensation.far * 1e3:.0f} mm off its plan"
+        if config.tuning.compensate
+        else " and along it"
+    )
+    return _finding(
+        "end-effector tube",
+        room >= reach,
+        f"an end-effector that hangs {surroundings.hanging * 1e3:.0f} mm below the base can be "
+        f"pushed {reach * 1e3:.0f} mm across the arm's plane{along}, by the worst disturbance "
+        f"({expected * 1e3:.0f} mm expected at random), and the plan keeps {room * 1e3:.0f} mm",
+        _proof(config, reach),
+        refuses=False,
+    )
+
+
+def part_tube(config: FlightConfig) -> tuple[PartReach, ...]:
+    """Reach of the parts of the base with the configured tracking loop."""
+    surroundings, dt = config.surroundings, config.tick_period_us * 1e-6
+    tracking, airframe = config.tuning.tracking, config.airframe
+    loop = LoopOfParts(
+        airframe=airframe,
+        tuning=tracking,
+        gains=tracking_gains(tracking, airframe.rotor_lag, dt),
+        disturbance=surroundings.disturbance,
+        hold_s=surroundings.disturbance_hold,
+        dt=dt,
+    )
+    return part_reaches(loop, body_of(config.planner.body, airframe))
+
+
+def _part_tube(config: FlightConfig, zones: list[Zone]) -> Finding:
+    """The base tilts to push back, and moves feet and rotors with it."""
+    reaches = part_tube(config)
+    far: list[PartReach] = []
+    for zone in zones:
+        n = zone.shape.numbers
+        far += [towards(reaches, (n[0], n[1], n[2]))] if kind_of(zone.shape).flat else reaches
+    most, room = max(far, key=lambda reach: reach.worst), stand_off(config.planner.walls)
+    return _finding(
+        "part tube",
+        room >= most.worst,
+        f"the worst disturbance on one axis and the tilt against it can move the {most.name} "
+        f"{most.worst * 1e3:.0f} mm towards a boundary ({most.expected * 1e3:.0f} mm expected at "
+        f"random), and the plan keeps {room * 1e3:.0f} mm",
+        _proof(config, most.worst),
+        refuses=False,
+    )
+
+
+def _proof(config: FlightConfig, reach: float) -> str:
+    """What keeps ``reach`` [m] from a wall: lambda, and alpha where the tilt would not do then."""
+    tuning, limits = config.planner.walls, config.planner.limits
+    least = math.ceil(1e3 * reach * tuning.slope) / 1e3
+    target = config.surroundings.target_acceleration
+    left = GRAVITY * math.tan(limits.tilt) - tuning.gamma * least - target
+    if left >= tuning.alpha:
+        return f"lambda >= {least:.3f} m/s would be proof"
+    if left > 0.0:
+        least_alpha = math.floor(1e2 * left) / 1e2
+        return f"lambda >= {least:.3f} m/s with alpha <= {least_alpha:.2f} m/s^2 would be proof"
+    return "no lambda that the tilt can keep would be proof"
+
+
+def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
+    """The tube is that of the linear loop: it holds while no limit is reached."""
+    disturbance = surroundings.disturbance
+    used = limits_used(config.airframe, config.tuning.tracking, loop, disturbance)
+    worst = max(used, key=lambda name: used[name])
+    return _finding(
+        "limits",
+        used[worst] <= 1.0,
+        f"the tube holds while no limit is reached: the worst disturbance of {disturbance:g} "
+        f"m/s^2 on one axis uses {used[worst]:.0%} of the {worst}",
+        f"up to {disturbance / used[worst]:.2f} m/s^2 none is",
+        refuses=False,
+    )
+
+
+def _sampled(tuning: BarrierTuning, surroundings: Surroundings, period: float) -> Finding:
+    least = sampled_robustness(tuning, surroundings.disturbance, period)
+    margin = (tuning.lambda_ - least) / tuning.slope
+    return _finding(
+        "sampled",
+        tuning.lambda_ >= least,
+        f"rejecting {surroundings.disturbance:g} m/s^2 by planning alone needs lambda >= "
+        f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.lambda_:.3f}: margin "
+        f"{margin * 1e3:+.0f} mm",
+        f"lambda = {least:.3f} m/s is enough",
+        refuses=False,
+    )
+
+
+def _finding(
+    name: str, holds: bool, statement: str, remedy: str, *, refuses: bool = True
+) -> Finding:
+    sentence = statement if holds else f"{statement}; {remedy}"
+    return Finding(name, holds, sentence, refuses)

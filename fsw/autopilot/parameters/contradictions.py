@@ -1,0 +1,63 @@
+"""Numbers that are allowed alone and contradict each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.autopilot.tuning import Tuning, tuned
+
+# Pairs of parameters: the first is to be below the second, or at most equal to it.
+_BELOW: tuple[tuple[str, str], ...] = (
+    ("BAT_CRIT_THR", "BAT_LOW_THR"),
+    ("BAT_EMERGEN_THR", "BAT_CRIT_THR"),
+)
+_AT_MOST: tuple[tuple[str, str], ...] = (
+    ("COM_POS_LOW_EPH", "COM_POS_FS_EPH"),
+    ("LND_HEIGHT", "LND_AIRBORNE"),
+    ("MIS_TAKEOFF_ALT", "TKO_CLIMB_MAX"),
+)
+
+# Limits of roll and pitch [deg] beyond which the flight is ended; 0: none.
+_FAILURES: tuple[str, ...] = ("FD_FAIL_R", "FD_FAIL_P")
+# deg above what the vehicle tilts by itself: gusts and a late estimate push it further for a while.
+_RESERVE = 15.0
+
+
+def agreed(config: FlightConfig, tuning: Tuning) -> FlightConfig:
+    """The configuration with a tuning in it.
+
+    Raises:
+        ValueError: The numbers contradict each other.
+    """
+    config = tuned(config, tuning)
+    against = contradictions(config)
+    if against:
+        raise ValueError("; ".join(against))
+    return config
+
+
+def contradictions(config: FlightConfig) -> tuple[str, ...]:
+    """A sentence for each contradiction between parameters, or with what the vehicle does."""
+    found = []
+    for pairs, strictly in ((_BELOW, True), (_AT_MOST, False)):
+        for lower, upper in pairs:
+            less, more = BY_NAME[lower].read(config), BY_NAME[upper].read(config)
+            if less < more or (less == more and not strictly):
+                continue
+            relation = "below" if strictly else "at most"
+            found.append(f"{lower} {less:g} is to be {relation} {upper}, {more:g}")
+    return (*found, *_within_usual_tilt(config))
+
+
+def _within_usual_tilt(config: FlightConfig) -> Iterator[str]:
+    """Attitude failures that a flight in which nothing fails would reach."""
+    planned = BY_NAME["PLN_TILT_MAX"].read(config)
+    loops = round(math.degrees(config.airframe.tilt_max), 6)
+    why = f"PLN_TILT_MAX, {planned:g}" if planned > loops else f"the {loops:g} deg of the loops"
+    for name in _FAILURES:
+        most = BY_NAME[name].read(config)
+        if most != 0.0 and not most >= max(planned, loops) + _RESERVE:
+            yield f"{name} {most:g} is to be 0 or at least {_RESERVE:g} deg above {why}"

@@ -1,0 +1,62 @@
+"""A ball; of radius zero it is a point, such as the tip of a branch.
+
+Source: docs/equations.md E11, E12, E23.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.autopilot.shapes.frame import CENTRE_BALL, outward_axis
+from fsw.autopilot.shapes.kind import ShapeKind, Surface
+from fsw.autopilot.signals import Shape, Vec3, Zone
+from fsw.compiled import kernel
+
+PLANES_INSIDE = 6
+
+
+def ball(centre: Vec3, radius: float) -> Shape:
+    """A ball of ``radius`` [m] about ``centre`` [m, NED]."""
+    return Shape("ball", (*centre, radius))
+
+
+def point(position: Vec3, clearance: float) -> Zone:
+    """A point at ``position`` [m, NED] to keep ``clearance`` [m] from."""
+    return Zone(ball(position, 0.0), clearance)
+
+
+def radius_problem(numbers: tuple[float, ...]) -> str | None:
+    """Why numbers that end with a radius [m] describe nothing round."""
+    return None if numbers[-1] >= 0.0 else f"the radius is {numbers[-1]:g} m; it must not be < 0"
+
+
+@kernel
+def ball_plane(
+    numbers: NDArray[np.float64], keep_in: bool, which: int, x: float, y: float, z: float
+) -> Surface:
+    """The tangent plane of a ball, ``numbers`` (16,) [m], near a point ``x``, ``y``, ``z`` [m].
+
+    Inside, the planes touch the ball along plus and minus an orthonormal frame whose first axis is
+    the outward ray; they contain the paper's pair h2a, h2b and nothing divides by the distance.
+    Inside 2 mm of the centre any direction does.
+    """
+    x, y, z, radius = x - numbers[0], y - numbers[1], z - numbers[2], numbers[3]
+    if keep_in:
+        ax, ay, az = outward_axis(x, y, z, which)
+        return Surface(radius - (ax * x + ay * y + az * z), -ax, -ay, -az)
+    length = np.sqrt(x * x + y * y + z * z)
+    nx, ny, nz = 1.0, 0.0, 0.0
+    if length > CENTRE_BALL:
+        nx, ny, nz = x / length, y / length, z / length
+    return Surface(nx * x + ny * y + nz * z - radius, nx, ny, nz)
+
+
+KIND = ShapeKind(
+    name="ball",
+    number=1,
+    meaning=("centre north [m]", "centre east [m]", "centre down [m]", "radius [m]"),
+    planes_inside=PLANES_INSIDE,
+    plane=ball_plane,
+    problem=radius_problem,
+)

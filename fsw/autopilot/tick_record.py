@@ -1,0 +1,298 @@
+"""The record of a tick: what the fast loop starts from and leaves.
+
+First come the estimate, the plan's state and its input, then the memory of the loops and of the
+watch over the actuators. Which law reads and writes what says the law; their order is that of
+``Autopilot.tick``, and of ``close_loops`` in ``fsw/autopilot/control/cascade.py``. Python objects
+are made of it where somebody asks for them.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any, Final
+
+from fsw.autopilot.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2
+from fsw.record import (
+    JOINTS,
+    ROTORS,
+    Five,
+    Nine,
+    PerJoint,
+    PerRotor,
+    Record,
+    Three,
+    Two,
+)
+
+
+class Estimate(Record):
+    """``StateEstimate``, for kernels."""
+
+    t_us: int
+    p_WB: Three  # m, NED
+    v_WB: Three  # m/s, NED
+    R_WB: Nine
+    w_WB_B: Three  # rad/s, FRD
+    yaw: float  # rad
+    q_arm: PerJoint  # rad
+    qd_arm: PerJoint  # rad/s
+    specific_force: float  # m/s^2, along -z of the body
+
+
+class PlanState(Record):
+    """``PredictionState``, for kernels."""
+
+    p: Three  # m, NED
+    v: Three  # m/s
+    a: Three  # m/s^2
+    j: Two  # m/s^3, horizontal
+    s: Two  # m/s^4, horizontal
+    yaw: float  # rad
+    yaw_rate: float  # rad/s
+    q_arm: PerJoint  # rad
+    qd_arm: PerJoint  # rad/s
+
+
+class Accelerations(Record):
+    """``PlanInput``, for kernels."""
+
+    a: Three  # m/s^2, NED
+    yaw_acc: float  # rad/s^2
+    qdd_arm: PerJoint  # rad/s^2
+
+
+class Sent(Record):
+    """``ActuatorCommand``, for kernels."""
+
+    rotor_thrust: PerRotor  # N
+    joint_torque: PerJoint  # N m
+
+
+class Health(Record):
+    """``ActuatorHealth``, for kernels."""
+
+    effectiveness: PerRotor  # thrust over what is commanded
+    least: PerRotor  # N
+    most: PerRotor  # N, beside the rotor's own limit
+    joints: PerJoint  # SOUND, STUCK or LIMP
+
+
+class Observed(Record):
+    """What the observer believes between two velocity readings."""
+
+    v: Three  # m/s, NED
+    d: Three  # m/s^2, NED, disturbance acceleration
+    disturbance_bias: Two  # m/s^2, horizontal part of d that stays: wind
+    recent: float  # m/s^2, largest horizontal d of late: at once up, slowly down
+
+
+class Joints(Record):
+    """What the joint loops carry from tick to tick."""
+
+    reference: PerJoint  # rad, of the last tick
+    reference_rate: PerJoint  # rad/s, of the last tick
+    momentum: PerJoint  # N m s, as the observer believes
+    disturbance: PerJoint  # N m, as the observer believes
+    integral: PerJoint  # rad s, of the errors
+
+
+FILTER_ACTED: Final = 1  # the safety filter changed the acceleration
+GATE_NEEDED: Final = 2  # the command is beyond the actuators' limits, or no number
+IMPAIRED: Final = 4  # a part has failed: ``health`` is not that of a healthy vehicle
+OFF_PLAN: Final = 8  # the base is out of the tube around the plan
+BREACH: Final = 16  # the safety filter saw a margin that is negative, or no number
+
+
+class Watched(Record):
+    """What the watch over the actuators knows (``fsw/autopilot/control/actuator_watch.py``)."""
+
+    running: float  # s, since it began
+    thrust: PerRotor  # N, of rotors that give what is commanded
+    rate: Three  # rad/s, of the last tick
+    torque: Two  # N m about x and y, observed beside the model
+    lift: float  # N, observed the same, beside what lasts
+    lasting: float  # share of the thrust that lasts along z
+    products: Five  # means of products of what is observed, in newtons of a rotor: xx yy zz xz yz
+    extra: PerRotor  # N, of each rotor beside its command, by its pattern
+    by_thrust: PerRotor  # N^2, of that and the thrust
+    thrust2: PerRotor  # N^2, of the thrust
+    slow: PerRotor  # N, of rotors that are twice as slow
+    slow_torque: Two  # N m about x and y, what they would leave
+    slow_lift: float  # N, the same
+    slow_by: float  # N^2, mean of what they would leave and what is observed
+    slow2: float  # N^2, mean square of what they would leave
+    suspect: int  # rotor, or NO_ROTOR
+    suspected: float  # s, for how long
+    failed: int  # rotor, or NO_ROTOR
+    effect: float  # thrust over command, of the failed rotor, as allocation takes it
+    failed2: float  # N^2, mean square of what it gives beside its command, by what turns
+    failed_by_thrust: float  # N^2, mean of that and the thrust
+    failed_thrust2: float  # N^2, of the thrust
+    failed_more2: float  # N^2, mean square of what it gives too much
+    gives: float  # N, of the failed rotor
+    lost_for: float  # s
+    others_lost_for: PerRotor  # s, of each rotor beside the failed one
+    lost: int
+    disobeys: int
+    quiet_for: float  # s
+    # Joints.
+    arm_seen: float  # s, since encoders tell its angles
+    momentum: PerJoint  # N m s
+    undone: PerJoint  # N m, observed beside the model
+    asked: PerJoint  # N m, as late as that
+    odd2: float  # N^2 m^2, mean square of what base and arm do not feel of each other
+    undone2: PerJoint  # means of squares, and of the product
+    asked2: PerJoint
+    undoing: PerJoint
+    rate2: PerJoint  # rad^2/s^2
+    behind2: PerJoint  # rad^2, mean square of the distance from the reference
+    joint_for: PerJoint  # s, for how long it has been suspected
+    joint: PerJoint  # SOUND, STUCK or LIMP
+    stood_at: PerJoint  # rad, where it was found stuck
+
+
+class Tick(Record):
+    """The whole state of the fast loop."""
+
+    estimate: Estimate
+    plan: PlanState  # where the running plan wants the vehicle now
+    u: Accelerations  # the plan's input
+    has_estimate: int  # 1: there has been one
+    has_plan: int  # 1: there is a plan's state
+    sent: Sent  # the last command; after a tick its own, which the safety gate has yet to pass
+    rotors: PerRotor  # N, where the rotor model says they are
+    mass: float  # kg, weighed in flight
+    observed: Observed
+    attitude: Three  # rad s, integrals
+    height: float  # m s, integral
+    joints: Joints
+    off_plan: float  # m, largest deviation of late
+    health: Health  # what has been found out about rotors and joints
+    watch: Watched
+    margin: float  # m, the least one that the safety filter saw in this tick
+    flags: int  # what happened in this tick
+    # What is flown: the plan's state and input, changed by the safety filter.
+    flown: PlanState
+    flown_u: Accelerations
+
+    @property
+    def commanded(self) -> ActuatorCommand:
+        """The last command."""
+        f1, f2, f3, f4, t1, t2 = _COMMAND.unpack_from(self.memory, _SENT_AT)
+        return ActuatorCommand((f1, f2, f3, f4), (t1, t2))
+
+    @commanded.setter
+    def commanded(self, command: ActuatorCommand) -> None:
+        _COMMAND.pack_into(self.memory, _SENT_AT, *command.rotor_thrust, *command.joint_torque)
+
+    @property
+    def down(self) -> float:
+        """The third of the estimate's position [m, NED]."""
+        return float(_ONE.unpack_from(self.memory, _DOWN_AT)[0])
+
+    @property
+    def upright(self) -> float:
+        """The cosine of the estimate's tilt [1]."""
+        return float(_ONE.unpack_from(self.memory, _UPRIGHT_AT)[0])
+
+    @property
+    def wind(self) -> Vec2:
+        """What lasts of the disturbance [m/s^2, NED]."""
+        north, east = _TWO.unpack_from(self.memory, _WIND_AT)
+        return north, east
+
+    @property
+    def joint_reference(self) -> Vec2:
+        """What the joints were asked for [rad]."""
+        first, second = _TWO.unpack_from(self.memory, _REFERENCE_AT)
+        return first, second
+
+    @property
+    def known(self) -> StateEstimate | None:
+        """The estimate; None: there has been none yet."""
+        return estimate_in(self, 0) if self.has_estimate else None
+
+    @known.setter
+    def known(self, x: StateEstimate) -> None:
+        self.has_estimate = 1
+        t_us, p, v, R, w, yaw, q, qd, force = x
+        _ESTIMATE.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *q, *qd, force)
+
+    @property
+    def nominal(self) -> PredictionState | None:
+        """The plan's state; None: there is none."""
+        if not self.has_plan:
+            return None
+        n: Any = _PLAN.unpack_from(self.memory, _PLAN_AT)
+        p, v, a, j, s, q, qd = n[:3], n[3:6], n[6:9], n[9:11], n[11:13], n[15:17], n[17:]
+        return PredictionState(p, v, a, j, s, n[13], n[14], q, qd)
+
+    @nominal.setter
+    def nominal(self, x: PredictionState | None) -> None:
+        self.has_plan = int(x is not None)
+        if x is not None:
+            p, v, a, j, s, yaw, rate, q, qd = x
+            _PLAN.pack_into(self.memory, _PLAN_AT, *p, *v, *a, *j, *s, yaw, rate, *q, *qd)
+
+    @property
+    def input(self) -> PlanInput:
+        """The plan's input."""
+        a, b, c, yaw_acc, first, second = _INPUT.unpack_from(self.memory, _INPUT_AT)
+        return PlanInput((a, b, c), yaw_acc, (first, second))
+
+    @input.setter
+    def input(self, u: PlanInput) -> None:
+        _INPUT.pack_into(self.memory, _INPUT_AT, *u.a, u.yaw_acc, *u.qdd_arm)
+
+    def take_given(self, other: Tick) -> None:
+        """Take estimate, plan and input of another one."""
+        self.memory[:_SENT_AT] = other.memory[:_SENT_AT]
+
+
+def estimate_in(record: Record, at: int) -> StateEstimate:
+    """The ``Estimate`` ``at`` [byte] of a record."""
+    x: Any = _ESTIMATE.unpack_from(record.memory, at)
+    p, v, R, w = x[1:4], x[4:7], x[7:16], x[16:19]
+    return StateEstimate(x[0], p, v, R, w, x[19], x[20:22], x[22:24], x[24])
+
+
+NO_ROTOR: Final = -1
+FLOWN_ROTORS: Final = 4  # of the vehicle, of those that a record has room for
+_FLOWN: Final = 2  # joints, the same
+_OF_JOINTS: Final = f"{_FLOWN}d{8 * (JOINTS - _FLOWN)}x"
+_ESTIMATE: Final = struct.Struct(f"<q19d{2 * _OF_JOINTS}d")
+_PLAN: Final = struct.Struct(f"<15d{2 * _OF_JOINTS}")
+_INPUT: Final = struct.Struct(f"<4d{_OF_JOINTS}")
+_COMMAND: Final = struct.Struct(f"<4d{8 * (ROTORS - FLOWN_ROTORS)}x{_OF_JOINTS}")
+_ONE: Final = struct.Struct("<d")
+_TWO: Final = struct.Struct("<2d")
+
+
+_DOWN_AT: Final = Tick.place("estimate", "p_WB") + 2 * 8
+_UPRIGHT_AT: Final = Tick.place("estimate", "R_WB") + 8 * 8
+_PLAN_AT: Final = Tick.place("plan")
+_INPUT_AT: Final = Tick.place("u")
+_SENT_AT: Final = Tick.place("sent")
+_WIND_AT: Final = Tick.place("observed", "disturbance_bias")
+_REFERENCE_AT: Final = Tick.place("joints", "reference")
+
+
+def new_tick(mass: float) -> Tick:
+    """One in which nothing is known yet, of a healthy vehicle of ``mass`` [kg]."""
+    r = Tick()
+    r.mass, r.margin = mass, math.inf
+    r.health.effectiveness[:], r.health.most[:] = 1.0, math.inf
+    r.observed.recent = _NOT_KNOWN
+    watch_anew(r.watch)
+    return r
+
+
+def watch_anew(s: Watched) -> None:
+    """Begin a watch that knows of nothing."""
+    s.numbers[:] = 0.0
+    s.suspect = s.failed = NO_ROTOR
+    s.effect = 1.0
+
+
+_NOT_KNOWN: Final = 1.0  # m/s^2; nothing was observed yet, and what is to come may be large

@@ -1,0 +1,159 @@
+"""Which tuning a tick flies: the one in its state, whatever was asked for or made ready."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.plan_exchange import nominal_at_rest
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.signals import (
+    Mode,
+    SafeSet,
+    SensorFrame,
+    Severity,
+    TickInputs,
+    TickOutputs,
+    Vec3,
+)
+from fsw.autopilot.tuning import Tuning, tuned
+from tests.fsw.autopilot.flight.in_flight import CONFIG, flying, vehicle_at
+from tests.fsw.records import with_record
+
+STILL: Vec3 = (0.0, 0.0, 0.0)
+HERE: Vec3 = (0.0, 0.0, -5.0)
+SLOW: Tuning = (("limits.climb_speed", 0.2), ("planner.weights.tracking", 12.0))
+UNSAFE: Tuning = (("planner.walls.lambda_", 0.1),)
+WALLED = SafeSet((wall((-1.0, 0.0, 0.0), -50.0, 0.1),))
+SOFT = replace(CONFIG, soft=True)
+
+
+def tick(
+    loop: TunedAutopilot, state: FlightState, tuning: Tuning | None = None
+) -> tuple[FlightState, TickOutputs]:
+    """One tick in the air, at a planning instant, with a tuning that is asked for."""
+    frame = SensorFrame(
+        t_us=state.t_us + CONFIG.mpc_period_us,
+        p_WB=HERE,
+        v_WB=STILL,
+        q_WB=(1.0, 0.0, 0.0, 0.0),
+        gyro_B=STILL,
+        accel_B=(0.0, 0.0, -9.81),
+        q_arm=(0.0, 0.0),
+        qd_arm=(0.0, 0.0),
+    )
+    return loop.tick(state, TickInputs(frame, tuning=tuning))
+
+
+def walled(mode: Mode = Mode.HOLD) -> FlightState:
+    state = flying(mode)
+    return replace(state, mission=replace(state.mission, safe_set=WALLED))
+
+
+def test_a_tuning_is_flown_from_the_tick_on_that_takes_it() -> None:
+    loop = TunedAutopilot(CONFIG)
+    state, outputs = tick(loop, walled())
+    assert (loop.config, outputs.tuning_taken) == (CONFIG, None)
+    state, outputs = tick(loop, state, SLOW)
+    assert (loop.config, outputs.tuning_taken) == (tuned(CONFIG, SLOW), True)
+    state, outputs = tick(loop, state)
+    assert (loop.config, state.tuning, outputs.tuning_taken) == (tuned(CONFIG, SLOW), SLOW, None)
+    _, outputs = tick(loop, state, ())
+    assert (loop.config, outputs.tuning_taken) == (CONFIG, True)
+
+
+def test_the_same_state_is_flown_alike_by_a_loop_that_never_saw_its_tuning() -> None:
+    state, _ = tick(TunedAutopilot(CONFIG), walled(), SLOW)
+    fresh = TunedAutopilot(CONFIG)
+    tick(fresh, state)
+    assert fresh.config == tuned(CONFIG, SLOW)
+
+
+def test_the_planner_is_asked_with_its_part_of_the_tuning() -> None:
+    loop, requests = TunedAutopilot(CONFIG), []
+    state = replace(walled(), index=0)
+    state = with_record(state, nominal=nominal_at_rest(vehicle_at(HERE)))
+    for tuning in (None, SLOW, None):
+        for _ in range(5):
+            state, outputs = tick(loop, state, tuning)
+            if outputs.plan_request is not None:
+                requests.append(outputs.plan_request.tuning)
+                break
+    assert requests == [(), (("weights.tracking", 12.0),), (("weights.tracking", 12.0),)]
+
+
+@pytest.mark.parametrize(
+    ("config", "mode", "taken"),
+    [(CONFIG, Mode.HOLD, False), (CONFIG, Mode.DISARMED, True), (SOFT, Mode.HOLD, True)],
+    ids=["armed", "disarmed", "soft"],
+)
+def test_what_breaks_an_inequality_is_not_taken_while_armed_unless_softly(
+    config: FlightConfig, mode: Mode, taken: bool
+) -> None:
+    loop = TunedAutopilot(config)
+    state, outputs = tick(loop, walled(mode), UNSAFE)
+    assert outputs.tuning_taken is taken
+    assert state.tuning == (UNSAFE if taken else ())
+    begins = {
+        text.text.partition(": ")[0] for text in outputs.texts if text.severity is Severity.WARNING
+    }
+    contradict = Condition.PARAMETERS_CONTRADICT.value
+    assert ("refused while armed" in begins) is not taken
+    assert (contradict in begins) is (mode is Mode.DISARMED), "told once, by its row"
+    assert len(begins) == 1
+    # Disarmed it stands against arming from now on.
+    assert bool(state.mission.refusals) is (mode is Mode.DISARMED)
+
+
+def test_what_is_broken_already_is_no_reason_against_another_change() -> None:
+    loop = TunedAutopilot(CONFIG)
+    on_ground, _ = tick(loop, walled(Mode.DISARMED), UNSAFE)
+    armed = replace(on_ground, vehicle=replace(on_ground.vehicle, mode=Mode.HOLD))
+    both = (*UNSAFE, ("limits.climb_speed", 0.2))
+    state, outputs = tick(loop, armed, both)
+    assert (state.tuning, outputs.tuning_taken) == (both, True)
+
+
+def test_what_was_made_ready_is_flown_without_being_made_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    loop = TunedAutopilot(CONFIG)
+    loop.prepare(SLOW)
+    assert loop.config == CONFIG
+
+    def forbidden(_config: FlightConfig) -> Autopilot:
+        pytest.fail("a loop was designed within a tick")
+
+    monkeypatch.setattr("fsw.autopilot.flight.tuned_autopilot.Autopilot", forbidden)
+    state, outputs = tick(loop, walled(), SLOW)
+    tick(loop, state)
+    assert (loop.config, outputs.tuning_taken) == (tuned(CONFIG, SLOW), True)
+
+
+def test_a_safe_set_that_cannot_be_kept_is_flown_softly_alone() -> None:
+    loop = TunedAutopilot(CONFIG)
+    assert loop.against(WALLED) == ()
+    soft = TunedAutopilot(tuned(SOFT, UNSAFE))
+    hard = TunedAutopilot(tuned(CONFIG, UNSAFE))
+    assert soft.against(WALLED) == ()
+    assert hard.against(WALLED) != ()
+
+
+def test_the_loop_of_another_tuning_is_made_without_asking_for_types_or_gains_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """numba's types of records and the gains of braking took a tenth of a second, not 5 ms."""
+    loop = TunedAutopilot(CONFIG)
+
+    def asked(*_: object) -> None:
+        raise AssertionError("it is known already")
+
+    monkeypatch.setattr("numba.np.numpy_support.from_struct_dtype", asked)
+    monkeypatch.setattr("fsw.autopilot.control.braking.solve_continuous_are", asked)
+    loop.prepare(SLOW)
