@@ -189,5 +189,5 @@ class CampaignFlights(Sequence[CampaignFlight]):
 
 def _same(found: Outcome) -> dict[str, Any]:
     """What a row takes over from the outcome of its job."""
-    mine = {one.name for one in fields(CampaignRow)} - {"seed"}
+    mine = {one.name for one in fields(CampaignRow)} - {"seed", "took_s"}
     return {one.name: getattr(found, one.name) for one in fields(found) if one.name in mine}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -79,8 +80,9 @@ class Job:
 
     def row(self) -> Outcome:
         """See :class:`studies.campaign.campaign.Flight`."""
+        began_s = time.thread_time()
         try:
-            return score(self, fly_job(self))
+            return replace(score(self, fly_job(self)), took_s=time.thread_time() - began_s)
         except Exception as error:
             return self.broken(f"{type(error).__name__}: {error}")
 
@@ -118,6 +120,7 @@ class Outcome:
     modes: str = ""  # that the vehicle changed to by itself, in their order
     reported: str = ""  # the text that names the sensor at fault; empty if there was none
     error: bool = False  # the flight itself broke, not the vehicle
+    took_s: float = field(default=0.0, compare=False)  # processor time
 
     def as_line(self) -> dict[str, Any]:
         """See :class:`studies.campaign.campaign.Row`."""

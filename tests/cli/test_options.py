@@ -199,6 +199,21 @@ def test_a_word_too_many_is_no_option(capsys: pytest.CaptureFixture[str]) -> Non
     assert "'extra' is one word too many" in refused(FlyOptions, "walls", "extra", capsys=capsys)
 
 
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["n", "--loud=yes"], "test: --loud: takes no value; 'yes' was given\n"),
+        (["n", "--count"], "test: --count: a value must follow it\n"),
+        ([], "test: NAME must be given\n"),
+        (["n", "--count=argument expected one argument"], "test: --count: 'argument expected"),
+    ],
+)
+def test_what_is_missing_or_too_much_is_said_in_our_words(
+    words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert refused(Example, *words, capsys=capsys).startswith(sentence)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Several:
     names: tuple[str, ...] = option("--name N", "names", str, default=(), repeated=True)
