@@ -309,16 +309,19 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
 
 @machine_code
 @kernel
-def doubt(filters: Filter, place: float, turn: float) -> None:
+def doubt(filters: Filter, place: float, turn: float, held: bool) -> None:
     """Know little more of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad].
 
     Either the pose's frame has moved, or the inertial unit leads the filter astray: its biases may
-    be anything, and velocity and attitude are what they have made of them.
+    be anything, and velocity and attitude are what they have made of them. But where poses do not
+    say how the vehicle is turned, ``held``, their places would be explained by any attitude.
     """
     M = filters[0].covariance
     for i in range(3):
         M[P + i, P + i] += place * place
         M[V + i, V + i] += _DOUBTED_SPEED * _DOUBTED_SPEED
+        if not held:
+            continue
         M[TH + i, TH + i] += turn * turn
         M[BA + i, BA + i] += _DOUBTED_FORCE * _DOUBTED_FORCE
         M[BG + i, BG + i] += _DOUBTED_RATE * _DOUBTED_RATE

@@ -127,7 +127,7 @@ class SensorFusion:
         for sample in _at_rest(t):
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
-        fusion.doubt(memory.numbers, 0.0, 0.0)
+        fusion.doubt(memory.numbers, 0.0, 0.0, True)
         redundancy.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
@@ -435,7 +435,7 @@ class SensorFusion:
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)
             if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
-                fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN)
+                fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN, max(ratio) < math.inf)
                 ratio = self._update.fuse_pose(memory, sample, half=one.half)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
@@ -453,7 +453,7 @@ class SensorFusion:
             memory = self._update.take(memory, one, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
-                fusion.doubt(memory.numbers, 0.0, 0.0)
+                fusion.doubt(memory.numbers, 0.0, 0.0, max(ratio) < math.inf)
             taken = zip(fused, ratio, strict=True)
             fused = tuple([now if r < math.inf else before for before, r in taken])
             memory = memory.noting(health._replace(fused=fused))

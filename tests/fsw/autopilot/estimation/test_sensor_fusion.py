@@ -709,6 +709,24 @@ def test_half_an_inertial_unit_that_fails_leaves_the_place_to_the_pose(half: str
     assert abs(flown.error()[3:6]).max() < 0.3
 
 
+@pytest.mark.parametrize(("leap", "rate"), [(0.02, 2.5), (0.05, 2.5), (0.2, 1.3)])
+def test_places_that_leap_turn_nothing_where_no_attitude_comes_with_them(
+    leap: float, rate: float
+) -> None:
+    # Any attitude and any bias would explain them.
+    def change(now: float, sample: Sample) -> Sample:
+        if not isinstance(sample, PoseSample) or now - START < 1.0:
+            return sample
+        x, y, z = sample.position
+        x += leap * (math.floor(rate * (now - START)) % 2)
+        return replace(sample, position=(x, y, z), attitude_variance=(math.inf,) * 3)
+
+    flown = Flown(run(MOCAP, 8, 4.0), change)
+    assert abs(flown.error()[:3]).max() < leap + 0.01
+    assert abs(flown.error()[6:9]).max() < 0.02
+    assert abs(flown.error()[9:12]).max() < 0.1
+
+
 def test_readings_of_the_imu_that_are_late_are_none() -> None:
     held: list[ImuSample] = []
 
