@@ -78,18 +78,18 @@ class Job:
         return hashlib.sha256((repr(distinct) + sources()).encode()).hexdigest()[:32]
 
     def row(self) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         try:
             return score(self, fly_job(self))
         except Exception as error:
             return self.broken(f"{type(error).__name__}: {error}")
 
     def broken(self, reason: str) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return Outcome(self.seed, completed=False, reason=reason, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return kept_row(Outcome, line)
 
 
@@ -120,7 +120,7 @@ class Outcome:
     error: bool = False  # the flight itself broke, not the vehicle
 
     def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.campaign.Row`."""
+        """See :class:`studies.campaign.ports.Row`."""
         return asdict(self)
 
 
