@@ -37,7 +37,9 @@ class Px4Mode:
     """A mode in PX4's numbers, so that ground stations name it and offer their buttons."""
 
     main: int  # PX4_CUSTOM_MAIN_MODE
-    sub: int = 0  # PX4_CUSTOM_SUB_MODE_*
+    sub: int  # PX4_CUSTOM_SUB_MODE_*; 0: none
+    nav_state: int  # NAVIGATION_STATE, and its bit in navigation_mode_group_t
+    name: str  # in that group
     standard: int = 0  # MAV_STANDARD_MODE as announced; 0: none
     also_standard: int = 0  # MAV_STANDARD_MODE that is understood though not announced
     selectable: bool = True  # offered to the operator; else entered by a command of its own

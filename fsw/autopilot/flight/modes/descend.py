@@ -19,7 +19,7 @@ class Descend(FlightMode):
     """PX4's DESCEND, which it shows as AUTO.LAND; no command begins it."""
 
     mode = Mode.DESCEND
-    px4 = Px4Mode(4, 6, selectable=False, offered=False)
+    px4 = Px4Mode(4, 6, 12, "descend", selectable=False, offered=False)
 
     def __init__(self, config: FlightConfig) -> None:
         super().__init__(config)

@@ -17,7 +17,7 @@ class Hold(FlightMode):
     """PX4's AUTO.LOITER; on the ground the rotors idle."""
 
     mode = Mode.HOLD
-    px4 = Px4Mode(4, 3)
+    px4 = Px4Mode(4, 3, 4, "loiter")
     interrupts_landing = True
     before_arming = True
     manual = True

@@ -37,7 +37,7 @@ class Mission(FlightMode):
     """PX4's AUTO.MISSION."""
 
     mode = Mode.MISSION
-    px4 = Px4Mode(4, 4, standard=6)
+    px4 = Px4Mode(4, 4, 3, "mission", standard=6)
     before_arming = True
     lifts_off = True
     external_reference = True

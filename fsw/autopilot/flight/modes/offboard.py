@@ -51,7 +51,7 @@ class Offboard(FlightMode):
     """PX4's OFFBOARD; what happens when setpoints stop is in ``failsafe.py``."""
 
     mode = Mode.OFFBOARD
-    px4 = Px4Mode(6)
+    px4 = Px4Mode(6, 0, 14, "offboard")
     before_arming = True
     manual = True
 

@@ -24,7 +24,7 @@ class Return(FlightMode):
     mode = Mode.RETURN
     # Standard mode 5, safe recovery, is not announced as PX4 does: QGroundControl 4.4 then renames
     # the mode, and does not find what its own Return button is looking for.
-    px4 = Px4Mode(4, 5, also_standard=5)
+    px4 = Px4Mode(4, 5, 5, "rtl", also_standard=5)
     interrupts_landing = True
 
     def refusal(self, context: CommandContext) -> str | None:

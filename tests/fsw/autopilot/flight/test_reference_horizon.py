@@ -118,7 +118,7 @@ class Elsewhere(FlightMode):
     """A mode whose reference is somewhere else altogether, and moves."""
 
     mode = Mode.HOLD
-    px4 = Px4Mode(0)
+    px4 = Px4Mode(0, 0, 0, "")
 
     def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
         return EndEffectorTarget(t_us, (9.0, 1e-6 * t_us, -3.0), (5.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -157,7 +157,7 @@ class UpAndDown(FlightMode):
     """From outside: at rest on the ground, up past the lowest height, and to the ground again."""
 
     mode = Mode.MISSION
-    px4 = Px4Mode(0)
+    px4 = Px4Mode(0, 0, 0, "")
     external_reference = True
 
     def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
