@@ -14,14 +14,11 @@ cover a third, a zone that moves otherwise.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.zones import surfaces
-from fsw.autopilot.signals import MAX_DISTANCE, SafeSet, Shape, Vec3, Zone
-
-_ROUND = ("ball", "target sphere")
+from fsw.autopilot.signals import SafeSet, Shape, Vec3, Zone
 
 
 def growth(old: SafeSet, new: SafeSet) -> str:
@@ -84,56 +81,19 @@ def _implies(new: Zone, old: Zone) -> bool:
         return False
     if new.shape == old.shape:
         return new.clearance >= old.clearance
-    if new.shape.kind == old.shape.kind and _covers(new, old):
+    if new.shape.kind == old.shape.kind and kind_of(new.shape).covers(new, old):
         return True
     return not old.keep_in and _holds_ball_around(new, old)
 
 
-def _covers(new: Zone, old: Zone) -> bool:
-    """Whether the one of two zones of a kind covers the other, its clearance included."""
-    kind, a, b = new.shape.kind, new.shape.numbers, old.shape.numbers
-    no_closer = new.clearance >= old.clearance
-    if kind == "half-space":
-        sign = -1.0 if new.keep_in else 1.0
-        return a[:3] == b[:3] and sign * a[3] + new.clearance >= sign * b[3] + old.clearance
-    if kind in _ROUND and new.keep_in:
-        return math.dist(a[:3], b[:3]) + a[3] - new.clearance <= b[3] - old.clearance
-    if kind == "vertical cylinder" and not new.keep_in:
-        apart = math.dist(a[:2], b[:2])
-        high = a[2] <= max(b[2] - old.clearance, -MAX_DISTANCE)
-        low = a[3] >= min(b[3] + old.clearance, MAX_DISTANCE)
-        return high and low and apart + b[4] + old.clearance <= a[4] + new.clearance
-    if kind == "box" and no_closer and (a[:3], a[6:]) == (b[:3], b[6:]):
-        sizes = zip(a[3:6], b[3:6], strict=True)
-        return all(x <= y if new.keep_in else x >= y for x, y in sizes)
-    if kind == "cylinder" and no_closer and a[:6] == b[:6]:
-        return a[6] <= b[6] if new.keep_in else a[6] >= b[6]
-    return False
-
-
 def _holds_ball_around(new: Zone, old: Zone) -> bool:
     """Whether a ball around all of the old zone, clearance included, is forbidden by the new."""
-    around = _ball_around(old.shape)
-    if around is None or new.shape.kind == "target sphere":
+    around = kind_of(old.shape).ball_around(old.shape.numbers)
+    if around is None or kind_of(new.shape).follows_target:
         return False
     centre, radius = around
     (at,) = surfaces(SafeSet((new,)), centre, new.t_us)
     return at.distance <= -(radius + old.clearance)
-
-
-def _ball_around(shape: Shape) -> tuple[Vec3, float] | None:
-    """Centre [m, NED] and radius [m] of a ball that holds a shape; None where none is known."""
-    n = shape.numbers
-    if shape.kind == "ball":
-        return (n[0], n[1], n[2]), n[3]
-    if shape.kind == "box":
-        return (n[0], n[1], n[2]), math.hypot(n[3], n[4], n[5])
-    if shape.kind == "cylinder":
-        middle = (0.5 * (n[0] + n[3]), 0.5 * (n[1] + n[4]), 0.5 * (n[2] + n[5]))
-        return middle, math.hypot(0.5 * math.dist(n[:3], n[3:6]), n[6])
-    if shape.kind == "vertical cylinder":
-        return (n[0], n[1], 0.5 * (n[2] + n[3])), math.hypot(0.5 * (n[3] - n[2]), n[4])
-    return None
 
 
 def _change(old: Zone, zones: tuple[Zone, ...]) -> str:
@@ -141,13 +101,18 @@ def _change(old: Zone, zones: tuple[Zone, ...]) -> str:
     for new in zones:
         if new.shape == old.shape and new.clearance < old.clearance:
             return f"loses {1e3 * (old.clearance - new.clearance):.1f} mm of clearance"
-    if old.shape.kind == "half-space" and not old.keep_in:
-        reaches = [
-            zone.shape.numbers[3] + zone.clearance
-            for zone in zones
-            if zone.shape.kind == "half-space" and zone.shape.numbers[:3] == old.shape.numbers[:3]
-        ]
+    before = _reach(old)
+    if before is not None:
+        normal, reach = before
+        reaches = [one[1] for one in map(_reach, zones) if one is not None and one[0] == normal]
         if reaches:
-            by = old.shape.numbers[3] + old.clearance - max(reaches)
-            return f"moves out by {1e3 * by:.1f} mm"
+            return f"moves out by {1e3 * (reach - max(reaches)):.1f} mm"
     return "is removed, moved or turned"
+
+
+def _reach(zone: Zone) -> tuple[Vec3, float] | None:
+    """Normal [1, NED] and how far [m] along it a flat zone to keep out of reaches."""
+    if zone.keep_in or not kind_of(zone.shape).flat:
+        return None
+    (at,) = surfaces(SafeSet((zone,)), (0.0, 0.0, 0.0), zone.t_us)
+    return at.normal, zone.clearance - at.distance
