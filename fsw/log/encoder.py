@@ -13,7 +13,7 @@ from operator import attrgetter
 from typing import Any, Final
 
 from fsw.autopilot.estimation.sensor_fault import Sensor
-from fsw.autopilot.flight.estimator_report import (
+from fsw.autopilot.flight.estimate.estimator_report import (
     ABOVE_GROUND,
     ABSOLUTE,
     HEIGHT,

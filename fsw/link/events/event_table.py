@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from fsw.autopilot.flight.ailments import AILMENTS
-from fsw.autopilot.flight.arming import CHECKS, Subject
-from fsw.autopilot.flight.conditions import Action, Condition
-from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.flight.commands.arming import CHECKS, Subject
+from fsw.autopilot.flight.failsafe.ailments import AILMENTS
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.signals import ArmingReport, FailsafeEvent, Severity
 from fsw.link.wire.px4_mode import custom_mode

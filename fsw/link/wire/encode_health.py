@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, fault_name
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import (
     BatteryState,
     Charge,

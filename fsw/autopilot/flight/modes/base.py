@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fsw.autopilot.flight.arming_health import ArmingHealth
+from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.land_detector import feel_ground
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.body import Body

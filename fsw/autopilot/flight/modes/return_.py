@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.autopilot.flight.mission_sequencer import nearest
+from fsw.autopilot.flight.mission.sequencer import nearest
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
     CommandContext,
@@ -12,7 +12,7 @@ from fsw.autopilot.flight.modes.base import (
     Px4Mode,
     moved,
 )
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, arrived
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, arrived
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.signals import Home, Mode, MotionSetpoint, StateEstimate, Vec3
 from fsw.frozen import replace

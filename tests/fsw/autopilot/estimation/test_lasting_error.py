@@ -16,7 +16,7 @@ from fsw.autopilot.estimation.sensor_checks import Health
 from fsw.autopilot.estimation.sensor_fault import Sensor
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
-from fsw.autopilot.flight.uncertain_clearance import pose_covariance
+from fsw.autopilot.flight.safety.uncertain_clearance import pose_covariance
 from fsw.autopilot.measurements import GnssSample, PoseSample
 from tests.fsw.random_states import estimate_of
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fsw.autopilot.flight.modes as modes_package
-from fsw.autopilot.flight.command_handlers import DENIED
+from fsw.autopilot.flight.commands.handlers import DENIED
 from fsw.autopilot.flight.modes import MODES, NAV_STATES
 from fsw.autopilot.signals import CommandResult, Mode
 from tests.fsw.autopilot.flight.asked import FLIGHT_MODES, ask

@@ -8,13 +8,14 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from tests.fsw.autopilot.flight.test_failsafe_response import Watched
 
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
+from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory, PlanMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
@@ -29,7 +30,6 @@ from fsw.autopilot.signals import (
 )
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
 from tests.fsw.autopilot.flight.test_autopilot import frame, tick
-from tests.fsw.autopilot.flight.test_failsafe_response import Watched
 from tests.fsw.records import with_record
 
 BEGIN_US = 1_002_000  # just after the table was looked at

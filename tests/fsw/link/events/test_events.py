@@ -9,9 +9,9 @@ from typing import Any, cast
 
 import pytest
 
-from fsw.autopilot.flight.ailments import AILMENTS
-from fsw.autopilot.flight.arming import CHECKS, Subject
-from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.flight.commands.arming import CHECKS, Subject
+from fsw.autopilot.flight.failsafe.ailments import AILMENTS
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.signals import (
     ArmingReport,
     Command,
