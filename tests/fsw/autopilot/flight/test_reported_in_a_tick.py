@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from tests.fsw.autopilot.flight.test_failsafe_response import Watched
 
 from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.flight.failsafe.conditions import Condition
@@ -28,6 +27,7 @@ from fsw.autopilot.signals import (
     SolverStatus,
     Zone,
 )
+from tests.fsw.autopilot.flight.failsafe.test_response import Watched
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
 from tests.fsw.autopilot.flight.test_autopilot import frame, tick
 from tests.fsw.records import with_record
