@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
 from fsw.autopilot.flight.commands.arming import CHECKS, ArmingCheck
 from fsw.autopilot.flight.failsafe.conditions import Action
 from fsw.autopilot.flight.failsafe.table import FAILSAFES, Failsafe
 from fsw.autopilot.parameters.float32 import as_text
 from fsw.autopilot.parameters.registry import BY_NAME
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """What the pages say of a row."""
+
+    detected: str  # what is looked at
+    does: str = ""  # the action, where no parameter chooses it
+    ends: str = ""  # when, where that is not simply when it is not so any more
+
+
+_FILE: Final = Path(__file__).with_suffix(".toml")
+WORDS: Final = {
+    name: Words(**said) for name, said in tomllib.loads(_FILE.read_text("utf-8")).items()
+}
 
 _HEAD = """\
 # Failsafe table
@@ -59,14 +79,19 @@ def _check(check: ArmingCheck) -> str:
     return f"| {check.subject.value} | {fails} | {'no' if check.permanent else 'yes'} |"
 
 
+def words(row: Failsafe) -> Words:
+    """What the pages say of a row."""
+    return WORDS[row.condition.name]
+
+
 def _cells(row: Failsafe) -> tuple[str, ...]:
     return (
         row.condition.value + (" (fault)" if row.of_vehicle else ""),
-        row.detected,
+        words(row).detected,
         seconds(row.within_us),
         _action(row),
         row.severity.name.lower(),
-        row.ends,
+        words(row).ends,
     )
 
 
@@ -78,7 +103,7 @@ def seconds(time_us: int) -> str:
 def _action(row: Failsafe) -> str:
     """What is done, in words or by the parameters that choose it."""
     chosen = [name for name in row.parameters if BY_NAME[name].choices and name in _CHOOSING]
-    parts = [row.does] if row.does else []
+    parts = [words(row).does] if words(row).does else []
     for name in chosen:
         parameter = BY_NAME[name]
         choices = [

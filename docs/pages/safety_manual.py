@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from docs.pages.failsafes import seconds
+from docs.pages.failsafes import seconds, words
 from docs.pages.requirements import Manual, Requirement, ShowingTest, Shown, load, shown_by_tests
 from fsw.autopilot.flight.commands.arming import CHECKS
 from fsw.autopilot.flight.failsafe.conditions import Condition
@@ -94,8 +94,8 @@ def _default(parameter: Parameter) -> str:
 
 def _action(row: Failsafe) -> str:
     """What is done by default."""
-    if row.does:
-        return row.does
+    if words(row).does:
+        return words(row).does
     chosen = [BY_NAME[name] for name in row.parameters if name in _ACTIONS]
     done = [f"{dict(one.choices)[int(one.default)].lower()} (`{one.name}`)" for one in chosen]
     return "; ".join(done)

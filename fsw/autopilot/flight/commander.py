@@ -11,11 +11,10 @@ from fsw.autopilot.flight.commands.arming_health import arming_health
 from fsw.autopilot.flight.commands.dedup import answered_before, remember, still_true
 from fsw.autopilot.flight.commands.handlers import Decision, decide, decide_without_estimate
 from fsw.autopilot.flight.failsafe.active import active, quickly_active, surely_none
-from fsw.autopilot.flight.failsafe.ailments import ailments
 from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.failsafe.response import overridden, respond
-from fsw.autopilot.flight.failsafe.table import BLOCKING, SLOW_US
+from fsw.autopilot.flight.failsafe.table import BLOCKING, SLOW_US, unhealthy
 from fsw.autopilot.flight.land_detector import in_the_air, standing_unclear, stands
 from fsw.autopilot.flight.mission.sequencer import refusal as mission_refusal
 from fsw.autopilot.flight.modes import MODES
@@ -152,7 +151,7 @@ class Commander:
         Empty if it could be armed, or is; of one that is armed, the report says what is ill.
         """
         if state.vehicle.armed:
-            sentence, report = "", ArmingReport(ill=ailments(state.vehicle.conditions))
+            sentence, report = "", ArmingReport(ill=unhealthy(state.vehicle.conditions))
         else:
             found = arming.failed(self.context(state, estimate))
             report = ArmingReport(tuple([number for number, _ in found]))

@@ -16,7 +16,6 @@ from functools import cache
 from typing import Any, Final
 
 from fsw.autopilot.flight.commands.arming import CHECKS, Subject
-from fsw.autopilot.flight.failsafe.ailments import AILMENTS
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.modes import MODES
@@ -95,9 +94,9 @@ def arming_events(report: ArmingReport) -> tuple[Event, ...]:
     for number in report.failed:
         errors |= 1 << _BITS[CHECKS[number].subject]
     for name in report.ill:
-        condition = Condition(name)
-        bit = 1 << _BITS[AILMENTS[condition]]
-        if ROWS[condition].severity <= Severity.CRITICAL:
+        row = ROWS[Condition(name)]
+        bit = 1 << _BITS[row.component] if row.component is not None else 0
+        if row.severity <= Severity.CRITICAL:
             errors |= bit
         else:
             warnings |= bit

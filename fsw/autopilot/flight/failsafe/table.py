@@ -4,16 +4,18 @@ A condition is reported once, when it becomes active. The strongest action that 
 asks for is taken, for as long as no command of the pilot overrides it: that is
 ``response.py``. Some actions are parameters, in PX4's names and numbers. To act on another
 condition, name it in ``conditions.py`` and add a row; docs/reference/failsafes.md is made from the
-rows.
+rows and what ``docs/pages/failsafes.toml`` says of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
 from fsw.autopilot.estimation.redundancy import UNDECIDED
+from fsw.autopilot.flight.commands.arming import Subject
 from fsw.autopilot.flight.failsafe import actions as actions
 from fsw.autopilot.flight.failsafe import evidence as evidence
 from fsw.autopilot.flight.failsafe import wording as wording
@@ -30,6 +32,13 @@ SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
 Evidence = Callable[[FailsafeContext], bool]
 
 
+class UserTakeoverAllowed(Enum):
+    """Whether the pilot can fly another mode while a condition acts, in PX4's words."""
+
+    ALWAYS = "always"
+    NEVER = "never"  # nothing but Descend can be flown
+
+
 @dataclass(frozen=True, slots=True)
 class Failsafe:
     """One row of the table."""
@@ -42,13 +51,10 @@ class Failsafe:
     of_vehicle: bool = False  # a fault of the vehicle, shown by telemetry for as long as it lasts
     slow: bool = False  # looked at once a planning period, not every tick
     delayed: bool = False  # holds for COM_FAIL_ACT_T before it returns or lands
-    # For the page of the table: what is looked at, how long it takes until the condition is
-    # reported, beyond the time of a parameter, and the parameters that belong to it.
-    detected: str = ""
-    within_us: int = AT_ONCE_US
-    parameters: tuple[str, ...] = ()
-    does: str = ""  # the action in words where no parameter chooses it
-    ends: str = ""  # when, where that is not simply when it is not so any more
+    within_us: int = AT_ONCE_US  # until it is reported, beyond the time of a parameter
+    parameters: tuple[str, ...] = ()  # that belong to it
+    component: Subject | None = None  # which is reported as unhealthy while it lasts
+    takeover: UserTakeoverAllowed = UserTakeoverAllowed.ALWAYS
 
 
 def _always(action: Action) -> Callable[[FailsafeContext], Action]:
@@ -66,11 +72,9 @@ FAILSAFES: Final = (
         Severity.EMERGENCY,
         lambda c: ": no estimate for 0.25 s" if evidence.is_blind(c) else wording.unaided(c),
         of_vehicle=True,
-        detected="in flight, the standard deviation of roll or pitch is above `COM_ATT_LOSS`, or "
-        "there has been no estimate at all for 125 ticks (0.25 s)",
         within_us=_SLOWLY,
         parameters=("COM_ATT_LOSS",),
-        does="terminate: rotors and joints off",
+        component=Subject.ATTITUDE,
     ),
     Failsafe(
         Condition.TILT_LOST,
@@ -79,13 +83,11 @@ FAILSAFES: Final = (
         Severity.EMERGENCY,
         wording.tilted,
         of_vehicle=True,
-        detected="in flight, roll has been above `FD_FAIL_R` for `FD_FAIL_R_TTRI`, or pitch above "
-        "`FD_FAIL_P` for `FD_FAIL_P_TTRI`",
         parameters=(
             *("FD_FAIL_R", "FD_FAIL_R_TTRI", "FD_FAIL_P", "FD_FAIL_P_TTRI"),
             "CBRK_FLIGHTTERM",
         ),
-        does="terminate: rotors and joints off; with `CBRK_FLIGHTTERM` 121212 warn",
+        component=Subject.ATTITUDE,
     ),
     Failsafe(
         Condition.POSITION_LOST,
@@ -94,11 +96,10 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         wording.uncertain,
         of_vehicle=True,
-        detected="in flight, no position could be used for `COM_AID_LOSS_T`, and the standard "
-        "deviation of the position is above `COM_POS_FS_EPH`",
         within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T", "COM_POS_FS_EPH"),
-        does="descend by attitude and height, away from zones while the speed is known",
+        component=Subject.ESTIMATOR,
+        takeover=UserTakeoverAllowed.NEVER,
     ),
     Failsafe(
         Condition.PLANNER_LOST,
@@ -108,11 +109,9 @@ FAILSAFES: Final = (
         wording.no_plan,
         of_vehicle=True,
         slow=True,
-        detected="in flight, no plan has begun for `COM_PLN_LOSS_T`: the planner is dead, silent "
-        "or finds none",
         within_us=_SLOWLY,
         parameters=("COM_PLN_LOSS_T",),
-        does="descend where it is, without plans",
+        takeover=UserTakeoverAllowed.NEVER,
     ),
     Failsafe(
         Condition.BREACH,
@@ -121,13 +120,8 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.breach_by),
         of_vehicle=True,
-        detected="in flight, a margin of a part of the vehicle to a zone that was announced is "
-        "negative by its own estimate: "
-        "each tick for hull, rotors, feet and arm ends near a zone, each planning period for "
-        "everything",
         within_us=_SLOWLY,
         parameters=("SAFE_BREACH_ACT",),
-        ends="every such margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
         Condition.FENCE_BREACH,
@@ -136,10 +130,8 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.fence_by),
         of_vehicle=True,
-        detected="the same to a zone of an uploaded fence",
         within_us=_SLOWLY,
         parameters=("GF_ACTION",),
-        ends="every such margin has been above 10 mm for 0.5 s",
     ),
     Failsafe(
         Condition.FAR_OUTSIDE,
@@ -149,11 +141,8 @@ FAILSAFES: Final = (
         of_vehicle=True,
         slow=True,
         delayed=True,
-        detected="in flight, a margin to a zone or the fence is below -1 m",
         within_us=_TWICE,
         parameters=("SAFE_BREACH_ACT", "COM_FAIL_ACT_T"),
-        does="hold, then land; only warn where `SAFE_BREACH_ACT` is 1. Nothing pushes the vehicle "
-        "towards a boundary that is so far away",
     ),
     Failsafe(
         Condition.ROTOR_LOST,
@@ -162,13 +151,8 @@ FAILSAFES: Final = (
         Severity.EMERGENCY,
         detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
         of_vehicle=True,
-        detected="in flight, a rotor has given less than a fifth of its command for 0.15 s: 0.28 s "
-        "after it was lost",
         parameters=("FD_ACT_EN", "CBRK_FLIGHTTERM"),
-        does="terminate: the others cannot hold the vehicle upright "
-        "([what is left](../concepts/failsafes.md#a-rotor-that-is-lost)); with `CBRK_FLIGHTTERM` "
-        "121212 land",
-        ends="never in a flight",
+        component=Subject.ACTUATORS,
     ),
     Failsafe(
         Condition.ROTOR_FAILED,
@@ -178,12 +162,9 @@ FAILSAFES: Final = (
         detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
         of_vehicle=True,
         slow=True,
-        detected="in flight, a rotor gives another thrust than it is commanded, by 1.5 N for "
-        "0.15 s, or by 4 N for 0.03 s: 0.1 s after it was lost, 0.3 s after it gives 70 %, "
-        "0.5 to 2 s after it gives random thrusts",
         within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
-        ends="a weak rotor gives what it is commanded for 3 s; another failure never ends",
+        component=Subject.ACTUATORS,
     ),
     Failsafe(
         Condition.JOINT_FAILED,
@@ -193,12 +174,9 @@ FAILSAFES: Final = (
         detail=lambda c: f": {c.state.damage.joint}{wording.lasting(c, c.state.damage.joint_us)}",
         of_vehicle=True,
         slow=True,
-        detected="in flight, for 0.1 s, torque has no effect on a joint that does not follow its "
-        "reference: 0.12 N m, and half of what is asked for; 0.4 s while both encoders repeat "
-        "themselves, which may be stuck",
         within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
-        ends="never in a flight",
+        component=Subject.ACTUATORS,
     ),
     Failsafe(
         Condition.POSITION_LOW,
@@ -207,10 +185,9 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         wording.uncertain,
         of_vehicle=True,
-        detected="in flight, no position could be used for `COM_AID_LOSS_T`, and the standard "
-        "deviation of the position is above `COM_POS_LOW_EPH`",
         within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T", "COM_POS_LOW_EPH", "COM_POS_LOW_ACT"),
+        component=Subject.ESTIMATOR,
     ),
     Failsafe(
         Condition.SENSOR_LOST,
@@ -219,9 +196,9 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         wording.lost_sensor,
         of_vehicle=True,
-        detected="in flight, inertial unit or joint encoders were of no use for `COM_SENS_LOSS_T`",
         within_us=_SLOWLY,
         parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
+        component=Subject.SENSORS,
     ),
     Failsafe(
         Condition.INERTIAL_LOST,
@@ -231,11 +208,9 @@ FAILSAFES: Final = (
         wording.lost_sensor,
         of_vehicle=True,
         slow=True,
-        detected="in flight, no pose holds the attitude, and the inertial unit has been silent for "
-        "`COM_SENS_LOSS_T`, or a half of it was of no use for 1 s",
         within_us=_TWICE,
         parameters=("COM_SENS_LOSS_T",),
-        does="descend in a hurry, away from zones: rotors' thrusts stand in",
+        component=Subject.SENSORS,
     ),
     Failsafe(
         Condition.SENSORS_UNDECIDED,
@@ -245,9 +220,8 @@ FAILSAFES: Final = (
         wording.suspects,
         of_vehicle=True,
         slow=True,
-        detected="in flight, the next row for 2 s",
         within_us=_TWICE,
-        does="land",
+        component=Subject.SENSORS,
     ),
     Failsafe(
         Condition.SENSORS_CONTRADICT,
@@ -257,11 +231,8 @@ FAILSAFES: Final = (
         wording.suspects,
         of_vehicle=True,
         slow=True,
-        detected="in flight, for 0.1 s, gyro, accelerometer, pose, satellites or magnetometer say "
-        "another motion than the others, and which of them is wrong is not known "
-        "([who is wrong](safety-manual.md#who-is-wrong))",
         within_us=_TWICE,
-        does="off the zones that are too close, then hold",
+        component=Subject.SENSORS,
     ),
     Failsafe(
         Condition.ROOM_LACKING,
@@ -270,11 +241,8 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",
         slow=True,
-        detected="in flight, for 0.5 s, walls leave 10 mm less than clearances should grow by "
-        "([barriers](../concepts/barriers.md#an-uncertain-place))",
         within_us=_TWICE,
         parameters=("SAFE_SIGMAS",),
-        does="critical text; they grow as far as a plan at rest still has a place",
     ),
     Failsafe(
         Condition.TUBE_LEFT,
@@ -283,12 +251,7 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.off_plan_by),
         of_vehicle=True,
-        detected="in flight, the base is further from the running plan's state, on any axis, than "
-        "the start-up analysis bounds it, and 10 mm for noise, or what the analysis of the "
-        "estimate finds if that is more",
         within_us=2 * AT_ONCE_US,
-        does="the next plan, within a planning period, starts from the measurement",
-        ends="the vehicle has been within half of that for 0.5 s",
     ),
     Failsafe(
         Condition.FILTER_ACTIVE,
@@ -296,10 +259,7 @@ FAILSAFES: Final = (
         _always(Action.PUSH),
         Severity.CRITICAL,
         of_vehicle=True,
-        detected="the safety filter changed the acceleration that the loops were about to realise",
         within_us=2 * AT_ONCE_US,
-        does="the filter works in every tick that needs it",
-        ends="it has changed nothing for 1 s",
     ),
     Failsafe(
         Condition.PLAN_STALE,
@@ -307,8 +267,6 @@ FAILSAFES: Final = (
         _always(Action.BRAKE),
         detail=wording.no_plan,
         of_vehicle=True,
-        detected="in flight, the running plan is older than 0.3 s",
-        does="brake to rest and hold, while the planner is asked again",
     ),
     Failsafe(
         Condition.AIDING_LOST,
@@ -316,28 +274,24 @@ FAILSAFES: Final = (
         _always(Action.DEAD_RECKON),
         detail=wording.unaided,
         of_vehicle=True,
-        detected="in flight, the estimate could use no position for `COM_AID_LOSS_T`",
         within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T",),
-        does="dead reckoning",
+        component=Subject.ESTIMATOR,
     ),
     Failsafe(
         Condition.ESTIMATE_INVALID,
         lambda c: c.state.invalid_ticks >= evidence.INVALID_TICKS,
         _always(Action.WARN),
         of_vehicle=True,
-        detected="on the ground, no estimate for 5 ticks (10 ms), or for 1 s after the start",
-        does="warning, at the start with the sensors that have never come; no arming. Telemetry "
-        "goes on and shows it",
+        component=Subject.ESTIMATOR,
     ),
     Failsafe(
         Condition.OUTPUT_NOT_FINITE,
         lambda c: c.state.output_replaced,
         _always(Action.WARN),
         of_vehicle=True,
-        detected="the safety gate found NaN or infinity in what the loops command",
         within_us=2 * AT_ONCE_US,
-        does="warning; the last finite command is repeated",
+        component=Subject.ACTUATORS,
     ),
     Failsafe(
         Condition.PLAN_REFUSED,
@@ -345,18 +299,14 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         detail=wording.refused_plan,
         of_vehicle=True,
-        detected="the planner answered that it has no plan",
         within_us=2 * AT_ONCE_US,
-        does="warning; the previous plan continues",
     ),
     Failsafe(
         Condition.PLAN_LATE,
         # In every tick: a plan may come before the next look, and would have been late in silence.
         lambda c: c.state.plan.awaited_missed and evidence.plans(c),
         _always(Action.WARN),
-        detected="in flight, a plan has not come at its time",
         within_us=2 * AT_ONCE_US,
-        does="warning; the previous plan continues",
     ),
     Failsafe(
         Condition.TIME_JUMPED,
@@ -368,11 +318,7 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         wording.jumped,
         slow=True,
-        detected="the sensors' clock went back, or the time stamp of the sensors went on by more "
-        "ticks at once than are made up for (25, 50 ms)",
         within_us=_SLOWLY,
-        does="critical text; where the clock alone jumped, the vehicle's time goes on evenly",
-        ends="a second later",
     ),
     Failsafe(
         Condition.LOOP_OVERRUN,
@@ -380,10 +326,7 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         detail=lambda c: f": {c.state.host.missed_ticks} in the last second",
         slow=True,
-        detected=f"10 of a second's {1_000_000 // TICK_US} ticks were late, skipped or without "
-        "readings of their own",
         within_us=SECOND_US,
-        does="warning; plans and estimate carry over missed ticks",
     ),
     Failsafe(
         Condition.CLOCK_JUMPED,
@@ -391,10 +334,7 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         detail=lambda c: f" by {1e-6 * c.state.host.clock_jump_us:+.1f} s",
         slow=True,
-        detected="within a second, the machine's wall clock moved by 0.5 s against its monotonic "
-        "clock",
         within_us=SECOND_US,
-        does="warning; nothing that flies uses the wall clock",
     ),
     Failsafe(
         Condition.LINK_FLOODED,
@@ -403,10 +343,8 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.host.datagrams} datagrams in the last second",
         slow=True,
-        detected="more than `COM_FLOOD_RATE` datagrams a second came from the ground",
         within_us=SECOND_US,
         parameters=("COM_FLOOD_RATE",),
-        does="critical text; what is read of a link in a tick is bounded, the rest is dropped",
     ),
     Failsafe(
         Condition.LOG_STOPPED,
@@ -415,10 +353,9 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.host.log_failure}",
         slow=True,
-        detected="a file of the flight log could not be written, was deleted, or has gaps",
         within_us=SECOND_US,
         parameters=("COM_ARM_SDCARD",),
-        does="critical text; the flight goes on, and the next arming is denied",
+        component=Subject.STORAGE,
     ),
     Failsafe(
         Condition.DISK_FULL,
@@ -427,18 +364,15 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: f": room for {1e-6 * c.state.host.disk_left_us:.0f} s of the flight log",
         slow=True,
-        detected="the disk has room for less than a minute of the flight log",
         within_us=SECOND_US,
-        does="critical text",
+        component=Subject.STORAGE,
     ),
     Failsafe(
         Condition.SETPOINTS_LOST,
         evidence.setpoints_are_lost,
         actions.on_setpoints_lost,
         detail=wording.refused_setpoints,
-        detected="in Offboard, no setpoint for `COM_OF_LOSS_T`",
         parameters=("COM_OF_LOSS_T", "COM_OBL_RC_ACT"),
-        ends="setpoints come again, or the pilot commands a mode",
     ),
     Failsafe(
         Condition.ZONES_SILENT,
@@ -447,11 +381,8 @@ FAILSAFES: Final = (
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.mission.silent_zones} held where predicted",
         slow=True,
-        detected="a zone that moves was not announced for `SAFE_MOVE_T`",
         within_us=_TWICE,
         parameters=("SAFE_MOVE_T",),
-        does="critical text; the zone stands where it is predicted then",
-        ends="it is announced again",
     ),
     Failsafe(
         Condition.DATALINK_LOST,
@@ -460,12 +391,8 @@ FAILSAFES: Final = (
         detail=lambda c: f" for {c.gcs_silent_us * 1e-6:.0f} s",
         slow=True,
         delayed=True,
-        detected="a HEARTBEAT of a ground station (MAV_TYPE_GCS) was received, then none for "
-        "`COM_DL_LOSS_T`; acted upon in every flight mode, in a mission too, but for the modes of "
-        "`COM_DLL_EXCEPT`, and as soon as such a mode is left",
         within_us=_SLOWLY,
         parameters=("COM_DL_LOSS_T", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
-        ends="a HEARTBEAT is received",
     ),
     Failsafe(
         Condition.FLIGHT_TIME_LOW,
@@ -474,9 +401,6 @@ FAILSAFES: Final = (
         detail=wording.time_left,
         slow=True,
         delayed=True,
-        detected="in flight, what is left of the battery lasts, at the current of the last half "
-        "minute, no longer than the way home takes: `RTL_TIME_FACTOR` times the time of it, and "
-        "`RTL_TIME_MARGIN`",
         within_us=_TWICE,
         parameters=(
             *("RTL_TIME_FACTOR", "RTL_TIME_MARGIN", "COM_FLTT_LOW_ACT"),
@@ -489,11 +413,9 @@ FAILSAFES: Final = (
         actions.on_battery,
         detail=wording.charge_left,
         slow=True,
-        detected="the charge is below `BAT_LOW_THR`",
         within_us=_TWICE,
         parameters=("BAT_LOW_THR",),
-        does="warning",
-        ends="the next level",
+        component=Subject.BATTERY,
     ),
     Failsafe(
         Condition.BATTERY_CRITICAL,
@@ -503,10 +425,9 @@ FAILSAFES: Final = (
         wording.charge_left,
         slow=True,
         delayed=True,
-        detected="the charge is below `BAT_CRIT_THR`",
         within_us=_TWICE,
         parameters=("BAT_CRIT_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
-        ends="the next level",
+        component=Subject.BATTERY,
     ),
     Failsafe(
         Condition.BATTERY_EMERGENCY,
@@ -516,10 +437,9 @@ FAILSAFES: Final = (
         wording.charge_left,
         slow=True,
         delayed=True,
-        detected="the charge is below `BAT_EMERGEN_THR`",
         within_us=_TWICE,
         parameters=("BAT_EMERGEN_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
-        ends="never in a flight",
+        component=Subject.BATTERY,
     ),
     Failsafe(
         Condition.PARAMETERS_CONTRADICT,
@@ -527,18 +447,20 @@ FAILSAFES: Final = (
         _always(Action.WARN),
         detail=lambda c: f": {c.contradiction}",
         slow=True,
-        detected="two parameters contradict each other "
-        "(`fsw/autopilot/parameters/contradictions.py`), or the start-up analysis finds that with "
-        "these parameters the safe set in force cannot be kept; with `--allow-inconsistent` that "
-        "is reported when the safe set comes, and is no condition",
         within_us=_SLOWLY,
-        does="warning, again when it is another contradiction; no arming. A change that would "
-        "bring one about is refused, in the air at least",
-        ends="the parameters or the safe set have been changed",
     ),
 )
 
 ROWS: Final = {row.condition: row for row in FAILSAFES}
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
-BLOCKING: Final = frozenset((Condition.POSITION_LOST, Condition.PLANNER_LOST))
-"""While one of these is active nothing but Descend can be flown."""
+BLOCKING: Final = frozenset(
+    row.condition for row in FAILSAFES if row.takeover is UserTakeoverAllowed.NEVER
+)
+
+
+def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
+    """Those of the active conditions that make a component unhealthy, by name.
+
+    On the ground the arming checks say it. They are about arming, and an armed vehicle has none.
+    """
+    return tuple([one.value for one in conditions if ROWS[one].component is not None])

@@ -545,12 +545,9 @@ def test_where_all_is_well_no_quick_row_is_active() -> None:
     assert seen == QUICK, "every quick row has evidence"
 
 
-def test_the_rows_name_parameters_that_exist_and_say_how_a_condition_is_found() -> None:
+def test_the_rows_name_parameters_that_exist_and_times_that_can_be_kept() -> None:
     for row in FAILSAFES:
         assert set(row.parameters) <= set(BY_NAME), row.condition
-        assert row.detected, row.condition
-        acts = {name for name in row.parameters if name.endswith("_ACT") or name == "GF_ACTION"}
-        assert row.does or acts, f"nothing says what is done about {row.condition.value}"
         assert row.within_us <= 1_100_000
         assert (row.within_us >= 100_000) if row.slow else True
 
