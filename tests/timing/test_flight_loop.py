@@ -34,14 +34,14 @@ from fsw.autopilot.signals import (
     TickOutputs,
 )
 from fsw.link.inbox import Inbox
-from fsw.link.sim_link import Pacing
+from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import message_ids
 from fsw.log.flight_log import FlightLog
 from fsw.log.reader import LoggedTick, open_flight, ticks
+from fsw.runtime.flight_loop import Ending, FlightLoop, FlightRecord
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
-from fsw.runtime.sim_loop import Ending, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 from messages import dialect
 from messages.block_file import BlockFile
@@ -193,7 +193,7 @@ class Bench:
         self.parameters = Parameters()
         parts = parts_of(tick)
         program = FlightProgram(FACTS, first, *parts, null, cast(Any, self.parameters), null)
-        self.loop = SimLoop(
+        self.loop = FlightLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
             self.time.clock, self.stop, cast(Any, self.files), self._sleep, self.time.clock,
             lambda t_us, texts: self.told.extend((t_us, text.text) for text in texts),

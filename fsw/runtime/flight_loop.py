@@ -35,7 +35,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
 from fsw.log.run_files import RunFiles
 from fsw.runtime.clock import unix_us
@@ -130,13 +130,13 @@ class Cycle:
     outputs: TickOutputs = field(init=False)  # from TICK on; whole from CONCLUDE on
 
 
-class SimLoop(Generic[State]):
+class FlightLoop(Generic[State]):
     """Walks the table of rate groups on every release."""
 
     def __init__(
         self,
         program: FlightProgram[State],
-        sim: SimLink,
+        vehicle: VehicleLink,
         ground: GroundLinks,
         inbox: Inbox,
         record: FlightRecord,
@@ -153,7 +153,7 @@ class SimLoop(Generic[State]):
         self._missions = program.missions
         self._happened = program.events
         self._tick = TickRunner(program.control, program.conclude, program.first_state)
-        self._sim = sim
+        self._vehicle = vehicle
         self._ground = ground
         self._inbox = inbox
         self._record = record
@@ -197,19 +197,24 @@ class SimLoop(Generic[State]):
         while not self._stop.requested and self._clock() - begin < wait_s * 1e6:
             if self._clock() - announced >= 200_000:
                 announced = self._clock()
-                self._sim.announce()
-            sensors = self._sim.wait_for_step()
+                self._vehicle.announce()
+            sensors = self._vehicle.wait_for_step()
             if sensors is not None:
                 return sensors
         return None
 
     def fly(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         """Tick on every release until the simulator, a signal or silence ends it."""
-        if self._sim.pacing is Pacing.LOCKSTEP:
-            self._releases = StepReleases(self._sim, self._clock)
+        if self._vehicle.pacing is Pacing.LOCKSTEP:
+            self._releases = StepReleases(self._vehicle, self._clock)
         else:
             self._releases = ScheduledReleases(
-                self._sim, self._clock, self._sleep, first, self._tick_us, self._record.deadlines
+                self._vehicle,
+                self._clock,
+                self._sleep,
+                first,
+                self._tick_us,
+                self._record.deadlines,
             )
         try:
             return self._tick_until_end(first, planner)
@@ -218,7 +223,7 @@ class SimLoop(Generic[State]):
 
     def _tick_until_end(self, first: SensorFrame, planner: PlanService) -> FlightEnd:
         index, t_us = -1, first.t_us
-        self._files.ulog.begin(t_us, lockstep=self._sim.pacing is Pacing.LOCKSTEP)
+        self._files.ulog.begin(t_us, lockstep=self._vehicle.pacing is Pacing.LOCKSTEP)
         rank_threads()  # the logs have started theirs
         watchdog = LinkWatchdog(self._clock)
         begun = self._record.begun_us = self._clock()
@@ -229,7 +234,7 @@ class SimLoop(Generic[State]):
                 if release.stale_us == 0:
                     watchdog.reset(release.begun_us)
                 index = self._run_groups(release, planner, index)
-            elif self._sim.shutdown:
+            elif self._vehicle.shutdown:
                 return FlightEnd(Ending.SHUTDOWN, "the simulator ended the run")
             elif watchdog.check() >= LINK_TIMEOUT_S * 1e6:
                 silence = f"the simulator sent nothing for {LINK_TIMEOUT_S:g} s"
@@ -277,24 +282,24 @@ class SimLoop(Generic[State]):
 
     def _actuate(self, cycle: Cycle) -> None:
         t_us, outputs = cycle.release.sensors.t_us, cycle.outputs
-        if self._sim.routed_acks:
-            for ack in self._sim.routed_acks:
+        if self._vehicle.routed_acks:
+            for ack in self._vehicle.routed_acks:
                 self._ground.acknowledge(t_us, ack)
-            self._sim.routed_acks.clear()
+            self._vehicle.routed_acks.clear()
         if outputs.acks:
             self._acknowledge(t_us, cycle.inputs.commands, outputs.acks)
-        self._sim.send_actuators(t_us, outputs)
+        self._vehicle.send_actuators(t_us, outputs)
 
     def _acknowledge(
         self, t_us: int, commands: tuple[Command, ...], acks: tuple[CommandAck, ...]
     ) -> None:
         for request in to_route(commands, acks):
-            self._sim.route(request)
+            self._vehicle.route(request)
         for ack in acks:
             if ack.result == CommandResult.IN_PROGRESS:
                 continue
             if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
-                self._sim.queue_ack(ack)
+                self._vehicle.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)
 
@@ -303,7 +308,7 @@ class SimLoop(Generic[State]):
         cycle.outputs = outputs
         self._vibration.add(cycle.release.sensors.gyro_B, cycle.release.sensors.accel_B)
         if outputs.texts is not sent:
-            self._sim.queue_texts(outputs.texts[len(sent) :])
+            self._vehicle.queue_texts(outputs.texts[len(sent) :])
         self._missions.observe(outputs.snapshot)
         self._happened.observe(cycle.inputs, outputs)
         if cycle.inputs.tuning is not None:
@@ -323,9 +328,9 @@ class SimLoop(Generic[State]):
         if events:
             self._notices += [StatusText(Severity.WARNING, event) for event in events]
             events.clear()
-        if self._sim.notices:
-            self._notices += self._sim.notices
-            self._sim.notices.clear()
+        if self._vehicle.notices:
+            self._notices += self._vehicle.notices
+            self._vehicle.notices.clear()
         if self._notices:
             outputs = replace(outputs, texts=(*outputs.texts, *self._notices))
         self._ground.publish(outputs)
@@ -359,7 +364,7 @@ class SimLoop(Generic[State]):
         self._record.groups[INNER.name].skipped = self._releases.skipped
 
     def _warn(self, cycle: Cycle) -> None:
-        if self._sim.pacing is Pacing.LOCKSTEP:
+        if self._vehicle.pacing is Pacing.LOCKSTEP:
             return  # there are no deadlines
         inner = self._record.groups[INNER.name]
         sentence = self._record.deadlines.warning(
@@ -376,7 +381,7 @@ class SimLoop(Generic[State]):
         """The files, and what else the next tick should know about the machine."""
         self._files.check()
         inner, missed = self._record.groups[INNER.name], 0
-        if self._sim.pacing is not Pacing.LOCKSTEP:  # which has no deadlines
+        if self._vehicle.pacing is not Pacing.LOCKSTEP:  # which has no deadlines
             missed = inner.late + inner.skipped + self._record.stale
         self._host_news = self._host.look(missed)
 
