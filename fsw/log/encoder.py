@@ -12,7 +12,7 @@ from dataclasses import astuple
 from operator import attrgetter
 from typing import Any, Final
 
-from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.estimate.estimator_report import (
     ABOVE_GROUND,
     ABSOLUTE,

@@ -15,8 +15,8 @@ from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
 from fsw.autopilot.control.safety_gate import gate
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.commands.bounds import bounded_update, target_problem

@@ -6,9 +6,9 @@ from dataclasses import field
 from functools import partial
 from typing import Final, NamedTuple
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.frame_dropout import Dropout
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.flight.commands.dedup import AnsweredCommand
 from fsw.autopilot.flight.failsafe.conditions import Condition, FailsafeMemory
 from fsw.autopilot.flight.mission.sequencer import MissionFlight

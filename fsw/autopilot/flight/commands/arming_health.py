@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fsw.autopilot.estimation.sensor_fault import sentence
+from fsw.autopilot.estimation.faults.sensor_fault import sentence
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import StateEstimate, Vec2

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.flight.commands.arming import NO_ESTIMATE, joined
 from fsw.autopilot.flight.estimate.estimator_report import AIDS_PLACE
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition

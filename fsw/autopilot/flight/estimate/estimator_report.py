@@ -7,9 +7,9 @@ from operator import itemgetter
 from typing import Final
 
 from fsw.autopilot.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
+from fsw.autopilot.estimation.faults.sensor_checks import Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, fault_name
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_checks import Health
-from fsw.autopilot.estimation.sensor_fault import Sensor, fault_name
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.autopilot.signals import (
     EstimatorReport,

@@ -13,8 +13,8 @@ from functools import partial
 from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import read_frame
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.frame_dropout import Dropout, filled
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.estimate.jump import returned
 from fsw.autopilot.flight.state import AIDED, COMPLETE, Aiding, FlightState, LostSensor
 from fsw.autopilot.signals import Severity, StateEstimate, StatusText, TickInputs

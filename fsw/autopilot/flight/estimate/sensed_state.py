@@ -9,6 +9,10 @@ from fsw.autopilot.control.cascade import Cascade, in_hover
 from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
+from fsw.autopilot.estimation.faults.pace import looked
+from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names
+from fsw.autopilot.estimation.faults.sensor_checks import Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
     FusionMemory,
@@ -17,10 +21,6 @@ from fsw.autopilot.estimation.fusion_memory import (
     copied,
 )
 from fsw.autopilot.estimation.lasting_error import lasting_error
-from fsw.autopilot.estimation.pace import looked
-from fsw.autopilot.estimation.redundancy import NOBODY, Source, names
-from fsw.autopilot.estimation.sensor_checks import Health
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.sensor_fusion import UNKNOWN, SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6

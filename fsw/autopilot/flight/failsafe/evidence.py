@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.safety.uncertain_clearance import LACKING
 from fsw.autopilot.flight.state import FlightState, LostSensor

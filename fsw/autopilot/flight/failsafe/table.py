@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from fsw.autopilot.estimation.redundancy import UNDECIDED
+from fsw.autopilot.estimation.faults.redundancy import UNDECIDED
 from fsw.autopilot.flight.commands.arming import Subject
 from fsw.autopilot.flight.failsafe import actions as actions
 from fsw.autopilot.flight.failsafe import evidence as evidence

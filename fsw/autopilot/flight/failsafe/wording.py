@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.sensor_fault import sentence
+from fsw.autopilot.estimation.faults.sensor_fault import sentence
 from fsw.autopilot.flight.failsafe.evidence import (
     FailsafeContext,
     lost_sensors,

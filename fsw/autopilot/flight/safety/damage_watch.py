@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from fsw.autopilot.control.actuator_watch import watch
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.autopilot.model.airframe import GRAVITY, Airframe

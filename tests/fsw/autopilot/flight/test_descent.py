@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.descent import Descent
 from fsw.autopilot.flight.modes.descend import Descend
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest

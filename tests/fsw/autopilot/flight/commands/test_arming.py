@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.arming import Subject
 from fsw.autopilot.flight.commands.arming_health import ArmingHealth, arming_health

@@ -9,7 +9,7 @@ import pytest
 
 from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.autopilot import keep_clear
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.estimation.error_state import LOST, RATE, TIME
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample
 from fsw.autopilot.signals import FlightSnapshot

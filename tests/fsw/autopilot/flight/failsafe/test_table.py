@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.failsafe.active import active, quickly_active
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, way_home_s

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from fsw.autopilot.estimation.sensor_checks import Aiding
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding
 from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, normalised, rotation_vector

@@ -12,9 +12,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation import redundancy
 from fsw.autopilot.estimation.error_state import FILTER
-from fsw.autopilot.estimation.redundancy import (
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.redundancy import (
     EVERY,
     NO_AID,
     UNDECIDED,

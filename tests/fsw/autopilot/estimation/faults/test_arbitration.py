@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from fsw.autopilot.estimation import redundancy
 from fsw.autopilot.estimation.error_state import BG, IMU_CAPACITY, LOST, NO_RATE
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
-from fsw.autopilot.estimation.redundancy import NOBODY, Source
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned

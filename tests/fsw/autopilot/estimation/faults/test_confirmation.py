@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.estimation.confirmation import Run
+from fsw.autopilot.estimation.faults.confirmation import Run
 from fsw.autopilot.measurements import PoseSample
 
 LEAST = 0.5  # s

@@ -14,7 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from fsw.autopilot.estimation import redundancy
 from fsw.autopilot.estimation.error_state import (
     BA,
     BG,
@@ -29,13 +28,21 @@ from fsw.autopilot.estimation.error_state import (
     V,
     watch_biases,
 )
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.redundancy import (
+    EVIDENCE,
+    NO_AID,
+    NOBODY,
+    Aid,
+    Source,
+    Verdict,
+)
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.autopilot.estimation.measurement_update import MeasurementUpdate
-from fsw.autopilot.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Aid, Source, Verdict
-from fsw.autopilot.estimation.sensor_checks import Aiding, Health
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import normalised

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fsw.autopilot.estimation.pace import Pace, looked
-from fsw.autopilot.estimation.sensor_checks import Health
-from fsw.autopilot.estimation.sensor_fault import Sensor
+from fsw.autopilot.estimation.faults.pace import Pace, looked
+from fsw.autopilot.estimation.faults.sensor_checks import Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 
 
 def told(samples: Callable[[int], int], looks: int) -> list[int]:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.imu import TIME_TOLERANCE
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.vectors import norm
 from fsw.autopilot.measurements import (
