@@ -82,7 +82,7 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.fault_matrix.expectations import EXPECTATIONS, ExpectationError, expectations
 
     try:

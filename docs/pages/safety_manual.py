@@ -6,11 +6,11 @@ import re
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from docs.pages.failsafes import seconds
+from docs.pages.failsafes import seconds, words
 from docs.pages.requirements import Manual, Requirement, ShowingTest, Shown, load, shown_by_tests
-from fsw.autopilot.flight.arming import CHECKS
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS, Failsafe
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS, Failsafe
 from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 
 BEGIN: Final = "<!-- requirements: make pages -->\n"
@@ -94,8 +94,8 @@ def _default(parameter: Parameter) -> str:
 
 def _action(row: Failsafe) -> str:
     """What is done by default."""
-    if row.does:
-        return row.does
+    if words(row).does:
+        return words(row).does
     chosen = [BY_NAME[name] for name in row.parameters if name in _ACTIONS]
     done = [f"{dict(one.choices)[int(one.default)].lower()} (`{one.name}`)" for one in chosen]
     return "; ".join(done)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
