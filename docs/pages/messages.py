@@ -32,11 +32,11 @@ decoding: `messages/README.md`.
 
 ## On the ground links
 
-Rates are the defaults in Hz, written "to ground stations / to programs", and counted in simulated
+Rates are the defaults in Hz, written "to ground stations/to programs", and counted in simulated
 time. MAV_CMD_SET_MESSAGE_INTERVAL changes a rate for one link. MAV_CMD_REQUEST_MESSAGE sends any
-message with a rate, or marked "on request", once. Direction: ↓ sent by the vehicle, ↑ received by
-the vehicle. Fields are in the order of the definition, with array size and unit. The fields of
-private messages are listed below.
+message with a rate, or marked "on request", once. ↓ sent by the vehicle, with the component that
+sends it, ↑ received. The fields of private messages are below, those of the others in MAVLink's
+`common.xml`.
 
 """
 _DIALECT_HEAD = """\
@@ -91,30 +91,13 @@ def reference(rows: Sequence[Traffic], definition: Path = DEFINITION) -> str:
 
 
 def _traffic(crossing: Sequence[Traffic], private: set[int]) -> str:
-    rows = ["| id | message | direction | component | Hz | fields |", "|---|---|---|---|---|---|"]
+    rows = ["| id | message | direction | Hz |", "|---|---|---|---|"]
     for row in crossing:
         name = dialect.mavlink_map[row.message_id].msgname
-        arrows = "".join("↓" * bool(row.component) + "↑" * row.heard)
-        component = str(row.component or "")
-        is_private = row.message_id in private
-        fields = "below" if is_private else _fields(row.message_id)
-        shown = f"[{name}](#{name.lower()})" if is_private else name
-        rows.append(
-            f"| {row.message_id} | {shown} | {arrows} | {component} | {row.rates} | {fields} |"
-        )
+        arrows = (f"↓{row.component}" if row.component else "") + "↑" * row.heard
+        shown = f"[{name}](#{name.lower()})" if row.message_id in private else name
+        rows.append(f"| {row.message_id} | {shown} | {arrows} | {row.rates} |")
     return "\n".join(rows) + "\n"
-
-
-def _fields(message_id: int) -> str:
-    """Fields of a message of common.xml, in one line."""
-    message = dialect.mavlink_map[message_id]
-    size = dict(zip(message.ordered_fieldnames, message.array_lengths, strict=True))
-    described = []
-    for name in message.fieldnames:
-        elements = f"[{size[name]}]" if size[name] else ""
-        unit = message.fieldunits_by_name.get(name, "").strip("[]")
-        described.append(f"`{name}{elements}` {unit}".strip())
-    return ", ".join(described)
 
 
 def _contents(messages: list[ET.Element]) -> str:
@@ -133,14 +116,15 @@ def _message(message: ET.Element) -> str:
     rows = [
         f"### {message.attrib['name']}\n",
         f"{_description(message)}\n",
-        "| field | type | unit | meaning |",
-        "|---|---|---|---|",
+        "| field | type, unit | meaning |",
+        "|---|---|---|",
     ]
     for field in message.findall("field"):
         enum = field.attrib.get("enum")
         unit = f"`{enum}`" if enum else field.attrib.get("units", "")
         meaning = (field.text or "").strip()
-        rows.append(f"| `{field.attrib['name']}` | {field.attrib['type']} | {unit} | {meaning} |")
+        type_ = f"{field.attrib['type']} {unit}".rstrip()
+        rows.append(f"| `{field.attrib['name']}` | {type_} | {meaning} |")
     return "\n".join(rows) + "\n"
 
 
@@ -177,7 +161,7 @@ def traffic() -> list[Traffic]:
     """Who sends what, and how often, by message."""
     rows: dict[int, Traffic] = {}
     for stream in STREAMS:
-        rates = f"{stream.ground_hz:g} / {stream.api_hz:g}"
+        rates = f"{stream.ground_hz:g}/{stream.api_hz:g}"
         if stream.ground_hz == 0.0:
             rates = "on request"
         elif stream in AT_ONCE:

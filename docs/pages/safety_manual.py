@@ -1,13 +1,15 @@
-"""The tables in docs/reference/safety-manual.md: requirements, conditions, checks, tests."""
+"""The tables in docs/reference/safety-manual.md, and the traceability of the requirements."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 from collections.abc import Collection, Iterable
 from typing import Final
 
 from docs.pages.failsafes import seconds
-from docs.pages.requirements import Manual, Requirement, ShowingTest, Shown, load, shown_by_tests
+from docs.pages.requirements import Manual, Requirement, Shown, load, shown_by_tests
 from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.flight.conditions import Condition
 from fsw.autopilot.flight.failsafe import ROWS, Failsafe
@@ -27,14 +29,34 @@ def reference(manual: Manual, shown: Shown) -> str:
         *_of_groups(manual, shown),
         "### Not shown by a test\n",
         _table(("requirement", "why"), sorted(manual.not_shown.items())),
-        "## Conditions and arming checks\n",
-        "The other direction: to which requirements each of them belongs.\n",
-        _reverse(manual),
-        "## Tests\n",
-        "*(long)*: run by `make test-long`, all others by `make test`.\n",
-        _tests(manual, shown),
     ]
     return "\n".join(parts)
+
+
+def traceability(manual: Manual, shown: Shown) -> str:
+    """What belongs to each requirement, as CSV: conditions, arming checks, files and tests.
+
+    A long test is run by ``make test-long``, every other one by ``make test``.
+    """
+    written = io.StringIO()
+    rows = csv.writer(written, lineterminator="\n")
+    rows.writerow(("requirement", "kind", "name", "where"))
+    for row in manual.requirements:
+        rows.writerows(
+            (row.id, "condition", ROWS[Condition[name]].condition.value, f"Condition.{name}")
+            for name in row.conditions
+        )
+        rows.writerows(
+            (row.id, "arming check", check.summary, check.subject.value)
+            for check in CHECKS
+            if check.summary in row.checks
+        )
+        rows.writerows((row.id, "file", file, "") for file in row.by)
+        rows.writerows(
+            (row.id, "long test" if test.is_long else "test", test.name, test.file)
+            for test in shown.get(row.id, ())
+        )
+    return written.getvalue()
 
 
 def inserted(page: str, manual: Manual | None = None, shown: Shown | None = None) -> str:
@@ -104,38 +126,6 @@ def _action(row: Failsafe) -> str:
 _ACTIONS: Final = frozenset(
     name for name, one in BY_NAME.items() if one.choices and name.endswith(("_ACT", "GF_ACTION"))
 )
-
-
-def _reverse(manual: Manual) -> str:
-    rows = [
-        (row.condition.value, f"`Condition.{row.condition.name}`",
-         _ids(one for one in manual.requirements if row.condition.name in one.conditions))
-        for row in ROWS.values()
-    ]  # fmt: skip
-    rows += [
-        (check.summary, f"arming, {check.subject.value}",
-         _ids(one for one in manual.requirements if check.summary in one.checks))
-        for check in CHECKS
-    ]  # fmt: skip
-    return _table(("condition or check", "name", "requirements"), rows)
-
-
-def _ids(rows: Iterable[Requirement]) -> str:
-    return ", ".join(row.id for row in rows)
-
-
-def _tests(manual: Manual, shown: Shown) -> str:
-    rows = [(row.id, _names(shown[row.id])) for row in manual.requirements if row.id in shown]
-    return _table(("requirement", "tests"), rows)
-
-
-def _names(tests: Iterable[ShowingTest]) -> str:
-    """The tests, file by file."""
-    by_file: dict[str, list[str]] = {}
-    for test in tests:
-        name = f"`{test.name}`{' *(long)*' if test.is_long else ''}"
-        by_file.setdefault(test.file, []).append(name)
-    return "; ".join(f"`{file}`: {', '.join(names)}" for file, names in by_file.items())
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:

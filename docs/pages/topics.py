@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Final
 
 from fsw.log.topics import TOPICS
@@ -16,7 +17,7 @@ def reference() -> str:
     """The topics as Markdown: a table of them, then the fields of each."""
     rows = ["| topic | written | content |", "|---|---|---|"]
     every = (*TOPICS, *TRUTH_TOPICS)
-    rows += [f"| [`{t.name}`](#{t.name}) | {t.when} | {t.about} |" for t in every]
+    rows += [f"| [`{t.name}`](#{t.name}) | {_when(t)} | {t.about} |" for t in every]
     return "\n".join(rows) + "\n\n" + "\n".join(_fields(topic) for topic in every) + "\n"
 
 
@@ -33,9 +34,22 @@ def inserted(page: str) -> str:
     return f"{before}{begin}{reference()}{end}{after}"
 
 
+# What the page says once, of every topic that has the mark.
+_MARKS: Final = {"; every tick with `LOG_PROFILE` 1": " †", "; none with exact sensors": " ‡"}
+
+
+def _when(topic: Topic) -> str:
+    when = topic.when
+    for words, mark in _MARKS.items():
+        when = when.replace(words, mark)
+    return when
+
+
 def _fields(topic: Topic) -> str:
+    """The fields of a topic: those that follow each other with one type and note in one row."""
     rows = [f"### {topic.name}\n", "| field | type | |", "|---|---|---|"]
-    rows += [f"| `{field.name}` | {_type(field)} | {field.note} |" for field in topic.fields]
+    for (type_, note), alike in itertools.groupby(topic.fields, lambda f: (_type(f), f.note)):
+        rows.append(f"| {', '.join(f'`{field.name}`' for field in alike)} | {type_} | {note} |")
     return "\n".join(rows) + "\n"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,8 @@ from docs.pages.requirements import (
     problems,
     shown_by_tests,
 )
-from docs.pages.safety_manual import inserted, reference
+from docs.pages.safety_manual import inserted, reference, traceability
+from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.control.tube import all_axes, all_axes_up_to
 from fsw.autopilot.flight.conditions import Condition
 from fsw.autopilot.flight.failsafe import ROWS
@@ -28,6 +30,7 @@ from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.registry import BY_NAME
 from tests.docs.fences import DOCS
 
+TRACEABILITY = DOCS / "reference" / "requirements-traceability.csv"
 PAGE = (DOCS / "reference" / "safety-manual.md").read_text(encoding="utf-8")
 
 
@@ -39,15 +42,23 @@ def test_the_tables_of_the_safety_manual_are_not_stale() -> None:
     assert inserted(PAGE) == PAGE, "run make pages"
 
 
-def test_the_page_has_each_condition_with_its_time_and_each_test() -> None:
+def test_the_page_has_each_condition_with_its_time() -> None:
     tables = reference(load(), shown_by_tests())
     for condition in Condition:
         assert f"{condition.value} ({seconds(ROWS[condition].within_us)})" in tables
-        assert f"| {condition.value} | `Condition.{condition.name}` | REQ-" in tables
+
+
+def test_the_traceability_is_not_stale_and_has_each_condition_check_and_test() -> None:
+    text = TRACEABILITY.read_text(encoding="utf-8")
+    assert text == traceability(load(), shown_by_tests()), "run make pages"
+    rows = {tuple(row[1:]) for row in csv.reader(text.splitlines())}
+    for condition in Condition:
+        assert ("condition", condition.value, f"Condition.{condition.name}") in rows
+    for check in CHECKS:
+        assert ("arming check", check.summary, check.subject.value) in rows
     for tests in shown_by_tests().values():
         for test in tests:
-            assert f"`{test.file}`" in tables
-            assert f"`{test.name}`" in tables
+            assert ("long test" if test.is_long else "test", test.name, test.file) in rows
 
 
 # ---------------------------------------------------------------- on a small scale

@@ -33,7 +33,7 @@ PARTS = {
     "planner": PlannerConfig(),
 }
 ROW = re.compile(
-    r"^\| `\w+` \| (?:INT32|FLOAT) \| ([^|]+) \| ([^|]*) \|.*\| `([\w.]+)\.(\w+)` \|$", re.MULTILINE
+    r"^\| `\w+` \| (?:INT32 )?([^|]+) \| ([^|]*) \|.*\| `([\w.]+)\.(\w+)` \|$", re.MULTILINE
 )
 
 
