@@ -1,4 +1,4 @@
-"""The table of topics in docs/reference/flight-log.md."""
+"""The topics in docs/reference/flight-log.md."""
 
 from __future__ import annotations
 
@@ -14,11 +14,8 @@ END: Final = "<!-- end -->"
 
 
 def reference() -> str:
-    """The topics as Markdown: a table of them, then the fields of each."""
-    rows = ["| topic | written | content |", "|---|---|---|"]
-    every = (*TOPICS, *TRUTH_TOPICS)
-    rows += [f"| [`{t.name}`](#{t.name}) | {_when(t)} | {t.about} |" for t in every]
-    return "\n".join(rows) + "\n\n" + "\n".join(_fields(topic) for topic in every) + "\n"
+    """The topics as Markdown: when each is written, what it is, and its fields."""
+    return "\n".join(_topic(topic) for topic in (*TOPICS, *TRUTH_TOPICS)) + "\n"
 
 
 def inserted(page: str) -> str:
@@ -45,12 +42,13 @@ def _when(topic: Topic) -> str:
     return when
 
 
-def _fields(topic: Topic) -> str:
-    """The fields of a topic: those that follow each other with one type and note in one row."""
-    rows = [f"### {topic.name}\n", "| field | type | |", "|---|---|---|"]
+def _topic(topic: Topic) -> str:
+    """One topic; fields that follow each other with one type and note are in one line."""
+    lines = [f"### {topic.name}\n", f"{topic.about}. Written {_when(topic)}.\n"]
     for (type_, note), alike in itertools.groupby(topic.fields, lambda f: (_type(f), f.note)):
-        rows.append(f"| {', '.join(f'`{field.name}`' for field in alike)} | {type_} | {note} |")
-    return "\n".join(rows) + "\n"
+        names = ", ".join(f"`{field.name}`" for field in alike)
+        lines.append(f"- {names} {type_}{f': {note}' if note else ''}")
+    return "\n".join(lines) + "\n"
 
 
 def _type(field: Field) -> str:

@@ -21,8 +21,8 @@ from docs.pages.requirements import (
     shown_by_tests,
 )
 from docs.pages.safety_manual import inserted, reference, traceability
-from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.control.tube import all_axes, all_axes_up_to
+from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.flight.conditions import Condition
 from fsw.autopilot.flight.failsafe import ROWS
 from fsw.autopilot.parameters.consistency import loop_tube
