@@ -165,7 +165,7 @@ def traffic() -> list[Traffic]:
     rows: dict[int, Traffic] = {}
     for stream in STREAMS:
         rates = f"{stream.ground_hz:g}/{stream.api_hz:g}"
-        if stream.ground_hz == 0.0:
+        if stream.ground_hz == stream.api_hz == 0.0:
             rates = "on request"
         elif stream in AT_ONCE:
             rates += ", and at once"

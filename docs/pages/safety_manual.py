@@ -18,7 +18,7 @@ from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 BEGIN: Final = "<!-- requirements: make pages -->\n"
 END: Final = "<!-- end -->"
 
-_HEAD: Final = ("requirement", "sentence", "by", "action", "tests")
+_HEAD: Final = ("requirement", "sentence", "by", "tests")
 
 
 def reference(manual: Manual, shown: Shown) -> str:
@@ -85,13 +85,10 @@ def _cells(row: Requirement, shown: Shown) -> tuple[str, ...]:
     conditions = [ROWS[Condition[name]] for name in row.conditions]
     by = [f"{one.condition.value} ({seconds(one.within_us)})" for one in conditions]
     by += [f"arming: {check[0].lower()}{check[1:]}" for check in row.checks]
-    by += [f"`{file}`" for file in row.by]
-    actions = list(dict.fromkeys(_action(one) for one in conditions))
-    actions += ["arming denied"] if row.checks else []
-    actions += [row.action] if row.action else []
+    by += [row.action] if row.action else []
     tests = len(shown.get(row.id, ()))
     number = str(tests) if tests else "**none**"
-    return row.id, _sentence(row.shall, conditions), ", ".join(by), "; ".join(actions), number
+    return row.id, _sentence(row.shall, conditions), "; ".join(by), number
 
 
 def _sentence(shall: str, conditions: Collection[Failsafe]) -> str:
@@ -112,20 +109,6 @@ def _default(parameter: Parameter) -> str:
     if parameter.unit == "norm":
         return f"{100.0 * value:g} %" if value >= 0.0 else f"{value:g}"
     return f"{value:.4g} {parameter.unit}".rstrip()
-
-
-def _action(row: Failsafe) -> str:
-    """What is done by default."""
-    if row.does:
-        return row.does
-    chosen = [BY_NAME[name] for name in row.parameters if name in _ACTIONS]
-    done = [f"{dict(one.choices)[int(one.default)].lower()} (`{one.name}`)" for one in chosen]
-    return "; ".join(done)
-
-
-_ACTIONS: Final = frozenset(
-    name for name, one in BY_NAME.items() if one.choices and name.endswith(("_ACT", "GF_ACTION"))
-)
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:

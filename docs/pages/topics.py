@@ -44,7 +44,7 @@ def _when(topic: Topic) -> str:
 
 def _topic(topic: Topic) -> str:
     """One topic; fields that follow each other with one type and note are in one line."""
-    lines = [f"### {topic.name}\n", f"{topic.about}. Written {_when(topic)}.\n"]
+    lines = [f"### {topic.name}\n", f"{topic.about} ({_when(topic)}).\n"]
     for (type_, note), alike in itertools.groupby(topic.fields, lambda f: (_type(f), f.note)):
         names = ", ".join(f"`{field.name}`" for field in alike)
         lines.append(f"- {names} {type_}{f': {note}' if note else ''}")
