@@ -83,5 +83,9 @@ def _cells(parameter: Parameter) -> tuple[str, ...]:
 
 
 def _meaning(parameter: Parameter) -> str:
-    choices = ", ".join(f"{number} {what.lower()}" for number, what in parameter.choices)
+    """What it means, with its choices; of a bit mask only the bits."""
+    shown = parameter.choices
+    if len(shown) > 8 and [number for number, _ in shown] == list(range(len(shown))):
+        shown = tuple(one for one in shown if one[0].bit_count() == 1)
+    choices = ", ".join(f"{number} {what.lower()}" for number, what in shown)
     return f"{parameter.meaning}: {choices}" if choices else parameter.meaning

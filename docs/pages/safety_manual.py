@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable
 from typing import Final
 
 from docs.pages.failsafes import seconds
-from docs.pages.requirements import Manual, Requirement, Shown, load, shown_by_tests
+from docs.pages.requirements import Manual, Requirement, Shown, load
 from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.flight.conditions import Condition
 from fsw.autopilot.flight.failsafe import ROWS, Failsafe
@@ -18,15 +18,13 @@ from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 BEGIN: Final = "<!-- requirements: make pages -->\n"
 END: Final = "<!-- end -->"
 
-_HEAD: Final = ("requirement", "sentence", "by", "tests")
 
-
-def reference(manual: Manual, shown: Shown) -> str:
+def reference(manual: Manual) -> str:
     """The tables in Markdown."""
     count, without = len(manual.requirements), len(manual.not_shown)
     parts = [
         f"{count} requirements, of which {without} are shown by no test.\n",
-        *_of_groups(manual, shown),
+        *_of_groups(manual),
         "### Not shown by a test\n",
         _table(("requirement", "why"), sorted(manual.not_shown.items())),
     ]
@@ -36,30 +34,32 @@ def reference(manual: Manual, shown: Shown) -> str:
 def traceability(manual: Manual, shown: Shown) -> str:
     """What belongs to each requirement, as CSV: conditions, arming checks, files and tests.
 
-    A long test is run by ``make test-long``, every other one by ``make test``.
+    A condition has the longest time until it is reported, a file what it does. A long test is run
+    by ``make test-long``, every other one by ``make test``.
     """
     written = io.StringIO()
     rows = csv.writer(written, lineterminator="\n")
-    rows.writerow(("requirement", "kind", "name", "where"))
+    rows.writerow(("requirement", "kind", "name", "where", "remark"))
     for row in manual.requirements:
         rows.writerows(
-            (row.id, "condition", ROWS[Condition[name]].condition.value, f"Condition.{name}")
-            for name in row.conditions
-        )
+            (row.id, "condition", one.condition.value, f"Condition.{one.condition.name}",
+             seconds(one.within_us))
+            for one in (ROWS[Condition[name]] for name in row.conditions)
+        )  # fmt: skip
         rows.writerows(
-            (row.id, "arming check", check.summary, check.subject.value)
+            (row.id, "arming check", check.summary, check.subject.value, "")
             for check in CHECKS
             if check.summary in row.checks
         )
-        rows.writerows((row.id, "file", file, "") for file in row.by)
+        rows.writerows((row.id, "file", "", file, row.action) for file in row.by)
         rows.writerows(
-            (row.id, "long test" if test.is_long else "test", test.name, test.file)
+            (row.id, "long test" if test.is_long else "test", test.name, test.file, "")
             for test in shown.get(row.id, ())
         )
     return written.getvalue()
 
 
-def inserted(page: str, manual: Manual | None = None, shown: Shown | None = None) -> str:
+def inserted(page: str, manual: Manual | None = None) -> str:
     """The page with the tables as they should be.
 
     Raises:
@@ -69,26 +69,27 @@ def inserted(page: str, manual: Manual | None = None, shown: Shown | None = None
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError("the page has no place for the requirements")
-    tables = reference(manual or load(), shown_by_tests() if shown is None else shown)
+    tables = reference(manual or load())
     return f"{before}{begin}{tables}{end}{after}"
 
 
-def _of_groups(manual: Manual, shown: Shown) -> list[str]:
+def _of_groups(manual: Manual) -> list[str]:
     parts = []
     for group, heading in manual.groups.items():
         of_group = [row for row in manual.requirements if row.id.split("-")[1] == group]
-        parts += [f"### {heading}\n", _table(_HEAD, [_cells(row, shown) for row in of_group])]
+        lines = "\n".join(_line(row, row.id in manual.not_shown) for row in of_group)
+        parts += [f"### {heading}\n", f"{lines}\n"]
     return parts
 
 
-def _cells(row: Requirement, shown: Shown) -> tuple[str, ...]:
+def _line(row: Requirement, not_shown: bool) -> str:
+    """A requirement with the conditions and checks that carry it out."""
     conditions = [ROWS[Condition[name]] for name in row.conditions]
-    by = [f"{one.condition.value} ({seconds(one.within_us)})" for one in conditions]
+    by = [one.condition.value for one in conditions]
     by += [f"arming: {check[0].lower()}{check[1:]}" for check in row.checks]
-    by += [row.action] if row.action else []
-    tests = len(shown.get(row.id, ()))
-    number = str(tests) if tests else "**none**"
-    return row.id, _sentence(row.shall, conditions), "; ".join(by), number
+    carried_out = f" *({'; '.join(by)})*" if by else ""
+    mark = " **No test.**" if not_shown else ""
+    return f"- **{row.id}**{carried_out} {_sentence(row.shall, conditions)}{mark}"
 
 
 def _sentence(shall: str, conditions: Collection[Failsafe]) -> str:
