@@ -287,7 +287,7 @@ LOOP_TIMING: Final = Topic(
         Field("group", "uint8_t", note="PANDION_RATE_GROUP"),
     ),
 )
-_MEASURED: Final = "every measurement, with the tick that it arrived for; none with exact sensors"
+_MEASURED: Final = "every measurement; none with exact sensors"
 _MEASURED_AT: Final = doubles("time", 0, "s, of the measurement, on the clock of the tick")
 SENSOR_COMBINED: Final = Topic(
     "sensor_combined",

@@ -125,21 +125,17 @@ def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:
 
 
 def test_the_streams_on_the_page_are_those_that_are_sent() -> None:
-    text = (REFERENCE / "ground-links.md").read_text(encoding="utf-8")
-    table = text.split("<!-- streams -->\n")[1].split("<!-- end -->")[0]
-    shown = [
-        tuple(cell.strip() for cell in line.strip("|").split("|"))
-        for line in table.strip().splitlines()[2:]
-    ]
-    assert shown == [
-        (
-            dialect.mavlink_map[stream.message_id].msgname,
-            f"{stream.ground_hz:g}",
-            f"{stream.api_hz:g}",
-            str(stream.component),
-        )
-        for stream in STREAMS
-    ]
+    text = (REFERENCE / "messages.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| ([^|]+) \| (.+) \|$", text, re.MULTILINE))
+    for stream in STREAMS:
+        name = dialect.mavlink_map[stream.message_id].msgname
+        rate = f"{stream.ground_hz:g}/{stream.api_hz:g}"
+        of_rate = [
+            messages
+            for shown, messages in rows.items()
+            if shown == ("on request" if rate == "0/0" else rate) or shown.startswith(f"{rate},")
+        ]
+        assert any(re.search(rf"\b{name}\b", messages) for messages in of_rate), name
 
 
 def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
