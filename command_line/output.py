@@ -62,7 +62,7 @@ def say(sentence: str, stream: TextIO | None = None) -> None:
 
 
 def complain(program: str, sentence: object) -> None:
-    """Print what is wrong in one line on standard error.
+    """Print what is wrong in one line on standard error; of an OSError without its number.
 
     Raises:
         BrokenPipeError: It is what is wrong: the reader of the output has left, as `head` does,
@@ -70,6 +70,9 @@ def complain(program: str, sentence: object) -> None:
     """
     if isinstance(sentence, BrokenPipeError):
         raise sentence
+    if isinstance(sentence, OSError) and sentence.strerror:
+        where = "" if sentence.filename is None else f"{sentence.filename}: "
+        sentence = f"{where}{sentence.strerror}"
     say(f"{program}: {sentence}", sys.stderr)
 
 

@@ -244,7 +244,7 @@ def load_tables(
     try:
         content = read_bounded(path, _MOST_BYTES)
     except OSError as error:
-        raise CampaignError(f"cannot read campaign {path}: {error.strerror}") from None
+        raise CampaignError(f"cannot read {path}: {error.strerror}") from None
     try:
         table = _table(content.decode("utf-8"))
         found = {key: table.pop(key) for key in more if key in table}

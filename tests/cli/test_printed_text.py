@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import io
 import json
 import math
@@ -83,6 +84,21 @@ def test_a_parameter_file_with_escapes_is_reported_without_them(
     printed = "".join(capsys.readouterr())
     assert len(printed.splitlines()) == 2
     assert printed.replace("\n", "").isprintable(), printed
+
+
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (OSError(errno.ENOENT, "No such file or directory", "a.params"), "a.params: No such file"),
+        (OSError(errno.ENOSPC, "No space left on device"), "No space left on device\n"),
+        (OSError("the file is too long"), "the file is too long\n"),
+    ],
+)
+def test_an_error_of_the_system_is_said_without_its_number(
+    error: OSError, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    complain("pandion", error)
+    assert capsys.readouterr().err.startswith(f"pandion: {sentence}")
 
 
 def test_json_knows_no_nan() -> None:
