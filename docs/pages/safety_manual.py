@@ -83,11 +83,10 @@ def _of_groups(manual: Manual) -> list[str]:
 
 
 def _line(row: Requirement, not_shown: bool) -> str:
-    """A requirement with the conditions and checks that carry it out."""
+    """A requirement with the conditions that carry it out."""
     conditions = [ROWS[Condition[name]] for name in row.conditions]
-    by = [one.condition.value for one in conditions]
-    by += [f"arming: {check[0].lower()}{check[1:]}" for check in row.checks]
-    carried_out = f" *({'; '.join(by)})*" if by else ""
+    by = "; ".join(one.condition.value for one in conditions)
+    carried_out = f" *({by})*" if by else ""
     mark = " **No test.**" if not_shown else ""
     return f"- **{row.id}**{carried_out} {_sentence(row.shall, conditions)}{mark}"
 
