@@ -79,7 +79,7 @@ def _action(row: Failsafe) -> str:
     """What is done, in words or by the parameters that choose it."""
     chosen = [name for name in row.parameters if BY_NAME[name].choices and name in _CHOOSING]
     parts = [row.does] if row.does else []
-    for name in chosen:
+    for name in () if row.does else chosen:
         parameter = BY_NAME[name]
         default = dict(parameter.choices)[int(parameter.default)].lower()
         parts.append(f"{default} (`{name}` {parameter.default})")
