@@ -138,9 +138,9 @@ def reference() -> str:
     for name, text in suites.items():
         for source in _sources(text):
             cited.setdefault(source, []).append(name)
-    numbers = [source.split()[0] for source in cited]
+    marks = [source.split()[0] for source in cited]
     for source, of in sorted(cited.items(), key=lambda row: int(row[0][1 : row[0].index("]")])):
-        only = f" (`{'`, `'.join(of)}`)" if numbers.count(source.split()[0]) > 1 else ""
+        only = f" (`{'`, `'.join(of)}`)" if marks.count(source.split()[0]) > 1 else ""
         parts.append(f"- {source}{only}")
     return "\n".join(parts) + "\n"
 
