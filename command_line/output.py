@@ -134,6 +134,7 @@ EXTRAS: Final = {
     "matplotlib": "report",
     "plotly": "report",
     "mcap": "mcap",
+    "pyarrow": "parquet",
     "textual": "top",
     "viser": "view",
     "gymnasium": "gym",

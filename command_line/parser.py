@@ -5,12 +5,19 @@ from __future__ import annotations
 import argparse
 import difflib
 import os
+import re
 from collections.abc import Iterable
 from typing import NoReturn
 
 from command_line.output import complain
 
 COULD_NOT_START = 2  # exit code
+_IN_OUR_WORDS = {
+    "^argument ": "",
+    "ignored explicit argument (.*)$": r"takes no value; \1 was given",
+    "expected one argument$": "a value must follow it",
+    "^the following arguments are required: (.*)$": r"\1 must be given",
+}
 _MOST_NAMES = 40  # in a sentence; a vehicle has 200 parameters
 
 
@@ -36,7 +43,9 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong in one sentence and exit with code 2."""
-        complain(self.prog, message.removeprefix("argument "))
+        for said, ours in _IN_OUR_WORDS.items():
+            message = re.sub(said, ours, message)
+        complain(self.prog, message)
         raise SystemExit(COULD_NOT_START)
 
     def _option_names(self) -> list[str]:

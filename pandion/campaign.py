@@ -61,9 +61,9 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
     from studies.campaign.plan import EXAMPLE, load_plan
+    from studies.campaign.ports import SchedulerGoneError
 
     if options.example:
         print(EXAMPLE.read_text(encoding="utf-8"), end="")
@@ -83,7 +83,7 @@ def main(argv: list[str]) -> int:
 
 
 def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
-    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.campaign.store import JOURNAL, begin
 
     plan.check(options.flights or plan.count)

@@ -85,8 +85,8 @@ def begin(verb: str, options: CampaignRunOptions, plan: CampaignPlan, work: str)
 
 def exit_code(verb: str, answer: Callable[[], int]) -> int:
     """The exit code of ``answer``; what stops it becomes a sentence."""
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
 
     try:
         return answer()

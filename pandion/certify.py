@@ -70,8 +70,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.campaign.store import read as read_campaign
 
     try:

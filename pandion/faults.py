@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, unwritten
+from command_line.output import complain, console_beside, json_text, say, unwritten
 from command_line.parser import COULD_NOT_START, unknown_name
 from command_line.values import output_file, whole
 from command_line.version import version
@@ -39,7 +39,7 @@ class FaultsOptions:
     """One cell, the matrix, or pairs of faults."""
 
     mode: str | None = option("MODE", "fly this mode alone")
-    fault: str | None = option("FAULT", "with this fault")
+    fault: str | None = option("FAULT", "with this fault; --matrix --list names them")
     matrix: bool = switch("--matrix", "every mode with every fault")
     pairs: int | None = option(
         "--pairs N", "N pairs of faults, drawn at random: what is hit is found", whole(1)
@@ -48,6 +48,7 @@ class FaultsOptions:
     only: str | None = option(
         "--only TEXT", "of the matrix or the pairs: faults and modes with this text"
     )
+    list: bool = switch("--list", "name what would be flown, MODE FAULT in each line")
     seed: range = option(
         "--seed N|A:B",
         "root of all randomness, or a flight with each from A to below B (default 0)",
@@ -69,7 +70,8 @@ class UnknownError(ValueError):
     """A mode or a fault that there is not."""
 
 
-_NEITHER: Final = "give MODE and FAULT, --matrix, --pairs or --pair"
+_NAMES: Final = "--matrix --list names all modes and faults"
+_NEITHER: Final = f"give MODE and FAULT, --matrix, --pairs or --pair; {_NAMES}"
 _LIMIT_S: Final = 600.0  # of a pair's flight, which takes seconds: longer is a hang
 
 
@@ -80,12 +82,13 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.fault_matrix.expectations import EXPECTATIONS, ExpectationError, expectations
 
     try:
         known = expectations(options.expect or EXPECTATIONS)
-        return _run(options, _chosen(options, known))
+        cells = _chosen(options, known)
+        return _list(cells) if options.list else _run(options, cells)
     except (ExpectationError, UnknownError, SchedulerGoneError, OSError) as error:
         complain("pandion faults", error)
         return COULD_NOT_START
@@ -148,7 +151,13 @@ def _cell(mode: str, expected: Expected, seed: int) -> Cell:
 
 
 def _unknown(what: str, name: str | None, known: tuple[str, ...]) -> str:
-    return _NEITHER if name is None else unknown_name(what, name, known)
+    return _NEITHER if name is None else f"{unknown_name(what, name, known)}; {_NAMES}"
+
+
+def _list(cells: list[Cell]) -> int:
+    for line in dict.fromkeys(f"{cell.mode:10} {cell.expected.name}" for cell in cells):
+        say(line)
+    return AS_EXPECTED
 
 
 def _run(options: FaultsOptions, cells: list[Cell]) -> int:

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
@@ -34,6 +35,8 @@ TRACKING = KNOWN["tracking"]
 DONE, BROKEN = 0, 1  # exit codes
 WIDTH: Final = 100  # of a table on the terminal, in characters
 KEYS: Final = 2  # columns that name a row
+# The first result of a row, after what names it: the name of a test is the same each night.
+_RESULTS: Final = ("passed", "completed", "x_m", "tc_s", "on_front")
 
 
 def seeds(text: str) -> range:
@@ -116,8 +119,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.drawing import NoMatplotlibError
     from studies.flight.own_parts import OwnPartError
     from studies.paper.settings import NoCellError
@@ -216,15 +219,15 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
 def _cases(report: Report) -> list[Case]:
     """A test a row, failed where the paper prints another mark; and one a flight that broke."""
     cases = []
-    for k, row in enumerate(report.rows):
-        named = list(row)[: list(row).index("passed")] if "passed" in row else []
-        name = ", ".join(f"{key} {row[key]}" for key in named) or f"row {k}"
+    for row in report.rows:
+        named = takewhile(lambda key: key not in _RESULTS, row)
+        name = ", ".join(f"{key} {row[key]}" for key in named)
         printed, flown = row.get("paper_completed"), row.get("passed") == row.get("total")
         failure = ""
         if printed is not None and printed != flown:
             mark = "completed" if printed else "not completed"
             failure = f"the paper prints {mark}; {row['passed']} of {row['total']} are completed"
-        cases.append(Case(report.title, name, failure=failure))
+        cases.append(Case(report.title, name, row["took_s"], failure))
     return cases + [Case(report.title, f"error {k}", error=e) for k, e in enumerate(report.errors)]
 
 

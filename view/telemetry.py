@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.signals import (

@@ -10,9 +10,9 @@ from typing import Final
 
 from docs.pages.failsafes import seconds
 from docs.pages.requirements import Manual, Requirement, Shown, load
-from fsw.autopilot.flight.arming import CHECKS
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS, Failsafe
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS, Failsafe
 from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 
 BEGIN: Final = "<!-- requirements: make pages -->\n"

@@ -572,6 +572,7 @@ class PlanRequest:
     joint_targets: tuple[Vec2, ...] = ()
     # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
     recent_disturbance: float = math.inf
+    mode: Mode = Mode.TRAJECTORY  # in which the plan is flown
 
 
 @dataclass(frozen=True, slots=True)

@@ -210,7 +210,7 @@ VEHICLE_STATUS: Final = Topic(
     "on change and every second",
     (
         Field("arming_state", "uint8_t", note="1 disarmed, 2 armed"),
-        Field("nav_state", "uint8_t", note="PX4's number of the nearest mode"),
+        Field("nav_state", "uint8_t", note="PX4's number of the mode"),
         Field("failsafe", "bool", note="a fault is active"),
         Field("mode", "char", 16, "Pandion's name of the mode"),
         Field("failures", "char", 96, "names of the active faults"),

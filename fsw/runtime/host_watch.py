@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from fsw.autopilot.flight.failsafe_evidence import JUMP_US, MISSED_TICKS
+from fsw.autopilot.flight.failsafe.evidence import JUMP_US, MISSED_TICKS
 from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import HostHealth
 from fsw.link.ground_links import GroundLinks

@@ -6,12 +6,9 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol
 
-if TYPE_CHECKING:
-    from studies.campaign.campaign import Flight, Row
-
-RowT = TypeVar("RowT", bound="Row")
+from studies.campaign.ports import Flight, RowT
 
 # A task costs the scheduler one or two milliseconds (python -m benchmarks scheduler): flights that
 # would be more go in batches.

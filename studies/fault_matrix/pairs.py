@@ -66,7 +66,7 @@ class Pair(Cell):
     __slots__ = ()
 
     def key(self) -> str:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return "pair " + super().key()
 
     def _flown(self) -> FaultFlight:

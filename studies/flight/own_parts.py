@@ -293,13 +293,14 @@ class _Pace:
 
 
 class WatchedPlanner:
-    """An own planner whose answers are checked; see ``PlanningCycle``."""
+    """An own planner whose answers are checked; after a failsafe has ended the trajectory, ours."""
 
     def __init__(self, planner: OwnPlanner, config: FlightConfig, *, allow_slow: bool) -> None:
         plan: Any = getattr(planner, "plan", None)
         if not callable(plan):
             raise OwnPartError(f"planner {type(planner).__name__}: must have plan(request)")
         self._plan, self._period_us = plan, config.mpc_period_us
+        self._ours = Planner(config.planner, config.airframe, processor_time_us)
         self._pace = _Pace("planner", config.mpc_period_us, allow_slow)
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
@@ -308,6 +309,8 @@ class WatchedPlanner:
         Raises:
             OwnPartError: The answer cannot be flown.
         """
+        if request.mode is not Mode.TRAJECTORY:
+            return self._ours.plan(request)
         t = 1e-6 * (request.t_apply_us - START_US)
         begun = processor_time_us()
         answer = self._pace.call(self._plan, request, t)

@@ -95,32 +95,37 @@ def test_json_knows_no_nan() -> None:
     }
 
 
-def test_no_program_writes_json_that_may_hold_nan() -> None:
-    """``json_text`` is the one way out."""
+@pytest.fixture(scope="module")
+def calls() -> list[tuple[str, str, ast.Call]]:
+    """File, name and tree of every call to print or to write JSON in the programs."""
     root = Path(__file__).parents[2]
-    wild = {
-        str(path.relative_to(root))
+    return [
+        (str(path.relative_to(root)), name, node)
         for folder in ("fsw", "sitl", "pandion", "studies", "benchmarks", "command_line", "view")
         for path in (root / folder).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Call)
-        and ast.unparse(node.func) in ("json.dumps", "json.dump")
-        and "allow_nan" not in [keyword.arg for keyword in node.keywords]
+        and (name := ast.unparse(node.func)) in ("json.dumps", "json.dump", "print")
+    ]
+
+
+def test_no_program_writes_json_that_may_hold_nan(calls: list[tuple[str, str, ast.Call]]) -> None:
+    """``json_text`` is the one way out."""
+    wild = {
+        file
+        for file, name, node in calls
+        if name != "print" and "allow_nan" not in [keyword.arg for keyword in node.keywords]
     }
     assert wild == KNOWN
 
 
 @pytest.mark.requirement("REQ-LINK-9")
-def test_every_complaint_is_made_printable() -> None:
+def test_every_complaint_is_made_printable(calls: list[tuple[str, str, ast.Call]]) -> None:
     """``complain`` and ``say`` are the one way to standard error."""
-    root = Path(__file__).parents[2]
     raw = [
-        str(path.relative_to(root))
-        for folder in ("fsw", "sitl", "pandion", "studies", "benchmarks", "command_line", "view")
-        for path in (root / folder).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call)
-        and ast.unparse(node.func) == "print"
+        file
+        for file, name, node in calls
+        if name == "print"
         and any(ast.unparse(keyword.value) == "sys.stderr" for keyword in node.keywords)
     ]
     assert raw == []

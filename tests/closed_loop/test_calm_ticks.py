@@ -12,7 +12,7 @@ import pytest
 
 from fsw.autopilot.estimation.fusion_memory import Trail
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.state import AIDED, FlightState
 from fsw.autopilot.model.actuator_health import ActuatorHealth
 from fsw.autopilot.mpc.planner import Planner

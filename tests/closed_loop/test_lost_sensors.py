@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.autopilot.signals import Mode, SensorFrame
 from sitl.scenario_file import load_scenario, parse_scenario

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sample
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario

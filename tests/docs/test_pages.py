@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from docs.pages.failsafes import WORDS, words
 from docs.pages.failsafes import reference as failsafe_reference
 from docs.pages.messages import OF_MISSIONS, reference, traffic
 from docs.pages.parameters import reference as parameter_reference
 from docs.pages.sensors import TABLES
 from docs.pages.sensors import inserted as with_sensors
 from docs.pages.topics import inserted
+from fsw.autopilot.flight.failsafe.table import FAILSAFES
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
@@ -142,3 +144,10 @@ def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
     for name, tuning in (("walls", config.walls), ("sphere", config.workspace)):
         cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.lambda_)
         assert f"| {name} | " + " | ".join(f"{value:g}" for value in cells) + " |" in text
+
+
+def test_the_pages_have_words_for_every_row_of_the_failsafe_table_and_for_no_other() -> None:
+    assert set(WORDS) == {row.condition.name for row in FAILSAFES}
+    for row in FAILSAFES:
+        acts = {name for name in row.parameters if name.endswith("_ACT") or name == "GF_ACTION"}
+        assert words(row).does or acts, f"nothing says what is done about {row.condition.value}"

@@ -23,9 +23,9 @@ from docs.pages.requirements import (
 )
 from docs.pages.safety_manual import inserted, reference, traceability
 from fsw.autopilot.control.tube import all_axes, all_axes_up_to
-from fsw.autopilot.flight.arming import CHECKS
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.registry import BY_NAME
@@ -83,7 +83,7 @@ conditions = ["BATTERY_LOW"]
 id = "REQ-BAT-2"
 shall = "It shall not be armed."
 checks = ["Empty"]
-by = ["fsw/autopilot/flight/arming.py"]
+by = ["fsw/autopilot/flight/commands/arming.py"]
 [not_shown]
 REQ-BAT-2 = "nothing measures it"
 """

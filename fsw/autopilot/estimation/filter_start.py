@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 
 from fsw.autopilot.estimation import fusion, kernels
-from fsw.autopilot.estimation.confirmation import Confirmation
 from fsw.autopilot.estimation.drift import FrameDrift, least
 from fsw.autopilot.estimation.error_state import IMU_CAPACITY, Filter
+from fsw.autopilot.estimation.faults.confirmation import Confirmation
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, Waiting
 from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorTuning

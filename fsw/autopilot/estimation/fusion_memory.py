@@ -8,13 +8,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fsw.autopilot.estimation.confirmation import Run
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import FILTER, Filter
-from fsw.autopilot.estimation.pace import Pace
-from fsw.autopilot.estimation.redundancy import LEAST_WALKS, Verdict
-from fsw.autopilot.estimation.sensor_checks import Aiding, Health
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.confirmation import Run
+from fsw.autopilot.estimation.faults.pace import Pace
+from fsw.autopilot.estimation.faults.redundancy import LEAST_WALKS, Verdict
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample, Sample
 from fsw.autopilot.signals import Vec2, Vec3, Vec4
 

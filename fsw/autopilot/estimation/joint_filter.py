@@ -20,8 +20,8 @@ import math
 from typing import Any, Final, NamedTuple
 
 from fsw.autopilot.estimation.error_state import PUSHES
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.imu import doubt
-from fsw.autopilot.estimation.sensor_fault import SensorFault
 from fsw.autopilot.estimation.stated_variance import followed
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.signals import Vec2

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from fsw.autopilot.estimation import fusion, kernels
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding
 from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory, Waiting
-from fsw.autopilot.estimation.sensor_checks import Aiding
 from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, normalised

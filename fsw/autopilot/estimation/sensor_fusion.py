@@ -16,9 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fsw.autopilot.estimation import fusion, kernels, redundancy
-from fsw.autopilot.estimation.arbitration import Arbitration, begun
-from fsw.autopilot.estimation.confirmation import Confirmation, Run
+from fsw.autopilot.estimation import fusion, kernels
 from fsw.autopilot.estimation.error_state import (
     DELAY,
     ERRORS,
@@ -27,6 +25,18 @@ from fsw.autopilot.estimation.error_state import (
     Array,
     Filter,
 )
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
+from fsw.autopilot.estimation.faults.confirmation import Confirmation, Run
+from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
+from fsw.autopilot.estimation.faults.sensor_checks import (
+    SENSOR_OF,
+    Aiding,
+    Health,
+    arrived,
+    is_attitude_stuck,
+)
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
@@ -51,15 +61,6 @@ from fsw.autopilot.estimation.kernels import (
     Asked,
 )
 from fsw.autopilot.estimation.measurement_update import MeasurementUpdate, attitude
-from fsw.autopilot.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
-from fsw.autopilot.estimation.sensor_checks import (
-    SENSOR_OF,
-    Aiding,
-    Health,
-    arrived,
-    is_attitude_stuck,
-)
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply

@@ -15,19 +15,18 @@ from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
 from fsw.autopilot.control.safety_gate import gate
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor
-from fsw.autopilot.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
-from fsw.autopilot.flight.before_estimate import nothing_known, nowhere, told
-from fsw.autopilot.flight.bounds import bounded_update, target_problem
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.damage_watch import DamageWatch
+from fsw.autopilot.flight.commands.bounds import bounded_update, target_problem
 from fsw.autopilot.flight.descent import Descent
-from fsw.autopilot.flight.exact_state import ExactState
-from fsw.autopilot.flight.jump import moved_along
+from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
+from fsw.autopilot.flight.estimate.exact_state import ExactState
+from fsw.autopilot.flight.estimate.jump import moved_along
+from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
+from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.land_detector import with_range
-from fsw.autopilot.flight.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
 from fsw.autopilot.flight.plan_exchange import (
@@ -37,15 +36,20 @@ from fsw.autopilot.flight.plan_exchange import (
     requested,
     with_nominal,
 )
-from fsw.autopilot.flight.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.restart import restarted
-from fsw.autopilot.flight.safe_set import SafeSetCheck
-from fsw.autopilot.flight.safety_watch import SafetyWatch
-from fsw.autopilot.flight.sensed_state import CaughtUp, SensedState
+from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
+from fsw.autopilot.flight.safety.damage_watch import DamageWatch
+from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
+from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
+from fsw.autopilot.flight.safety.uncertain_clearance import (
+    KeptSet,
+    UncertainClearance,
+    pose_covariance,
+)
+from fsw.autopilot.flight.safety.zone_room import ZoneRoom
+from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
-from fsw.autopilot.flight.zone_room import ZoneRoom
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
@@ -505,6 +509,7 @@ class Autopilot:
             from_nominal=from_nominal,
             joint_targets=joints,
             recent_disturbance=state.cascade.observed.recent,
+            mode=state.vehicle.mode,
         )
         if safety.replan:
             safety = replace(safety, replan=False)

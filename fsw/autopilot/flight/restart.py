@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
 from fsw.autopilot.flight.state import (
     FlightState,
     OffboardMemory,
@@ -19,7 +20,6 @@ from fsw.autopilot.flight.state import (
     SafetyMemory,
     VehicleMemory,
 )
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.signals import StateEstimate
 
 RESTARTED: Final = "flight software restarted"

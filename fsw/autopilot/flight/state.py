@@ -6,16 +6,16 @@ from dataclasses import field
 from functools import partial
 from typing import Final, NamedTuple
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.frame_dropout import Dropout
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.autopilot.flight.accuracy_watch import AccuracyMemory
-from fsw.autopilot.flight.command_dedup import AnsweredCommand
-from fsw.autopilot.flight.conditions import Condition, FailsafeMemory
-from fsw.autopilot.flight.mission_sequencer import MissionFlight
-from fsw.autopilot.flight.offboard_setpoints import Tilt
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, ReferenceState
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.commands.dedup import AnsweredCommand
+from fsw.autopilot.flight.failsafe.conditions import Condition, FailsafeMemory
+from fsw.autopilot.flight.mission.sequencer import MissionFlight
+from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory
+from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.setpoints.offboard import Tilt
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.autopilot.model.airframe import AIRFRAME

@@ -32,6 +32,7 @@ from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.flight_config import FlightConfig, Surroundings
 from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.shapes.ball import is_point
 from fsw.autopilot.signals import SafeSet, Zone
 
 _SIGMAS = 3.0  # that count where clearances do not grow
@@ -85,7 +86,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         findings += _rooms_in_sphere(config, loop, radius)
     if others:
         findings.append(_actuation(config, planner.walls, surroundings, math.inf))
-        points = [zone.clearance for zone in others if _is_point(zone)]
+        points = [zone.clearance for zone in others if is_point(zone)]
         if points and planner.body == "points":
             findings.append(_links(config, min(points)))
     for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
@@ -103,10 +104,6 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
             findings += _returns(config, loop)
         findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
-
-
-def _is_point(zone: Zone) -> bool:
-    return zone.shape.kind == "ball" and zone.shape.numbers[-1] == 0.0
 
 
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:

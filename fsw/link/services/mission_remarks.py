@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from fsw.autopilot.flight import mission_sequencer
+from fsw.autopilot.flight.mission import sequencer as mission_sequencer
 from fsw.autopilot.shapes.half_space import KIND as HALF_SPACE
 from fsw.autopilot.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
 from fsw.autopilot.signals import FlightSnapshot, MissionAction, MissionStep, SafeSet, Vec2, Zone

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
-from fsw.autopilot.flight.bounds import mission_problem, safe_set_problem
-from fsw.autopilot.flight.safe_set import may_grow_fence
-from fsw.autopilot.flight.safe_set_change import growth
+from fsw.autopilot.flight.commands.bounds import mission_problem, safe_set_problem
+from fsw.autopilot.flight.safety.safe_set import may_grow_fence
+from fsw.autopilot.flight.safety.safe_set_change import growth
 from fsw.autopilot.shapes.zones import surfaces
 from fsw.autopilot.signals import (
     FlightSnapshot,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, fault_name
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, fault_name
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import (
     BatteryState,
     Charge,

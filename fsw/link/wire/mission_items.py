@@ -12,7 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from fsw.autopilot.flight.bounds import MAX_REPEATS, MAX_SPEED, MAX_STAY, MAX_YAW, circle_problem
+from fsw.autopilot.flight.commands.bounds import (
+    MAX_REPEATS,
+    MAX_SPEED,
+    MAX_STAY,
+    MAX_YAW,
+    circle_problem,
+)
 from fsw.autopilot.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
 from messages import dialect
 

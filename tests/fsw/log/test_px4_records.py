@@ -16,7 +16,7 @@ from pyulog.px4 import PX4ULog
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.attitude import attitude_reference
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.measurements import ImuSample
 from fsw.autopilot.signals import (

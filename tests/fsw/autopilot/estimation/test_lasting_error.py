@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import ERRORS
+from fsw.autopilot.estimation.faults.sensor_checks import Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.lasting_error import lasting_error
-from fsw.autopilot.estimation.sensor_checks import Health
-from fsw.autopilot.estimation.sensor_fault import Sensor
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
-from fsw.autopilot.flight.uncertain_clearance import pose_covariance
+from fsw.autopilot.flight.safety.uncertain_clearance import pose_covariance
 from fsw.autopilot.measurements import GnssSample, PoseSample
 from tests.fsw.random_states import estimate_of
 

@@ -11,13 +11,13 @@ import pytest
 
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
-from fsw.autopilot.flight.safe_set import joined
+from fsw.autopilot.flight.safety.safe_set import joined
+from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.measurements import ImuSample, JointSample, Sample
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
+from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory, PlanMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
@@ -27,9 +27,9 @@ from fsw.autopilot.signals import (
     SolverStatus,
     Zone,
 )
+from tests.fsw.autopilot.flight.failsafe.test_response import Watched
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
 from tests.fsw.autopilot.flight.test_autopilot import frame, tick
-from tests.fsw.autopilot.flight.test_failsafe_response import Watched
 from tests.fsw.records import with_record
 
 BEGIN_US = 1_002_000  # just after the table was looked at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.state import (
     Aiding,
     FlightState,

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.flight.safe_set import SafeSetCheck
-from fsw.autopilot.flight.safety_watch import SafetyWatch
+from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
+from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
+from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
 from fsw.autopilot.flight.state import SafetyMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import EndEffectorTarget, StateEstimate, Vec2
