@@ -18,7 +18,8 @@ outside its range is refused, and while armed one that breaks an inequality of t
 [start-up analysis](../equations.md). The reason comes as STATUSTEXT, and the value in force is sent
 back.
 
-Type is FLOAT but where INT32 stands before the default; INT32 are sent bytewise, as PX4 sends them.
+Each has its default, its range and its meaning. Type is FLOAT but where INT32 stands before the
+default; INT32 are sent bytewise, as PX4 sends them.
 """
 
 _READ_ONLY = """\
@@ -33,13 +34,10 @@ def reference() -> str:
     parts = [_HEAD]
     for group in GROUPS:
         parts.append(f"## {group}\n")
-        parts.append(_table([p for p in PARAMETERS if p.group == group]))
+        parts.append(_list([p for p in PARAMETERS if p.group == group]))
     parts.append("## Names of PX4\n")
     parts.append(_READ_ONLY)
-    facts = ["| name | value | meaning |", "|---|---|---|"]
-    facts += [
-        f"| {', '.join(names)} | {value} | {meaning} |" for (value, meaning), names in _facts()
-    ]
+    facts = [f"- {', '.join(names)} = {value}: {meaning}" for (value, meaning), names in _facts()]
     parts.append("\n".join(facts) + "\n")
     return "\n".join(parts)
 
@@ -67,19 +65,15 @@ def _type(value: float) -> str:
     return "INT32 " if type_name(value) == "INT32" else ""
 
 
-def _table(parameters: list[Parameter]) -> str:
-    rows = ["| name | default | range | meaning |", "|---|---|---|---|"]
-    rows += [f"| {' | '.join(_cells(parameter))} |" for parameter in parameters]
-    return "\n".join(rows) + "\n"
+def _list(parameters: list[Parameter]) -> str:
+    return "\n".join(_line(parameter) for parameter in parameters) + "\n"
 
 
-def _cells(parameter: Parameter) -> tuple[str, ...]:
-    return (
-        f"`{parameter.name}`",
-        f"{_type(parameter.default)}{as_text(parameter.default)} {parameter.unit}".rstrip(),
-        f"{as_text(parameter.least)}…{as_text(parameter.most)}",
-        _meaning(parameter),
-    )
+def _line(parameter: Parameter) -> str:
+    """Name, default with its unit, range and meaning."""
+    default = f"{_type(parameter.default)}{as_text(parameter.default)} {parameter.unit}".rstrip()
+    span = f"{as_text(parameter.least)}…{as_text(parameter.most)}"
+    return f"- `{parameter.name}` = {default} ({span}): {_meaning(parameter)}"
 
 
 def _meaning(parameter: Parameter) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import Final
 
 from docs.pages.failsafes import seconds
@@ -26,7 +26,7 @@ def reference(manual: Manual) -> str:
         f"{count} requirements, of which {without} are shown by no test.\n",
         *_of_groups(manual),
         "### Not shown by a test\n",
-        _table(("requirement", "why"), sorted(manual.not_shown.items())),
+        "\n".join(f"- **{id_}**: {why}" for id_, why in sorted(manual.not_shown.items())) + "\n",
     ]
     return "\n".join(parts)
 
@@ -83,11 +83,10 @@ def _of_groups(manual: Manual) -> list[str]:
 
 
 def _line(row: Requirement, not_shown: bool) -> str:
-    """A requirement with the conditions and checks that carry it out."""
+    """A requirement with the conditions that carry it out."""
     conditions = [ROWS[Condition[name]] for name in row.conditions]
-    by = [one.condition.value for one in conditions]
-    by += [f"arming: {check[0].lower()}{check[1:]}" for check in row.checks]
-    carried_out = f" *({'; '.join(by)})*" if by else ""
+    by = "; ".join(one.condition.value for one in conditions)
+    carried_out = f" *({by})*" if by else ""
     mark = " **No test.**" if not_shown else ""
     return f"- **{row.id}**{carried_out} {_sentence(row.shall, conditions)}{mark}"
 
@@ -110,9 +109,3 @@ def _default(parameter: Parameter) -> str:
     if parameter.unit == "norm":
         return f"{100.0 * value:g} %" if value >= 0.0 else f"{value:g}"
     return f"{value:.4g} {parameter.unit}".rstrip()
-
-
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    lines += [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join(lines) + "\n"

@@ -165,10 +165,7 @@ def _table(
     notes: dict[str, dict[str, str]],
 ) -> str:
     """Every key of one sensor: its own, and those of all sensors that a suite gives."""
-    head = ["key", "allowed", "meaning", *(("value", "source") if values else ())]
-    rows = [_row(head), "|---" * len(head) + "|"]
-    if values:
-        rows = [f"On board in `{'`, `'.join(values)}`.\n", *rows]
+    rows = [f"On board in `{'`, `'.join(values)}`.\n"] if values else []
     hints = typing.get_type_hints(kind, include_extras=True)
     common = {field.name for field in dataclasses.fields(keys.Timing)}
     for field in dataclasses.fields(kind):
@@ -178,11 +175,14 @@ def _table(
         repeated = kind is not keys.Timing and field.name in common
         meaning = "" if repeated else MEANINGS[name][field.name]
         allowed = "" if repeated else _allowed(hints[field.name])
-        cells = [f"`{field.name}`", allowed, meaning]
-        if values:
-            cells.append(_value(dict(zip(values, given, strict=True))))
-            cells.append(_source([notes[suite].get(field.name, "") for suite in values]))
-        rows.append(_row(cells))
+        value = _value(dict(zip(values, given, strict=True))) if values else ""
+        source = _source([notes[suite].get(field.name, "") for suite in values])
+        line = f"- `{field.name}`"
+        line += f" ({allowed})" if allowed else ""
+        line += f" = {value}" if value else ""
+        line += f": {meaning}" if meaning else ""
+        line += f" [{source}]" if source else ""
+        rows.append(line)
     return "\n".join(rows) + "\n"
 
 
@@ -194,16 +194,13 @@ def _value(given: dict[str, Any]) -> str:
     return ", ".join(f"`{suite}` {value}" for suite, value in shown.items())
 
 
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
 def _allowed(hint: Any) -> str:
     if typing.get_origin(hint) is not Annotated:
         return "true, false"
     plain, permitted = typing.get_args(hint)
     count = len(typing.get_args(plain))
-    return f"{count} numbers, {permitted}" if count else str(permitted)
+    span = str(permitted).replace(" to ", "…")
+    return f"{count} numbers, {span}" if count else span
 
 
 def _shown(value: Any) -> str:

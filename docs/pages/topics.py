@@ -31,6 +31,8 @@ def inserted(page: str) -> str:
     return f"{before}{begin}{reference()}{end}{after}"
 
 
+# The note of the time of a measurement.
+_STAMP: Final = "s, of the measurement, on the clock of the tick"
 # What the page says once, of every topic that has the mark.
 _MARKS: Final = {"; every tick with `LOG_PROFILE` 1": " †", "; none with exact sensors": " ‡"}
 
@@ -45,7 +47,8 @@ def _when(topic: Topic) -> str:
 def _topic(topic: Topic) -> str:
     """One topic; fields that follow each other with one type and note are in one line."""
     lines = [f"### {topic.name}\n", f"{topic.about} ({_when(topic)}).\n"]
-    for (type_, note), alike in itertools.groupby(topic.fields, lambda f: (_type(f), f.note)):
+    fields = [field for field in topic.fields if field.note != _STAMP]
+    for (type_, note), alike in itertools.groupby(fields, lambda f: (_type(f), f.note)):
         names = ", ".join(f"`{field.name}`" for field in alike)
         lines.append(f"- {names} {type_}{f': {note}' if note else ''}")
     return "\n".join(lines) + "\n"

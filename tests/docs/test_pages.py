@@ -100,7 +100,7 @@ def test_every_number_of_a_suite_has_a_place_in_a_table() -> None:
         table = page.split(f"### `[sensors.{name}]`")[1].split("###")[0]
         own = {field.name for field in dataclasses.fields(kind)}
         own -= {field.name for field in dataclasses.fields(Timing)}
-        assert own <= set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE)), name
+        assert own <= set(re.findall(r"^- `(\w+)`", table, re.MULTILINE)), name
 
 
 def test_the_reference_of_parameters_is_not_stale() -> None:

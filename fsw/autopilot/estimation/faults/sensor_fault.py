@@ -29,7 +29,7 @@ class SensorFault(IntEnum):
     STUCK = 6
     JUMP = 7
     STALE = 8
-    SELDOM = 9
+    RATE_TOO_LOW = 9
     DISAGREES = 10
     NO_FIX = 11
     NOISY = 12
@@ -45,7 +45,7 @@ _SENTENCES = {
     SensorFault.STUCK: "is stuck at one reading",
     SensorFault.JUMP: "jumps, and is not believed",
     SensorFault.STALE: "is silent",
-    SensorFault.SELDOM: "comes less often than it did",
+    SensorFault.RATE_TOO_LOW: "comes less often than it did",
     SensorFault.DISAGREES: "does not agree with the other sensors",
     SensorFault.NO_FIX: "has no fix",
     SensorFault.NOISY: "is noisier than stated",

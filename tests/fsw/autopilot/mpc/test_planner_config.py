@@ -33,9 +33,7 @@ PARTS = {
     "planner.soft": SoftWeights(),
     "planner": PlannerConfig(),
 }
-ROW = re.compile(
-    r"^\| `(\w+)` \| (?:INT32 )?([^ |]+) ?([^|]*) \| [^|]*…[^|]* \|.*\|$", re.MULTILINE
-)
+ROW = re.compile(r"^- `(\w+)` = (?:INT32 )?(\S+) ?(.*?) \([^)]*…", re.MULTILINE)
 
 
 @pytest.mark.parametrize("part", PARTS)
