@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.output import json_text, unwritten
+from command_line.output import json_text, try_write
 from command_line.process import (
     NOT_COMPLETED,
     CouldNotStart,
@@ -140,7 +140,7 @@ class _Session:
         result["inbox_refused"] = inbox.refused
         result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
-        lost = unwritten(directory / "fsw.json", json_text(result, 2) + "\n")
+        lost = try_write(directory / "fsw.json", json_text(result, 2) + "\n")
         sentence = f"fsw: {end.sentence}"
         self._events.report("ended", sentence, ending=end.ending.value, result=result)
         for what in lost:

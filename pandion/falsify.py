@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from command_line.bounded_file import read_bounded
 from command_line.bounded_json import JsonError, json_object
 from command_line.options import read
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.log.run_directory import new_run_directory
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HOLDS, BROKEN = 0, 1  # exit codes
 _FORMAT: Final = "pandion-disturbance-1"
 _MM: Final = 1e3
-_MOST_BYTES: Final = 64 * 1024 * 1024  # of a file that is read
+_MAX_BYTES: Final = 64 * 1024 * 1024  # of a file that is read
 _STEPS_A_SECOND: Final = 500
 
 
@@ -62,7 +62,7 @@ def main(argv: list[str]) -> int:
         OwnPartError,
         OSError,
     ) as error:
-        complain("pandion falsify", error)
+        print_error("pandion falsify", error)
         return COULD_NOT_START
 
 
@@ -138,7 +138,7 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
 
 def _sentences(outcome: Outcome, amplitude: float) -> list[str]:
     """Each claim: what was found, the bound, and whether it was tested and held."""
-    bounds, least = outcome.bounds, outcome.least_margin
+    bounds, least = outcome.bounds, outcome.min_margin
     one, many = outcome.worst_of_one_axis, outcome.worst_of_all_axes
     told = []
     if one is not None:
@@ -213,7 +213,7 @@ def _as_json(
         "worst": _summary(outcome.worst),
         "worst_of_one_axis": _summary(outcome.worst_of_one_axis),
         "worst_of_all_axes": _summary(outcome.worst_of_all_axes),
-        "least_margin": _summary(outcome.least_margin),
+        "least_margin": _summary(outcome.min_margin),
         "whole_stack": {
             "evaluations": whole_stack.evaluations,
             "contacts": whole_stack.contacts,
@@ -321,7 +321,7 @@ def _replayed(flown: Replayed) -> dict[str, Any]:
 def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float, float], ...]]:
     """The first step and the values of a kept disturbance."""
     try:
-        kept = json_object(read_bounded(path, _MOST_BYTES))
+        kept = json_object(read_bounded(path, _MAX_BYTES))
         if kept["format"] != _FORMAT:
             raise KeyError("format")
         first = kept["first_step"]

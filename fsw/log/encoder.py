@@ -271,7 +271,7 @@ class LogEncoder:
                 *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
                 *(safety.breaches, safety.departures, safety.interventions),
-                *(*_filled(report.added[: topics.MARGINS]), report.lacking),
+                *(*_filled(report.added[: topics.MARGINS]), report.shortfall),
                 *(_END_EFFECTOR, t_us, *p, *v, *wanted),
             )
         )

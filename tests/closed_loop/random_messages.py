@@ -133,7 +133,7 @@ class Talkers:
             Site(
                 locate=partial(to_local, config.origin),
                 judge=lambda safe_set: self.flight.against(safe_set),
-                least_margin=self.flight.least_margin,
+                min_margin=self.flight.min_margin,
                 clearance=lambda: config.limits.fence_clearance,
             )
         )

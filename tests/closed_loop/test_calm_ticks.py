@@ -101,11 +101,11 @@ class Flight:
     ],
 )
 def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
-    name: str, ticks: int, push: float, least_calm: float
+    name: str, ticks: int, push: float, min_calm: float
 ) -> None:
     flight = Flight(name, push)
     flight.fly(ticks)
-    assert flight.calm >= least_calm * flight.loop.simulation.step
+    assert flight.calm >= min_calm * flight.loop.simulation.step
 
 
 @pytest.mark.drawn(2)
@@ -113,10 +113,10 @@ def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
     ("suite", "push", "least_calm"),
     [("mocap", 0.0, 0.85), ("vio", 0.0, 0.7), in_long("rtk", 0.0, 0.7), ("mocap", 3.0, 0.0)],
 )
-def test_so_is_one_of_a_suite(suite: str, push: float, least_calm: float) -> None:
+def test_so_is_one_of_a_suite(suite: str, push: float, min_calm: float) -> None:
     flight = Flight("walls", push, suite)
     flight.fly(1500)
-    assert flight.calm >= least_calm * flight.loop.simulation.step
+    assert flight.calm >= min_calm * flight.loop.simulation.step
 
 
 @pytest.mark.drawn(1)

@@ -149,7 +149,7 @@ def connected(folder: Path, config: FlightConfig) -> Iterator[Connected]:
     parameters = ParameterStore(config, lambda tuning: None)
     parameters.open(AtOnce(), lambda values: None)
     site = Site(
-        partial(to_local, config.origin), flight.loop.against, lambda: 0.1, flight.loop.least_margin
+        partial(to_local, config.origin), flight.loop.against, lambda: 0.1, flight.loop.min_margin
     )
     missions = MissionStore(site)
     health = LoopHealth()

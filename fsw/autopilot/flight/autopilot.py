@@ -42,7 +42,7 @@ from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.safety.uncertain_clearance import (
-    KeptSet,
+    InflatedSafeSet,
     UncertainClearance,
     pose_covariance,
 )
@@ -121,7 +121,11 @@ class Autopilot:
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
         tick = config.tick_period_us * 1e-6
-        self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
+        self._zones: tuple[InflatedSafeSet, EndEffectorTarget | None, Array] = (
+            InflatedSafeSet(),
+            None,
+            NO_ZONES,
+        )
         self._safe_sets = SafeSetCheck(config)
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
@@ -154,7 +158,7 @@ class Autopilot:
         self._room = ZoneRoom(config)
         self._tick_us = config.tick_period_us
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
-        self._most_us = config.catch_up_ticks * config.tick_period_us
+        self._max_us = config.catch_up_ticks * config.tick_period_us
 
     def warm_up(self) -> None:
         """Compile every kernel of the tick, before anything flies."""
@@ -172,11 +176,11 @@ class Autopilot:
         """Findings on whether this configuration can keep a safe set."""
         return self._safe_sets.analyse(safe_set)
 
-    def least_margin(
+    def min_margin(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> float:
         """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone."""
-        return self._safe_sets.least_margin(safe_set, estimate, target)
+        return self._safe_sets.min_margin(safe_set, estimate, target)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
@@ -215,7 +219,7 @@ class Autopilot:
         vehicle = state.vehicle
         armed = vehicle.armed
         flown = vehicle.flies and vehicle.unloaded is None and bool(state.cascade.has_plan)
-        if flown and now_us - state.t_us > self._most_us:
+        if flown and now_us - state.t_us > self._max_us:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
         if state.cascade is not began:  # loops or plan begin anew
             r = state.cascade.copy()
@@ -460,7 +464,7 @@ class Autopilot:
 
     def _jumped(self, state: FlightState, now_us: int) -> bool:
         """Whether time did: on by more than is made up for, or not on at all."""
-        return state.index >= 0 and not 0 < now_us - state.t_us <= self._most_us
+        return state.index >= 0 and not 0 < now_us - state.t_us <= self._max_us
 
     def _resumed(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """The state after a time without ticks: loops and plan go on from the measurement."""
@@ -573,7 +577,7 @@ class Autopilot:
         are uncertain while a part of them is missing. None: certain.
         """
         if covariance is not None and fusion is not None:
-            return pose_covariance(covariance, estimate, self._sensed.lasting_error(fusion))
+            return pose_covariance(covariance, estimate, self._sensed.correlated_error(fusion))
         if fusion is None and state.aiding is not AIDED:
             position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
             return np.diag((position**2,) * 3 + (attitude**2,) * 3)

@@ -30,7 +30,7 @@ from fsw.autopilot.control.tube import (
 )
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.parameters.flight_config import FlightConfig, Surroundings
+from fsw.autopilot.parameters.flight_config import DisturbanceModel, FlightConfig
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.ball import is_point
 from fsw.autopilot.signals import SafeSet, Zone
@@ -195,7 +195,7 @@ def _estimate(
     )
 
 
-def base_reach(loop: Tube, surroundings: Surroundings) -> float:
+def base_reach(loop: Tube, surroundings: DisturbanceModel) -> float:
     """How far a disturbance within the assumed one pushes the base off its plan [m], an axis.
 
     Without what clearances grow by while the memory of wind is in force.
@@ -220,7 +220,7 @@ def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float)
 
 
 def _actuation(
-    config: FlightConfig, tuning: BarrierTuning, surroundings: Surroundings, radius: float
+    config: FlightConfig, tuning: BarrierTuning, surroundings: DisturbanceModel, radius: float
 ) -> Finding:
     available = GRAVITY * math.tan(config.planner.limits.tilt)
     wanted = tuning.alpha + tuning.gamma * tuning.lambda_ + surroundings.target_acceleration
@@ -287,7 +287,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
     )
 
 
-def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
+def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: DisturbanceModel) -> Finding:
     reach, room = base_reach(loop, surroundings), stand_off(tuning)
     return _finding(
         "tube",
@@ -459,12 +459,12 @@ def _proof(config: FlightConfig, reach: float) -> str:
     if left >= tuning.alpha:
         return f"lambda >= {least:.3f} m/s would be proof"
     if left > 0.0:
-        least_alpha = math.floor(1e2 * left) / 1e2
-        return f"lambda >= {least:.3f} m/s with alpha <= {least_alpha:.2f} m/s^2 would be proof"
+        min_alpha = math.floor(1e2 * left) / 1e2
+        return f"lambda >= {least:.3f} m/s with alpha <= {min_alpha:.2f} m/s^2 would be proof"
     return "no lambda that the tilt can keep would be proof"
 
 
-def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
+def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) -> Finding:
     """The tube is that of the linear loop: it holds while no limit is reached."""
     disturbance = surroundings.disturbance
     used = limits_used(config.airframe, config.tuning.tracking, loop, disturbance)
@@ -479,7 +479,7 @@ def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Fin
     )
 
 
-def _sampled(tuning: BarrierTuning, surroundings: Surroundings, period: float) -> Finding:
+def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: float) -> Finding:
     least = sampled_robustness(tuning, surroundings.disturbance, period)
     margin = (tuning.lambda_ - least) / tuning.slope
     return _finding(

@@ -25,14 +25,14 @@ from fsw.autopilot.parameters.registry import BY_NAME
 VEHICLE: Final = 1  # MAVLink system of the vehicle
 COMPONENT: Final = 1  # and its autopilot's component
 
-_MOST_BYTES: Final = 1024 * 1024  # a file of all parameters has 12 kB
+_MAX_BYTES: Final = 1024 * 1024  # a file of all parameters has 12 kB
 # How the files of Windows' editors begin, and what is behind it.
 _MARKS: Final = {
     codecs.BOM_UTF8: "utf-8-sig",
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
-_MOST_COMPLAINTS: Final = 20  # sentences; of the rest the number
+_MAX_COMPLAINTS: Final = 20  # sentences; of the rest the number
 
 _HEAD: Final = """\
 # Onboard parameters for Vehicle 1
@@ -65,12 +65,12 @@ def parse(text: str) -> Loaded:
             found = _entry(words)
         except ValueError as error:
             unusable += 1
-            if unusable <= _MOST_COMPLAINTS:
+            if unusable <= _MAX_COMPLAINTS:
                 complaints.append(f"line {number} is passed over: {error}")
         else:
             values.update(found)
-    if unusable > _MOST_COMPLAINTS:
-        complaints.append(f"{unusable - _MOST_COMPLAINTS} more lines are passed over")
+    if unusable > _MAX_COMPLAINTS:
+        complaints.append(f"{unusable - _MAX_COMPLAINTS} more lines are passed over")
     return Loaded(values, tuple(complaints), unusable)
 
 
@@ -80,7 +80,7 @@ def load(path: Path) -> Loaded:
     Raises:
         OSError: It cannot be read, or is no file of parameters by its length.
     """
-    data = read_bounded(path, _MOST_BYTES)
+    data = read_bounded(path, _MAX_BYTES)
     encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
     # What is no text shows as lines of no use, not as an error.
     return parse(data.decode(encoding, "replace"))
@@ -131,7 +131,7 @@ def save(path: Path, values: Mapping[str, float]) -> None:
 
 
 def _entry(words: list[str]) -> dict[str, float]:
-    """The parameter of a line and its value; none where the line says what cannot be changed."""
+    """The parameter of a line and its value; none where it cannot be changed."""
     if len(words) == 5:
         vehicle, component, name, number, _ = words
         if (vehicle, component) != (str(VEHICLE), str(COMPONENT)):

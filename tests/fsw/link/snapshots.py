@@ -125,7 +125,7 @@ SNAPSHOT = FlightSnapshot(
         (0.3, 0.2, 0.4),
         (0.5, -0.1, 0.6),
         added=(0.125, 0.25),
-        lacking=0.0625,
+        shortfall=0.0625,
     ),
     home=Home((-0.5, 0.25, -0.3), math.pi),
     battery=BatteryState(voltage=15.2, current=18.3, consumed=1.9, remaining=0.62),

@@ -42,8 +42,8 @@ from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
+from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
 from fsw.autopilot.estimation.measurement_update import MeasurementUpdate
-from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import normalised
 from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample
@@ -62,7 +62,10 @@ _PARTS: Final = {
     Sensor.POSE: (Source.POSE, Source.ATTITUDE),
     Sensor.GNSS: (Source.GNSS, Source.GNSS),
 }
-_FOLLOWED: Final = (SensorFault.SELDOM, SensorFault.NOISY)  # encoders that are used all the same
+_FOLLOWED: Final = (
+    SensorFault.RATE_TOO_LOW,
+    SensorFault.NOISY,
+)  # encoders that are used all the same
 _ROUNDING: Final = 1e-9  # s
 
 Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
@@ -75,7 +78,7 @@ class Arbitration:
     def __init__(
         self,
         tuning: EstimatorTuning,
-        stated: StatedVariance,
+        stated: MeasurementNoise,
         update: MeasurementUpdate,
         again: Again,
     ) -> None:

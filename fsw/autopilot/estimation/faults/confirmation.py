@@ -12,7 +12,7 @@ import math
 from typing import Final, NamedTuple
 
 from fsw.autopilot.estimation.faults.sensor_checks import Aiding
-from fsw.autopilot.estimation.stated_variance import StatedVariance
+from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
 from fsw.autopilot.geometry.vectors import norm
@@ -73,7 +73,7 @@ class Run(NamedTuple):
 class Confirmation:
     """Compares samples, but for their noise."""
 
-    def __init__(self, tuning: EstimatorTuning, stated: StatedVariance) -> None:
+    def __init__(self, tuning: EstimatorTuning, stated: MeasurementNoise) -> None:
         self._tuning = tuning
         self._stated = stated
 

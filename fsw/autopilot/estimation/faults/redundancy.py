@@ -100,7 +100,7 @@ _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 # Of forces [m/s^3/sqrt(Hz)] and rates [rad/s^2/sqrt(Hz)] of the rotors' model: gusts and errors.
-LEAST_WALKS: Final = (3.0, 0.15)
+MIN_WALKS: Final = (3.0, 0.15)
 _LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
 _MODEL_SIGMAS: Final = 5.0  # of them, that are nominal
 _NOISE_SIGMAS: Final = 4.0  # of the noise of measurements
@@ -253,8 +253,8 @@ def look(
     for k in range(COUNT):
         _note_largest(s, now, k)
     # How quickly the model has been off, which is what a filter without a half of the unit needs.
-    x.model_walk[0] = LEAST_WALKS[0]
-    x.model_walk[1] = max(LEAST_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
+    x.model_walk[0] = MIN_WALKS[0]
+    x.model_walk[1] = max(MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
 
 
 @compilable

@@ -29,7 +29,7 @@ class SensorFault(IntEnum):
     STUCK = 6
     JUMP = 7
     STALE = 8
-    SELDOM = 9
+    RATE_TOO_LOW = 9
     DISAGREES = 10
     NO_FIX = 11
     NOISY = 12
@@ -45,7 +45,7 @@ _WORDS = {
     SensorFault.STUCK: "stuck",
     SensorFault.JUMP: "jump rejected",
     SensorFault.STALE: "silent",
-    SensorFault.SELDOM: "rate too low",
+    SensorFault.RATE_TOO_LOW: "rate too low",
     SensorFault.DISAGREES: "inconsistent with the other sensors",
     SensorFault.NO_FIX: "no fix",
     SensorFault.NOISY: "noisier than stated",

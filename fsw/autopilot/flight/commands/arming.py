@@ -53,7 +53,7 @@ def _estimate(context: CommandContext) -> str:
 
 
 def _attitude(context: CommandContext) -> str:
-    tilt, most = (math.degrees(x) for x in (context.health.tilt, context.health.most_tilt))
+    tilt, most = (math.degrees(x) for x in (context.health.tilt, context.health.max_tilt))
     if tilt <= most:
         return ""
     return f"the vehicle is tilted by {tilt:.0f} deg; {most:.0f} deg are allowed"
@@ -66,7 +66,7 @@ def _standing(context: CommandContext) -> str:
 
 
 def _battery(context: CommandContext) -> str:
-    remaining, least = context.health.remaining, context.health.least_remaining
+    remaining, least = context.health.remaining, context.health.min_remaining
     if remaining >= least:
         return ""
     left = f"{100 * remaining:.0f} % left, {100 * least:.0f} % needed"
@@ -74,7 +74,7 @@ def _battery(context: CommandContext) -> str:
 
 
 def _outside(context: CommandContext) -> str:
-    margin = context.health.least_margin
+    margin = context.health.min_margin
     if margin >= 0.0:
         return ""
     return f"the vehicle is outside its safe set by {-1e3 * margin:.0f} mm"

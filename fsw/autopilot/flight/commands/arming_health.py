@@ -20,13 +20,13 @@ class ArmingHealth:
     """Empty sentences are what is well."""
 
     tilt: float = 0.0  # rad
-    most_tilt: float = math.radians(15.0)  # rad
+    max_tilt: float = math.radians(15.0)  # rad
     estimator: str = ""  # why the estimate is not to be relied upon
     sensor: str = ""  # which one fails, and how
     remaining: float = 1.0  # share of the battery's capacity
-    least_remaining: float = 0.1
+    min_remaining: float = 0.1
     parameters: str = ""  # which contradict each other
-    least_margin: float = math.inf  # m, of the safe set
+    min_margin: float = math.inf  # m, of the safe set
     joint_rates: Vec2 = (0.0, 0.0)  # rad/s
     joints: Vec2 = (0.0, 0.0)  # rad
     damage: str = ""  # parts that have failed
@@ -48,13 +48,13 @@ def arming_health(
     upright = estimate.R_WB[8]
     return ArmingHealth(
         tilt=math.acos(min(max(upright, -1.0), 1.0)) if upright == upright else math.pi,
-        most_tilt=limits.arm_tilt,
+        max_tilt=limits.arm_tilt,
         estimator=estimator,
         sensor=_failing_sensor(state, estimate.t_us - limits.sensor_loss_us),
         remaining=state.battery.remaining,
-        least_remaining=least,
+        min_remaining=least,
         parameters=contradiction,
-        least_margin=min(margins, default=math.inf),
+        min_margin=min(margins, default=math.inf),
         joint_rates=estimate.qd_arm,
         joints=estimate.q_arm,
         damage=state.damage.rotor or state.damage.joint,

@@ -33,11 +33,11 @@ def told(state: FlightState, tick_us: int) -> tuple[StatusText, ...]:
     lasted_us = state.invalid_ticks * tick_us
     if not lasted_us - tick_us < TOLD_AFTER_US <= lasted_us:
         return ()
-    lacking = Condition.ESTIMATE_INVALID
-    severity = ROWS[lacking].severity
-    event = FailsafeEvent(lacking.value, Action.WARN.value, severity)
+    shortfall = Condition.ESTIMATE_INVALID
+    severity = ROWS[shortfall].severity
+    event = FailsafeEvent(shortfall.value, Action.WARN.value, severity)
     seconds = 1e-6 * TOLD_AFTER_US
-    text = f"{lacking.value} for {seconds:.0f} s: {_reason(state.fusion)}"
+    text = f"{shortfall.value} for {seconds:.0f} s: {_reason(state.fusion)}"
     return (StatusText(severity, text, event),)
 
 

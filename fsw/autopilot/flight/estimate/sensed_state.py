@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from fsw.autopilot.control.cascade import Cascade, in_hover
 from fsw.autopilot.estimation import kernels
+from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
-from fsw.autopilot.estimation.faults.pace import looked
 from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names
+from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_checks import Health
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import (
@@ -20,7 +21,6 @@ from fsw.autopilot.estimation.fusion_memory import (
     at_start,
     copied,
 )
-from fsw.autopilot.estimation.lasting_error import lasting_error
 from fsw.autopilot.estimation.sensor_fusion import UNKNOWN, SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
@@ -53,7 +53,7 @@ _EVERY_TICK = (_IMU, Sensor.ENCODERS)
 _HELD = (35.0, 70.0)
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
-_IN_USE = (SensorFault.REPEATED, SensorFault.SELDOM, SensorFault.DISAGREES, SensorFault.NOISY)
+_IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
 _NOISY = 4.0  # times the stated variance
 _BEGUN = 1.0  # s, until scales have settled
 _SHOWN = 1.0  # s, for which another fault says more
@@ -95,9 +95,9 @@ class SensedState:
             return None
         return self._fusion.covariance(memory, memory.now)
 
-    def lasting_error(self, memory: FusionMemory) -> Vec6:
+    def correlated_error(self, memory: FusionMemory) -> Vec6:
         """Variances of position [m^2, NED] and attitude [rad^2, FRD] besides the filter's."""
-        return lasting_error(memory, self._tuning)
+        return correlated_error(memory, self._tuning)
 
     def estimate(
         self, state: FlightState, inputs: TickInputs
@@ -217,7 +217,7 @@ class SensedState:
                 return state
             unknown = unknown_report(state.estimator, memory, estimate.t_us, self._stale)
             return replace(state, estimator=unknown)
-        lasting = self.lasting_error(memory)
+        lasting = self.correlated_error(memory)
         report = estimator_report(memory, covariance, lasting, estimate, memory.now, self._stale)
         drifted = math.sqrt(max(0.0, *covariance.diagonal()[P : P + 3].tolist()))
         return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
@@ -273,11 +273,11 @@ def _report(
 
 def _report_seldom(memory: FusionMemory, now: float, texts: list[StatusText]) -> FusionMemory:
     """Report sensors that have begun to come less often than they did."""
-    paces, seldom = looked(memory.paces, memory.health, now)
-    memory = memory._replace(paces=paces)
+    sample_rates, seldom = looked(memory.sample_rates, memory.health, now)
+    memory = memory._replace(sample_rates=sample_rates)
     for sensor in seldom:
-        memory = memory.noting(memory.of(sensor).with_fault(SensorFault.SELDOM, now))
-        texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.SELDOM)))
+        memory = memory.noting(memory.of(sensor).with_fault(SensorFault.RATE_TOO_LOW, now))
+        texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.RATE_TOO_LOW)))
     return memory
 
 

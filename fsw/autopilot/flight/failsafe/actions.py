@@ -6,7 +6,7 @@ from typing import Final
 
 from fsw.autopilot.flight.failsafe.conditions import Action
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
-from fsw.autopilot.signals import Charge, Mode
+from fsw.autopilot.signals import BatteryWarning, Mode
 
 BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
 
@@ -53,10 +53,10 @@ def on_datalink_lost(context: FailsafeContext) -> Action:
 def on_battery(context: FailsafeContext) -> Action:
     """COM_LOW_BAT_ACT: 0 warn, 2 land when critical, 3 return then and land in an emergency."""
     return {
-        (2, Charge.CRITICAL): Action.LAND,
-        (2, Charge.EMERGENCY): Action.LAND,
-        (3, Charge.CRITICAL): Action.RETURN,
-        (3, Charge.EMERGENCY): Action.LAND,
+        (2, BatteryWarning.CRITICAL): Action.LAND,
+        (2, BatteryWarning.EMERGENCY): Action.LAND,
+        (3, BatteryWarning.CRITICAL): Action.RETURN,
+        (3, BatteryWarning.EMERGENCY): Action.LAND,
     }.get((context.limits.low_battery_action, context.state.battery.charge), Action.WARN)
 
 

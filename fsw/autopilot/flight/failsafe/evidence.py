@@ -7,7 +7,7 @@ from typing import Final
 
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Condition
-from fsw.autopilot.flight.safety.uncertain_clearance import LACKING
+from fsw.autopilot.flight.safety.uncertain_clearance import SHORTFALL
 from fsw.autopilot.flight.state import FlightState, LostSensor
 from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.autopilot.periods import TICK_US
@@ -99,8 +99,8 @@ def datalink_is_lost(context: FailsafeContext) -> bool:
 def lacks_room(context: FailsafeContext) -> bool:
     """In flight, for half a second, walls leave less than clearances should grow by."""
     kept = context.state.kept
-    lasts = context.estimate.t_us - kept.ample_us >= _LACKING_US
-    return kept.lacking > LACKING and lasts and context.state.vehicle.flies
+    lasts = context.estimate.t_us - kept.sufficient_us >= _LACKING_US
+    return kept.shortfall > SHORTFALL and lasts and context.state.vehicle.flies
 
 
 def is_unaided(context: FailsafeContext) -> bool:

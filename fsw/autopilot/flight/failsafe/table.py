@@ -23,7 +23,7 @@ from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.safety.zone_room import is_deep
 from fsw.autopilot.periods import PLANNING_US, TICK_US
-from fsw.autopilot.signals import Charge, Severity
+from fsw.autopilot.signals import BatteryWarning, Severity
 
 AT_ONCE_US: Final = TICK_US
 SLOW_US: Final = PLANNING_US  # after which the other rows are looked at again
@@ -239,7 +239,7 @@ FAILSAFES: Final = (
         evidence.lacks_room,
         _always(Action.WARN),
         Severity.CRITICAL,
-        detail=lambda c: f": {1e3 * c.state.kept.lacking:.0f} mm less than SAFE_SIGMAS asks for",
+        detail=lambda c: f": {1e3 * c.state.kept.shortfall:.0f} mm less than SAFE_SIGMAS asks for",
         slow=True,
         within_us=_TWICE,
         parameters=("SAFE_SIGMAS",),
@@ -409,7 +409,7 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.BATTERY_LOW,
-        lambda c: c.state.battery.charge is Charge.LOW,
+        lambda c: c.state.battery.charge is BatteryWarning.LOW,
         actions.on_battery,
         detail=wording.charge_left,
         slow=True,
@@ -419,7 +419,7 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.BATTERY_CRITICAL,
-        lambda c: c.state.battery.charge is Charge.CRITICAL,
+        lambda c: c.state.battery.charge is BatteryWarning.CRITICAL,
         actions.on_battery,
         Severity.CRITICAL,
         wording.charge_left,
@@ -431,7 +431,7 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.BATTERY_EMERGENCY,
-        lambda c: c.state.battery.charge is Charge.EMERGENCY,
+        lambda c: c.state.battery.charge is BatteryWarning.EMERGENCY,
         actions.on_battery,
         Severity.EMERGENCY,
         wording.charge_left,

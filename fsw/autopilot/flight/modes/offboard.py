@@ -216,7 +216,7 @@ def report(state: FlightState, now_us: int) -> OffboardReport:
         joints=memory.joints,
         accepted=memory.accepted,
         refused=memory.refused,
-        age_us=now_us - memory.heard_us if memory.heard_us >= 0 else 0,
+        age_us=now_us - memory.last_received_us if memory.last_received_us >= 0 else 0,
     )
 
 

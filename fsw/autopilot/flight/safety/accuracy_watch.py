@@ -21,7 +21,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import SafeSet, Severity, StatusText, Vec3
 
 _WINDOW_US: Final = 1_000_000  # of which the worst instant counts
-_LEAST, _MOST = 6, 30  # windows before it is told, and after which it is told as it is
+_MIN, _MOST = 6, 30  # windows before it is told, and after which it is told as it is
 _EXACT: Final = Accuracy("", 0.0, 0.0, 0.0)
 _SETTLED: Final = 0.05  # share by which velocity and tilt may differ from the window before
 
@@ -73,7 +73,7 @@ class AccuracyWatch:
             abs(now - then) <= _SETTLED * then
             for now, then in zip(most[1:], memory.before[1:], strict=True)
         )
-        if windows < (_LEAST if settled else _MOST) or not safe_set.zones:
+        if windows < (_MIN if settled else _MOST) or not safe_set.zones:
             return AccuracyMemory(window_us=now_us, windows=windows, before=most)
         accuracy = Accuracy(source, *most)
         texts += [

@@ -22,7 +22,7 @@ from fsw.compiled import machine_code, packed
 ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
 _WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
-_LEAST_GIVEN: Final = 0.1  # N, of a rotor that does not obey
+_MIN_GIVEN: Final = 0.1  # N, of a rotor that does not obey
 _UNDECIDED: Final = 0.4  # s, for which a joint that gives no torque may be encoders that are stuck
 
 
@@ -102,7 +102,7 @@ class DamageWatch:
         if not found.disobeys:
             return ActuatorHealth(_with(HEALTHY.effectiveness, k, found.effect), joints=joints)
         # It is commanded what it gives in hover, and reckoned with as what it really gives.
-        gives = min(max(s.gives, _LEAST_GIVEN), self._top)
+        gives = min(max(s.gives, _MIN_GIVEN), self._top)
         return ActuatorHealth(
             _with(HEALTHY.effectiveness, k, gives / self._hover),
             _with(HEALTHY.least, k, gives),

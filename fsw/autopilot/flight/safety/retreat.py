@@ -32,14 +32,14 @@ def retreat_place(
         for k in range(len(safe_set.zones)):
             zone = SafeSet(safe_set.zones[k : k + 1])
             for at in surfaces(zone, add_scaled(estimate.p_WB, shift, 1.0), estimate.t_us):
-                lacking = room - (at.distance - hull_reach(body, at.normal))
-                if lacking > _TOLERANCE:
-                    shift = add_scaled(shift, at.normal, lacking)
+                shortfall = room - (at.distance - hull_reach(body, at.normal))
+                if shortfall > _TOLERANCE:
+                    shift = add_scaled(shift, at.normal, shortfall)
             for p, radius in ends:
                 for at in surfaces(zone, add_scaled(p, shift, 1.0), estimate.t_us):
-                    lacking = room - (at.distance - radius)
-                    if lacking > _TOLERANCE:
-                        shift = add_scaled(shift, at.normal, lacking)
+                    shortfall = room - (at.distance - radius)
+                    if shortfall > _TOLERANCE:
+                        shift = add_scaled(shift, at.normal, shortfall)
         if shift is before:
             break
     length = sum(value * value for value in shift) ** 0.5

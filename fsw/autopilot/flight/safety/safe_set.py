@@ -5,8 +5,8 @@ source may shrink either, and only its owner may grow it (``safe_set_change.grow
 and every refusal is a text that says who and what. Disarmed, another source may become the
 owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
 nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the
-way in which it could stop, outside. A moving zone that
-is not announced any more is not predicted for ever: it is held where it is after a time-out.
+way in which it could stop, outside. A moving zone that has timed out is not predicted for ever: it
+is held where it is then.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fsw.autopilot.flight.safety.safe_set_change import (
     summary,
 )
 from fsw.autopilot.flight.safety.safety_watch import least
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import MissionMemory
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.mpc.reference import still_at
@@ -340,7 +340,7 @@ class SafeSetCheck:
         surfaces(walled, estimate.p_WB, estimate.t_us)
         self._margins.report(walled, estimate, still_at(estimate.p_WB))
 
-    def least_margin(
+    def min_margin(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> float:
         """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone.
@@ -354,11 +354,11 @@ class SafeSetCheck:
         return least(self._margins.report(safe_set, estimate, target).margins)
 
     def margins(
-        self, kept: KeptSet, estimate: StateEstimate, target: EndEffectorTarget | None
+        self, kept: InflatedSafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle in the safe set in force."""
         report = self._margins.report(kept.source, estimate, target)
-        return replace(report, added=kept.added, lacking=kept.lacking) if kept.added else report
+        return replace(report, added=kept.added, shortfall=kept.shortfall) if kept.added else report
 
 
 def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:

@@ -21,7 +21,7 @@ from fsw.frozen import replace
 # m, beyond the tube. The observer's velocity noise and the position's own, 1 mm rms each in the
 # simulator and in motion capture, move the base by 2 mm rms against its estimate; five times that.
 NOISE_ROOM = 0.01
-_LEAST_TUBE = 0.05  # m: where no disturbance is expected, the loop is not perfect all the same
+_MIN_TUBE = 0.05  # m: where no disturbance is expected, the loop is not perfect all the same
 _BACK = 0.5  # of the tube's radius: closer than this the vehicle is on its plan again
 _BACK_US = 500_000  # for as long
 _CLEAR = 0.01  # m of margin that end a breach
@@ -37,7 +37,7 @@ class SafetyWatch:
         follows_state = config.inner == "tracking"
         reach = base_reach(loop, config.surroundings) + NOISE_ROOM
         # The other loop follows no state: only an upset takes it off its plan.
-        self.radius = max(reach, _LEAST_TUBE) if follows_state else config.upset_distance
+        self.radius = max(reach, _MIN_TUBE) if follows_state else config.upset_distance
         self._back = _BACK * self.radius
         # More upright than this, neither roll nor pitch is beyond its limit.
         beyond = [a for a in (config.limits.roll_failure, config.limits.pitch_failure) if a > 0.0]
@@ -121,7 +121,7 @@ class SafetyWatch:
         known = memory.breach_us >= 0 or memory.fence_us >= 0
         if not flies or not report.margins:
             return replace(memory, breach_us=-1, fence_us=-1) if known else memory
-        now_us, (of_set, of_fence) = estimate.t_us, _least_margins(report, announced)
+        now_us, (of_set, of_fence) = estimate.t_us, _min_margins(report, announced)
         if not seen >= 0.0 and of_set >= 0.0 and of_fence >= 0.0:
             of_set, of_fence = (seen, of_fence) if of_set <= of_fence else (of_set, seen)
         if not known and of_set >= 0.0 and of_fence >= 0.0:
@@ -166,7 +166,7 @@ def beyond_room(unsure: float) -> float:
     return max(unsure - NOISE_ROOM, 0.0)
 
 
-def _least_margins(report: ConstraintReport, announced: int) -> tuple[float, float]:
+def _min_margins(report: ConstraintReport, announced: int) -> tuple[float, float]:
     """The least margins [m] of the zones that were ``announced`` [1], and of those behind them."""
     margins = report.margins
     first = len(margins)

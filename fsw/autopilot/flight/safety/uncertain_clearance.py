@@ -47,7 +47,7 @@ _MOST: Final = 2.0
 # the wall behind.
 _RISE: Final = 0.8
 _AMPLE: Final = 0.01  # m; zones that grow by less are not searched for room
-LACKING: Final = 0.01  # m of room; a workspace has 1 mm to spare, motion capture asks for 3
+SHORTFALL: Final = 0.01  # m of room; a workspace has 1 mm to spare, motion capture asks for 3
 _NEAR: Final = 2.0  # m; zones farther off leave room enough
 _RIM: Final = 8  # places around a disc: an octagon around its rim, in which a convex function is
 _SHARES: Final = 6  # bisections of what there is room for
@@ -60,20 +60,20 @@ _NO_NORMALS: Final = np.empty((0, 3))
 _NOTHING: Final[Vec6] = (0.0,) * 6
 
 
-class KeptSet(NamedTuple):
+class InflatedSafeSet(NamedTuple):
     """The safe set as it is kept: that in force, and more where the estimate is not sure."""
 
     source: SafeSet = SafeSet()  # in force
     safe_set: SafeSet = SafeSet()  # kept; the same object where nothing was added
     added: tuple[float, ...] = ()  # m, to the clearance of each zone; empty: nothing
-    lacking: float = 0.0  # m, largest margin shortfall of a zone
-    ample_us: int = -1  # when there was room enough last; -1: not known yet
+    shortfall: float = 0.0  # m, largest margin shortfall of a zone
+    sufficient_us: int = -1  # when there was room enough last; -1: not known yet
     spread: tuple[float, ...] = ()  # m, k sigma at each zone
     t_us: int = 0  # at that time
     given: tuple[float, ...] = ()  # m, that each clearance is less for want of room; empty: nothing
 
     @property
-    def whole(self) -> KeptSet:
+    def whole(self) -> InflatedSafeSet:
         """The same without what was given."""
         if not self.given:
             return self
@@ -88,7 +88,7 @@ class KeptSet(NamedTuple):
         added = self.added or (0.0,) * len(self.given)
         return tuple(map(float.__sub__, added, self.given))
 
-    def of(self, safe_set: SafeSet) -> KeptSet:
+    def of(self, safe_set: SafeSet) -> InflatedSafeSet:
         """The same for another safe set in force, until the next planning tick knows better."""
         if safe_set is self.source:
             return self
@@ -97,8 +97,8 @@ class KeptSet(NamedTuple):
             zone.shape.kind for zone in self.source.zones
         ]
         return _grown(safe_set, added)._replace(
-            lacking=self.lacking,
-            ample_us=self.ample_us,
+            shortfall=self.shortfall,
+            sufficient_us=self.sufficient_us,
             spread=self.spread if alike else (),
             t_us=self.t_us,
         )
@@ -132,12 +132,12 @@ class UncertainClearance:
 
     def keep(
         self,
-        before: KeptSet,
+        before: InflatedSafeSet,
         safe_set: SafeSet,
         estimate: StateEstimate,
         pose: Array | None,
         wind: Vec2 = (0.0, 0.0),
-    ) -> KeptSet:
+    ) -> InflatedSafeSet:
         """The safe set to keep from now on.
 
         ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
@@ -146,7 +146,7 @@ class UncertainClearance:
         """
         sure = pose is None or not self._sigmas > 0.0
         if (sure and wind == (0.0, 0.0)) or not safe_set.zones:
-            return before if before.safe_set is safe_set else KeptSet(safe_set, safe_set)
+            return before if before.safe_set is safe_set else InflatedSafeSet(safe_set, safe_set)
         pose = _SURE if sure or pose is None else _finite(pose)
         spread, levers = self._spread(safe_set, estimate, pose)
         turned = _turned(safe_set, wind)
@@ -157,13 +157,15 @@ class UncertainClearance:
             max(more - there - gust, 0.0)
             for more, there, gust in zip(wanted, granted, turned, strict=True)
         ]
-        lacking = max(short)
+        shortfall = max(short)
         kept = before
         if safe_set is not before.source or granted != before.added:
             kept = _grown(safe_set, granted)
-        t_us, lacks = estimate.t_us, lacking > LACKING and before.ample_us >= 0
-        ample_us = before.ample_us if lacks else t_us
-        return KeptSet(kept.source, kept.safe_set, kept.added, lacking, ample_us, spread, t_us)
+        t_us, lacks = estimate.t_us, shortfall > SHORTFALL and before.sufficient_us >= 0
+        sufficient_us = before.sufficient_us if lacks else t_us
+        return InflatedSafeSet(
+            kept.source, kept.safe_set, kept.added, shortfall, sufficient_us, spread, t_us
+        )
 
     def deviation(self, estimate: StateEstimate, pose: Array) -> float:
         """Standard deviation [m] of the least certain part of the body, along its worst axis.
@@ -184,7 +186,9 @@ class UncertainClearance:
         _look(pose, estimate.R_WB, arm, self._places, normals, levers, most)
         return levers, most.tolist()
 
-    def _ahead(self, before: KeptSet, spread: tuple[float, ...], now_us: int) -> tuple[float, ...]:
+    def _ahead(
+        self, before: InflatedSafeSet, spread: tuple[float, ...], now_us: int
+    ) -> tuple[float, ...]:
         """What clearances are to grow by [m], in steps: k sigma as it will be when plans can act.
 
         A boundary that comes nearer is met by a plan that is on its way back from it.
@@ -267,14 +271,14 @@ def _turned(safe_set: SafeSet, wind: Vec2) -> tuple[float, ...]:
     )
 
 
-def _grown(safe_set: SafeSet, added: tuple[float, ...]) -> KeptSet:
+def _grown(safe_set: SafeSet, added: tuple[float, ...]) -> InflatedSafeSet:
     if not max(added, default=0.0) > 0.0:
-        return KeptSet(safe_set, safe_set, added)
+        return InflatedSafeSet(safe_set, safe_set, added)
     zones = [
         replace(zone, clearance=zone.clearance + more)
         for zone, more in zip(safe_set.zones, added, strict=True)
     ]
-    return KeptSet(safe_set, SafeSet(tuple(zones)), added)
+    return InflatedSafeSet(safe_set, SafeSet(tuple(zones)), added)
 
 
 def _stepped(more: float) -> float:
@@ -316,9 +320,9 @@ def _kept_off(normals: Array, room: Array) -> Array | None:
         if not (left < -_STEP).any():
             return shift
         for n, there in zip(normals, room, strict=True):
-            lacking = -(there + float(n @ shift))
-            if lacking > 0.0:
-                shift = shift + lacking * n
+            shortfall = -(there + float(n @ shift))
+            if shortfall > 0.0:
+                shift = shift + shortfall * n
     return None
 
 

@@ -22,7 +22,7 @@ from typing import Final
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.control.safety_filter import ROOM
 from fsw.autopilot.flight.safety.safe_set_change import held
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.geometry.vectors import clamp, dot
 from fsw.autopilot.model.body import Body, hull_reach
 from fsw.autopilot.parameters.consistency import stand_off
@@ -57,11 +57,11 @@ class ZoneRoom:
 
     def limit(
         self,
-        kept: KeptSet,
+        kept: InflatedSafeSet,
         report: ConstraintReport,
         estimate: StateEstimate,
         target: EndEffectorTarget | None,
-    ) -> KeptSet:
+    ) -> InflatedSafeSet:
         """The set to keep, of whose source the ``report`` says the margins now."""
         if not self._limits or not report.per_zone:
             return kept
@@ -89,7 +89,7 @@ class ZoneRoom:
 
     def _least(
         self,
-        kept: KeptSet,
+        kept: InflatedSafeSet,
         k: int,
         margin: float,
         tuning: BarrierTuning,

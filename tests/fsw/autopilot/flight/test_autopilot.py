@@ -16,7 +16,7 @@ from fsw.autopilot.flight.commands.arming import CHECKS
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.safety.safe_set import joined
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory
 from fsw.autopilot.measurements import ImuSample, JointSample, Sample
 from fsw.autopilot.shapes.half_space import wall
@@ -259,7 +259,7 @@ def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_u
     outside = frame(1_000_000, p_WB=(60.0, 0.0, -5.0))
     seen = estimate_state(outside)
     assert seen is not None
-    kept = KeptSet().of(mission.safe_set)
+    kept = InflatedSafeSet().of(mission.safe_set)
     state = replace(
         with_record(flying(), nominal=nominal_at_rest(seen)), mission=mission, kept=kept
     )

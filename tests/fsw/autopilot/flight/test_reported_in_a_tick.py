@@ -13,13 +13,13 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory, PlanMemory
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
     BatteryState,
-    Charge,
+    BatteryWarning,
     Mode,
     PlanFailure,
     PlanTimings,
@@ -50,7 +50,7 @@ def hovering(**changes: Any) -> FlightState:
         **changes,
     }
     nominal = given.pop("nominal", nominal_at_rest(seen))
-    kept = KeptSet().of(given["mission"].safe_set)
+    kept = InflatedSafeSet().of(given["mission"].safe_set)
     return replace(
         with_record(flying(), nominal=nominal), index=0, t_us=BEGIN_US - 2_000, kept=kept, **given
     )
@@ -144,8 +144,8 @@ def test_what_is_found_once_a_period_is_reported_in_time_in_any_phase(
 @pytest.mark.parametrize(
     ("battery", "mode"),
     [
-        (BatteryState(remaining=0.09, charge=Charge.CRITICAL), Mode.RETURN),
-        (BatteryState(remaining=0.04, charge=Charge.EMERGENCY), Mode.LAND),
+        (BatteryState(remaining=0.09, charge=BatteryWarning.CRITICAL), Mode.RETURN),
+        (BatteryState(remaining=0.04, charge=BatteryWarning.EMERGENCY), Mode.LAND),
         (BatteryState(time_left=20.0), Mode.RETURN),
     ],
     ids=["critical", "nearly empty", "flight time"],

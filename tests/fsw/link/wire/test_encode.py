@@ -12,7 +12,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import (
     AttitudeSetpoint,
-    Charge,
+    BatteryWarning,
     ConstraintKind,
     ConstraintReport,
     FlightSnapshot,
@@ -422,7 +422,7 @@ def test_what_forbids_arming_takes_the_prearm_bit_alone() -> None:
 
 @pytest.mark.parametrize(("charge", "state"), [(0, 1), (1, 2), (2, 3), (3, 4)])
 def test_a_battery_that_runs_low_says_so(charge: int, state: int) -> None:
-    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, charge=Charge(charge)))
+    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, charge=BatteryWarning(charge)))
     assert read_back(stream_of(ids.BATTERY_STATUS), low).charge_state == state
 
 

@@ -59,7 +59,7 @@ def unwell(**changes: Any) -> arming.CommandContext:
         (unwell(remaining=math.nan), Subject.BATTERY, "battery"),
         (unwell(parameters="A is below B"), Subject.PARAMETERS, "A is below B"),
         (INCONSISTENT, Subject.SAFE_SET, "the sphere is too small"),
-        (unwell(least_margin=-0.02), Subject.SAFE_SET, "outside its safe set by 20 mm"),
+        (unwell(min_margin=-0.02), Subject.SAFE_SET, "outside its safe set by 20 mm"),
         (unwell(joint_rates=(0.0, -2.1)), Subject.JOINTS, "swings"),
         (unwell(joints=(3.0, 0.0)), Subject.JOINTS, "beyond their limits"),
         (unwell(damage="rotor 2 gives nothing"), Subject.ACTUATORS, "rotor 2"),
@@ -155,7 +155,7 @@ def test_sensors_margins_damage_and_the_log_are_looked_at() -> None:
     for silent_us, words in ((2_400_000, "barometer has been silent for 2 s"), (10**6, "")):
         report = replace(REPORT, sensors=(SensorReport("barometer", silent_us),))
         assert healthy(estimator=report).sensor == words
-    assert healthy(constraints=ConstraintReport(margins=(0.2, -0.1))).least_margin == -0.1
+    assert healthy(constraints=ConstraintReport(margins=(0.2, -0.1))).min_margin == -0.1
     assert healthy(damage=Damage(joint="joint 1 is stuck")).damage == "joint 1 is stuck"
     full = HostHealth(log_failure="flight.ulg ends early: No space left on device")
     assert "No space left" in healthy(host=full).storage
@@ -168,4 +168,4 @@ def test_the_least_charge_is_a_parameter_and_by_default_the_critical_one(
     least: float, needed: float
 ) -> None:
     health = healthy(limits(arm_battery=least), battery=BatteryState(remaining=0.07))
-    assert (health.remaining, health.least_remaining) == (0.07, needed)
+    assert (health.remaining, health.min_remaining) == (0.07, needed)

@@ -31,7 +31,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     ActuatorReport,
     BatteryState,
-    Charge,
+    BatteryWarning,
     Command,
     CommandAction,
     CommandRequest,
@@ -117,7 +117,7 @@ class Watched:
 COMMANDER = Commander(CONFIG)
 
 
-def charge(level: Charge) -> BatteryState:
+def charge(level: BatteryWarning) -> BatteryState:
     return BatteryState(remaining=0.04, charge=level)
 
 
@@ -209,18 +209,18 @@ def test_what_ended_is_told_once_and_the_mode_stays() -> None:
 
 @pytest.mark.requirement("REQ-MODE-2")
 def test_the_strongest_wins_and_a_milder_one_never_takes_over() -> None:
-    watched = Watched(AT_ONCE).until(11.0, battery=charge(Charge.EMERGENCY))
+    watched = Watched(AT_ONCE).until(11.0, battery=charge(BatteryWarning.EMERGENCY))
     assert watched.flown == (Mode.LAND, Mode.MISSION)
     assert any("battery nearly empty: 4 % left, landing" in text for text in watched.texts)
     assert "no ground station for 10 s" in watched.texts, "told, and not acted upon"
     watched = Watched(AT_ONCE).until(11.0)
-    assert watched.until(12.0, battery=charge(Charge.CRITICAL)).flown[0] is Mode.RETURN
-    assert watched.until(13.0, battery=charge(Charge.EMERGENCY)).flown[0] is Mode.LAND
+    assert watched.until(12.0, battery=charge(BatteryWarning.CRITICAL)).flown[0] is Mode.RETURN
+    assert watched.until(13.0, battery=charge(BatteryWarning.EMERGENCY)).flown[0] is Mode.LAND
 
 
 def test_a_stronger_condition_shortens_no_delay_but_one_that_cannot_wait_does() -> None:
     watched = Watched().until(12.0)
-    watched.until(13.0, battery=charge(Charge.EMERGENCY))
+    watched.until(13.0, battery=charge(BatteryWarning.EMERGENCY))
     assert watched.flown == (Mode.HOLD, Mode.MISSION)
     assert watched.until(15.0).flown == (Mode.LAND, Mode.MISSION)
     watched = Watched().until(12.0).until(12.1, aiding=ADRIFT)
@@ -245,7 +245,9 @@ def test_a_pilot_takes_over_and_the_condition_acts_again_only_after_it_has_ended
     assert "failsafe overridden: no ground station" in watched.texts
     assert watched.flown == (Mode.HOLD, None)
     assert watched.until(40.0).flown == (Mode.HOLD, None)
-    assert watched.until(41.0, battery=charge(Charge.CRITICAL)).flown[1] is Mode.HOLD, "another one"
+    assert watched.until(41.0, battery=charge(BatteryWarning.CRITICAL)).flown[1] is Mode.HOLD, (
+        "another one"
+    )
     assert watched.told(SwitchMode(Mode.HOLD)) == CommandResult.ACCEPTED
     watched.heard().until(42.0)
     assert watched.until(60.0).flown == (Mode.RETURN, Mode.HOLD)
@@ -293,7 +295,7 @@ def test_a_vehicle_that_has_returned_and_holds_does_not_return_again_but_acts_on
     assert watched.flown == (Mode.HOLD, Mode.MISSION), "it is home, and the station still lost"
     watched.until(61.0, safety=OUTSIDE)
     assert "failsafe: outside the safe set by 10 mm, retreating" in watched.texts
-    watched.until(62.0, battery=charge(Charge.CRITICAL))
+    watched.until(62.0, battery=charge(BatteryWarning.CRITICAL))
     assert watched.flown == (Mode.RETURN, Mode.MISSION)
 
 
@@ -301,7 +303,14 @@ def test_a_vehicle_that_has_returned_and_holds_does_not_return_again_but_acts_on
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from([Charge.OK, Charge.LOW, Charge.CRITICAL, Charge.EMERGENCY]),
+            st.sampled_from(
+                [
+                    BatteryWarning.OK,
+                    BatteryWarning.LOW,
+                    BatteryWarning.CRITICAL,
+                    BatteryWarning.EMERGENCY,
+                ]
+            ),
             st.booleans(),
             st.booleans(),
             st.booleans(),
@@ -311,7 +320,7 @@ def test_a_vehicle_that_has_returned_and_holds_does_not_return_again_but_acts_on
 )
 @settings(max_examples=25, deadline=None)
 def test_without_a_pilot_a_vehicle_never_goes_on_with_what_a_failsafe_ended(
-    happens: list[tuple[Charge, bool, bool, bool]],
+    happens: list[tuple[BatteryWarning, bool, bool, bool]],
 ) -> None:
     """Whatever begins and ends: what was flown is left once and not taken up again."""
     watched, left = Watched(limits(failsafe_delay_us=200_000)), False
@@ -450,9 +459,9 @@ HAPPENS: dict[Condition, dict[str, Any]] = {
     Condition.LINK_FLOODED: {"host": HostHealth(datagrams=10**4)},
     Condition.LOG_STOPPED: {"host": HostHealth(log_failure="flight.ulg ends early")},
     Condition.DISK_FULL: {"host": HostHealth(disk_left_us=0)},
-    Condition.BATTERY_LOW: {"battery": charge(Charge.LOW)},
-    Condition.BATTERY_CRITICAL: {"battery": charge(Charge.CRITICAL)},
-    Condition.BATTERY_EMERGENCY: {"battery": charge(Charge.EMERGENCY)},
+    Condition.BATTERY_LOW: {"battery": charge(BatteryWarning.LOW)},
+    Condition.BATTERY_CRITICAL: {"battery": charge(BatteryWarning.CRITICAL)},
+    Condition.BATTERY_EMERGENCY: {"battery": charge(BatteryWarning.EMERGENCY)},
     Condition.FLIGHT_TIME_LOW: {"battery": BatteryState(time_left=1.0)},
     Condition.PARAMETERS_CONTRADICT: {"mission": MissionMemory(refusals=("too little room",))},
 }
@@ -561,7 +570,7 @@ def test_what_is_not_delayed_acts_while_something_else_waits(
 def test_a_vehicle_goes_on_drawing_back_while_a_return_waits(breach_first: bool) -> None:
     watched = Watched().heard()
     outside = replace(watched.state.safety, breach_us=2 * SECOND, breach_by=0.05)
-    low = charge(Charge.CRITICAL)
+    low = charge(BatteryWarning.CRITICAL)
     first, second = ("safety", outside), ("battery", low)
     if not breach_first:
         first, second = second, first

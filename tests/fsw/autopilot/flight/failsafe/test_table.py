@@ -14,7 +14,7 @@ from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, way_home_s
 from fsw.autopilot.flight.failsafe.response import report
 from fsw.autopilot.flight.failsafe.table import FAILSAFES, FAULTS, ROWS
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import (
     AIDED,
     Aiding,
@@ -32,7 +32,7 @@ from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import (
     ActuatorReport,
     BatteryState,
-    Charge,
+    BatteryWarning,
     Home,
     HostHealth,
     Mode,
@@ -44,7 +44,7 @@ from tests.fsw.random_states import random_estimate
 PERIOD_US = 100_000
 NOW_US = 10**9
 CONFIG = flight_config(body="points")
-AMPLE = KeptSet(ample_us=NOW_US)
+AMPLE = InflatedSafeSet(sufficient_us=NOW_US)
 
 
 @dataclass(frozen=True)
@@ -67,21 +67,21 @@ class Evidence:
     refusals: tuple[str, ...] = ()
     safety: SafetyMemory = field(default_factory=SafetyMemory)
     aiding: Aiding = AIDED
-    kept: KeptSet = AMPLE
+    kept: InflatedSafeSet = AMPLE
     config: FlightConfig = CONFIG
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = field(default_factory=Damage)
     plan: PlanMemory = field(default_factory=PlanMemory)
 
     def context(self) -> FailsafeContext:
-        heard_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
+        last_received_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
         state = FlightState(
             invalid_ticks=self.invalid_ticks,
             output_replaced=self.output_replaced,
             vehicle=VehicleMemory(
                 mode=self.mode,
                 landed=self.landed,
-                gcs_heard_us=heard_us,
+                gcs_heard_us=last_received_us,
                 failsafe_from=self.failsafe_from,
                 conditions=self.known,
                 home=Home((0.0, 0.0, 0.0), 0.0),
@@ -103,7 +103,7 @@ class Evidence:
 FINE = Evidence()
 OUTSIDE = SafetyMemory(breach_us=NOW_US, breach_by=0.0123)
 OVER_THE_FENCE = SafetyMemory(fence_us=NOW_US, fence_by=0.0123)
-CRAMPED = KeptSet(lacking=0.0234, ample_us=NOW_US - 500_000)
+CRAMPED = InflatedSafeSet(shortfall=0.0234, sufficient_us=NOW_US - 500_000)
 OFF_PLAN = SafetyMemory(off_plan_us=NOW_US, off_plan_by=0.0834)
 UNAIDED = Aiding(1_500_000, Sensor.POSE, SensorFault.STUCK)
 
@@ -116,7 +116,7 @@ def replaced_sensor(for_us: int) -> Aiding:
 OFFBOARD = replace(FINE, mode=Mode.OFFBOARD, setpoint_age_us=500_000)
 
 
-def charged(charge: Charge) -> BatteryState:
+def charged(charge: BatteryWarning) -> BatteryState:
     return BatteryState(remaining=0.07, charge=charge)
 
 
@@ -190,9 +190,9 @@ def test_nothing_wrong_is_no_condition() -> None:
         (OFFBOARD, Condition.SETPOINTS_LOST),
         (replace(FINE, silent_zones=1), Condition.ZONES_SILENT),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
-        (replace(FINE, battery=charged(Charge.LOW)), Condition.BATTERY_LOW),
-        (replace(FINE, battery=charged(Charge.CRITICAL)), Condition.BATTERY_CRITICAL),
-        (replace(FINE, battery=charged(Charge.EMERGENCY)), Condition.BATTERY_EMERGENCY),
+        (replace(FINE, battery=charged(BatteryWarning.LOW)), Condition.BATTERY_LOW),
+        (replace(FINE, battery=charged(BatteryWarning.CRITICAL)), Condition.BATTERY_CRITICAL),
+        (replace(FINE, battery=charged(BatteryWarning.EMERGENCY)), Condition.BATTERY_EMERGENCY),
         (replace(FINE, refusals=("lambda is too large",)), Condition.PARAMETERS_CONTRADICT),
     ],
 )
@@ -295,18 +295,18 @@ def test_a_lost_station_is_ignored_in_the_modes_of_the_parameter_alone(
 @pytest.mark.parametrize(
     ("number", "charge", "expected"),
     [
-        (0, Charge.CRITICAL, Action.WARN),
-        (0, Charge.EMERGENCY, Action.WARN),
-        (2, Charge.LOW, Action.WARN),
-        (2, Charge.CRITICAL, Action.LAND),
-        (2, Charge.EMERGENCY, Action.LAND),
-        (3, Charge.LOW, Action.WARN),
-        (3, Charge.CRITICAL, Action.RETURN),
-        (3, Charge.EMERGENCY, Action.LAND),
+        (0, BatteryWarning.CRITICAL, Action.WARN),
+        (0, BatteryWarning.EMERGENCY, Action.WARN),
+        (2, BatteryWarning.LOW, Action.WARN),
+        (2, BatteryWarning.CRITICAL, Action.LAND),
+        (2, BatteryWarning.EMERGENCY, Action.LAND),
+        (3, BatteryWarning.LOW, Action.WARN),
+        (3, BatteryWarning.CRITICAL, Action.RETURN),
+        (3, BatteryWarning.EMERGENCY, Action.LAND),
     ],
 )
 def test_a_low_battery_is_acted_on_as_the_parameter_says(
-    number: int, charge: Charge, expected: Action
+    number: int, charge: BatteryWarning, expected: Action
 ) -> None:
     context = replace(FINE, battery=charged(charge), limits=FlightLimits(low_battery_action=number))
     assert action(context) is expected
@@ -314,9 +314,9 @@ def test_a_low_battery_is_acted_on_as_the_parameter_says(
 
 @pytest.mark.requirement("REQ-BAT-2", "REQ-BAT-3")
 def test_a_battery_that_is_critical_returns_and_one_nearly_empty_lands_by_default() -> None:
-    assert action(replace(FINE, battery=charged(Charge.LOW))) is Action.WARN
-    assert action(replace(FINE, battery=charged(Charge.CRITICAL))) is Action.RETURN
-    assert action(replace(FINE, battery=charged(Charge.EMERGENCY))) is Action.LAND
+    assert action(replace(FINE, battery=charged(BatteryWarning.LOW))) is Action.WARN
+    assert action(replace(FINE, battery=charged(BatteryWarning.CRITICAL))) is Action.RETURN
+    assert action(replace(FINE, battery=charged(BatteryWarning.EMERGENCY))) is Action.LAND
 
 
 @pytest.mark.requirement("REQ-BAT-4")
@@ -451,7 +451,7 @@ def test_a_report_names_the_condition_its_number_and_what_is_done() -> None:
         "failsafe: no ground station for 12 s, returning",
     )
     assert report(row, lost, Action.RETURN, 5_000_000)[1].endswith("12 s, returning in 5 s")
-    low = replace(FINE, battery=charged(Charge.CRITICAL)).context()
+    low = replace(FINE, battery=charged(BatteryWarning.CRITICAL)).context()
     (row,) = active(low)
     assert report(row, low, Action.WARN) == (Severity.CRITICAL, "battery critical: 7 % left")
     over = replace(FINE, safety=SafetyMemory(pitched_us=NOW_US - 310_000)).context()
@@ -503,7 +503,7 @@ def test_between_two_planning_periods_slow_rows_are_as_they_were_found_last() ->
     evidence = replace(
         FINE,
         output_replaced=True,
-        battery=charged(Charge.LOW),
+        battery=charged(BatteryWarning.LOW),
         known=(Condition.ZONES_SILENT, Condition.TUBE_LEFT),
     )
     found = [row.condition for row in quickly_active(evidence.context())]
@@ -620,7 +620,7 @@ def test_a_fault_is_the_vehicles_own() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.994, 1.0])
 def test_what_is_left_of_the_battery_is_told_in_percent(share: float) -> None:
-    battery = BatteryState(remaining=share, charge=Charge.LOW)
+    battery = BatteryState(remaining=share, charge=BatteryWarning.LOW)
     context = replace(FINE, battery=battery).context()
     (row,) = active(context)
     assert report(row, context, Action.WARN)[1] == f"battery low: {round(100 * share)} % left"
@@ -630,8 +630,8 @@ def test_what_is_left_of_the_battery_is_told_in_percent(share: float) -> None:
 def test_room_is_lacking_in_flight_only_for_a_while_and_by_more_than_a_workspace_does() -> None:
     for evidence in (
         replace(FINE, kept=CRAMPED, landed=True),
-        replace(FINE, kept=CRAMPED._replace(ample_us=NOW_US - 499_999)),
-        replace(FINE, kept=CRAMPED._replace(lacking=0.01)),
+        replace(FINE, kept=CRAMPED._replace(sufficient_us=NOW_US - 499_999)),
+        replace(FINE, kept=CRAMPED._replace(shortfall=0.01)),
     ):
         assert conditions(evidence) == ()
     cramped = replace(FINE, kept=CRAMPED)

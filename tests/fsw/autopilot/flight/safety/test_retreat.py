@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.consistency import stand_off
@@ -85,7 +85,7 @@ def test_there_nothing_of_the_vehicle_is_too_close(
     if math.dist(place, start) > 0.999:
         return
     there = vehicle_at(place)._replace(q_arm=q_arm)
-    found = CHECK.margins(KeptSet().of(SafeSet(zones)), there, None)
+    found = CHECK.margins(InflatedSafeSet().of(SafeSet(zones)), there, None)
     margins = found.margins
     assert min(margins) >= ROOM - 2e-3
     assert FlightState().safety == SafetyWatch(CONFIG, CHECK.loop_tube).breach(

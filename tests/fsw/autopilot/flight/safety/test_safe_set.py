@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck, joined
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import MissionMemory
 from fsw.autopilot.model.kinematics import point_in_flight
 from fsw.autopilot.parameters.consistency import loop_tube
@@ -138,14 +138,14 @@ def test_softly_it_is_flown_all_the_same_with_the_warnings() -> None:
 def test_margins_are_of_base_elbow_and_end_effector() -> None:
     estimate = vehicle_at((0.0, 0.0, -1.0))._replace(q_arm=(0.5, 0.4))
     target = EndEffectorTarget(0, (0.0, 0.0, -0.775), (0.0,) * 3, (0.0,) * 3)
-    report = CHECK.margins(KeptSet().of(SafeSet((NORTH,))), estimate, target)
+    report = CHECK.margins(InflatedSafeSet().of(SafeSet((NORTH,))), estimate, target)
     l1, _ = CONFIG.airframe.link_length
     elbow = point_in_flight(estimate, (l1, 0.0))[0]
     tip = point_in_flight(estimate, CONFIG.airframe.link_length)[0]
     assert elbow != tip
     places = (estimate.p_WB, elbow, tip)
     assert report.margins == pytest.approx([5.0 - p[0] - 0.1 for p in places])
-    ball = CHECK.margins(KeptSet().of(SafeSet((SPHERE,))), estimate, target)
+    ball = CHECK.margins(InflatedSafeSet().of(SafeSet((SPHERE,))), estimate, target)
     assert ball.kind is ConstraintKind.WORKSPACE
     assert ball.margins == pytest.approx((0.075,))
 
@@ -153,11 +153,11 @@ def test_margins_are_of_base_elbow_and_end_effector() -> None:
 def test_margins_are_without_what_clearances_have_grown_by_and_say_it() -> None:
     in_force = SafeSet((NORTH,))
     wider = SafeSet((replace(NORTH, clearance=0.3),))
-    kept = KeptSet(in_force, wider, (0.2,), 0.05)
+    kept = InflatedSafeSet(in_force, wider, (0.2,), 0.05)
     estimate = vehicle_at((0.0, 0.0, -1.0))
     report = CHECK.margins(kept, estimate, None)
-    assert report.margins == CHECK.margins(KeptSet().of(in_force), estimate, None).margins
-    assert (report.added, report.lacking) == ((0.2,), 0.05)
+    assert report.margins == CHECK.margins(InflatedSafeSet().of(in_force), estimate, None).margins
+    assert (report.added, report.shortfall) == ((0.2,), 0.05)
 
 
 def test_a_zone_that_moves_is_taken_and_what_is_known_of_it_is_not_said_again() -> None:

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.flight.safety.uncertain_clearance import (
-    LACKING,
-    KeptSet,
+    SHORTFALL,
+    InflatedSafeSet,
     UncertainClearance,
     place_covariances,
     pose_covariance,
@@ -60,7 +60,7 @@ def grown(
     safe_set: SafeSet, pose: Array, body: str = "points", sigmas: float = 3.0
 ) -> tuple[float, ...]:
     """What is added to each clearance for an uncertainty that lasts."""
-    return clearance(body, sigmas).keep(KeptSet(), safe_set, vehicle(), pose).added
+    return clearance(body, sigmas).keep(InflatedSafeSet(), safe_set, vehicle(), pose).added
 
 
 def certain(**deviations: float) -> Array:
@@ -71,7 +71,7 @@ def certain(**deviations: float) -> Array:
 
 @pytest.mark.requirement("REQ-SAFE-11")
 def test_each_clearance_grows_by_the_deviation_along_its_normal() -> None:
-    kept = clearance().keep(KeptSet(), BOTH, vehicle(), certain(x=0.01, y=0.02))
+    kept = clearance().keep(InflatedSafeSet(), BOTH, vehicle(), certain(x=0.01, y=0.02))
     assert kept.added == pytest.approx((0.03, 0.06), abs=STEP)
     for zone, before, more in zip(kept.safe_set.zones, BOTH.zones, kept.added, strict=True):
         assert zone == replace(before, clearance=before.clearance + more)
@@ -83,7 +83,7 @@ def test_an_unknown_heading_moves_the_end_effector_sideways() -> None:
 
 def test_exact_states_and_no_sigmas_keep_the_safe_set_itself() -> None:
     for sigmas, pose in ((3.0, None), (0.0, certain(x=1.0)), (3.0, certain())):
-        kept = clearance(sigmas=sigmas).keep(KeptSet(), BOTH, vehicle(), pose)
+        kept = clearance(sigmas=sigmas).keep(InflatedSafeSet(), BOTH, vehicle(), pose)
         assert kept.safe_set is BOTH
         assert clearance(sigmas=sigmas).keep(kept, BOTH, vehicle(), pose).safe_set is BOTH
 
@@ -102,7 +102,7 @@ def test_the_filters_attitude_is_about_the_bodys_axes() -> None:
 def test_a_moments_doubt_does_not_make_it_flee() -> None:
     """A pose that comes a little late while nothing else tells how the vehicle moves."""
     law, set_ = clearance(), SafeSet((NORTH,))
-    kept = law.keep(KeptSet(), set_, vehicle(), certain(x=0.005))
+    kept = law.keep(InflatedSafeSet(), set_, vehicle(), certain(x=0.005))
     (before,) = kept.added
     sudden = law.keep(kept, set_, vehicle()._replace(t_us=vehicle().t_us + 100_000), certain(x=0.2))
     assert sudden.added[0] == pytest.approx(before + 0.08, abs=2e-3)
@@ -110,7 +110,9 @@ def test_a_moments_doubt_does_not_make_it_flee() -> None:
 
 def test_a_place_that_is_lost_leaves_a_bounded_clearance() -> None:
     for size in (1e6, math.inf, math.nan):
-        kept = clearance().keep(KeptSet(), SafeSet((NORTH,)), vehicle(), np.diag([size] * 6))
+        kept = clearance().keep(
+            InflatedSafeSet(), SafeSet((NORTH,)), vehicle(), np.diag([size] * 6)
+        )
         assert kept.added == pytest.approx((2.0,))
 
 
@@ -151,7 +153,7 @@ def test_no_part_of_the_body_is_less_certain_than_its_clearance(seed: int, full:
     normal = (float(n[0]), float(n[1]), float(n[2]))
     zones = SafeSet((wall(normal, -5.0, 0.1), Zone(ball((9.0, 0.0, 0.0), 0.3), 0.1)))
     body = clearance("full")
-    flat, round_ = body.keep(KeptSet(), zones, estimate, pose).added
+    flat, round_ = body.keep(InflatedSafeSet(), zones, estimate, pose).added
     covariances = place_covariances(pose, places(estimate, seed))
     along = np.sqrt(np.einsum("i,kij,j->k", n, covariances, n)).max()
     anywhere = np.sqrt(np.linalg.eigvalsh(covariances)[:, -1].max())
@@ -163,7 +165,7 @@ def test_no_part_of_the_body_is_less_certain_than_its_clearance(seed: int, full:
 
 
 def test_small_changes_leave_the_safe_set_as_it_is_and_growth_is_followed_at_once() -> None:
-    body, kept, changes = clearance(), KeptSet(), 0
+    body, kept, changes = clearance(), InflatedSafeSet(), 0
     random = np.random.default_rng(1)
     for k in range(100):
         before = kept
@@ -176,7 +178,7 @@ def test_small_changes_leave_the_safe_set_as_it_is_and_growth_is_followed_at_onc
 
 
 def test_a_deviation_that_grows_is_met_ahead() -> None:
-    body, kept = clearance(), KeptSet()
+    body, kept = clearance(), InflatedSafeSet()
     for k in range(10):
         pose = certain(x=0.01 * k)  # 0.3 m/s of three deviations
         kept = body.keep(kept, SafeSet((NORTH,)), vehicle(1_000_000 + 100_000 * k), pose)
@@ -185,12 +187,14 @@ def test_a_deviation_that_grows_is_met_ahead() -> None:
 
 
 def test_a_safe_set_that_comes_between_planning_ticks_grows_as_much() -> None:
-    kept = clearance().keep(KeptSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01, y=0.01))
+    kept = clearance().keep(
+        InflatedSafeSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01, y=0.01)
+    )
     other = kept.of(BOTH)
     assert other.source is BOTH
     assert other.added == (kept.added[0],) * 2
     assert kept.of(kept.source) is kept
-    assert KeptSet().of(BOTH).safe_set is BOTH
+    assert InflatedSafeSet().of(BOTH).safe_set is BOTH
 
 
 @pytest.mark.parametrize("pose", [certain(x=0.3), certain(x=0.02)], ids=["doubt", "drift"])
@@ -198,7 +202,10 @@ def test_a_safe_set_that_is_renewed_grows_no_faster_and_no_slower(pose: Array) -
     """As zones that move are, ten times a second; the other set is always the same."""
     body, histories = clearance(), []
     for renewed in (False, True):
-        kept, history = body.keep(KeptSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01)), []
+        kept, history = (
+            body.keep(InflatedSafeSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01)),
+            [],
+        )
         for k in range(1, 6):
             if renewed:
                 kept = kept.of(SafeSet((wall((-1.0, 0.0, 0.0), -5.0 - 1e-3 * k, 0.1),)))
@@ -214,7 +221,7 @@ def test_a_safe_set_that_is_renewed_grows_no_faster_and_no_slower(pose: Array) -
 
 
 def test_other_zones_of_other_kinds_have_no_deviation_to_compare_with_but_the_bound() -> None:
-    kept = clearance().keep(KeptSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01))
+    kept = clearance().keep(InflatedSafeSet(), SafeSet((NORTH,)), vehicle(), certain(x=0.01))
     other = kept.of(SafeSet((Zone(ball((9.0, 0.0, 0.0), 0.3), 0.1),)))
     assert (other.spread, other.t_us) == ((), kept.t_us)
     assert kept.of(SafeSet((EAST,))).spread == kept.spread
@@ -228,36 +235,38 @@ def corridor(left: float, right: float) -> SafeSet:
 @pytest.mark.requirement("REQ-SAFE-11")
 def test_walls_are_given_what_room_there_is_and_the_lack_of_it_is_said() -> None:
     narrow = corridor(0.2, 0.3)
-    kept = clearance().keep(KeptSet(), narrow, vehicle(), certain(y=0.1))
+    kept = clearance().keep(InflatedSafeSet(), narrow, vehicle(), certain(y=0.1))
     left, right = kept.added
     free = 0.5 - left - right
     assert free == pytest.approx(2.0 * ROOM, abs=0.01), "a plan at rest still has its place"
     assert free >= 2.0 * ROOM - STEP
     assert left == pytest.approx(right, abs=0.01)
-    assert kept.lacking == pytest.approx(0.3 - left, abs=STEP)
-    assert kept.lacking > LACKING
-    wide = clearance().keep(KeptSet(), corridor(0.4, 0.4), vehicle(), certain(y=0.1))
+    assert kept.shortfall == pytest.approx(0.3 - left, abs=STEP)
+    assert kept.shortfall > SHORTFALL
+    wide = clearance().keep(InflatedSafeSet(), corridor(0.4, 0.4), vehicle(), certain(y=0.1))
     assert wide.added == pytest.approx((0.3, 0.3), abs=STEP)
-    assert wide.lacking == 0.0
+    assert wide.shortfall == 0.0
 
 
 def test_walls_that_are_not_in_each_others_way_grow_in_full() -> None:
     zones = (*corridor(0.2, 0.2).zones, wall((-1.0, 0.0, 0.0), -1.0, 0.0))
     pose = certain(x=0.1, y=0.1)
-    *sides, ahead = clearance().keep(KeptSet(), SafeSet(zones), vehicle(), pose).added
+    *sides, ahead = clearance().keep(InflatedSafeSet(), SafeSet(zones), vehicle(), pose).added
     assert max(sides) < 0.13
     assert ahead == pytest.approx(0.3, abs=STEP)
 
 
 def test_a_room_too_small_for_any_plan_stays_as_it_is() -> None:
-    kept = clearance().keep(KeptSet(), corridor(0.05, 0.05), vehicle(), certain(y=0.1))
+    kept = clearance().keep(InflatedSafeSet(), corridor(0.05, 0.05), vehicle(), certain(y=0.1))
     assert kept.added == (0.0, 0.0)
-    assert kept.lacking == pytest.approx(0.3, abs=STEP)
+    assert kept.shortfall == pytest.approx(0.3, abs=STEP)
 
 
 def test_all_sides_of_a_box_to_stay_in_come_nearer_as_far_as_they_can() -> None:
     inside = SafeSet((Zone(box((0.0, 0.0, 0.0), (0.4, 0.6, 0.8)), 0.0, keep_in=True),))
-    (more,) = clearance().keep(KeptSet(), inside, vehicle(arm=(0.0, 0.0)), certain(y=0.2)).added
+    (more,) = (
+        clearance().keep(InflatedSafeSet(), inside, vehicle(arm=(0.0, 0.0)), certain(y=0.2)).added
+    )
     assert more == pytest.approx(0.4 - ROOM, abs=0.01)
 
 
@@ -265,25 +274,25 @@ def test_the_sphere_around_the_target_shrinks_to_the_stand_off_and_not_further()
     inside = stand_off(BARRIERS[1])
     for spare, wanted, found in ((0.02, 0.005, 0.015), (0.0105, 0.005, 0.010), (-0.01, 0.005, 0.0)):
         safe_set = SafeSet((target_sphere((0.0, 0.0, -0.2), inside + spare),))
-        kept = clearance().keep(KeptSet(), safe_set, vehicle(), certain(x=wanted))
+        kept = clearance().keep(InflatedSafeSet(), safe_set, vehicle(), certain(x=wanted))
         assert kept.added == pytest.approx((found,), abs=1e-9)
 
 
 def test_the_time_since_there_was_room_is_known() -> None:
-    body, kept = clearance(), KeptSet()
+    body, kept = clearance(), InflatedSafeSet()
     for k in range(5):
         narrow = corridor(0.2, 0.2)
         kept = body.keep(kept, narrow, vehicle(1_000_000 + 100_000 * k), certain(y=0.1))
-    assert kept.ample_us == 1_000_000, "an estimate that starts in flight is given time"
+    assert kept.sufficient_us == 1_000_000, "an estimate that starts in flight is given time"
     kept = body.keep(kept, narrow, vehicle(9_000_000), certain(y=0.001))
-    assert kept.ample_us == 9_000_000
-    assert kept.lacking == 0.0
+    assert kept.sufficient_us == 9_000_000
+    assert kept.shortfall == 0.0
 
 
 def test_a_wall_far_off_takes_no_room() -> None:
     far: Vec3 = (0.0, 1.0, 0.0)
     zones = SafeSet((wall(far, -50.0, 0.0), wall((0.0, -1.0, 0.0), 0.0, 0.0)))
-    kept = clearance().keep(KeptSet(), zones, vehicle(), certain(y=0.1))
+    kept = clearance().keep(InflatedSafeSet(), zones, vehicle(), certain(y=0.1))
     assert kept.added == pytest.approx((0.3, 0.3), abs=STEP), "the vehicle can still draw back"
 
 
@@ -292,9 +301,9 @@ def test_a_wall_far_off_takes_no_room() -> None:
 
 def test_clearances_grow_by_what_wind_that_turns_can_do_along_each_normal() -> None:
     set_, wind = SafeSet((NORTH, EAST)), (0.03, 0.01)
-    kept = clearance().keep(KeptSet(), set_, vehicle(), None, wind)
+    kept = clearance().keep(InflatedSafeSet(), set_, vehicle(), None, wind)
     assert kept.added == pytest.approx((0.03, 0.01), abs=1.1e-3)
-    both = clearance().keep(KeptSet(), set_, vehicle(), certain(x=0.005), wind)
+    both = clearance().keep(InflatedSafeSet(), set_, vehicle(), certain(x=0.005), wind)
     assert both.added == pytest.approx((0.045, 0.01), abs=1.1e-3)
     calm = clearance().keep(kept, set_, vehicle(), None)
     assert calm.safe_set is set_
@@ -302,6 +311,6 @@ def test_clearances_grow_by_what_wind_that_turns_can_do_along_each_normal() -> N
 
 def test_a_sphere_without_room_for_wind_lacks_nothing_by_it() -> None:
     set_ = SafeSet((target_sphere((0.0, 0.0, -0.2), stand_off(BARRIERS[1]) + 1e-3),))
-    kept = clearance().keep(KeptSet(), set_, vehicle(), None, (0.03, 0.0))
+    kept = clearance().keep(InflatedSafeSet(), set_, vehicle(), None, (0.03, 0.0))
     assert kept.added[0] < 2e-3
-    assert not kept.lacking > LACKING
+    assert not kept.shortfall > SHORTFALL

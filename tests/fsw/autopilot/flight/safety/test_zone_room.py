@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.safety.zone_room import ZoneRoom, is_deep
 from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.parameters.flight_config import lowest_height
@@ -31,12 +31,12 @@ def limited(
     estimate: StateEstimate,
     target: EndEffectorTarget | None = None,
     room: ZoneRoom = ROOMS,
-) -> tuple[KeptSet, float]:
+) -> tuple[InflatedSafeSet, float]:
     """The set that is kept, and the margin that it leaves."""
-    kept = KeptSet().of(SafeSet((zone,)))
+    kept = InflatedSafeSet().of(SafeSet((zone,)))
     report = CHECK.margins(kept, estimate, target)
     found = room.limit(kept, report, estimate, target)
-    after = CHECK.margins(KeptSet().of(found.safe_set), estimate, target)
+    after = CHECK.margins(InflatedSafeSet().of(found.safe_set), estimate, target)
     margins = CHECK.margins(found, estimate, target).margins
     assert margins == report.margins, "what is reported is of the set in force"
     return found, min(after.margins)
@@ -79,7 +79,7 @@ def test_from_deeper_than_its_room_the_vehicle_may_stay_where_it_is(zone: Zone) 
     assert left > rest + 0.3
     assert found.safe_set.zones[0].velocity == STILL
     assert is_deep(CHECK.margins(found, vehicle_at(HERE), target))
-    assert not is_deep(CHECK.margins(KeptSet().of(SafeSet()), vehicle_at(HERE), None))
+    assert not is_deep(CHECK.margins(InflatedSafeSet().of(SafeSet()), vehicle_at(HERE), None))
 
 
 def test_a_ceiling_pushes_no_lower_than_the_lowest_height_of_references() -> None:

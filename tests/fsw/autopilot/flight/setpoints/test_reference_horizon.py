@@ -13,7 +13,7 @@ from fsw.autopilot.flight.modes.mission import Mission
 from fsw.autopilot.flight.modes.takeoff import Takeoff
 from fsw.autopilot.flight.modes.trajectory import Trajectory
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
-from fsw.autopilot.flight.safety.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
@@ -135,7 +135,7 @@ def test_a_reference_from_outside_is_governed_and_of_one_of_the_vehicles_own_the
     p_WE, _ = point_in_flight(estimate, CONFIG.airframe.link_length)
     walled = flying()
     ahead = SafeSet((wall((-1.0, 0.0, 0.0), -0.2, 0.1),))
-    walled = replace(walled, kept=KeptSet().of(ahead))
+    walled = replace(walled, kept=InflatedSafeSet().of(ahead))
     _, (own, _) = HORIZON(Elsewhere(CONFIG), flying(), estimate, 400_000)
     assert [target.t_us for target in own] == [
         400_000 + node * CONFIG.mpc_period_us for node in range(CONFIG.planner.horizon + 1)

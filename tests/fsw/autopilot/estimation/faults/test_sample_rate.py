@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fsw.autopilot.estimation.faults.pace import Pace, looked
+from fsw.autopilot.estimation.faults.sample_rate import SampleRate, looked
 from fsw.autopilot.estimation.faults.sensor_checks import Health
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 
 
 def told(samples: Callable[[int], int], looks: int) -> list[int]:
     """Looks, of 0.1 s, at which a sensor is told that brings ``samples`` before each."""
-    paces: tuple[Pace, ...] = ()
+    sample_rates: tuple[SampleRate, ...] = ()
     seen, came, found = 0, 0.0, []
     for k in range(looks):
         seen += samples(k)
         came = 0.1 * k if samples(k) else came
-        paces, seldom = looked(paces, (Health(Sensor.GNSS, came=came, seen=seen),), 0.1 * k)
+        sample_rates, seldom = looked(
+            sample_rates, (Health(Sensor.GNSS, came=came, seen=seen),), 0.1 * k
+        )
         found += [k] if seldom else []
     return found
 

@@ -16,7 +16,7 @@ import math
 
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.stated_variance import believable
+from fsw.autopilot.estimation.measurement_noise import believable
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 
@@ -24,7 +24,7 @@ _NONE: Vec6 = (0.0,) * 6
 _LASTING = 0.25  # of the least deviation of a pose: most of that is noise
 
 
-def lasting_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
+def correlated_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
     """Variances of position [m^2, NED] and attitude [rad^2, FRD] besides the filter's.
 
     Those of a whole reading of the position's source.

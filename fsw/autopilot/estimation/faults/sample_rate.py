@@ -16,11 +16,11 @@ _LOOKS: Final = 10  # of 0.1 s, over which samples are counted
 _SELDOM: Final = 0.7  # of what is usual; markers that are hidden once leave 0.8
 _AGAIN: Final = 0.85
 _FOLLOWS: Final = 0.02  # share of the newest count in what is usual
-_LEAST_USUAL: Final = 4.0  # samples in so many looks; of fewer one is missing now and then
+_MIN_USUAL: Final = 4.0  # samples in so many looks; of fewer one is missing now and then
 _SILENT: Final = 0.15  # s
 
 
-class Pace(NamedTuple):
+class SampleRate(NamedTuple):
     """How often one sensor is heard."""
 
     sensor: Sensor
@@ -31,23 +31,23 @@ class Pace(NamedTuple):
 
 
 def looked(
-    paces: tuple[Pace, ...], health: tuple[Health, ...], now: float
-) -> tuple[tuple[Pace, ...], tuple[Sensor, ...]]:
+    sample_rates: tuple[SampleRate, ...], health: tuple[Health, ...], now: float
+) -> tuple[tuple[SampleRate, ...], tuple[Sensor, ...]]:
     """Paces after a look at ``now`` [s] at what is known of each sensor.
 
     Beside them those that have begun to come too seldom.
     """
-    known = {pace.sensor: pace for pace in paces}
+    known = {pace.sensor: pace for pace in sample_rates}
     after, told = [], []
     for one in health:
-        pace = _after(known.get(one.sensor, Pace(one.sensor)), one, now)
+        pace = _after(known.get(one.sensor, SampleRate(one.sensor)), one, now)
         if pace.seldom and not (one.sensor in known and known[one.sensor].seldom):
             told.append(one.sensor)
         after.append(pace)
     return tuple(after), tuple(told)
 
 
-def _after(pace: Pace, health: Health, now: float) -> Pace:
+def _after(pace: SampleRate, health: Health, now: float) -> SampleRate:
     counts = (*pace.counts, health.seen - pace.seen)[-_LOOKS:]
     usual, seldom, total = pace.usual, pace.seldom, sum(counts)
     silent = now - health.came > _SILENT
@@ -57,6 +57,6 @@ def _after(pace: Pace, health: Health, now: float) -> Pace:
         elif total > _SELDOM * usual or (seldom and not silent):
             usual += _FOLLOWS * (total - usual)
             seldom = seldom and total < _AGAIN * usual
-        elif not silent and usual >= _LEAST_USUAL:
+        elif not silent and usual >= _MIN_USUAL:
             seldom = True
-    return Pace(pace.sensor, health.seen, counts, usual, seldom)
+    return SampleRate(pace.sensor, health.seen, counts, usual, seldom)
