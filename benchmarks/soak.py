@@ -272,7 +272,7 @@ def grown(glances: list[Glance], min_s: float = 0.0) -> dict[str, tuple[float, f
 
     Memory [MB/h] twice: by a line through all of it, and as it grows at least in each part, which
     tells a leak from what is taken once. It is left out of a process that was seen for less than
-    ``least_s`` [s].
+    ``min_s`` [s].
     """
     settled = [one for one in glances if one.at_s >= glances[0].at_s + _SETTLED_S]
     if len(settled) < _MIN_GLANCES:

@@ -219,7 +219,8 @@ def _report(flight: PlannedFlight, display: Display) -> list[str]:
     if not flight.options.report:
         where = shlex.quote(str(flight.out))
         display.say(
-            f"to see it: {command_name()} view {where}; as a file to send: {command_name()} report {where}"
+            f"to see it: {command_name()} view {where}; "
+            f"as a file to send: {command_name()} report {where}"
         )
         return []
     from messages.ulog_reader import UlogError

@@ -50,7 +50,7 @@ class Mode(Enum):
         return self is not _DISARMED and self is not _FAULT
 
 
-_DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT  # found in a tenth of the time
+_DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT  # ten times as fast as Mode.X
 
 
 class SolverStatus(IntEnum):
@@ -695,7 +695,7 @@ class ConstraintReport:
     per_zone: tuple[int, ...] = ()  # how many of them belong to each zone
     # m, kept from each zone beyond its clearance because the estimate is not sure; empty: nothing
     added: tuple[float, ...] = ()
-    shortfall: float = 0.0  # m, what there is no room for of that, of the zone that lacks most
+    shortfall: float = 0.0  # m, largest shortfall of that of a zone
 
     def shown(self, most: int) -> tuple[tuple[float, ...], tuple[float, ...], int | None]:
         """Margins [m] and barrier values [m/s] for a record with room for ``most``, and the least.

@@ -88,7 +88,7 @@ class Flight:
 
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(
-    ("name", "ticks", "push", "least_calm"),
+    ("name", "ticks", "push", "min_calm"),
     [
         ("walls", 2000, 0.0, 0.88),
         in_long("workspace", 1500, 0.0, 0.88),
@@ -110,7 +110,7 @@ def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
 
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(
-    ("suite", "push", "least_calm"),
+    ("suite", "push", "min_calm"),
     [("mocap", 0.0, 0.85), ("vio", 0.0, 0.7), in_long("rtk", 0.0, 0.7), ("mocap", 3.0, 0.0)],
 )
 def test_so_is_one_of_a_suite(suite: str, push: float, min_calm: float) -> None:

@@ -245,7 +245,7 @@ def test_a_telemetry_log_of_any_length_is_refused(
         path.touch()
         os.truncate(path, 1 << 40)
     else:
-        monkeypatch.setattr(tlog_flight, "_MOST_SCENES", 20)
+        monkeypatch.setattr(tlog_flight, "_MAX_SCENES", 20)
         path.write_bytes(a_log(50))
     with pytest.raises(UlogError, match=r"too long: (must be )?at most"):
         TlogFlight(path)

@@ -150,7 +150,7 @@ class MissionMemory:
     owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
     fence_owner: MessageSource | None = None  # who uploaded the fence
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
-    silent_zones: int = 0  # that moved, are not announced any more, and are held where they were
+    silent_zones: int = 0  # that moved, timed out, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
     flight: MissionFlight = field(default_factory=MissionFlight)
 

@@ -131,7 +131,7 @@ def save(path: Path, values: Mapping[str, float]) -> None:
 
 
 def _entry(words: list[str]) -> dict[str, float]:
-    """The parameter of a line and its value; none where the line says what cannot be changed."""
+    """The parameter of a line and its value; none where it cannot be changed."""
     if len(words) == 5:
         vehicle, component, name, number, _ = words
         if (vehicle, component) != (str(VEHICLE), str(COMPONENT)):

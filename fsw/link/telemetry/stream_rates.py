@@ -47,7 +47,7 @@ class StreamRates:
     ) -> None:
         """Lay out the defaults, at most one message a tick; a rate of 0 is sent on request only.
 
-        All of them together send no more than ``most_bytes_s`` [bytes/s] on average.
+        All of them together send no more than ``max_bytes_s`` [bytes/s] on average.
         """
         self._tick_us = tick_us
         self._max_bytes_s = max_bytes_s

@@ -35,20 +35,20 @@ class SensorFault(IntEnum):
     NOISY = 12
 
 
-_SENTENCES = {
-    SensorFault.NONE: "is in use",
-    SensorFault.NOT_FINITE: "says what is not a number",
-    SensorFault.IMPLAUSIBLE: "says what cannot be",
-    SensorFault.FUTURE: "has a time stamp in the future",
-    SensorFault.REPEATED: "has a time stamp that does not move on",
-    SensorFault.TOO_OLD: "comes too late to be of use",
-    SensorFault.STUCK: "is stuck at one reading",
-    SensorFault.JUMP: "jumps, and is not believed",
-    SensorFault.STALE: "is silent",
-    SensorFault.RATE_TOO_LOW: "comes less often than it did",
-    SensorFault.DISAGREES: "does not agree with the other sensors",
-    SensorFault.NO_FIX: "has no fix",
-    SensorFault.NOISY: "is noisier than stated",
+_WORDS = {
+    SensorFault.NONE: "in use",
+    SensorFault.NOT_FINITE: "not finite",
+    SensorFault.IMPLAUSIBLE: "implausible",
+    SensorFault.FUTURE: "time stamp in the future",
+    SensorFault.REPEATED: "time stamp repeated",
+    SensorFault.TOO_OLD: "too late",
+    SensorFault.STUCK: "stuck",
+    SensorFault.JUMP: "jump rejected",
+    SensorFault.STALE: "silent",
+    SensorFault.RATE_TOO_LOW: "rate too low",
+    SensorFault.DISAGREES: "inconsistent with the other sensors",
+    SensorFault.NO_FIX: "no fix",
+    SensorFault.NOISY: "noisier than stated",
 }
 
 
@@ -59,8 +59,4 @@ def fault_name(fault: SensorFault) -> str:
 
 def sentence(sensor: Sensor, fault: SensorFault) -> str:
     """What the operator reads."""
-    told = _SENTENCES[fault]
-    if sensor is Sensor.ENCODERS:  # there are several
-        told = told.replace("is ", "are ", 1).replace("says ", "say ", 1).replace("jumps", "jump")
-        told = told.replace("comes ", "come ", 1).replace("does ", "do ", 1)
-    return f"{sensor.value} {told}"
+    return f"{sensor.value} {_WORDS[fault]}"

@@ -40,7 +40,7 @@ def arming_health(
     limits, aiding, margins = config.limits, state.aiding, state.constraints.margins
     estimator = ""
     if aiding.unaided_us >= limits.aiding_loss_us:
-        estimator = f"no position is measured: {sentence(aiding.pose, aiding.pose_fault)}"
+        estimator = f"no position measurement: {sentence(aiding.pose, aiding.pose_fault)}"
     elif not aiding.attitude_sigma <= _KNOWN_ANGLE:
         degrees = math.degrees(aiding.attitude_sigma)
         estimator = f"roll and pitch are known to {degrees:.0f} deg only"

@@ -1,4 +1,4 @@
-"""The estimate from sensors with times of their own; its faults are told, its jumps handed on."""
+"""The estimate from sensors with their own time stamps; reports faults, passes on jumps."""
 
 from __future__ import annotations
 

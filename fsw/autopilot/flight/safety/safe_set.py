@@ -5,8 +5,8 @@ source may shrink either, and only its owner may grow it (``safe_set_change.grow
 and every refusal is a text that says who and what. Disarmed, another source may become the
 owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
 nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the
-way in which it could stop, outside. A moving zone that
-is not announced any more is not predicted for ever: it is held where it is after a time-out.
+way in which it could stop, outside. A moving zone that has timed out is not predicted for ever: it
+is held where it is then.
 """
 
 from __future__ import annotations

@@ -60,8 +60,8 @@ class SafetyWatch:
         pitched = flies and limits.pitch_failure > 0.0 and not abs(pitch) <= limits.pitch_failure
         return replace(
             memory,
-            rolled_us=_since(memory.rolled_us, estimate.t_us, so=rolled),
-            pitched_us=_since(memory.pitched_us, estimate.t_us, so=pitched),
+            rolled_us=_since(memory.rolled_us, estimate.t_us, active=rolled),
+            pitched_us=_since(memory.pitched_us, estimate.t_us, active=pitched),
         )
 
     def off_plan(
@@ -190,8 +190,8 @@ def _outside(last_us: int, by: float, now_us: int, least: float) -> tuple[int, f
     return (-1 if now_us - last_us >= _CLEAR_US else last_us), by
 
 
-def _since(since_us: int, now_us: int, *, so: bool) -> int:
-    """Since when it is ``so``; -1: it is not."""
-    if not so:
+def _since(since_us: int, now_us: int, *, active: bool) -> int:
+    """When it became ``active``; -1: it is not."""
+    if not active:
         return -1
     return since_us if since_us >= 0 else now_us

@@ -66,7 +66,7 @@ class InflatedSafeSet(NamedTuple):
     source: SafeSet = SafeSet()  # in force
     safe_set: SafeSet = SafeSet()  # kept; the same object where nothing was added
     added: tuple[float, ...] = ()  # m, to the clearance of each zone; empty: nothing
-    shortfall: float = 0.0  # m, what there is no room for, of the zone that lacks most
+    shortfall: float = 0.0  # m, largest margin shortfall of a zone
     sufficient_us: int = -1  # when there was room enough last; -1: not known yet
     spread: tuple[float, ...] = ()  # m, k sigma at each zone
     t_us: int = 0  # at that time

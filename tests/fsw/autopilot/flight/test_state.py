@@ -44,7 +44,7 @@ def test_a_pose_or_the_inertial_unit_holds_the_attitude(
 
 
 @pytest.mark.parametrize(
-    ("heard_us", "now_us", "young"),
+    ("last_received_us", "now_us", "young"),
     [
         (-1, 0, False),
         (-1, 10, False),

@@ -22,9 +22,11 @@ NONE: Vec4 = (0.0, 0.0, 0.0, 0.0)
 @pytest.mark.parametrize(
     ("remaining", "charge"),
     [
-        (1.0, BatteryWarning.OK), (0.3, BatteryWarning.OK), (0.299, BatteryWarning.LOW), (0.2, BatteryWarning.LOW),
-        (0.199, BatteryWarning.CRITICAL), (0.1, BatteryWarning.CRITICAL), (0.099, BatteryWarning.EMERGENCY),
-        (0.0, BatteryWarning.EMERGENCY), (math.nan, BatteryWarning.EMERGENCY),
+        (1.0, BatteryWarning.OK), (0.3, BatteryWarning.OK),
+        (0.299, BatteryWarning.LOW), (0.2, BatteryWarning.LOW),
+        (0.199, BatteryWarning.CRITICAL), (0.1, BatteryWarning.CRITICAL),
+        (0.099, BatteryWarning.EMERGENCY), (0.0, BatteryWarning.EMERGENCY),
+        (math.nan, BatteryWarning.EMERGENCY),
     ],
 )  # fmt: skip
 def test_each_level_begins_below_its_share(remaining: float, charge: BatteryWarning) -> None:

@@ -227,7 +227,7 @@ def test_a_sensor_that_is_heard_has_its_bit_and_one_that_fails_loses_it(
     name, always = sensor.value, _GPS | _MAG  # position and heading are known all the same
     assert bits_with() == (always, 0)
     assert bits_with(SensorReport(name, 8_000)) == (always | bit, 0)
-    assert bits_with(SensorReport(name, 8_000, "seldom")) == (always | bit, 0)
+    assert bits_with(SensorReport(name, 8_000, "rate too low")) == (always | bit, 0)
     for fault in ("stale", "stuck", "not finite", "no fix", "too old"):
         assert bits_with(SensorReport(name, 600_000, fault)) == (always | bit, bit)
     # One outlier was refused, or the newest reading is.

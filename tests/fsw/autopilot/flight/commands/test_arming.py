@@ -49,11 +49,11 @@ def unwell(**changes: Any) -> arming.CommandContext:
     [
         (BLIND, Subject.ESTIMATOR, "estimate is invalid"),
         (TERMINATED, Subject.TERMINATION, "terminated; restart the flight software"),
-        (unwell(estimator="no position is measured"), Subject.ESTIMATOR, "no position"),
+        (unwell(estimator="no position measurement"), Subject.ESTIMATOR, "no position"),
         (unwell(tilt=math.radians(16.0)), Subject.ATTITUDE, "tilted by 16 deg; 15 deg"),
         (unwell(tilt=math.pi), Subject.ATTITUDE, "tilted by 180 deg"),
         (unwell(tilt=math.nan), Subject.ATTITUDE, "tilted"),
-        (unwell(sensor="IMU is silent"), Subject.SENSORS, "IMU is silent"),
+        (unwell(sensor="IMU silent"), Subject.SENSORS, "IMU silent"),
         (UNCLEAR, Subject.STANDING, "neither at rest on the ground nor clearly in the air"),
         (unwell(remaining=0.0), Subject.BATTERY, "0 % left, 10 % needed"),
         (unwell(remaining=math.nan), Subject.BATTERY, "battery"),
@@ -131,7 +131,7 @@ def test_an_attitude_that_is_no_number_is_upside_down() -> None:
 @pytest.mark.parametrize(
     ("aiding", "words"),
     [
-        (Aiding(unaided_us=250_000), "no position is measured: pose is silent"),
+        (Aiding(unaided_us=250_000), "no position measurement: pose silent"),
         (Aiding(attitude_sigma=0.3), "roll and pitch are known to 17 deg only"),
         (Aiding(attitude_sigma=math.nan), "roll and pitch"),
         (Aiding(unaided_us=249_999, attitude_sigma=0.2), ""),
@@ -150,7 +150,7 @@ def test_sensors_margins_damage_and_the_log_are_looked_at() -> None:
     lost = LostSensor(Sensor.ENCODERS, SensorFault.STUCK, NOW_US - 50_000)
     soon = lost._replace(since_us=NOW_US - 49_999)
     for found in ((lost,), (soon._replace(sensor=Sensor.IMU), lost)):
-        assert "encoders are stuck" in healthy(aiding=Aiding(lost=found)).sensor
+        assert "encoders stuck" in healthy(aiding=Aiding(lost=found)).sensor
     assert healthy(aiding=Aiding(lost=(soon,))).sensor == "", "for a moment"
     for silent_us, words in ((2_400_000, "barometer has been silent for 2 s"), (10**6, "")):
         report = replace(REPORT, sensors=(SensorReport("barometer", silent_us),))

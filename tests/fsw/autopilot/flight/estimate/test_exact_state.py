@@ -72,7 +72,7 @@ def test_a_pose_that_is_missing_is_carried_on_and_the_plan_moves_along_when_it_i
     for k in range(1, 101):
         state, texts = seen(state, frame(k, p_WB=NOTHING))
         said += texts
-    assert said == ["pose says what cannot be"]
+    assert said == ["pose implausible"]
     assert math.dist(estimate_of(state).p_WB, (0.0, 0.0, -3.0)) < 1e-3
     assert state.aiding.unaided_us == 99 * TICK_US
     assert 0.0 < state.aiding.position_sigma < 0.01

@@ -592,15 +592,15 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
     for aiding, words in (
         (
             UNAIDED,
-            "no position is measured: pose is stuck at one reading, for 1.50 s: dead reckoning",
+            "no position measurement: pose stuck, for 1.50 s: dead reckoning",
         ),
         (
             replaced_sensor(60_000),
-            "failsafe: sensor lost: IMU is stuck at one reading, for 0.06 s, holding",
+            "failsafe: sensor lost: IMU stuck, for 0.06 s, holding",
         ),
         (
             Aiding(400_000, Sensor.POSE, SensorFault.NOT_FINITE, attitude_sigma=0.8),
-            "attitude unknown: pose says what is not a number, for 0.40 s: terminate",
+            "attitude unknown: pose not finite, for 0.40 s: terminate",
         ),
     ):
         context = replace(FINE, mode=Mode.TRAJECTORY, aiding=aiding).context()

@@ -315,7 +315,7 @@ def test_a_joint_that_hangs_loose_and_stands_still_may_be_one_that_is_not_seen(
     for repeat in (True, False):
         damage = WATCHER.see(Damage(), loops, loops.copy(), 1, angles_repeat=repeat)
         assert damage.joint.startswith("joint 2 ")
-        assert ("joint encoders are stuck" in damage.joint) is (doubted and repeat)
+        assert ("joint encoders stuck" in damage.joint) is (doubted and repeat)
 
 
 def test_allocation_is_left_alone_where_that_is_asked_for() -> None:
