@@ -55,7 +55,7 @@ from fsw.runtime.realtime import (
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
-    from fsw.autopilot.parameters.kept_file import ParameterFile
+    from fsw.storage.kept_file import ParameterFile
 
 DONE: Final = 0  # exit code
 
@@ -185,8 +185,8 @@ class _Session:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
         # Imported here because they take a second, which the other refusals need not wait.
-        from fsw.autopilot.parameters.kept_file import ParameterFile
         from fsw.runtime.assembly import configured
+        from fsw.storage.kept_file import ParameterFile
 
         path, record = self._options.params, directory / "parameters.params"
         try:

@@ -189,7 +189,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
 
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     """One flight in this process, its trace, and what flies it with both processes and a log."""
-    from fsw.autopilot.parameters.storage import save
+    from fsw.storage.parameter_file import save
     from sitl.scenario_text import scenario_text
     from studies.campaign.flight import CampaignFlight
     from studies.campaign.keys import CampaignError

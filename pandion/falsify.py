@@ -90,8 +90,8 @@ def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
         return config
     from fsw.autopilot.parameters.contradictions import contradictions
     from fsw.autopilot.parameters.registry import tuning_of
-    from fsw.autopilot.parameters.storage import load
     from fsw.autopilot.tuning import tuned
+    from fsw.storage.parameter_file import load
 
     loaded = load(options.params)
     config = tuned(config, tuning_of(loaded.values))

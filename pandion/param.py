@@ -16,7 +16,7 @@ from command_line.parser import COULD_NOT_START, unknown_name
 from messages.addresses import LinkError, parse_link_address
 
 if TYPE_CHECKING:
-    from fsw.autopilot.parameters.storage import Loaded
+    from fsw.storage.parameter_file import Loaded
     from pandion.param_vehicle import ParameterClient
 
 DONE, REFUSED = 0, 1  # exit codes
@@ -93,8 +93,8 @@ class FileValues:
         from fsw.autopilot.parameters.facts import ALIASES
         from fsw.autopilot.parameters.flight_config import FlightConfig
         from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
-        from fsw.autopilot.parameters.storage import save
         from fsw.autopilot.tuning import tuned
+        from fsw.storage.parameter_file import save
         from pandion.param_vehicle import ParameterRefused
 
         parameter = BY_NAME.get(ALIASES.get(name, name))
@@ -192,7 +192,7 @@ def _import(options: _File, values: Values) -> int:
 
 
 def _export(options: _File, values: Values) -> int:
-    from fsw.autopilot.parameters.storage import save
+    from fsw.storage.parameter_file import save
 
     known = values.read_all()
     # A reader of the file would refuse such a line.
@@ -208,7 +208,7 @@ def _export(options: _File, values: Values) -> int:
 
 def _read_file(path: Path) -> Loaded:
     """The values of a file; unusable lines are reported on standard error."""
-    from fsw.autopilot.parameters.storage import load
+    from fsw.storage.parameter_file import load
 
     loaded = load(path)
     for complaint in loaded.complaints:

@@ -97,7 +97,7 @@ def _print_parameters(options: _Params) -> int:
     for name, value in values.items():
         print(f"param set {name} {as_text(value)}")
     if options.out is not None:
-        from fsw.autopilot.parameters.storage import as_params
+        from fsw.storage.parameter_file import as_params
 
         text = as_params(values).replace("Stack: Pandion", "Stack: PX4 Pro")
         for problem in try_write(options.out, text):

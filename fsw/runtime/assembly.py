@@ -13,13 +13,13 @@ from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.control_choice import FULL, ControlChoice
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.ports import VehicleFacts
 from fsw.autopilot.signals import Origin
 from fsw.autopilot.tuning import flat
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.runtime import clock
 from fsw.runtime.program import FlightProgram
+from fsw.storage.parameter_store import ParameterStore
 
 
 def flight_software(

@@ -12,7 +12,7 @@ import pytest
 
 from command_line.bounded_json import json_object
 from command_line.bounded_toml import MAX_PARTS, toml_table
-from fsw.autopilot.parameters.storage import parse
+from fsw.storage.parameter_file import parse
 from messages import ulog
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log

@@ -15,7 +15,6 @@ from pathlib import Path
 import fastcrc
 
 from docs.pages.messages import heard
-from fsw.autopilot.parameters import storage
 from fsw.autopilot.parameters.control_choice import choice_of
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.link.inbox import Inbox
@@ -29,6 +28,7 @@ from fsw.log.reader import open_flight
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
 from fsw.runtime.replay import fact, other_numbers, replay
+from fsw.storage import parameter_file as storage
 from messages import dialect, ulog
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log

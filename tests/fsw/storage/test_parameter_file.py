@@ -12,14 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.mavparm import MAVParmDict
 
-from fsw.autopilot.parameters import storage
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.parameters.kept_file import ParameterFile
 from fsw.autopilot.parameters.registry import BY_NAME, PARAMETERS
-from fsw.autopilot.parameters.storage import as_params, as_parm, load, parse, save
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.tuning import Tuning
-from tests.fsw.autopilot.parameters.test_store import ticks
+from fsw.storage import parameter_file as storage
+from fsw.storage.kept_file import ParameterFile
+from fsw.storage.parameter_file import as_params, as_parm, load, parse, save
+from fsw.storage.parameter_store import ParameterStore
+from tests.fsw.storage.test_parameter_store import ticks
 
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 

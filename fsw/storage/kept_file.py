@@ -12,8 +12,8 @@ from pathlib import Path
 
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.parameters.storage import Loaded, load, save
-from fsw.autopilot.parameters.store import ParameterStore
+from fsw.storage.parameter_file import Loaded, load, save
+from fsw.storage.parameter_store import ParameterStore
 
 
 class ParameterFile:

@@ -9,9 +9,9 @@ import pytest
 
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import PARAMETERS
-from fsw.autopilot.parameters.store import REST_TICKS, WAITING, ParameterStore
 from fsw.autopilot.tuning import Tuning, tuned
-from tests.fsw.autopilot.parameters.threads import AtOnce
+from fsw.storage.parameter_store import REST_TICKS, WAITING, ParameterStore
+from tests.fsw.storage.threads import AtOnce
 
 
 class Kept:
