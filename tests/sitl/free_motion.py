@@ -6,12 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from sitl.plant.aerial_manipulator import Inputs, plant
+from sitl.plant.aerial_manipulator import Inputs, Workspace, empty_workspace, plant
 from sitl.plant.integrator import held, integrate
+from sitl.plant.packing import pack_params
 from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from tests.sitl.state_view import StateView
+
+
+def record_of(inputs: Inputs) -> Inputs:
+    """Inputs as flights hand them to kernels: as arrays they are compiled once more, for 4 s."""
+    return pack_params(inputs)
+
+
+def workspace(joints: int = 2) -> Workspace:
+    """Memory for a vehicle with ``joints`` joints, likewise."""
+    return pack_params(empty_workspace(joints))
 
 
 def frictionless(gravity: float) -> Vehicle:
@@ -39,7 +50,7 @@ def flown(vehicle: Vehicle, start: Array, seconds: float, step: float) -> Array:
     """The state after ``seconds`` without any input."""
     joints = len(vehicle.links)
     state = start.copy()
-    inputs = Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3))
+    inputs = record_of(Inputs(np.zeros(4), np.zeros(joints), np.zeros(3), np.zeros(3)))
     places = np.empty((round(seconds / step), 2 + joints, 3))
     states = np.empty((len(places), len(state)))
     integrate(plant(vehicle), state, inputs, step, places, states, held(joints))

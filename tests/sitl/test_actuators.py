@@ -11,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl.plant.actuators import joint_torque, thrust_rate
-from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
+from sitl.plant.aerial_manipulator import Inputs, acceleration_into, plant
 from sitl.plant.integrator import held, integrate
 from sitl.plant.parameters import EndStops, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.trim import NoTrimError, level_hover
+from tests.sitl.free_motion import record_of, workspace
 from tests.sitl.state_view import StateView
 
 
@@ -23,7 +24,8 @@ def test_a_rotor_reaches_63_percent_of_a_step_after_its_lag() -> None:
     vehicle, state = Vehicle(), at_rest(2)
     view = StateView(state)
     view.p_WB[2] = -50.0
-    inputs = Inputs(np.array([5.0, 0.0, 99.0, -3.0]), np.zeros(2), np.zeros(3), np.zeros(3))
+    thrust = np.array([5.0, 0.0, 99.0, -3.0])
+    inputs = record_of(Inputs(thrust, np.zeros(2), np.zeros(3), np.zeros(3)))
     room = (np.empty((40, 4, 3)), np.empty((40, 21)), held(2))
     integrate(plant(vehicle), state, inputs, 0.001, *room)
     grown = 1.0 - math.exp(-1.0)
@@ -54,13 +56,14 @@ def test_a_joint_drive_saturates() -> None:
 
 @given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
 def test_trim_is_an_equilibrium_at_any_arm_posture(first: float, second: float) -> None:
-    vehicle, state, work = Vehicle(stops=EndStops(())), at_rest(2), empty_workspace(2)
+    vehicle, state, work = Vehicle(stops=EndStops(())), at_rest(2), workspace()
     trim = level_hover(vehicle, (first, second))
     view = StateView(state)
     view.p_WB[2] = -5.0
     view.q_arm[:] = (first, second)
     view.thrust[:] = trim.thrust
-    inputs = Inputs(view.thrust.copy(), np.array(trim.torque), np.zeros(3), np.zeros(3))
+    torque = np.array(trim.torque)
+    inputs = record_of(Inputs(view.thrust.copy(), torque, np.zeros(3), np.zeros(3)))
     acceleration_into(plant(vehicle), state, inputs, work)
     assert np.abs(work.load).max() <= 1e-10
 

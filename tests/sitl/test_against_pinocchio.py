@@ -9,15 +9,11 @@ import pinocchio as pin
 import pytest
 
 from sitl.plant.actuators import joint_torque, rotor_torque
-from sitl.plant.aerial_manipulator import (
-    Inputs,
-    acceleration_into,
-    empty_workspace,
-    plant,
-)
+from sitl.plant.aerial_manipulator import Inputs, acceleration_into, plant
 from sitl.plant.parameters import EndStops, Link, Vehicle
 from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
+from tests.sitl.free_motion import record_of, workspace
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
 
@@ -94,7 +90,7 @@ def pinocchio_acceleration(
 @pytest.mark.parametrize("joints", [_in_long(1), 2, _in_long(3)])
 def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> None:
     random = np.random.default_rng(joints)
-    work = empty_workspace(joints)
+    work = workspace(joints)
     worst = 0.0
     for trial in range(STATES):
         if trial % 100 == 0:
@@ -108,7 +104,7 @@ def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> N
             random.uniform(-5.0, 5.0, 3),
             random.uniform(-1.0, 1.0, 3),
         )
-        acceleration_into(numbers, state, inputs, work)
+        acceleration_into(numbers, state, record_of(inputs), work)
         expected = pinocchio_acceleration(vehicle, model, data, state, inputs)
         error = np.abs(work.load - expected).max() / np.abs(expected).max()
         worst = max(worst, float(error))

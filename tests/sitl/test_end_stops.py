@@ -14,7 +14,7 @@ from sitl.plant.integrator import STEP_S, held, integrate
 from sitl.plant.parameters import GRAVITY, EndStops, Vehicle
 from sitl.plant.state import ARM, at_rest
 from sitl.plant.vector import Array
-from tests.sitl.free_motion import flown, frictionless, tumbling
+from tests.sitl.free_motion import flown, frictionless, record_of, tumbling
 from tests.sitl.state_view import StateView
 from tests.sitl.test_conservation import weigh
 
@@ -34,7 +34,7 @@ def swung(first: float, both: float, rate1: float, rate2: float) -> Array:
 
 def driven(vehicle: Vehicle, start: Array, torque: tuple[float, float], steps: int) -> Array:
     """Every state under constant joint torques."""
-    inputs = Inputs(np.full(4, 8.6), np.array(torque), np.zeros(3), np.zeros(3))
+    inputs = record_of(Inputs(np.full(4, 8.6), np.array(torque), np.zeros(3), np.zeros(3)))
     states = np.empty((steps, len(start)))
     room = (np.empty((steps, 4, 3)), states, held(2))
     integrate(plant(vehicle), start.copy(), inputs, STEP_S, *room)

@@ -16,7 +16,7 @@ from sitl.plant.vector import Array
 from sitl.scenario import ActuatorKeys
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.scenario_validation import check
-from tests.sitl.free_motion import frictionless, tumbling
+from tests.sitl.free_motion import frictionless, record_of, tumbling
 from tests.sitl.test_conservation import weigh
 
 STEP_S = 0.001
@@ -42,7 +42,7 @@ class Arm:
         return now
 
     def step(self, torque: tuple[float, float] = (0.0, 0.0)) -> None:
-        inputs = Inputs(np.zeros(4), np.array(torque), np.zeros(3), np.zeros(3))
+        inputs = record_of(Inputs(np.zeros(4), np.array(torque), np.zeros(3), np.zeros(3)))
         room = np.empty((1, 4, 3)), self.judged
         integrate(self.plant, self.state, inputs, STEP_S, *room, held(2))
 

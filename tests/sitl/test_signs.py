@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace, plant
+from sitl.plant.aerial_manipulator import Inputs, acceleration_into, plant
 from sitl.plant.parameters import Vehicle, level_reach
 from sitl.plant.state import at_rest
 from sitl.plant.trim import level_hover
 from sitl.plant.vector import Array
+from tests.sitl.free_motion import record_of, workspace
 from tests.sitl.state_view import StateView
 
 HOVER = Vehicle().mass * Vehicle().gravity / 4.0
@@ -28,8 +29,9 @@ def _acceleration(
     view.p_WB[2] = -5.0
     view.q_WB[:] = q_WB
     view.thrust[:] = thrust
-    work = empty_workspace(2)
-    inputs = Inputs(np.zeros(4), np.array(torque), np.array(force_W), np.array(torque_B))
+    work = workspace()
+    loads = np.array(torque), np.array(force_W), np.array(torque_B)
+    inputs = record_of(Inputs(np.zeros(4), *loads))
     acceleration_into(plant(Vehicle()), state, inputs, work)
     return work.load.copy()
 

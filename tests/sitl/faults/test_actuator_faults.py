@@ -17,7 +17,7 @@ from sitl.plant.parameters import Vehicle
 from sitl.scenario import ActuatorKeys, Scenario
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
-from tests.sitl.free_motion import frictionless, tumbling
+from tests.sitl.free_motion import frictionless, record_of, tumbling
 from tests.sitl.test_conservation import weigh
 from tests.sitl.test_simulation import _trimmed
 
@@ -117,7 +117,7 @@ def test_a_flight_with_a_stuck_joint_keeps_energy_and_momentum() -> None:
     state = tumbling()
     seize(vehicle, state, (True, False))
     energy, momentum = weigh(vehicle, state)
-    zeros = Inputs(np.zeros(4), np.zeros(2), np.zeros(3), np.zeros(3))
+    zeros = record_of(Inputs(np.zeros(4), np.zeros(2), np.zeros(3), np.zeros(3)))
     steps = 500
     places, states = np.empty((steps, 4, 3)), np.empty((steps, len(state)))
     integrate(numbers[0], state, zeros, 0.001, places, states, held(2))
