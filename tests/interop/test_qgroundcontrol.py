@@ -17,11 +17,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from fsw.autopilot.parameters.storage import load
 
 from fsw.autopilot.parameters.metadata import metadata_crc, parameter_document
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.parameters.registry import PARAMETERS
-from fsw.autopilot.parameters.storage import load
 from fsw.link.events.event_table import event_document
 from messages import dialect
 from tests.interop.station import PATIENCE_S, Station
