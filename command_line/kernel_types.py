@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Final
+
+# Said of a tuple of kernels, such as the table of shapes that a kernel calls (sitl/distance.py,
+# fsw/autopilot/shapes/zones.py), which numba has unrolled for years and still calls experimental.
+_TUPLE_OF_KERNELS: Final = "First-class function type feature is experimental"
 
 
 def compile_for_types(dispatcher: Any, without_value: Callable[[Any], Any]) -> None:
@@ -28,6 +33,26 @@ def compile_for_types(dispatcher: Any, without_value: Callable[[Any], Any]) -> N
         )
 
     dispatcher.get_call_template = of_types
+
+
+def compile_quietly(dispatcher: Any) -> None:
+    """Let numba compile a kernel without its warning of tuples of kernels, and with all others.
+
+    Whoever imports a package may set up warnings anew, as pytest does for each test: a filter that
+    was set by an import holds for as long as that.
+    """
+    compiler = getattr(dispatcher, "_compiler", None)
+    if compiler is None:  # NUMBA_DISABLE_JIT
+        return
+    compile_it = compiler.compile
+
+    def quietly(arguments: Any, returned: Any) -> Any:
+        # Under numba's lock, as its own filters of warnings: these are of the whole process.
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", _TUPLE_OF_KERNELS)
+            return compile_it(arguments, returned)
+
+    compiler.compile = quietly
 
 
 _OF_ARRAYS: dict[Any, Any] = {}

@@ -61,8 +61,8 @@ def say(sentence: str, stream: TextIO | None = None) -> None:
     print(printable(sentence) + "\n", end="", file=stream or sys.stdout, flush=True)
 
 
-def complain(program: str, sentence: object) -> None:
-    """Print what is wrong in one line on standard error.
+def print_error(program: str, sentence: object) -> None:
+    """Print what is wrong in one line on standard error; of an OSError without its number.
 
     Raises:
         BrokenPipeError: It is what is wrong: the reader of the output has left, as `head` does,
@@ -70,10 +70,13 @@ def complain(program: str, sentence: object) -> None:
     """
     if isinstance(sentence, BrokenPipeError):
         raise sentence
+    if isinstance(sentence, OSError) and sentence.strerror:
+        where = "" if sentence.filename is None else f"{sentence.filename}: "
+        sentence = f"{where}{sentence.strerror}"
     say(f"{program}: {sentence}", sys.stderr)
 
 
-def typed(program: str = "pandion") -> str:
+def command_name(program: str = "pandion") -> str:
     """How this program is typed in the shell that started it: by its path where PATH has it not."""
     started = Path(sys.argv[0]) if sys.argv else Path()
     found = shutil.which(program)
@@ -110,7 +113,7 @@ def write_text(target: str | None, text: str) -> None:
         Path(target).write_text(text, encoding="utf-8")
 
 
-def unwritten(target: str | Path | None, text: str) -> list[str]:
+def try_write(target: str | Path | None, text: str) -> list[str]:
     """Write to a target as ``write_text`` does; returns what could not be written, and why."""
     try:
         write_text(None if target is None else str(target), text)
@@ -134,6 +137,7 @@ EXTRAS: Final = {
     "matplotlib": "report",
     "plotly": "report",
     "mcap": "mcap",
+    "pyarrow": "parquet",
     "textual": "top",
     "viser": "view",
     "gymnasium": "gym",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, ParamSpec, TypeVar, cast
@@ -15,13 +14,8 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types, types_of
+from command_line.kernel_types import compile_for_types, compile_quietly, types_of
 
-# The shapes' kernels are called by a table of functions (fsw/autopilot/shapes/zones.py), which
-# numba has had for years and still calls new.
-warnings.filterwarnings(
-    "ignore", "First-class function type", numba.NumbaExperimentalFeatureWarning
-)
 tell_layouts_apart(numba.types.Record)
 
 IN_PYTHON: Final = bool(numba.config.DISABLE_JIT)
@@ -72,6 +66,7 @@ def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
     finally:
         numba.config.CACHE_DIR = before
     compile_for_types(dispatcher, numba.types.unliteral)
+    compile_quietly(dispatcher)
     _DISPATCHERS.append(dispatcher)
     return cast(Callable[P, R], dispatcher)
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from command_line.folders import data_folder, home
 from command_line.options import option, read, switch
-from command_line.output import complain
+from command_line.output import print_error, unwritable
 from command_line.parser import COULD_NOT_START
 from command_line.values import one_of
 from messages import export
@@ -55,7 +55,7 @@ def main(argv: list[str]) -> int:
     try:
         print(install(options.out), end="")
     except (GenerationError, OSError) as error:
-        complain("pandion dialect", _reason(error))
+        print_error("pandion dialect", unwritable(error))
         return COULD_NOT_START
     return 0
 
@@ -71,9 +71,3 @@ def _wireshark(wanted: Path | None) -> str:
     path = folder.absolute() / "pandion.lua"
     export.write_wireshark_plugin(path)
     return _WIRESHARK.format(path=path)
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"cannot write {error.filename}: {error.strerror}"
-    return str(error)

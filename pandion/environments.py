@@ -19,7 +19,6 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pandion.first_time import compiling
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.compiled import compiled
 from sitl.plant.state import Q_WB, THRUST, V_WB, W_WB_B
@@ -28,6 +27,7 @@ from sitl.result import EndKind
 from sitl.scenario_file import ScenarioError
 from sitl.simulation import Controls, Simulation
 from sitl.world import fill_margins
+from studies.flight.kernels import compile_first
 
 Floats = NDArray[np.float32]
 
@@ -69,8 +69,8 @@ class PandionEnv(gymnasium.Env[Floats, Floats]):
             ScenarioError: The scenario cannot be flown so.
         """
         found = load_scenario(scenario, sensors="perfect", duration_s=duration_s)
-        with compiling():
-            simulation = self._simulation = Simulation(found, 0)
+        compile_first(halves=("sitl",))
+        simulation = self._simulation = Simulation(found, 0)
         try:
             simulation.leap(Controls((0.5,) * 4, (0.0, 0.0), armed=True), 1, PLANT_S)
         except ValueError as error:

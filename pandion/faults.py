@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, unwritten
+from command_line.output import console_beside, json_text, print_error, say, try_write
 from command_line.parser import COULD_NOT_START, unknown_name
 from command_line.values import output_file, whole
 from command_line.version import version
@@ -39,7 +39,7 @@ class FaultsOptions:
     """One cell, the matrix, or pairs of faults."""
 
     mode: str | None = option("MODE", "fly this mode alone")
-    fault: str | None = option("FAULT", "with this fault")
+    fault: str | None = option("FAULT", "with this fault; --matrix --list names them")
     matrix: bool = switch("--matrix", "every mode with every fault")
     pairs: int | None = option(
         "--pairs N", "N pairs of faults, drawn at random: what is hit is found", whole(1)
@@ -48,6 +48,7 @@ class FaultsOptions:
     only: str | None = option(
         "--only TEXT", "of the matrix or the pairs: faults and modes with this text"
     )
+    list: bool = switch("--list", "name what would be flown, MODE FAULT in each line")
     seed: range = option(
         "--seed N|A:B",
         "root of all randomness, or a flight with each from A to below B (default 0)",
@@ -69,7 +70,8 @@ class UnknownError(ValueError):
     """A mode or a fault that there is not."""
 
 
-_NEITHER: Final = "give MODE and FAULT, --matrix, --pairs or --pair"
+_NAMES: Final = "--matrix --list names all modes and faults"
+_NEITHER: Final = f"give MODE and FAULT, --matrix, --pairs or --pair; {_NAMES}"
 _LIMIT_S: Final = 600.0  # of a pair's flight, which takes seconds: longer is a hang
 
 
@@ -80,14 +82,15 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.fault_matrix.expectations import EXPECTATIONS, ExpectationError, expectations
 
     try:
         known = expectations(options.expect or EXPECTATIONS)
-        return _run(options, _chosen(options, known))
+        cells = _chosen(options, known)
+        return _list(cells) if options.list else _run(options, cells)
     except (ExpectationError, UnknownError, SchedulerGoneError, OSError) as error:
-        complain("pandion faults", error)
+        print_error("pandion faults", error)
         return COULD_NOT_START
 
 
@@ -148,7 +151,13 @@ def _cell(mode: str, expected: Expected, seed: int) -> Cell:
 
 
 def _unknown(what: str, name: str | None, known: tuple[str, ...]) -> str:
-    return _NEITHER if name is None else unknown_name(what, name, known)
+    return _NEITHER if name is None else f"{unknown_name(what, name, known)}; {_NAMES}"
+
+
+def _list(cells: list[Cell]) -> int:
+    for line in dict.fromkeys(f"{cell.mode:10} {cell.expected.name}" for cell in cells):
+        say(line)
+    return AS_EXPECTED
 
 
 def _run(options: FaultsOptions, cells: list[Cell]) -> int:
@@ -162,7 +171,7 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
             rows = _flown(cells, options, display)
     except KeyboardInterrupt:
         kept = "is lost" if options.journal is None else f"is in {options.journal}"
-        complain("pandion faults", f"interrupted; what was flown {kept}")
+        print_error("pandion faults", f"interrupted; what was flown {kept}")
         return COULD_NOT_START
     for row in rows:
         if row.differs or len(rows) == 1:
@@ -178,12 +187,12 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
         display.say(f"known limit {name}: {count}")
     display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
     text = json_text([row.as_json() for row in rows], 1) + "\n"
-    lost = unwritten(options.json, text)
-    lost += unwritten(options.junit, junit_xml("faults", [_case(row) for row in rows]))
+    lost = try_write(options.json, text)
+    lost += try_write(options.junit, junit_xml("faults", [_case(row) for row in rows]))
     if options.html is not None:
-        lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
+        lost += try_write(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
     for what in lost:
-        complain("pandion faults", f"cannot write {what}")
+        print_error("pandion faults", f"cannot write {what}")
     return DIFFERS if wrong or lost else AS_EXPECTED
 
 

@@ -19,12 +19,11 @@ from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
-from fsw.autopilot.parameters.storage import load, save
 from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.revision import revision
-from pandion.first_time import compiling
+from fsw.storage.parameter_file import load, save
 from pandion.flown import Result, Verdict, write_json
 from pandion.join_truth import join_truth
 from pandion.references import AnyReference, trajectory
@@ -39,6 +38,7 @@ from sitl.truth_log import TruthLog
 from studies.flight.closed_loop import simulate
 from studies.flight.fly_again import changed_parameters, fly_words
 from studies.flight.job import Job, score
+from studies.flight.kernels import compile_first
 from studies.flight.own_parts import OwnLaw, OwnParts, PushLaw
 from studies.flight.result import FlightResult
 
@@ -124,8 +124,8 @@ def fly(
     parts = OwnParts(planner, controller if own else None, disturbance, allow_slow)
     job = Job("full", flown, config, int(seed))
     if not processes:
-        with compiling():
-            return _in_this_process(job, parts, log=log)
+        compile_first()
+        return _in_this_process(job, parts, log=log)
     if parts != OwnParts(allow_slow=allow_slow) or not safety_filter:
         raise ValueError("processes=True flies no own planner, controller or disturbance")
     given = str(scenario) if isinstance(scenario, str) and reference is None else None

@@ -6,12 +6,13 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read
-from command_line.output import complain, console_beside, say, write_text
+from command_line.output import console_beside, print_error, say, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of
 from command_line.version import version
@@ -34,6 +35,8 @@ TRACKING = KNOWN["tracking"]
 DONE, BROKEN = 0, 1  # exit codes
 WIDTH: Final = 100  # of a table on the terminal, in characters
 KEYS: Final = 2  # columns that name a row
+# The first result of a row, after what names it: the name of a test is the same each night.
+_RESULTS: Final = ("passed", "completed", "x_m", "tc_s", "on_front")
 
 
 def seeds(text: str) -> range:
@@ -116,8 +119,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.drawing import NoMatplotlibError
     from studies.flight.own_parts import OwnPartError
     from studies.paper.settings import NoCellError
@@ -141,7 +144,7 @@ def main(argv: list[str]) -> int:
         SchedulerGoneError,
         OSError,
     ) as error:
-        complain("pandion reproduce", error)
+        print_error("pandion reproduce", error)
         return COULD_NOT_START
 
 
@@ -164,7 +167,7 @@ def _run(options: ReproduceOptions) -> int:
             with campaign_of(options.cluster, journal, report, display.say) as campaign:
                 found = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
-        complain("pandion reproduce", f"interrupted; --out {folder} resumes")
+        print_error("pandion reproduce", f"interrupted; --out {folder} resumes")
         return BROKEN
     page = write(found, settings, _provenance(options), options.what, folder)
     _show(found, console)
@@ -172,7 +175,7 @@ def _run(options: ReproduceOptions) -> int:
     write_text(options.json, rows_text(found))
     write_text(options.junit, junit_xml(options.what, _cases(found)))
     for error in found.errors:
-        complain("pandion reproduce", error)
+        print_error("pandion reproduce", error)
     return BROKEN if found.errors else DONE
 
 
@@ -216,15 +219,15 @@ def _provenance(options: ReproduceOptions) -> tuple[str, ...]:
 def _cases(report: Report) -> list[Case]:
     """A test a row, failed where the paper prints another mark; and one a flight that broke."""
     cases = []
-    for k, row in enumerate(report.rows):
-        named = list(row)[: list(row).index("passed")] if "passed" in row else []
-        name = ", ".join(f"{key} {row[key]}" for key in named) or f"row {k}"
+    for row in report.rows:
+        named = takewhile(lambda key: key not in _RESULTS, row)
+        name = ", ".join(f"{key} {row[key]}" for key in named)
         printed, flown = row.get("paper_completed"), row.get("passed") == row.get("total")
         failure = ""
         if printed is not None and printed != flown:
             mark = "completed" if printed else "not completed"
             failure = f"the paper prints {mark}; {row['passed']} of {row['total']} are completed"
-        cases.append(Case(report.title, name, failure=failure))
+        cases.append(Case(report.title, name, row["took_s"], failure))
     return cases + [Case(report.title, f"error {k}", error=e) for k, e in enumerate(report.errors)]
 
 

@@ -15,7 +15,6 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.signals import StateEstimate, TickOutputs
-from pandion.first_time import compiling
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.plant.integrator import held, step
 from sitl.plant.parameters import plant
@@ -24,6 +23,7 @@ from sitl.scenario import Scenario
 from sitl.simulation import Simulation, Truth
 from sitl.start import effects, first_state, flown_vehicle
 from studies.flight.closed_loop import ScenarioFlight, controls, readings
+from studies.flight.kernels import compile_first
 from studies.flight.mission import target
 from studies.flight.own_parts import Observation, OwnParts, PushLaw, numbers, observed
 from studies.flight.result import FlightResult
@@ -66,8 +66,8 @@ class Simulator:
         self.seed = seed
         self._parts = OwnParts(disturbance=disturbance)
         self._pilot: Autopilot | None = None
-        with compiling():
-            self.reset()
+        compile_first(halves=("sitl",))
+        self.reset()
 
     def reset(self, seed: int | None = None) -> Observation:
         """Begin the flight anew, with another ``seed`` if one is given; what is observed first."""
@@ -194,6 +194,7 @@ class Autopilot:
         """
         if simulator.simulation.step:
             raise RuntimeError("the flight has begun: reset() the simulator first")
+        compile_first(halves=("fsw",))
         config = config or flight_config(body=simulator.scenario.body)
         self._flight = ScenarioFlight(simulator.simulation, config, simulator.seed)
         self._outputs: TickOutputs | None = None

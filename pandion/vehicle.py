@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from command_line.actions import read_action
 from command_line.options import option, switch
-from command_line.output import complain, json_text, say
+from command_line.output import json_text, print_error, say
 from command_line.parser import COULD_NOT_START
 
 if TYPE_CHECKING:
@@ -73,10 +73,10 @@ def main(argv: list[str]) -> int:
     try:
         return act(options)
     except VehicleError as error:
-        complain("pandion vehicle", error)
+        print_error("pandion vehicle", error)
         return REFUSED
     except OSError as error:
-        complain("pandion vehicle", f"cannot write {error.filename}: {error.strerror}")
+        print_error("pandion vehicle", f"cannot write {error.filename}: {error.strerror}")
         return COULD_NOT_START
 
 
@@ -90,19 +90,26 @@ def _list(_: _List) -> int:
 
 
 def _show(options: _Show) -> int:
-    from pandion.vehicle_figures import figures, warnings
+    from pandion.vehicle_figures import figures, start_up, warnings
     from vehicles.vehicle_file import load_vehicle
 
     vehicle = load_vehicle(options.vehicle)
     found = figures(vehicle)
     if options.json:
         told = warnings(vehicle, found)
-        print(json_text(asdict(found) | {"name": vehicle.name, "warnings": told}, 2))
+        print(
+            json_text(
+                asdict(found)
+                | {"name": vehicle.name, "warnings": told, "start_up": start_up(vehicle)},
+                2,
+            )
+        )
         return DONE
     from pandion.vehicle_drawing import drawing
 
     for title, text in _rows(vehicle, found):
         say(f"{title:17} {text}")
+    say(f"{'at start':17} {start_up(vehicle)}")
     for warning in warnings(vehicle, found):
         say(f"{'warning':17} {warning}")
     print(drawing(vehicle))
@@ -137,7 +144,7 @@ def _check(options: _Check) -> int:
     found = figures(vehicle)
     told = warnings(vehicle, found)
     for warning in told:
-        complain("pandion vehicle", f"{vehicle.name}: {warning}")
+        print_error("pandion vehicle", f"{vehicle.name}: {warning}")
     if found.hover_throttle > 1.0:
         return REFUSED
     notes = {0: "no warning", 1: "1 warning"}.get(len(told), f"{len(told)} warnings")
@@ -167,7 +174,7 @@ def _import(options: _Import) -> int:
     text = vehicle_text(vehicle, comment)
     parse_vehicle(text, name)  # every number within its range
     for note in notes:
-        complain("pandion vehicle", note)
+        print_error("pandion vehicle", note)
     if options.out is None:
         print(text, end="")
         return DONE

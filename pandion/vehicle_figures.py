@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from fsw.autopilot.model.airframe import GRAVITY, wrench_of
+from fsw.autopilot.control.tube import limits_used
+from fsw.autopilot.model.airframe import GRAVITY, airframe_of, wrench_of
 from fsw.autopilot.model.multibody import Bodies, bodies_of, posture
+from fsw.autopilot.parameters.consistency import base_reach, loop_tube
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from vehicles.description import Vehicle
+from vehicles.vehicle_file import VehicleError
 
 Array = NDArray[np.float64]
 _POSTURES: Final = 400  # that are drawn within the limits
@@ -57,6 +61,23 @@ def figures(vehicle: Vehicle) -> Figures:
         reach=_reach(vehicle),
         joint_load=tuple(np.max(np.abs(loads), axis=0).tolist()),
         joint_torque=tuple(joint.torque_max for joint in vehicle.joints),
+    )
+
+
+def start_up(vehicle: Vehicle) -> str:
+    """What the flight software's analysis says at start with its default loops, in a sentence."""
+    try:
+        airframe = airframe_of(vehicle)
+    except VehicleError as error:
+        return str(error)
+    config = replace(FlightConfig(), airframe=airframe)
+    pushed, loop = config.surroundings.disturbance, loop_tube(config)
+    used = limits_used(airframe, config.tuning.tracking, loop, pushed)
+    most = max(used, key=lambda name: used[name])
+    reach = base_reach(loop, config.surroundings)
+    return (
+        f"the base stays within {1e3 * reach:.0f} mm of its plan under {pushed:g} m/s^2, "
+        f"which takes {100.0 * used[most]:.0f} % of {most}"
     )
 
 

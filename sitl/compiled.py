@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, ParamSpec, TypeVar, cast
@@ -12,13 +11,8 @@ from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types, types_of
+from command_line.kernel_types import compile_for_types, compile_quietly, types_of
 
-# The shapes' kernels are called by a table of functions (sitl/distance.py), which numba has had for
-# years and still calls new.
-warnings.filterwarnings(
-    "ignore", "First-class function type", numba.NumbaExperimentalFeatureWarning
-)
 tell_layouts_apart(numba.types.Record)
 
 P = ParamSpec("P")
@@ -85,4 +79,5 @@ def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:
     finally:
         numba.config.CACHE_DIR = before
     compile_for_types(dispatcher, numba.types.unliteral)
+    compile_quietly(dispatcher)
     return cast(Callable[P, R], dispatcher)

@@ -1,12 +1,19 @@
-"""What a client that lists the parameters of a vehicle with defaults must see."""
+"""What a client that lists the parameters of a vehicle must see."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from fsw.autopilot.parameters.facts import FACTS
 from fsw.autopilot.parameters.registry import PARAMETERS
 
-_TUNABLE: Final = {parameter.name: parameter.default for parameter in PARAMETERS}
-LISTED: Final = _TUNABLE | {fact.name: fact.read(_TUNABLE) for fact in FACTS}
-"""Every value by name, read-only ones included."""
+
+def listed(kept: Mapping[str, float]) -> dict[str, float]:
+    """Every value by name, read-only ones included, of a vehicle that has kept other ones."""
+    tunable = {parameter.name: parameter.default for parameter in PARAMETERS} | kept
+    return tunable | {fact.name: fact.read(tunable) for fact in FACTS}
+
+
+LISTED: Final = listed({})
+"""With defaults."""

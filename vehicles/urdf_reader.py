@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 MOST_BYTES: Final = 4 * 1024 * 1024
 _MOST_LINKS: Final = 500
+_MOST: Final = 1e6  # of any number, whatever its unit
 _HALF_TURN: Final = np.diag([1.0, -1.0, -1.0])  # about x, from FLU to FRD and back
 _MOVE: Final = ("revolute", "continuous")
 _RATE, _TORQUE = 5.0, 2.0  # rad/s, N m; of a joint that does not say
@@ -174,8 +175,8 @@ def _numbers(element: ET.Element | None, key: str, default: V3) -> Array:
         found = np.array([float(word) for word in text.split()])
     except ValueError:
         found = np.zeros(0)
-    if found.shape != (3,) or not np.isfinite(found).all():
-        raise VehicleError(f"{key} = {shown(text)}: must be 3 finite numbers")
+    if found.shape != (3,) or not (np.abs(found) <= _MOST).all():
+        raise VehicleError(f"{key} = {shown(text)}: must be 3 numbers of at most {_MOST:g}")
     return found
 
 
@@ -187,8 +188,8 @@ def _number(element: ET.Element | None, key: str, default: float) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise VehicleError(f"{key} = {shown(text)}: must be a finite number")
+    if not abs(value) <= _MOST:
+        raise VehicleError(f"{key} = {shown(text)}: must be a number of at most {_MOST:g}")
     return value
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -78,18 +79,19 @@ class Job:
         return hashlib.sha256((repr(distinct) + sources()).encode()).hexdigest()[:32]
 
     def row(self) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
+        began_s = time.thread_time()
         try:
-            return score(self, fly_job(self))
+            return replace(score(self, fly_job(self)), took_s=time.thread_time() - began_s)
         except Exception as error:
             return self.broken(f"{type(error).__name__}: {error}")
 
     def broken(self, reason: str) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return Outcome(self.seed, completed=False, reason=reason, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return kept_row(Outcome, line)
 
 
@@ -118,9 +120,10 @@ class Outcome:
     modes: str = ""  # that the vehicle changed to by itself, in their order
     reported: str = ""  # the text that names the sensor at fault; empty if there was none
     error: bool = False  # the flight itself broke, not the vehicle
+    took_s: float = field(default=0.0, compare=False)  # processor time
 
     def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.campaign.Row`."""
+        """See :class:`studies.campaign.ports.Row`."""
         return asdict(self)
 
 

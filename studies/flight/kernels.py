@@ -12,29 +12,41 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
+
+import numba
 
 from command_line.compile_progress import CompileProgress
 from command_line.kernel_cache import KernelCache
+from command_line.output import say as say_line
 from fsw.autopilot.parameters.control_choice import ControlChoice
 
 HALVES: Final = ("fsw", "sitl")
-_CAMPAIGN: Final = "campaign"
+_COMPLETE: Final = "campaign"  # the mark of a cache that has all kernels of a half
 # Compiling leaves much behind that is not garbage yet: as often as Python looks by itself, looking
 # takes 7 % of the time; so, 2.5 %.
 _YOUNG: Final = 100_000
 _LOOK_S: Final = 0.5
 _SAY_S: Final = 10.0
 
+_failed: set[str] = set()  # halves that could not be compiled first by this process
 
-def compile_first(say: Callable[[str], None]) -> None:
+
+def _on_standard_error(sentence: str) -> None:
+    say_line(f"pandion: {sentence}", sys.stderr)
+
+
+def compile_first(
+    say: Callable[[str], None] = _on_standard_error, halves: Sequence[str] = HALVES
+) -> None:
     """Compile what is not on disk yet, each half in a process of its own, and wait for it.
 
-    ``say`` takes a sentence. If a half cannot be compiled, the first flight will say why.
+    ``say`` takes a sentence. A half that cannot be compiled so is compiled by the first flight,
+    which says why it cannot be; no second attempt is made.
     """
-    due = [half for half in HALVES if _cache(half).is_due(_CAMPAIGN)]
-    if not due:
+    due = [half for half in halves if half not in _failed and _cache(half).is_due(_COMPLETE)]
+    if not due or numba.config.DISABLE_JIT:
         return
     progress = CompileProgress()
     for cache in map(_cache, due):
@@ -44,7 +56,8 @@ def compile_first(say: Callable[[str], None]) -> None:
     # In sessions of their own: an interrupt is for this process, which ends them silently.
     running = [
         subprocess.Popen(
-            [sys.executable, "-m", __name__, half],
+            # -P: a directory of the same name where the user stands must not be imported.
+            [sys.executable, "-P", "-m", __name__, half],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -58,6 +71,7 @@ def compile_first(say: Callable[[str], None]) -> None:
         for one in running:
             one.kill()
             one.wait()
+    _failed.update(half for half in due if _cache(half).is_due(_COMPLETE))
 
 
 def _wait(
@@ -79,7 +93,7 @@ def compile_half(half: str) -> None:
     """Build what flies, or what simulates; either compiles all that it calls."""
     _build(half)
     cache = _cache(half)
-    cache.note(_CAMPAIGN)
+    cache.note(_COMPLETE)
     cache.note(ControlChoice().kernels if half == "fsw" else "flight")
 
 

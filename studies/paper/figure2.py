@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 import numpy as np
 
 from studies.campaign.campaign import Campaign
@@ -20,7 +23,13 @@ _GRID_M = 0.002
 def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Compute and draw the set, which depends on no setting."""
     sets = {name: InverseWorkspace(elbows=elbows) for name, elbows in _ELBOWS.items()}
-    spheres = {name: _spheres(workspace) for name, workspace in sets.items()}
+    took_s: dict[tuple[str, str], float] = {}  # processor time of each sphere
+    spheres: dict[str, dict[str, Inscribed]] = {name: {} for name in sets}
+    for name, workspace in sets.items():
+        for what, find in _SPHERES.items():
+            began_s = time.thread_time()
+            spheres[name][what] = find(workspace)
+            took_s[name, what] = time.thread_time() - began_s
     rows = [
         {
             "elbows": name,
@@ -28,6 +37,7 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
             "x_m": sphere.x_m,
             "d_iw_m": sphere.up_m,
             "radius_m": sphere.radius_m,
+            "took_s": took_s[name, what],
         }
         for name, found in spheres.items()
         for what, sphere in found.items()
@@ -70,13 +80,16 @@ def _numbers(row: dict[str, object]) -> list[float]:
     return [float(str(row[key])) for key in ("x_m", "d_iw_m", "radius_m")]
 
 
-def _spheres(workspace: InverseWorkspace) -> dict[str, Inscribed]:
+def _at_the_papers_centre(workspace: InverseWorkspace) -> Inscribed:
     radius = workspace.inscribed_radius(PAPER.x_m, PAPER.up_m)
-    return {
-        "at the paper's centre": Inscribed(PAPER.x_m, PAPER.up_m, radius),
-        "straight above": workspace.largest(on_axis=True),
-        "anywhere": workspace.largest(),
-    }
+    return Inscribed(PAPER.x_m, PAPER.up_m, radius)
+
+
+_SPHERES: dict[str, Callable[[InverseWorkspace], Inscribed]] = {
+    "at the paper's centre": _at_the_papers_centre,
+    "straight above": lambda workspace: workspace.largest(on_axis=True),
+    "anywhere": InverseWorkspace.largest,
+}
 
 
 def _draw(sets: dict[str, InverseWorkspace], spheres: dict[str, dict[str, Inscribed]]) -> Sheet:

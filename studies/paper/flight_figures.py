@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -51,30 +52,39 @@ def _report(
     name: str, caption: str, case: Case, settings: Settings, campaign: Campaign[Outcome], draw: Draw
 ) -> Report:
     flown = scenario(case, disturbed=True, duration_s=settings.duration_s)
-    flights = _fly(case, flown, settings, campaign)
+    flights, took_s = _fly(case, flown, settings, campaign)
     arrays = {controller: _arrays(flight) for controller, flight in flights.items()}
     return Report(
         title=f"{name.capitalize()}, {settings.plant} plant, seed {settings.seeds[0]}",
-        rows=[_row(name, settings, controller, flight) for controller, flight in flights.items()],
+        rows=[
+            {**_row(name, settings, controller, flight), "took_s": took_s[controller]}
+            for controller, flight in flights.items()
+        ],
         tables=(_table(flights),),
         figures=(Figure(name, caption, draw(arrays, flown).svg(), dict(arrays)),),
         deviations=deviations("flight-figures", settings.plant),
     )
 
 
-def _fly(case: Case, flown: Scenario, settings: Settings, campaign: Campaign[Outcome]) -> Flights:
+def _fly(
+    case: Case, flown: Scenario, settings: Settings, campaign: Campaign[Outcome]
+) -> tuple[Flights, dict[str, float]]:
+    """The flight of each controller, and its processor time [s]."""
     chosen: list[Entrant] = [
         entrant
         for entrant in entrants(case, settings.plant, settings.inner)
         if entrant.comparison == "paper" and entrant.name in TITLES
     ]
     flights: Flights = {}
+    took_s = {}
     for entrant in chosen:
         campaign.report(len(flights), len(chosen))
         job = Job(settings.plant, flown, entrant.config, settings.seeds[0])
+        began_s = time.thread_time()
         flights[entrant.name] = fly_job(job, traced=True)
+        took_s[entrant.name] = time.thread_time() - began_s
     campaign.report(len(chosen), len(chosen))
-    return flights
+    return flights, took_s
 
 
 def _arrays(flight: FlightResult) -> dict[str, list[float]]:

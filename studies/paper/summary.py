@@ -45,6 +45,7 @@ class Summary:
     reported: int  # flights in which a text named the sensor at fault
     text: str  # the most frequent such text
     modes: dict[str, int]  # that vehicles changed to by themselves, with the flights that did
+    took_s: float  # processor time of the distinct flights
 
 
 def fly_cells(
@@ -74,7 +75,8 @@ def fly_jobs(
 def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
     """The numbers of one cell, from the outcome of each of its jobs."""
     total = len(outcomes)
-    flown = len({job.key() for job in jobs})
+    took_s = {job.key(): row.took_s for job, row in zip(jobs, outcomes, strict=True)}
+    flown = len(took_s)
     passed = sum(row.completed for row in outcomes)
     # Unlike the normal approximation, Wilson's interval means something where all passed.
     low, high = binomtest(round(passed * flown / total), flown).proportion_ci(method="wilson")
@@ -109,6 +111,7 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         reported=len(texts),
         text=max(texts, key=texts.count, default=""),
         modes=dict(Counter(row.modes for row in whole if row.modes)),
+        took_s=sum(took_s.values()),
     )
 
 

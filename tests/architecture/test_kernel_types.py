@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from numba import literal_unroll
 
 import fsw.compiled
 import sitl.compiled
+from command_line.kernel_types import compile_quietly
 
 DOORS = {
     "fsw compiled": fsw.compiled.compiled,
@@ -39,3 +43,38 @@ def test_a_kernel_that_is_handed_constants_is_compiled_once_for_all_of_them(door
     assert filled.tolist() == [5.0, 6.0, 7.0, 9.0]
     assert len({signature[1] for signature in inner.signatures}) == 1
     assert not any("Literal" in str(signature) for signature in inner.signatures)
+
+
+def add_one(x: float) -> float:
+    return x + 1.0
+
+
+def add_two(x: float) -> float:
+    return x + 2.0
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_of_a_table_of_kernels_numba_says_nothing_whatever_filters_there_are(door: str) -> None:
+    compile_it: Callable[..., Any] = DOORS[door]
+    table: Any = (compile_it(add_one), compile_it(add_two))
+
+    def add_all(x: float) -> float:
+        for one in literal_unroll(table):
+            x = one(x)
+        return x
+
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert compile_it(add_all)(1.0) == 4.0
+    assert said == []
+
+
+def test_what_else_numba_warns_of_is_heard() -> None:
+    def compile_it(arguments: Any, returned: Any) -> Any:
+        warnings.warn("np.dot() is faster on contiguous arrays", UserWarning, stacklevel=1)
+        return arguments, returned
+
+    dispatcher = SimpleNamespace(_compiler=SimpleNamespace(compile=compile_it))
+    compile_quietly(dispatcher)
+    with pytest.warns(UserWarning, match="contiguous"):
+        assert dispatcher._compiler.compile("arguments", "returned") == ("arguments", "returned")

@@ -167,7 +167,7 @@ def test_flights_of_another_campaign_are_not_mixed_in(
     ("words", "sentence"),
     [
         ([], "--example"),
-        (["nowhere.toml"], "cannot read campaign nowhere.toml"),
+        (["nowhere.toml"], "cannot read nowhere.toml"),
         (["x.toml", "--workers=1", "--scheduler=tcp://a:1"], "not allowed with"),
         (["x.toml", f"--tls-ca-file={__file__}"], "are for a scheduler"),
         (

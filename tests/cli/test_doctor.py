@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import socket
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from command_line.output import EXTRAS
 from pandion import doctor, health_checks
 from pandion.health_checks import FAIL, OK, WARN
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_a_taken_port_is_seen_and_a_free_one_too() -> None:
@@ -46,6 +51,14 @@ def test_an_old_package_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     found = health_checks.versions()
     assert found.state == FAIL
     assert "numpy >= 99, nosuch >= 1" in found.found
+
+
+def test_every_extra_of_the_package_is_looked_for() -> None:
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = pyproject["project"]["optional-dependencies"]
+    del extras["bench"]  # of `python -m benchmarks`, which is not in the wheel
+    named = {(name, re.match("[a-z]+", one)[0]) for name, needs in extras.items() for one in needs}
+    assert named | {("campaign", "dask")} == {(name, one) for one, name in EXTRAS.items()}
 
 
 def test_one_processor_is_not_enough_for_real_time(monkeypatch: pytest.MonkeyPatch) -> None:

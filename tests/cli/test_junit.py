@@ -42,15 +42,19 @@ def test_no_text_breaks_the_document(name: str, sentence: str) -> None:
 
 def test_a_table_of_the_paper_fails_where_the_paper_has_another_mark() -> None:
     rows: list[dict[str, Any]] = [
-        {"case": "I", "controller": "blf", "passed": 20, "total": 20, "paper_completed": True},
-        {"case": "I", "controller": "hc", "passed": 20, "total": 20, "paper_completed": False},
         {
             "case": "I",
-            "controller": "hc + 80 mm",
-            "passed": 3,
+            "controller": controller,
+            "passed": passed,
             "total": 20,
-            "paper_completed": None,
-        },
+            "took_s": took_s,
+            "paper_completed": printed,
+        }
+        for controller, passed, took_s, printed in (
+            ("blf", 20, 1.5, True),
+            ("hc", 20, 2.5, False),
+            ("hc + 80 mm", 3, 3.5, None),
+        )
     ]
     found = reproduced(Report("Table IV", rows, errors=("seed 3: MemoryError",)))
     assert [(one.name, bool(one.failure), bool(one.error)) for one in found] == [
@@ -59,6 +63,7 @@ def test_a_table_of_the_paper_fails_where_the_paper_has_another_mark() -> None:
         ("case I, controller hc + 80 mm", False, False),
         ("error 0", False, True),
     ]
+    assert [one.seconds for one in found] == [1.5, 2.5, 3.5, 0.0]
     assert found[1].failure == "the paper prints not completed; 20 of 20 are completed"
 
 

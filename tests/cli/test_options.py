@@ -28,7 +28,7 @@ from fsw.link.link_choice import LinkChoice
 from pandion.certify import CertifyOptions
 from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions
-from pandion.falsify import FalsifyOptions
+from pandion.falsify_options import FalsifyOptions
 from pandion.fly_verb import FlyOptions
 from pandion.replay import ReplayOptions
 from pandion.report import ReportOptions
@@ -197,6 +197,21 @@ def test_a_lambda_that_would_not_arm_is_refused_before_anything_starts(
 
 def test_a_word_too_many_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
     assert "'extra' is one word too many" in refused(FlyOptions, "walls", "extra", capsys=capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["n", "--loud=yes"], "test: --loud: takes no value; 'yes' was given\n"),
+        (["n", "--count"], "test: --count: a value must follow it\n"),
+        ([], "test: NAME must be given\n"),
+        (["n", "--count=argument expected one argument"], "test: --count: 'argument expected"),
+    ],
+)
+def test_what_is_missing_or_too_much_is_said_in_our_words(
+    words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert refused(Example, *words, capsys=capsys).startswith(sentence)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

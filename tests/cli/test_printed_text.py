@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import io
 import json
 import math
@@ -15,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line.output import complain, json_text, typed
+from command_line.output import command_name, json_text, print_error
 from command_line.printable import printable
 from fsw.link.wire import message_ids as ids
 from messages.frames import FrameWriter
@@ -36,7 +37,7 @@ def test_every_text_prints_as_one_line_and_printable_ones_as_they_are(text: str)
 
 
 def test_sentences_and_tables_show_escapes_as_text(capsys: pytest.CaptureFixture[str]) -> None:
-    complain("pandion", f"no file {ESCAPE}")
+    print_error("pandion", f"no file {ESCAPE}")
     stream = io.StringIO()
     display = Display(stream)
     display.say(f"text {ESCAPE}")
@@ -85,6 +86,21 @@ def test_a_parameter_file_with_escapes_is_reported_without_them(
     assert printed.replace("\n", "").isprintable(), printed
 
 
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (OSError(errno.ENOENT, "No such file or directory", "a.params"), "a.params: No such file"),
+        (OSError(errno.ENOSPC, "No space left on device"), "No space left on device\n"),
+        (OSError("the file is too long"), "the file is too long\n"),
+    ],
+)
+def test_an_error_of_the_system_is_said_without_its_number(
+    error: OSError, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    print_error("pandion", error)
+    assert capsys.readouterr().err.startswith(f"pandion: {sentence}")
+
+
 def test_json_knows_no_nan() -> None:
     value = {"a": math.nan, "b": [math.inf, (-math.inf, 1.5)], "c": {"d": math.nan}, "e": "NaN"}
     assert json.loads(json_text(value)) == {
@@ -95,32 +111,37 @@ def test_json_knows_no_nan() -> None:
     }
 
 
-def test_no_program_writes_json_that_may_hold_nan() -> None:
-    """``json_text`` is the one way out."""
+@pytest.fixture(scope="module")
+def calls() -> list[tuple[str, str, ast.Call]]:
+    """File, name and tree of every call to print or to write JSON in the programs."""
     root = Path(__file__).parents[2]
-    wild = {
-        str(path.relative_to(root))
+    return [
+        (str(path.relative_to(root)), name, node)
         for folder in ("fsw", "sitl", "pandion", "studies", "benchmarks", "command_line", "view")
         for path in (root / folder).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Call)
-        and ast.unparse(node.func) in ("json.dumps", "json.dump")
-        and "allow_nan" not in [keyword.arg for keyword in node.keywords]
+        and (name := ast.unparse(node.func)) in ("json.dumps", "json.dump", "print")
+    ]
+
+
+def test_no_program_writes_json_that_may_hold_nan(calls: list[tuple[str, str, ast.Call]]) -> None:
+    """``json_text`` is the one way out."""
+    wild = {
+        file
+        for file, name, node in calls
+        if name != "print" and "allow_nan" not in [keyword.arg for keyword in node.keywords]
     }
     assert wild == KNOWN
 
 
 @pytest.mark.requirement("REQ-LINK-9")
-def test_every_complaint_is_made_printable() -> None:
+def test_every_complaint_is_made_printable(calls: list[tuple[str, str, ast.Call]]) -> None:
     """``complain`` and ``say`` are the one way to standard error."""
-    root = Path(__file__).parents[2]
     raw = [
-        str(path.relative_to(root))
-        for folder in ("fsw", "sitl", "pandion", "studies", "benchmarks", "command_line", "view")
-        for path in (root / folder).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call)
-        and ast.unparse(node.func) == "print"
+        file
+        for file, name, node in calls
+        if name == "print"
         and any(ast.unparse(keyword.value) == "sys.stderr" for keyword in node.keywords)
     ]
     assert raw == []
@@ -173,8 +194,8 @@ def test_a_printed_command_can_be_typed_where_it_was_printed(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [str(program)])
     monkeypatch.setenv("PATH", "/nowhere")
-    assert typed() == "bin/pandion"
+    assert command_name() == "bin/pandion"
     monkeypatch.setenv("PATH", str(program.parent))
-    assert typed() == "pandion"
+    assert command_name() == "pandion"
     monkeypatch.setattr("sys.argv", ["pytest"])
-    assert typed() == "pandion"
+    assert command_name() == "pandion"

@@ -32,6 +32,7 @@ def test_paper_is_listed_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -> 
     assert code == 0
     assert "hover throttle    50 % of full thrust" in out
     assert "thrust to weight  2.00" in out
+    assert "at start          the base stays within 71 mm of its plan under 0.8 m/s^2" in out
     # Rotor 3 is ahead, 1 behind, 2 to the left, and the arm hangs down.
     rows = [line.strip() for line in out[out.index("from above") :].splitlines()]
     assert rows[1] == "3"
@@ -58,6 +59,17 @@ def test_as_json_the_figures_are_for_programs(capsys: pytest.CaptureFixture[str]
     table = json.loads(out)
     assert (code, table["name"], table["warnings"]) == (0, "paper", [])
     assert table["authority"].keys() == {"roll", "pitch", "yaw"}
+
+
+def test_a_vehicle_that_the_flight_software_does_not_fly_yet_is_shown_with_the_reason(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    across = replace(PAPER.joints[0], axis=(1.0, 0.0, 0.0))
+    path.write_text(vehicle_text(replace(PAPER, joints=(across, PAPER.joints[1]))))
+    code, out, _ = run(capsys, "show", str(path))
+    assert code == 0
+    assert "at start          vehicle mine: the flight software flies an arm like" in out
 
 
 @pytest.mark.parametrize(

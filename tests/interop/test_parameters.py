@@ -20,38 +20,31 @@ from pymavlink.mavparm import MAVParmDict
 
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.parameters.registry import BY_NAME
-from fsw.autopilot.parameters.storage import load
+from fsw.storage.parameter_file import load
 from pandion import param
 from pandion.param_vehicle import NoAnswer, ParameterClient
-from tests.cli.command import clean_up, start
+from tests.interop.vehicle import REAL_TIME, Vehicle, parameter_file
 from tests.parameters_on_the_wire import LISTED
 from tests.processes.both_processes import free_port
 
+PACING = REAL_TIME
 DEFAULTS = LISTED
 
 
 class Ground:
     """A vehicle that stands and waits, and where it listens."""
 
-    def __init__(self, directory: Path) -> None:
-        self.directory = directory
-        self.params = directory / "vehicle.params"
-        self.gcs = free_port()
-        self.process = start(
-            "fly", "ground", "--realtime", "--duration=120", f"--gcs=udp:127.0.0.1:{self.gcs}",
-            f"--params={self.params}", f"--out={directory / 'run'}", cwd=directory,
-        )  # fmt: skip
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.params = parameter_file(vehicle.out.parent)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
-            ear.bind(("127.0.0.1", self.gcs))
+            ear.bind(("127.0.0.1", vehicle.gcs_port))
             ear.settimeout(90.0)
             self.port = int(ear.recvfrom(2048)[1][1])
 
 
 @pytest.fixture(scope="module")
-def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
-    ground = Ground(tmp_path_factory.mktemp("ground"))
-    yield ground
-    clean_up(ground.process)
+def ground(vehicle: Vehicle) -> Ground:
+    return Ground(vehicle)
 
 
 @pytest.fixture

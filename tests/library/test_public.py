@@ -7,14 +7,18 @@ changes this file changes the version in pyproject.toml.
 from __future__ import annotations
 
 import inspect
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+import fsw.compiled
 import pandion
+import sitl.compiled
 from command_line.kernel_cache import KernelCache
+from studies.flight import kernels
 from tests.cli.command import environment
 
 NAMES = """
@@ -86,15 +90,35 @@ def test_what_an_extra_is_missing_for_says_so(
     assert "Traceback" not in done.stderr
 
 
-def test_a_first_flight_says_that_it_compiles(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+COMPILES = """#!/bin/sh
+cd {folder}/$4
+for k in 1 2 3 4 5 6 7 8 9; do touch $k.nbi; done
+sleep 1.2
+{end}
+"""
+
+
+@pytest.mark.parametrize("end", ["touch campaign-numba.complete", "exit 1"])
+def test_a_first_flight_says_how_far_compiling_is_once(
+    end: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    kept: list[str] = []
-    monkeypatch.setattr(KernelCache, "is_due", lambda *_: "library" not in kept)
-    monkeypatch.setattr(KernelCache, "note", lambda _, what: kept.append(what))
-    for expected in (1, 0):
-        pandion.fly("walls", duration_s=0.1, log=False)
-        assert capsys.readouterr().err.count("compiles its kernels") == expected
+    compiler = tmp_path / "compiler"
+    compiler.write_text(COMPILES.format(folder=tmp_path, end=end), encoding="utf-8")
+    compiler.chmod(0o755)
+    for half in (fsw.compiled, sitl.compiled):
+        folder = tmp_path / half.__name__.partition(".")[0]
+        folder.mkdir()
+        kept = KernelCache(folder, 90, "numba")
+        monkeypatch.setattr(half, "cache", lambda kept=kept: kept)
+    monkeypatch.setattr(kernels.sys, "executable", str(compiler))
+    monkeypatch.setattr(kernels, "_SAY_S", 0.0)
+    monkeypatch.setattr(kernels, "_failed", set())
+    pandion.fly("walls", duration_s=0.1, log=False)
+    first, *more = capsys.readouterr().err.splitlines()
+    assert first == "pandion: compiling 180 kernels before the first flight"
+    assert re.fullmatch(r"pandion: compiling: 18 of 180 kernels, about \d+ s left", more[-1])
+    pandion.fly("walls", duration_s=0.1, log=False)
+    assert capsys.readouterr().err == ""
 
 
 def test_importing_it_loads_nothing_that_takes_time() -> None:

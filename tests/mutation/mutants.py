@@ -16,7 +16,7 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.operator import Operator
 from cosmic_ray.plugins import get_operator
 
-from tests.mutation.functions import enclosing
+from tests.mutation.functions import enclosing, not_run
 
 # One or two plausible slips for every construct. cosmic-ray's full list replaces each + by eleven
 # other operators; << of two floats is a type error, which any test finds and which proves nothing.
@@ -86,38 +86,6 @@ class Mutant:
         )
 
 
-Span = tuple[tuple[int, int], tuple[int, int]]
-
-
-def _span(node: Any) -> Span:
-    return (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
-
-
-def _not_run(tree: ast.Module) -> list[Span]:
-    """Where a change changes nothing that flies: annotations, decorators, types, examples."""
-    nodes: list[Any] = []
-    for node in ast.walk(tree):
-        nodes += getattr(node, "decorator_list", [])
-        nodes += filter(None, [getattr(node, "returns", None), getattr(node, "annotation", None)])
-        # The examples of machine code say types only.
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "machine_code":
-            nodes.append(node)
-        # What a warm-up computes is thrown away.
-        if isinstance(node, ast.FunctionDef) and node.name == "warm_up":
-            nodes.append(node)
-        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
-            nodes.append(node)
-    nodes += [node for node in tree.body if isinstance(node, ast.Assign) and _is_type(node.value)]
-    return [_span(node) for node in nodes]
-
-
-def _is_type(value: ast.expr) -> bool:
-    """Whether it reads like an alias: tuple[float, ...] | None."""
-    while isinstance(value, ast.BinOp | ast.Subscript):
-        value = value.left if isinstance(value, ast.BinOp) else value.value
-    return getattr(value, "id", "") in ("tuple", "dict", "Callable", "NDArray", "Vec3")
-
-
 # A star before keyword parameters that became a slash; a length for numpy to find, which any
 # negative number asks for.
 _ALIKE = re.compile(r"(^|[(,])\s*/\s*,|reshape\(- ?2\b")
@@ -138,7 +106,7 @@ def mutants(copy: Path, module: str) -> tuple[Mutant, ...]:
     source = (copy / module).read_text()
     lines = source.splitlines()
     tree = ast.parse(source)
-    skipped, functions = _not_run(tree), enclosing(tree)
+    skipped, functions = not_run(tree), enclosing(tree)
     found: list[tuple[Any, ...]] = []
     parsed = get_ast(source)
     for operator_name, operator in OPERATORS.items():

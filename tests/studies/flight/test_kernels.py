@@ -57,7 +57,7 @@ def test_what_is_not_on_disk_is_compiled_and_an_interrupt_ends_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     compiler, asked = tmp_path / "compiler", tmp_path / "asked"
-    compiler.write_text(f'#!/bin/sh\necho "$$ $3" >> {asked}\nexec sleep 60\n')
+    compiler.write_text(f'#!/bin/sh\necho "$$ $4" >> {asked}\nexec sleep 60\n')
     compiler.chmod(0o755)
     monkeypatch.setattr(kernels.sys, "executable", str(compiler))
     said: list[str] = []

@@ -8,6 +8,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -63,6 +64,7 @@ def test_table_4_has_a_row_for_everyone_in_every_case(table4: Report) -> None:
     }
     everyone = {"naive", "hc", "hc-tightened", "sc", "blf"}
     assert fair == {(name, case) for name in everyone for case in CASES} | {("naive-centred", "II")}
+    assert_timed_and_named(table4)
 
 
 def test_table_4_at_speed_has_every_tightening_and_scenarios_of_its_own() -> None:
@@ -126,6 +128,7 @@ def test_a_figure_has_its_numbers_beside_it(name: str, tmp_path: Path) -> None:
     page = write(report, TINY, (), name, tmp_path).read_text()
     assert_self_contained(page)
     assert "<svg" in page
+    assert_timed_and_named(report)
     assert (tmp_path / f"{name}.svg").read_text().startswith("<?xml")
     numbers = json.loads((tmp_path / f"{name}.json").read_text())
     if name != "fig2":
@@ -140,6 +143,7 @@ def test_table_3_has_the_papers_columns_and_ours() -> None:
     assert {(row["horizon"], row["lambda"]) for row in report.rows} > set(TABLE_3)
     assert {row["horizon"] for row in report.rows if row["ours"]} == {1, 5, 10}
     assert all(row["tc_s"] > 0.0 for row in report.rows)
+    assert_timed_and_named(report)
 
 
 def test_the_reference_costs_tracking_error_only_where_it_is_unsafe() -> None:
@@ -187,9 +191,10 @@ def test_a_slip_is_refused_in_one_sentence(
 def test_the_command_writes_rows_page_and_a_verdict_on_the_seeds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out, rows = tmp_path / "out", tmp_path / "rows.json"
+    out, rows, junit = (tmp_path / name for name in ("out", "rows.json", "junit.xml"))
     words = ["smallest-sphere", "--plant", "double-integrator", "--seeds", "0:1"]
     words += ["--duration", "0.3", "--workers", "0", "--out", str(out), "--json", str(rows)]
+    words += ["--junit", str(junit)]
     assert reproduce.main(words) == 0
     reported = capsys.readouterr().out
     assert "used for tuning" in reported
@@ -199,6 +204,22 @@ def test_the_command_writes_rows_page_and_a_verdict_on_the_seeds(
     lines = (out / "smallest-sphere.md").read_text().splitlines()
     assert len([line for line in lines if line.startswith("| 0.")]) == len(found)
     assert (out / "journal.jsonl").exists()
+    assert [one.get("time") for one in cases(junit)] == [f"{row['took_s']:.3f}" for row in found]
+    assert all(row["took_s"] > 0.0 for row in found)
+    assert reproduce.main(words) == 0  # from the journal, with the times that it keeps
+    assert json.loads(rows.read_text()) == found
+
+
+def cases(junit: Path) -> list[ET.Element]:
+    return ET.parse(junit).findall("testsuite/testcase")
+
+
+def assert_timed_and_named(report: Report) -> None:
+    """As tests of a night's JUnit XML: each with the time it took, and the same name each night."""
+    found = reproduce._cases(report)
+    assert all(case.seconds > 0.0 for case in found)
+    assert len({case.name for case in found}) == len(found)
+    assert not any(result in case.name for case in found for result in ("tc_s", "radius_m"))
 
 
 def assert_self_contained(page: str) -> None:
