@@ -6,7 +6,7 @@ import sys
 from importlib import import_module
 from typing import Final
 
-from command_line.output import complain
+from command_line.output import print_error
 from command_line.parser import COULD_NOT_START, unknown_name
 
 _INTERRUPTED: Final = 1  # exit code
@@ -43,12 +43,12 @@ def main(argv: list[str] | None = None) -> int:
     name, *options = words
     if name not in BENCHMARKS:
         sentence = unknown_name("benchmark", name, BENCHMARKS)
-        complain("python -m benchmarks", sentence)
+        print_error("python -m benchmarks", sentence)
         return COULD_NOT_START
     try:
         return int(import_module(f"benchmarks.{name}").main(options))
     except KeyboardInterrupt:
-        complain(f"python -m benchmarks {name}", "interrupted")
+        print_error(f"python -m benchmarks {name}", "interrupted")
         return _INTERRUPTED
 
 

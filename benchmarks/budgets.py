@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-MOST_OTHER_LOAD: Final = 0.25  # processors that other programs may use while we measure
-MOST_STOLEN: Final = 0.02  # share of the machine that its host may take away
-MOST_STOPPED: Final = 0.0005  # share of the time; half the releases that a flight may be late for
+MAX_OTHER_LOAD: Final = 0.25  # processors that other programs may use while we measure
+MAX_STOLEN: Final = 0.02  # share of the machine that its host may take away
+MAX_STOPPED: Final = 0.0005  # share of the time; half the releases that a flight may be late for
 
 Budgets = Mapping[str, Mapping[str, float]]
 
@@ -63,8 +63,8 @@ class MachineNoise:
     @property
     def too_much(self) -> bool:
         """Whether the figures say something about the machine rather than about us."""
-        quiet = self.others <= MOST_OTHER_LOAD and self.stolen <= MOST_STOLEN
-        return not (quiet and (self.stopped is None or self.stopped <= MOST_STOPPED))
+        quiet = self.others <= MAX_OTHER_LOAD and self.stolen <= MAX_STOLEN
+        return not (quiet and (self.stopped is None or self.stopped <= MAX_STOPPED))
 
 
 def load_budgets(path: Path | None = None) -> Budgets:

@@ -17,7 +17,7 @@ from typing import Any, Final
 from benchmarks.download_client import DownloadClient, NothingCame
 from benchmarks.machine_watch import version_and_machine
 from command_line.options import json_file, option, read
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import number
 from fsw.link.files.flight_logs import MARK
 from pandion.display import Display
@@ -82,7 +82,7 @@ def main(argv: list[str]) -> int:
     try:
         fetched = measure(int(options.size_mb * _MB), Display(console))
     except (ProcessFailed, NothingCame) as error:
-        complain("python -m benchmarks download", error)
+        print_error("python -m benchmarks download", error)
         return error.exit_code if isinstance(error, ProcessFailed) else NOT_PASSED
     for each in fetched.downloads:
         same = "identical" if each.identical else "NOT identical"

@@ -21,7 +21,7 @@ from benchmarks.flood_traffic import SYSTEM
 from benchmarks.machine_watch import version_and_machine
 from benchmarks.requirement import Requirement, print_requirements
 from command_line.options import json_file, option, read
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
@@ -30,8 +30,8 @@ from pandion.supervisor import ProcessFailed, Supervisor
 PASSED, NOT_PASSED = 0, 1  # exit codes
 RATE_HZ: Final = 5000.0
 SETTLE_S: Final = 2.0  # of a flight, before anything is counted
-MOST_GAP_S: Final = 1.5
-MOST_ACK_S: Final = 0.050
+MAX_GAP_S: Final = 1.5
+MAX_ACK_S: Final = 0.050
 RATE_TOLERANCE: Final = 0.10
 # Two flights on one machine differ by this much without any flood.
 LATENESS_FACTOR: Final = 1.25
@@ -70,7 +70,7 @@ def main(argv: list[str]) -> int:
         calm = measure(options.duration_s, flooded=False, display=Display(console))
         flooded = measure(options.duration_s, flooded=True, display=Display(console))
     except ProcessFailed as error:
-        complain("python -m benchmarks flood", error)
+        print_error("python -m benchmarks flood", error)
         return error.exit_code
     rows = [*correctness(flooded), *timing(flooded, calm)]
     print_requirements(rows, console)
@@ -173,11 +173,11 @@ def timing(flight: Flight, calm: Flight) -> list[Requirement]:
         Requirement(
             "command to acknowledgement, longest",
             max(heard.acknowledged_s, default=9.9),
-            MOST_ACK_S,
+            MAX_ACK_S,
             "s",
         ),
         Requirement("changes of mode", max(len(heard.modes) - 1, 0), 0, ""),
-        Requirement("heartbeat, largest gap", max(gaps, default=float("nan")), MOST_GAP_S, "s"),
+        Requirement("heartbeat, largest gap", max(gaps, default=float("nan")), MAX_GAP_S, "s"),
         Requirement("commands without an answer", heard.asked - len(heard.acknowledged_s), 1, ""),
         Requirement("telemetry rate, largest deviation", rate_deviation(heard), RATE_TOLERANCE, ""),
     ]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 from command_line.options import json_file, option, read
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
 from command_line.version import version
@@ -30,7 +30,7 @@ from sitl.scenario_file import PERFECT, SUITE_NAMES, ScenarioError, load_scenari
 DONE, SLOW = 0, 1  # exit codes
 TARGET: Final = 25.0  # times real time, at 500 Hz
 PEER: Final = "benchmarks.pymavlink_process"
-LEAST_RATIO: Final = 0.85  # of a suite of sensors, to the speed with exact states
+MIN_RATIO: Final = 0.85  # of a suite of sensors, to the speed with exact states
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ def main(argv: list[str]) -> int:
     try:
         found = _measure(options, console)
     except (ProcessFailed, ScenarioError, OSError) as error:
-        complain("python -m benchmarks lockstep", error)
+        print_error("python -m benchmarks lockstep", error)
         return COULD_NOT_START
     write_text(options.json, json_text(found, 1) + "\n")
     print("\n".join(_lines(found)), file=console)
@@ -75,7 +75,7 @@ def main(argv: list[str]) -> int:
 def _met(found: dict[str, Any]) -> bool:
     if found["sensors"] == PERFECT:
         return bool(found["real_time_factor_best"] >= TARGET)
-    return bool(found["ratio"] >= LEAST_RATIO)
+    return bool(found["ratio"] >= MIN_RATIO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +222,7 @@ def _lines(found: dict[str, Any]) -> list[str]:
     else:
         last = [
             f"{factor} times real time",
-            f"{found['ratio']:.2f} times as fast as with exact states (target {LEAST_RATIO:g}: "
+            f"{found['ratio']:.2f} times as fast as with exact states (target {MIN_RATIO:g}: "
             f"{met}), best to best {found['ratio_best']:.2f}",
         ]
     return [

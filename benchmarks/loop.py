@@ -19,7 +19,7 @@ from benchmarks.budgets import BudgetRow, Budgets, judge, load_budgets, result
 from benchmarks.machine_watch import Watch
 from benchmarks.values import several
 from command_line.options import json_file, option, read
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import seconds, whole
 from command_line.version import version
@@ -68,10 +68,10 @@ def main(argv: list[str]) -> int:
     try:
         flown = [_measure(options, hogs, budgets, console) for hogs in options.hogs]
     except ProcessFailed as error:
-        complain("python -m benchmarks loop", error)
+        print_error("python -m benchmarks loop", error)
         return error.exit_code
     except ScenarioError as error:
-        complain("python -m benchmarks loop", error)
+        print_error("python -m benchmarks loop", error)
         return COULD_NOT_START
     machine["load_after"] = round(os.getloadavg()[0], 2)
     for measured in flown:

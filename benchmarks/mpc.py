@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.values import several
 from command_line.options import json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from command_line.version import version
@@ -48,7 +48,7 @@ def main(argv: list[str]) -> int:
     try:
         return _run(options)
     except OSError as error:
-        complain(_PROGRAM, error)
+        print_error(_PROGRAM, error)
         return COULD_NOT_START
 
 

@@ -52,7 +52,7 @@ class EmptyRow:
     error: bool = False
 
     def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.campaign.Row`."""
+        """See :class:`studies.campaign.ports.Row`."""
         return asdict(self)
 
 
@@ -63,19 +63,19 @@ class EmptyFlight:
     number: int
 
     def key(self) -> str:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return str(self.number)
 
     def row(self) -> EmptyRow:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return EmptyRow(self.number)
 
     def broken(self, reason: str) -> EmptyRow:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return EmptyRow(self.number, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> EmptyRow:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return EmptyRow(**line)
 
 

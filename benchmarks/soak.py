@@ -25,7 +25,7 @@ from benchmarks.requirement import Requirement, print_requirements
 from benchmarks.soak_client import ANSWER_S, COMPONENT, GAP_S, SYSTEM, Client
 from benchmarks.soak_faults import scenario
 from command_line.options import json_file, option, read
-from command_line.output import complain, console_beside, json_text, write_text
+from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import number, whole
 from pandion.display import Display
 from pandion.supervisor import Flown, ProcessFailed, Supervisor
@@ -33,17 +33,17 @@ from pandion.supervisor import Flown, ProcessFailed, Supervisor
 PASSED, NOT_PASSED = 0, 1  # exit codes
 _GLANCE_S: Final = 5.0
 _SETTLED_S: Final = 120.0  # from here on nothing may grow
-_LEAST_GLANCES: Final = 24  # two minutes, to say anything
+_MIN_GLANCES: Final = 24  # two minutes, to say anything
 # Of the time, that a process must have lived for its memory to be judged: what one takes once in
 # some minutes is not what it takes in an hour. A planner that nothing happens to lives for half.
-_LEAST_LIFE: Final = 0.25
-_MOST_GROWTH_MB_H: Final = 10.0
+_MIN_LIFE: Final = 0.25
+_MAX_GROWTH_MB_H: Final = 10.0
 _ONCE_MB: Final = 4.0  # that a process may take once: programs kept ready, code that is loaded late
 _STEP: Final = 1.5  # what is taken at once in the middle makes a line rise by so much of it
 _PARTS: Final = 3  # of a process's life: a leak grows in each, what is taken once in one
 _STARVED: Final = 0.1  # of the time that a process waits for a processor: it is not alone
-_MOST_FLIGHTS: Final = 3  # an hour: what is injected should not end them
-_MOST_GROUNDED: Final = 0.5  # of the time; a soak of a vehicle that stands says little
+_MAX_FLIGHTS: Final = 3  # an hour: what is injected should not end them
+_MAX_GROUNDED: Final = 0.5  # of the time; a soak of a vehicle that stands says little
 _RECORDED: Final = ["COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"]
 # A battery lasts 16 minutes: an empty one is told, and neither lands the vehicle nor keeps it down.
 _PARAMETERS: Final = """# Pandion
@@ -132,7 +132,7 @@ def main(argv: list[str]) -> int:
             flights.append(one)
             display.say(f"flight {len(flights)}: {one.flown_s:.0f} s, {one.ended}")
     except ProcessFailed as error:
-        complain("python -m benchmarks soak", error)
+        print_error("python -m benchmarks soak", error)
         return error.exit_code
     rows = judge(flights)
     print_requirements(rows, console)
@@ -200,7 +200,7 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
     growth: dict[str, tuple[float, float]] = {}  # and what it may be; of the worst process
     for one in flights:
         for name, glances in one.glances.items():
-            for what, found in grown(glances, _LEAST_LIFE * one.flown_s).items():
+            for what, found in grown(glances, _MIN_LIFE * one.flown_s).items():
                 kind = f"{name.split()[0]}: {what}"
                 worst = growth.setdefault(kind, found)
                 growth[kind] = max(worst, found, key=lambda it: it[0] - it[1])
@@ -217,8 +217,8 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
             0,
             "",
         ),
-        Requirement("flights an hour", len(flights) / max(hours, 1.0), _MOST_FLIGHTS, ""),
-        Requirement("share of the time on the ground", 1.0 - aloft_s / flown_s, _MOST_GROUNDED, ""),
+        Requirement("flights an hour", len(flights) / max(hours, 1.0), _MAX_FLIGHTS, ""),
+        Requirement("share of the time on the ground", 1.0 - aloft_s / flown_s, _MAX_GROUNDED, ""),
     ]
     # What did not live for long enough is not judged, and says nothing.
     unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "planner", "sitl"))
@@ -267,15 +267,15 @@ def waited(glances: list[Glance]) -> tuple[float, float] | None:
     return share[0], max(share)
 
 
-def grown(glances: list[Glance], least_s: float = 0.0) -> dict[str, tuple[float, float]]:
+def grown(glances: list[Glance], min_s: float = 0.0) -> dict[str, tuple[float, float]]:
     """By what a process has grown since it had settled, and by what it may.
 
     Memory [MB/h] twice: by a line through all of it, and as it grows at least in each part, which
     tells a leak from what is taken once. It is left out of a process that was seen for less than
-    ``least_s`` [s].
+    ``min_s`` [s].
     """
     settled = [one for one in glances if one.at_s >= glances[0].at_s + _SETTLED_S]
-    if len(settled) < _LEAST_GLANCES:
+    if len(settled) < _MIN_GLANCES:
         return {}
     quarter = max(len(settled) // 4, 1)
     first, last = settled[:quarter], settled[-quarter:]
@@ -283,15 +283,15 @@ def grown(glances: list[Glance], least_s: float = 0.0) -> dict[str, tuple[float,
         "handles": (max(one.handles for one in last) - max(one.handles for one in first), 0.0),
         "threads": (max(one.threads for one in last) - max(one.threads for one in first), 0.0),
     }
-    if glances[-1].at_s - glances[0].at_s < least_s:
+    if glances[-1].at_s - glances[0].at_s < min_s:
         return found
     hours = (settled[-1].at_s - settled[0].at_s) / 3600.0
     ends = [round(k * len(settled) / _PARTS) for k in range(_PARTS + 1)]
     parts = [settled[begin:end] for begin, end in pairwise(ends)]
-    once = max(_MOST_GROWTH_MB_H, _STEP * _ONCE_MB / hours)
+    once = max(_MAX_GROWTH_MB_H, _STEP * _ONCE_MB / hours)
     return found | {
         "memory": (_slope(settled), once),
-        "memory, steady": (min(map(_slope, parts)), _MOST_GROWTH_MB_H),
+        "memory, steady": (min(map(_slope, parts)), _MAX_GROWTH_MB_H),
     }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from command_line.options import read
-from command_line.output import complain
+from command_line.output import print_error
 from command_line.parser import COULD_NOT_START, Parser, unknown_name
 
 Actions = Mapping[str, tuple[type[Any], Callable[..., int], str]]
@@ -29,7 +29,7 @@ def read_action(
         print(f"`{prog} ACTION --help` prints the options of an action.")
         return 0
     if argv[0] not in actions:
-        complain(prog, unknown_name("action", argv[0], actions))
+        print_error(prog, unknown_name("action", argv[0], actions))
         return COULD_NOT_START
     kind, act, what = actions[argv[0]]
     return read(kind, f"{prog} {argv[0]}", what, argv[1:]), act

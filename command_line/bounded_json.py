@@ -9,7 +9,7 @@ from typing import Any, Final, NoReturn
 
 from command_line.bounded_file import read_bounded
 
-MOST_DEPTH: Final = 16  # of arrays and objects in each other; what we write has 5
+MAX_DEPTH: Final = 16  # of arrays and objects in each other; what we write has 5
 _LARGEST: Final = 1 << 64  # of an integer
 
 
@@ -77,7 +77,7 @@ def json_numbers(text: str | bytes) -> dict[str, float]:
 def _check(found: dict[str, Any]) -> None:
     """Level by level, so that depth costs no stack."""
     level: list[Any] = [found]
-    for _ in range(MOST_DEPTH):
+    for _ in range(MAX_DEPTH):
         inner: list[Any] = []
         for one in level:
             parts = one if isinstance(one, list) else [*one, *one.values()]
@@ -103,7 +103,7 @@ def _is_unicode(text: str) -> bool:
 
 
 def _too_deep() -> JsonError:
-    return JsonError(f"is nested too deeply: must be at most {MOST_DEPTH} levels")
+    return JsonError(f"is nested too deeply: must be at most {MAX_DEPTH} levels")
 
 
 def _no_number(name: str) -> NoReturn:

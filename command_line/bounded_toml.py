@@ -6,14 +6,14 @@ import re
 import tomllib
 from typing import Any, Final
 
-MOST_PARTS: Final = 16  # of a dotted key; what we write has 2
+MAX_PARTS: Final = 16  # of a dotted key; what we write has 2
 # The library keeps every beginning of a dotted key: 100,000 parts would take tens of gigabytes. So
 # keys are counted first, token by token as the library reads them: no character is looked at more
 # often than the pattern has alternatives, whatever the quotes around it.
 _KEY: Final = r"""(?:[\w-]++|"(?!"")(?:[^"\\\n]|\\[^\n])*+"|'(?!'')[^'\n]*+')"""
 _DOT: Final = r"[ \t]*+\.[ \t]*+"
 _TOKEN: Final = re.compile(
-    rf"(?P<long>{_KEY}(?:{_DOT}{_KEY}){{{MOST_PARTS}}})"
+    rf"(?P<long>{_KEY}(?:{_DOT}{_KEY}){{{MAX_PARTS}}})"
     rf"|{_KEY}(?:{_DOT}{_KEY})*+"
     r'|"""(?:[^"\\]|\\.|"(?!""))*+"{3,5}'
     r"|'''(?:[^']|'(?!''))*+'{3,5}"
@@ -38,7 +38,7 @@ def toml_table(text: str) -> dict[str, Any]:
         if token.lastgroup == "open":
             break  # a string without an end: the library reads no further either
         if token.lastgroup == "long":
-            raise TomlError(f"nested too deeply: a key must have at most {MOST_PARTS} parts")
+            raise TomlError(f"nested too deeply: a key must have at most {MAX_PARTS} parts")
     try:
         return tomllib.loads(text)
     except RecursionError:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from command_line.output import complain
+from command_line.output import print_error
 from command_line.parser import Parser
 from command_line.values import one_of, output_file
 
@@ -149,7 +149,7 @@ class Option:
             def __call__(
                 self, parser: Any, namespace: Any, values: Any, option_string: str | None = None
             ) -> None:
-                complain(
+                print_error(
                     parser.prog,
                     f"{option_string} is now {new}; "
                     "the old name will be removed in the next release",

@@ -61,7 +61,7 @@ def say(sentence: str, stream: TextIO | None = None) -> None:
     print(printable(sentence) + "\n", end="", file=stream or sys.stdout, flush=True)
 
 
-def complain(program: str, sentence: object) -> None:
+def print_error(program: str, sentence: object) -> None:
     """Print what is wrong in one line on standard error; of an OSError without its number.
 
     Raises:
@@ -76,7 +76,7 @@ def complain(program: str, sentence: object) -> None:
     say(f"{program}: {sentence}", sys.stderr)
 
 
-def typed(program: str = "pandion") -> str:
+def command_name(program: str = "pandion") -> str:
     """How this program is typed in the shell that started it: by its path where PATH has it not."""
     started = Path(sys.argv[0]) if sys.argv else Path()
     found = shutil.which(program)
@@ -113,7 +113,7 @@ def write_text(target: str | None, text: str) -> None:
         Path(target).write_text(text, encoding="utf-8")
 
 
-def unwritten(target: str | Path | None, text: str) -> list[str]:
+def try_write(target: str | Path | None, text: str) -> list[str]:
     """Write to a target as ``write_text`` does; returns what could not be written, and why."""
     try:
         write_text(None if target is None else str(target), text)

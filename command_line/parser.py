@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from typing import NoReturn
 
-from command_line.output import complain
+from command_line.output import print_error
 
 COULD_NOT_START = 2  # exit code
 _IN_OUR_WORDS = {
@@ -18,7 +18,7 @@ _IN_OUR_WORDS = {
     "expected one argument$": "a value must follow it",
     "^the following arguments are required: (.*)$": r"\1 must be given",
 }
-_MOST_NAMES = 40  # in a sentence; a vehicle has 200 parameters
+_MAX_NAMES = 40  # in a sentence; a vehicle has 200 parameters
 
 
 class Parser(argparse.ArgumentParser):
@@ -45,7 +45,7 @@ class Parser(argparse.ArgumentParser):
         """Say what is wrong in one sentence and exit with code 2."""
         for said, ours in _IN_OUR_WORDS.items():
             message = re.sub(said, ours, message)
-        complain(self.prog, message)
+        print_error(self.prog, message)
         raise SystemExit(COULD_NOT_START)
 
     def _option_names(self) -> list[str]:
@@ -60,7 +60,7 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     nearest = difflib.get_close_matches(name.lstrip("-"), names, n=1, cutoff=0.51)
     if nearest:
         hint = f"did you mean {names[nearest[0]]}?"
-    elif len(names) > _MOST_NAMES:
+    elif len(names) > _MAX_NAMES:
         hint = f"none of the {len(names)} that there are is like it"
     else:
         hint = f"known: {', '.join(names.values())}"

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.output import json_text, unwritten
+from command_line.output import json_text, try_write
 from command_line.process import (
     NOT_COMPLETED,
     CouldNotStart,
@@ -32,8 +32,9 @@ from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
-from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.sim_link import SimLink
 from fsw.link.udp_endpoint import LinkError, parse_address
+from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.log.flight_log import LogSubject
 from fsw.log.revision import revision
@@ -41,6 +42,7 @@ from fsw.log.run_directory import run_directory
 from fsw.log.run_files import RunFiles
 from fsw.runtime import clock, report
 from fsw.runtime.console import Console
+from fsw.runtime.flight_loop import START_US, Ending, FlightEnd, FlightLoop, FlightRecord
 from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
 from fsw.runtime.process import in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
@@ -50,11 +52,10 @@ from fsw.runtime.realtime import (
     release_real_time,
     scheduler,
 )
-from fsw.runtime.sim_loop import START_US, Ending, FlightEnd, FlightRecord, SimLoop
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
-    from fsw.autopilot.parameters.kept_file import ParameterFile
+    from fsw.storage.kept_file import ParameterFile
 
 DONE: Final = 0  # exit code
 
@@ -101,7 +102,7 @@ class _Session:
         inbox = Inbox(options.links.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
-        sim = SimLink(simulator, inbox, facts, clock.now_us)
+        vehicle: VehicleLink = SimLink(simulator, inbox, facts, clock.now_us)
         autopilot = AUTOPILOTS[options.links.autopilot]
         context = TelemetryContext(
             facts,
@@ -125,21 +126,21 @@ class _Session:
         ports = {link.name: link.port for link in ground.links if link.port is not None}
         self._events.report("links", "", ports=ports)
         console = Console(self._events, START_US)
-        loop = SimLoop(
-            *(program, sim, ground, inbox, record, clock.now_us, self._stop, files),
+        loop = FlightLoop(
+            *(program, vehicle, ground, inbox, record, clock.now_us, self._stop, files),
             tell=console.observe,
         )
         try:
-            end = self._fly(loop, sim, program.planner, planner, record)
+            end = self._fly(loop, vehicle, program.planner, planner, record)
         finally:
-            for part in (planner, sim, ground, files, keeping, console):
+            for part in (planner, vehicle, ground, files, keeping, console):
                 part.close()
         result = report.as_json(options.control, facts, end, record)
-        result["retransmissions"] = sim.retransmissions
+        result["retransmissions"] = vehicle.retransmissions
         result["inbox_refused"] = inbox.refused
         result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
-        lost = unwritten(directory / "fsw.json", json_text(result, 2) + "\n")
+        lost = try_write(directory / "fsw.json", json_text(result, 2) + "\n")
         sentence = f"fsw: {end.sentence}"
         self._events.report("ended", sentence, ending=end.ending.value, result=result)
         for what in lost:
@@ -184,8 +185,8 @@ class _Session:
             CouldNotStart: The file cannot be read or written, or contradicts itself.
         """
         # Imported here because they take a second, which the other refusals need not wait.
-        from fsw.autopilot.parameters.kept_file import ParameterFile
         from fsw.runtime.assembly import configured
+        from fsw.storage.kept_file import ParameterFile
 
         path, record = self._options.params, directory / "parameters.params"
         try:
@@ -213,8 +214,8 @@ class _Session:
 
     def _fly(
         self,
-        loop: SimLoop[Any],
-        sim: SimLink,
+        loop: FlightLoop[Any],
+        vehicle: VehicleLink,
         inline: PlanningCycle,
         planner: ProcessPlanner,
         record: FlightRecord,
@@ -230,7 +231,7 @@ class _Session:
                 f"no simulator answered at {options.sim} within {options.wait_s:g} s"
             )
         # Lockstep announces itself with the first step; a first step without it was not the first.
-        if sim.pacing is Pacing.LOCKSTEP:
+        if vehicle.pacing is Pacing.LOCKSTEP:
             settle_memory()
             record.scheduler = scheduler()
             return loop.fly(first, InlinePlanner(inline, clock.now_us, record.mpc))
@@ -283,13 +284,13 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
     }
     if options.seed is not None:
         facts["seed"] = options.seed
-    vehicle = program.facts
+    airframe = program.facts
     return LogSubject(
         facts=facts,
         numbers=program.numbers,
         parameters=program.parameters.values,
-        thrust_max=vehicle.rotor_thrust_max,
-        link_length=vehicle.link_length,
+        thrust_max=airframe.rotor_thrust_max,
+        link_length=airframe.link_length,
         profile=round(program.parameters.values["LOG_PROFILE"]),
     )
 

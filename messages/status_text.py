@@ -9,7 +9,7 @@ from messages.frames import Frame
 
 STATUSTEXT = 253  # the message's id
 _SIZE = 50  # bytes of text in one message
-_MOST_PIECES = 255
+_MAX_PIECES = 255
 
 
 def pieces(sentence: str, severity: int, text_id: int) -> list[tuple[int, bytes, int, int]]:
@@ -20,7 +20,7 @@ def pieces(sentence: str, severity: int, text_id: int) -> list[tuple[int, bytes,
     whole = sentence.encode("utf-8")
     if len(whole) <= _SIZE:
         return [(severity, whole, 0, 0)]
-    starts = range(0, min(len(whole), _MOST_PIECES * _SIZE), _SIZE)
+    starts = range(0, min(len(whole), _MAX_PIECES * _SIZE), _SIZE)
     return [(severity, whole[at : at + _SIZE], text_id, n) for n, at in enumerate(starts)]
 
 

@@ -15,8 +15,8 @@ _STAMP: Final = 8  # bytes before each frame: microseconds, big-endian
 _SIGNATURE: Final = 13
 _MAGIC_1, _MAGIC_2 = 0xFE, 0xFD
 _MARKER: Final = re.compile(b"[\xfe\xfd]")
-_MOST_UNKNOWN: Final = 4  # frames of unknown messages in a row
-_MOST_FAILED: Final = 1_000_000  # markers in a row that begin no frame: seconds of looking
+_MAX_UNKNOWN: Final = 4  # frames of unknown messages in a row
+_MAX_FAILED: Final = 1_000_000  # markers in a row that begin no frame: seconds of looking
 
 
 class TlogFrames:
@@ -33,7 +33,7 @@ class TlogFrames:
 
     def __iter__(self) -> Iterator[tuple[float, Frame]]:
         log, at, failed = self._log, 0, 0
-        while at + _STAMP + 3 <= len(log) and failed < _MOST_FAILED:
+        while at + _STAMP + 3 <= len(log) and failed < _MAX_FAILED:
             start = at + _STAMP
             length, frame = frame_at(log, start)
             end = start + self._size(start)
@@ -47,7 +47,7 @@ class TlogFrames:
                 further = len(log) if marker is None else marker.start() - _STAMP
                 self.skipped += further - at
                 at, failed = further, failed + 1
-        self.unread = len(log) - at if failed == _MOST_FAILED else 0
+        self.unread = len(log) - at if failed == _MAX_FAILED else 0
         self.skipped += len(log) - at - self.unread
 
     def _size(self, start: int) -> int:
@@ -64,7 +64,7 @@ class TlogFrames:
 
         A few that cannot may lie between, or the log may end there.
         """
-        for _ in range(_MOST_UNKNOWN):
+        for _ in range(_MAX_UNKNOWN):
             if end == len(self._log):
                 return True
             start = end + _STAMP

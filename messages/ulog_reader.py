@@ -22,7 +22,7 @@ from messages.ulog import Field, Topic
 _HEADER: Final = Struct("<Hc")
 _KEY = re.compile(r"(?P<type>\w+)(?:\[(?P<count>\d{1,5})\])? (?P<name>\S+)")
 _NAME = re.compile(r"\w+", re.ASCII)  # of a topic; it also names a file of an export
-_MOST_BYTES: Final = 65533  # of a record behind its number
+_MAX_BYTES: Final = 65533  # of a record behind its number
 _TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
 _DEEPEST: Final = 8  # types inside one another
 _APPENDED: Final = 1  # bit of the flags: data was appended behind the end
@@ -183,8 +183,8 @@ class UlogFile:
             whole = struct.calcsize("<" + "".join(one.code for one in fields))
             if not fields or (fields[0].name, fields[0].type) != ("timestamp", "uint64_t"):
                 continue
-            if whole > _MOST_BYTES:
-                raise ValueError(f"{name} has records of more than {_MOST_BYTES} bytes")
+            if whole > _MAX_BYTES:
+                raise ValueError(f"{name} has records of more than {_MAX_BYTES} bytes")
             while fields[-1].is_padding:
                 fields.pop()
             self.formats[name] = Topic(name, "", "", tuple(fields[1:]))
@@ -201,7 +201,7 @@ class UlogFile:
                 raise ValueError(f"{one.name} has the unknown type {one.type!r}")
             else:
                 inner = tuple(self._flat(self._declared[one.type], depth + 1))
-                if len(inner) * (one.count or 1) > _MOST_BYTES:
+                if len(inner) * (one.count or 1) > _MAX_BYTES:
                     raise ValueError(f"{one.name} has too many fields")
                 for k in range(one.count or 1):
                     where = f"{one.name}[{k}]" if one.count else one.name

@@ -13,7 +13,7 @@ from pandion.own_modules import put_first
 
 put_first()
 
-from command_line.output import EXTRAS, complain, print_anything, without  # noqa: E402
+from command_line.output import EXTRAS, print_anything, print_error, without  # noqa: E402
 from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
 
 # Module, and what the verb does, by what it is for.
@@ -114,15 +114,15 @@ def main(argv: list[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRAS:
             raise
-        complain("pandion", without(error, EXTRAS[error.name]))
+        print_error("pandion", without(error, EXTRAS[error.name]))
         return COULD_NOT_START
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         _silence_stdout()
-        complain("pandion", f"cannot write {error.filename or 'output'}: disk full")
+        print_error("pandion", f"cannot write {error.filename or 'output'}: disk full")
     except KeyboardInterrupt:
-        complain("pandion", "interrupted")
+        print_error("pandion", "interrupted")
     return _INTERRUPTED
 
 
@@ -150,7 +150,7 @@ def _run(words: list[str]) -> int:
     if name not in VERBS and name not in _MOVED:
         what = "option" if name.startswith("-") else "verb"
         known = ("--help", "--version") if what == "option" else VERBS
-        complain("pandion", unknown_name(what, name, known))
+        print_error("pandion", unknown_name(what, name, known))
         return COULD_NOT_START
     module = VERBS[name][0] if name in VERBS else _MOVED[name]
     entry = import_module(module).main

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from command_line.junit import junit_xml
 from command_line.options import as_words, group, json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, say, typed, unwritten
+from command_line.output import command_name, console_beside, json_text, print_error, say, try_write
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from command_line.version import version
@@ -61,9 +61,9 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
     from studies.campaign.plan import EXAMPLE, load_plan
+    from studies.campaign.ports import SchedulerGoneError
 
     if options.example:
         print(EXAMPLE.read_text(encoding="utf-8"), end="")
@@ -78,12 +78,12 @@ def main(argv: list[str]) -> int:
             return _again(options, plan)
         return _fly(options, options.file, plan)
     except (CampaignError, SchedulerGoneError, OSError) as error:
-        complain("pandion campaign", error)
+        print_error("pandion campaign", error)
         return COULD_NOT_START
 
 
 def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
-    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.campaign.store import JOURNAL, begin
 
     plan.check(options.flights or plan.count)
@@ -99,12 +99,14 @@ def _fly(options: CampaignOptions, file: Path, plan: CampaignPlan) -> int:
             _all(options, plan, asked, folder, display)
     except KeyboardInterrupt:
         command = _resumed(options, file, folder)
-        complain("pandion campaign", f"interrupted; what was flown is kept, go on with: {command}")
+        print_error(
+            "pandion campaign", f"interrupted; what was flown is kept, go on with: {command}"
+        )
         return BROKEN
     except SchedulerGoneError as error:
         if not (folder / JOURNAL).stat().st_size:
             raise
-        complain("pandion campaign", f"{error}; what was flown is in {folder}")
+        print_error("pandion campaign", f"{error}; what was flown is in {folder}")
         return BROKEN
     return _written(options, folder, display)
 
@@ -113,7 +115,7 @@ def _resumed(options: CampaignOptions, file: Path, folder: Path) -> str:
     """The command that goes on: as it was given, into the same directory."""
     words = as_words(replace(options, file=None, out=None))
     command = ["campaign", str(file), *words, "--out", str(folder)]
-    return f"{typed()} {shlex.join(command)}"
+    return f"{command_name()} {shlex.join(command)}"
 
 
 def _all(
@@ -173,13 +175,13 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     for passed, sentence in shown or [verdict(rows, result.asked)]:
         display.say(f"{'PASS' if passed else 'FAIL'} {sentence}")
     display.say(f"page {folder / PAGE}")
-    lost = unwritten(options.json, json_text(facts, 1) + "\n")
-    lost += unwritten(options.junit, junit_xml(result.plan.name, junit_cases(result, judged)))
+    lost = try_write(options.json, json_text(facts, 1) + "\n")
+    lost += try_write(options.junit, junit_xml(result.plan.name, junit_cases(result, judged)))
     for what in lost:
-        complain("pandion campaign", f"cannot write {what}")
+        print_error("pandion campaign", f"cannot write {what}")
     for row in rows:
         if row.error:
-            complain("pandion campaign", f"flight {row.flight} broke: {row.reason}")
+            print_error("pandion campaign", f"flight {row.flight} broke: {row.reason}")
             break
     met = all(passed for passed, _ in shown)
     return FLOWN if met and not (lost or more["errors"]) else BROKEN
@@ -187,7 +189,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
 
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     """One flight in this process, its trace, and what flies it with both processes and a log."""
-    from fsw.autopilot.parameters.storage import save
+    from fsw.storage.parameter_file import save
     from sitl.scenario_text import scenario_text
     from studies.campaign.flight import CampaignFlight
     from studies.campaign.keys import CampaignError
@@ -219,9 +221,9 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
     save(params, changed_parameters(job))
     say(f"trace {trace}", console)
-    command = fly_command(typed(), job, flight.case.controller, scenario, params)
+    command = fly_command(command_name(), job, flight.case.controller, scenario, params)
     say(f"with its log: {command}", console)
-    lost = unwritten(options.json, json_text(traced["row"], 1) + "\n")
+    lost = try_write(options.json, json_text(traced["row"], 1) + "\n")
     for what in lost:
-        complain("pandion campaign", f"cannot write {what}")
+        print_error("pandion campaign", f"cannot write {what}")
     return BROKEN if row.error or lost else FLOWN

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from command_line.output import complain, console_beside, unwritten
+from command_line.output import console_beside, print_error, try_write
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.log.run_directory import new_run_directory
@@ -56,9 +56,9 @@ class CampaignRun:
 
     def written(self, text: str) -> bool:
         """Write what ``--json`` asks for; False, and a sentence, if that cannot be done."""
-        lost = unwritten(self.json, text)
+        lost = try_write(self.json, text)
         for what in lost:
-            complain(f"pandion {self.verb}", f"cannot write {what}")
+            print_error(f"pandion {self.verb}", f"cannot write {what}")
         return not lost
 
 
@@ -85,14 +85,14 @@ def begin(verb: str, options: CampaignRunOptions, plan: CampaignPlan, work: str)
 
 def exit_code(verb: str, answer: Callable[[], int]) -> int:
     """The exit code of ``answer``; what stops it becomes a sentence."""
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
 
     try:
         return answer()
     except KeyboardInterrupt:
-        complain(f"pandion {verb}", "interrupted; the same command with --out goes on")
+        print_error(f"pandion {verb}", "interrupted; the same command with --out goes on")
         return _INTERRUPTED
     except (CampaignError, SchedulerGoneError, OSError) as error:
-        complain(f"pandion {verb}", error)
+        print_error(f"pandion {verb}", error)
         return COULD_NOT_START

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from command_line.bounded_file import read_bounded
 from command_line.options import group, json_file, option, read
-from command_line.output import complain, console_beside, json_text, unwritten
+from command_line.output import console_beside, json_text, print_error, try_write
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, whole
 from pandion.cluster_options import ClusterOptions, campaign_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 CERTIFIED, DIFFERS = 0, 1  # exit codes
 _INTERRUPTED: Final = 1  # as well
 PAGE = "certificate.html"
-_MOST_BYTES: Final = 64 * 1024 * 1024  # of a page that is read
+_MAX_BYTES: Final = 64 * 1024 * 1024  # of a page that is read
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,8 +70,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.campaign.store import read as read_campaign
 
     try:
@@ -86,10 +86,10 @@ def main(argv: list[str]) -> int:
             return _verify(options, result, options.verify)
         return _certify(options, result)
     except KeyboardInterrupt:
-        complain("pandion certify", "interrupted; nothing was certified")
+        print_error("pandion certify", "interrupted; nothing was certified")
         return _INTERRUPTED
     except (CampaignError, NoCertificateError, SchedulerGoneError, OSError) as error:
-        complain("pandion certify", error)
+        print_error("pandion certify", error)
         return COULD_NOT_START
 
 
@@ -151,11 +151,11 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
     if result.left_out:
         display.say(left_out(result.left_out))
     written = options.html or options.campaign / PAGE
-    lost = unwritten(options.json, json_text(stated, 1) + "\n")
-    lost += unwritten(written, page(stated, result))
+    lost = try_write(options.json, json_text(stated, 1) + "\n")
+    lost += try_write(written, page(stated, result))
     display.say(f"page {written}; {stated['commands'][0]} --verify {written}")
     for what in lost:
-        complain("pandion certify", f"cannot write {what}")
+        print_error("pandion certify", f"cannot write {what}")
     met = all(one["met"] for one in stated.get("required", ()))
     return CERTIFIED if met and not lost else DIFFERS
 
@@ -176,8 +176,8 @@ def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
     if not wrong:
         display.say(f"{path} is what {options.campaign} shows, digest {stated['digest']}")
     text = json_text({"same": not wrong, "differences": wrong}, 1) + "\n"
-    for what in unwritten(options.json, text):
-        complain("pandion certify", f"cannot write {what}")
+    for what in try_write(options.json, text):
+        print_error("pandion certify", f"cannot write {what}")
     return DIFFERS if wrong else CERTIFIED
 
 
@@ -195,7 +195,7 @@ def _statement(path: Path) -> dict[str, Any]:
     from studies.statistics.certificate_page import statement_in
 
     try:
-        stated = statement_in(read_bounded(path, _MOST_BYTES).decode("utf-8"))
+        stated = statement_in(read_bounded(path, _MAX_BYTES).decode("utf-8"))
     except UnicodeDecodeError:
         stated = None
     if stated is None or stated.get("format") != FORMAT:

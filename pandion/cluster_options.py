@@ -79,7 +79,8 @@ def campaign_of(
     **more: Any,
 ) -> Campaign[Any]:
     """What flies where the options say; ``more`` are fields of ``Campaign``."""
-    from studies.campaign.campaign import Campaign, Scheduler, mute, silent
+    from studies.campaign.campaign import Campaign, mute, silent
+    from studies.campaign.ports import Scheduler
 
     scheduler = Scheduler(
         address=options.scheduler,

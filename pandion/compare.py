@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from command_line.junit import Case, junit_xml
 from command_line.options import json_file, option, read
-from command_line.output import complain, console_beside, json_text, say, unwritten
+from command_line.output import console_beside, json_text, print_error, say, try_write
 from command_line.parser import COULD_NOT_START
 from command_line.values import number
 from pandion.gate_options import junit
@@ -52,7 +52,7 @@ def main(argv: list[str]) -> int:
         if not found:
             raise CampaignError("the campaigns have no configuration in common")
     except (CampaignError, OSError) as error:
-        complain("pandion compare", error)
+        print_error("pandion compare", error)
         return COULD_NOT_START
     console = console_beside(options.json)
     changed = changes(first, second)
@@ -78,10 +78,10 @@ def main(argv: list[str]) -> int:
         )
         for one in found
     ]
-    lost = unwritten(options.json, json_text(record, 1) + "\n")
-    lost += unwritten(options.junit, junit_xml("compare", cases))
+    lost = try_write(options.json, json_text(record, 1) + "\n")
+    lost += try_write(options.junit, junit_xml("compare", cases))
     for what in lost:
-        complain("pandion compare", f"cannot write {what}")
+        print_error("pandion compare", f"cannot write {what}")
     return WORSE if worse else _UNFIT if lost else NOT_WORSE
 
 

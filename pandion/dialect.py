@@ -8,7 +8,7 @@ from typing import Final
 
 from command_line.folders import data_folder, home
 from command_line.options import option, read, switch
-from command_line.output import complain, unwritable
+from command_line.output import print_error, unwritable
 from command_line.parser import COULD_NOT_START
 from command_line.values import one_of
 from messages import export
@@ -55,7 +55,7 @@ def main(argv: list[str]) -> int:
     try:
         print(install(options.out), end="")
     except (GenerationError, OSError) as error:
-        complain("pandion dialect", unwritable(error))
+        print_error("pandion dialect", unwritable(error))
         return COULD_NOT_START
     return 0
 

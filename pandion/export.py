@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import OneOf, option, read
-from command_line.output import complain, say, without
+from command_line.output import print_error, say, without
 from command_line.parser import COULD_NOT_START
 from pandion.display import Display
 
@@ -65,10 +65,10 @@ def main(argv: list[str]) -> int:
         if count == 0:
             raise UlogError(f"{path} holds no record")
     except (UlogError, ValueError, OSError) as error:
-        complain("pandion export", error)
+        print_error("pandion export", error)
         return COULD_NOT_START
     except ModuleNotFoundError as error:
-        complain("pandion export", f"--mcap: {without(error, 'mcap')}")
+        print_error("pandion export", f"--mcap: {without(error, 'mcap')}")
         return COULD_NOT_START
     say(f"{count} records of {path} in {options.csv or options.mcap}{_left_out(log)}")
     return DONE
@@ -95,7 +95,7 @@ def _write_layouts(folder: Path) -> int:
         for name, text in made.items():
             (folder / name).write_text(text, encoding="utf-8")
     except OSError as error:
-        complain("pandion export", error)
+        print_error("pandion export", error)
         return COULD_NOT_START
     say(f"{', '.join(made)} in {folder}")
     return DONE

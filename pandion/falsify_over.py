@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from command_line.output import complain, json_text
+from command_line.output import json_text, print_error
 from command_line.parser import COULD_NOT_START
 from pandion.campaign_run import begin, exit_code
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from pandion.falsify import FalsifyOptions
+    from pandion.falsify_options import FalsifyOptions
     from studies.search.worst_flights import Find, Searched
 
 HOLDS, BROKEN = 0, 1  # exit codes
@@ -51,7 +51,7 @@ def _search(options: FalsifyOptions, file: Path) -> int:
             report=report,
         )
     if not found.finds:
-        complain("pandion falsify", f"no flight could be flown: {found.why}")
+        print_error("pandion falsify", f"no flight could be flown: {found.why}")
         return COULD_NOT_START
     finds = [_kept(k, find, folder, display) for k, find in enumerate(found.finds[: options.keep])]
     if found.broken:

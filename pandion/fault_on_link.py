@@ -55,7 +55,7 @@ class LinkCell(Cell):
     __slots__ = ()
 
     def key(self) -> str:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return "link " + super().key() + sources(fault_station, supervisor, child)[:16]
 
     def _flown(self) -> FaultFlight:

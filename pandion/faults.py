@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, say, unwritten
+from command_line.output import console_beside, json_text, print_error, say, try_write
 from command_line.parser import COULD_NOT_START, unknown_name
 from command_line.values import output_file, whole
 from command_line.version import version
@@ -82,7 +82,7 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.fault_matrix.expectations import EXPECTATIONS, ExpectationError, expectations
 
     try:
@@ -90,7 +90,7 @@ def main(argv: list[str]) -> int:
         cells = _chosen(options, known)
         return _list(cells) if options.list else _run(options, cells)
     except (ExpectationError, UnknownError, SchedulerGoneError, OSError) as error:
-        complain("pandion faults", error)
+        print_error("pandion faults", error)
         return COULD_NOT_START
 
 
@@ -171,7 +171,7 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
             rows = _flown(cells, options, display)
     except KeyboardInterrupt:
         kept = "is lost" if options.journal is None else f"is in {options.journal}"
-        complain("pandion faults", f"interrupted; what was flown {kept}")
+        print_error("pandion faults", f"interrupted; what was flown {kept}")
         return COULD_NOT_START
     for row in rows:
         if row.differs or len(rows) == 1:
@@ -187,12 +187,12 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
         display.say(f"known limit {name}: {count}")
     display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
     text = json_text([row.as_json() for row in rows], 1) + "\n"
-    lost = unwritten(options.json, text)
-    lost += unwritten(options.junit, junit_xml("faults", [_case(row) for row in rows]))
+    lost = try_write(options.json, text)
+    lost += try_write(options.junit, junit_xml("faults", [_case(row) for row in rows]))
     if options.html is not None:
-        lost += unwritten(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
+        lost += try_write(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
     for what in lost:
-        complain("pandion faults", f"cannot write {what}")
+        print_error("pandion faults", f"cannot write {what}")
     return DIFFERS if wrong or lost else AS_EXPECTED
 
 

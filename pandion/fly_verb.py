@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from command_line.options import as_words, declared, group, json_file, read, switch
-from command_line.output import complain, json_text, typed, unwritable, unwritten, without
+from command_line.output import command_name, json_text, print_error, try_write, unwritable, without
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
@@ -77,7 +77,7 @@ def main(argv: list[str]) -> int:
     try:
         flight = planned(options)
     except (ScenarioError, LinkError, OSError) as error:
-        complain("pandion fly", unwritable(error))
+        print_error("pandion fly", unwritable(error))
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
@@ -89,7 +89,7 @@ def main(argv: list[str]) -> int:
             as_words(_sitl_options(flight)), lambda port: as_words(_fsw_options(flight, port))
         )
     except ProcessFailed as error:
-        complain("pandion fly", error)
+        print_error("pandion fly", error)
         return error.exit_code
     finally:
         view.close()
@@ -201,14 +201,14 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
     )
     result = as_json(reports)
     text = json_text(result, 2) + "\n"
-    lost = unwritten(out / "result.json", text)
+    lost = try_write(out / "result.json", text)
     tracking_max_m = (flown.sitl or {}).get("tracking_error_max_m")
     first = first_rows(result, tracking_max_m)
     display.result(result, first, table_rows(result, tracking_max_m)[len(first) :])
-    lost = [*flown.unwritten, *lost, *unwritten(options.json, text)]
+    lost = [*flown.unwritten, *lost, *try_write(options.json, text)]
     lost += _report(flight, display)
     if lost:
-        complain("pandion fly", f"results could not be written: {'; '.join(lost)}")
+        print_error("pandion fly", f"results could not be written: {'; '.join(lost)}")
     if flown.sitl is not None and flown.sitl.get("end_kind") == "refused":
         return COULD_NOT_START
     return COMPLETED if result["completed"] and not lost else NOT_COMPLETED
@@ -219,7 +219,8 @@ def _report(flight: PlannedFlight, display: Display) -> list[str]:
     if not flight.options.report:
         where = shlex.quote(str(flight.out))
         display.say(
-            f"to see it: {typed()} view {where}; as a file to send: {typed()} report {where}"
+            f"to see it: {command_name()} view {where}; "
+            f"as a file to send: {command_name()} report {where}"
         )
         return []
     from messages.ulog_reader import UlogError

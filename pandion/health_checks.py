@@ -22,7 +22,7 @@ from pandion.own_modules import our_modules
 OK, WARN, FAIL = "ok", "warn", "fail"
 
 _GB: Final = 1e9
-_LEAST_FREE: Final = 200e6  # bytes: a flight of two minutes with LOG_PROFILE 1, and its telemetry
+_MIN_FREE: Final = 200e6  # bytes: a flight of two minutes with LOG_PROFILE 1, and its telemetry
 _FEW_FREE: Final = 2e9
 _MEMORY: Final = 1.5e9  # bytes that both processes and the compiler take
 _LATE_US: Final = 500.0  # a quarter of a tick
@@ -296,7 +296,7 @@ def disk(out: Path) -> Check:
     found = f"{free / _GB:.1f} GB free for {out}"
     if not os.access(folder, os.W_OK):
         return Check("disk", FAIL, f"{folder} cannot be written", "name another folder with --out")
-    if free < _LEAST_FREE:
+    if free < _MIN_FREE:
         return Check("disk", FAIL, found, "make room: a minute of flight takes 11 to 23 MB")
     if free < _FEW_FREE:
         return Check("disk", WARN, found, "a minute of flight takes 11 to 23 MB")

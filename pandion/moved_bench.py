@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
-from command_line.output import complain
+from command_line.output import print_error
 from command_line.parser import COULD_NOT_START
 
 CHECKOUT: Final = Path(__file__).parents[1]
@@ -15,13 +15,13 @@ CHECKOUT: Final = Path(__file__).parents[1]
 def main(argv: list[str]) -> int:
     """Name the new command and run it; returns its exit code."""
     if not (CHECKOUT / "benchmarks" / "__main__.py").exists():
-        complain(
+        print_error(
             "pandion bench",
             "the benchmarks are not part of the installed package; "
             "run `python -m benchmarks` in a checkout of the repository",
         )
         return COULD_NOT_START
     command = " ".join(["python -m benchmarks", *argv[:1]])
-    complain("pandion bench", f"this command has moved; use `{command}`")
+    print_error("pandion bench", f"this command has moved; use `{command}`")
     # By name: the shipped package may not depend on the folder.
     return int(import_module("benchmarks.__main__").main(argv))

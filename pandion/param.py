@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from command_line.actions import read_action
 from command_line.options import OneOf, option, switch
-from command_line.output import complain, json_text, say
+from command_line.output import json_text, print_error, say
 from command_line.parser import COULD_NOT_START, unknown_name
 from messages.addresses import LinkError, parse_link_address
 
 if TYPE_CHECKING:
-    from fsw.autopilot.parameters.storage import Loaded
+    from fsw.storage.parameter_file import Loaded
     from pandion.param_vehicle import ParameterClient
 
 DONE, REFUSED = 0, 1  # exit codes
@@ -93,8 +93,8 @@ class FileValues:
         from fsw.autopilot.parameters.facts import ALIASES
         from fsw.autopilot.parameters.flight_config import FlightConfig
         from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
-        from fsw.autopilot.parameters.storage import save
         from fsw.autopilot.tuning import tuned
+        from fsw.storage.parameter_file import save
         from pandion.param_vehicle import ParameterRefused
 
         parameter = BY_NAME.get(ALIASES.get(name, name))
@@ -133,13 +133,13 @@ def main(argv: list[str]) -> int:
         with ParameterClient(parse_link_address(options.vehicle)) as vehicle:
             return act(options, vehicle)
     except (LinkError, NoAnswer, OSError) as error:
-        complain("pandion param", error)
+        print_error("pandion param", error)
         return COULD_NOT_START
     except ParameterRefused as error:
-        complain("pandion param", error)
+        print_error("pandion param", error)
         return REFUSED
     except KeyboardInterrupt:
-        complain("pandion param", "interrupted")
+        print_error("pandion param", "interrupted")
         return REFUSED
 
 
@@ -185,14 +185,14 @@ def _import(options: _File, values: Values) -> int:
             values.write(name, value)
             changed += 1
         except ParameterRefused as error:
-            complain("pandion param", error)
+            print_error("pandion param", error)
             refused += 1
     print(f"{len(loaded.values)} parameters read, {changed} changed, {refused} refused")
     return REFUSED if refused else DONE
 
 
 def _export(options: _File, values: Values) -> int:
-    from fsw.autopilot.parameters.storage import save
+    from fsw.storage.parameter_file import save
 
     known = values.read_all()
     # A reader of the file would refuse such a line.
@@ -201,18 +201,18 @@ def _export(options: _File, values: Values) -> int:
     say(f"{len(kept)} parameters written to {options.path}")
     if len(kept) < len(known):
         names = ", ".join(sorted(known.keys() - kept.keys()))
-        complain("pandion param", f"left out, because the value is not a finite number: {names}")
+        print_error("pandion param", f"left out, because the value is not a finite number: {names}")
         return REFUSED
     return DONE
 
 
 def _read_file(path: Path) -> Loaded:
     """The values of a file; unusable lines are reported on standard error."""
-    from fsw.autopilot.parameters.storage import load
+    from fsw.storage.parameter_file import load
 
     loaded = load(path)
     for complaint in loaded.complaints:
-        complain("pandion param", f"{path}, {complaint}")
+        print_error("pandion param", f"{path}, {complaint}")
     return loaded
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from command_line.actions import read_action
 from command_line.options import option
-from command_line.output import complain, unwritten
+from command_line.output import print_error, try_write
 from command_line.parser import COULD_NOT_START
 from command_line.values import known, one_of, place
 from messages.addresses import LinkError, parse_link_address
@@ -69,7 +69,7 @@ def main(argv: list[str]) -> int:
     try:
         return act(options)
     except (ScenarioError, LinkError) as error:
-        complain("pandion px4", error)
+        print_error("pandion px4", error)
         return COULD_NOT_START
 
 
@@ -97,11 +97,11 @@ def _print_parameters(options: _Params) -> int:
     for name, value in values.items():
         print(f"param set {name} {as_text(value)}")
     if options.out is not None:
-        from fsw.autopilot.parameters.storage import as_params
+        from fsw.storage.parameter_file import as_params
 
         text = as_params(values).replace("Stack: Pandion", "Stack: PX4 Pro")
-        for problem in unwritten(options.out, text):
-            complain("pandion px4", f"cannot write {problem}")
+        for problem in try_write(options.out, text):
+            print_error("pandion px4", f"cannot write {problem}")
             return FAILED
     return DONE if options.vehicle is None else _set_all(options, values)
 
@@ -118,10 +118,10 @@ def _set_all(options: _Params, values: dict[str, int | float]) -> int:
                     vehicle.write(name, value)
                 except ParameterRefused as error:
                     refused += 1
-                    complain("pandion px4", f"{name}: {error}")
+                    print_error("pandion px4", f"{name}: {error}")
             vehicle.set_origin(options.origin)
         except NoAnswer as error:
-            complain("pandion px4", error)
+            print_error("pandion px4", error)
             return FAILED
     print(f"{len(values) - refused} of {len(values)} set; restart PX4: some count from then on")
     return FAILED if refused else DONE

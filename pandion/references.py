@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sitl.scenario import Circle, Hold, Lissajous, Points, Polynomial, Trajectory
 from sitl.scenario_file import read_points
-from sitl.scenario_validation import MOST_POINTS, check_trajectory
+from sitl.scenario_validation import MAX_POINTS, check_trajectory
 from sitl.trajectory import reference as reference_of
 from studies.flight.own_parts import OwnPartError, numbers
 
@@ -63,8 +63,8 @@ def _points(table: Array, ends: Any) -> Points:
 
 
 def _sampled(given: Callable[[float], Any], duration_s: float) -> Points:
-    if not (math.isfinite(duration_s) and duration_s / _APART_S < MOST_POINTS):
-        most = _APART_S * MOST_POINTS
+    if not (math.isfinite(duration_s) and duration_s / _APART_S < MAX_POINTS):
+        most = _APART_S * MAX_POINTS
         raise OwnPartError(f"reference: give duration_s, at most {most:g} s, for a callable")
     count = math.ceil(duration_s / _APART_S) + 1
     width = len(np.ravel(_called(given, 0.0)))

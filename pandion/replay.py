@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from command_line.options import json_file, option, read, switch
-from command_line.output import complain, console_beside, json_text, say, write_text
+from command_line.output import console_beside, json_text, print_error, say, write_text
 from command_line.parser import COULD_NOT_START
 from fsw.autopilot.signals import Origin
 from pandion.display import Display
@@ -46,7 +46,7 @@ def main(argv: list[str]) -> int:
         log = open_flight(options.log)
         return _verify(options, log) if options.verify else _summarise(options, log)
     except (UlogError, ValueError, OSError) as error:
-        complain("pandion replay", error)
+        print_error("pandion replay", error)
         return COULD_NOT_START
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, TextIO
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read
-from command_line.output import complain, console_beside, say, write_text
+from command_line.output import console_beside, print_error, say, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of
 from command_line.version import version
@@ -119,8 +119,8 @@ def main(argv: list[str]) -> int:
     from fsw.runtime.process import pin_numerics_to_one_thread
 
     pin_numerics_to_one_thread()  # before NumPy loads
-    from studies.campaign.campaign import SchedulerGoneError
     from studies.campaign.keys import CampaignError
+    from studies.campaign.ports import SchedulerGoneError
     from studies.drawing import NoMatplotlibError
     from studies.flight.own_parts import OwnPartError
     from studies.paper.settings import NoCellError
@@ -144,7 +144,7 @@ def main(argv: list[str]) -> int:
         SchedulerGoneError,
         OSError,
     ) as error:
-        complain("pandion reproduce", error)
+        print_error("pandion reproduce", error)
         return COULD_NOT_START
 
 
@@ -167,7 +167,7 @@ def _run(options: ReproduceOptions) -> int:
             with campaign_of(options.cluster, journal, report, display.say) as campaign:
                 found = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
-        complain("pandion reproduce", f"interrupted; --out {folder} resumes")
+        print_error("pandion reproduce", f"interrupted; --out {folder} resumes")
         return BROKEN
     page = write(found, settings, _provenance(options), options.what, folder)
     _show(found, console)
@@ -175,7 +175,7 @@ def _run(options: ReproduceOptions) -> int:
     write_text(options.json, rows_text(found))
     write_text(options.junit, junit_xml(options.what, _cases(found)))
     for error in found.errors:
-        complain("pandion reproduce", error)
+        print_error("pandion reproduce", error)
     return BROKEN if found.errors else DONE
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from command_line.options import option, read
-from command_line.output import complain, without
+from command_line.output import print_error, without
 from command_line.parser import COULD_NOT_START
 from messages.addresses import LinkError, parse_link_address
 
@@ -34,18 +34,18 @@ def main(argv: list[str]) -> int:
         from view.top.app import TopApp
         from view.top.peer import TelemetryPeer
     except LinkError as error:
-        complain("pandion top", error)
+        print_error("pandion top", error)
         return COULD_NOT_START
     except ModuleNotFoundError as error:
-        complain("pandion top", without(error, "top"))
+        print_error("pandion top", without(error, "top"))
         return COULD_NOT_START
     if not sys.stdout.isatty():
-        complain("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
+        print_error("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
         return COULD_NOT_START
     try:
         peer = TelemetryPeer(vehicle)
     except LinkError as error:
-        complain("pandion top", error)
+        print_error("pandion top", error)
         return COULD_NOT_START
     app = TopApp(peer)
     app.run()

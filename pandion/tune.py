@@ -52,7 +52,7 @@ def _tune(options: SearchTaskOptions, file: Path) -> int:
 def _written(found: Outcome, path: Path) -> str:
     """Write the parameters that differ from the defaults; the sentence that says where."""
     from fsw.autopilot.parameters.registry import BY_NAME
-    from fsw.autopilot.parameters.storage import save
+    from fsw.storage.parameter_file import save
 
     assert found.best is not None
     config = found.task.with_values(found.best.values).bases[0].config

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from command_line.options import option, read, switch
-from command_line.output import complain, say, without
+from command_line.output import print_error, say, without
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from pandion.view_beside import PORT
@@ -51,7 +51,7 @@ def main(argv: list[str]) -> int:
     try:
         return _show_live(options) if options.log is None else _show_log(options, options.log)
     except ModuleNotFoundError as error:
-        complain("pandion view", without(error, "view"))
+        print_error("pandion view", without(error, "view"))
         return COULD_NOT_START
 
 
@@ -61,7 +61,7 @@ def _show_log(options: ViewOptions, log: Path) -> int:
     try:
         flight = _opened(log)
     except UlogError as error:
-        complain("pandion view", error)
+        print_error("pandion view", error)
         return COULD_NOT_START
     from view.log_page import LogPage
     from view.page import PageError, address, open_server
@@ -69,10 +69,10 @@ def _show_log(options: ViewOptions, log: Path) -> int:
     try:
         server = open_server(options.host, options.port, flight.title)
     except PageError as error:
-        complain("pandion view", error)
+        print_error("pandion view", error)
         return COULD_NOT_START
     for sentence in flight.unusable:
-        complain("pandion view", f"{sentence}; shown without it")
+        print_error("pandion view", f"{sentence}; shown without it")
     page = LogPage(server, flight)
     say(f"{flight.title}: open {address(server)}; Ctrl-C ends")
     try:
@@ -94,7 +94,7 @@ def _show_live(options: ViewOptions) -> int:
         link = VehicleLink(parse_link_address(options.vehicle), commands=commands)
         server = open_server(options.host, options.port, f"vehicle at {options.vehicle}")
     except (LinkError, PageError) as error:
-        complain("pandion view", error)
+        print_error("pandion view", error)
         return COULD_NOT_START
     link.start()
     page = LivePage(server, link)

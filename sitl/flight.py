@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable
 from typing import Final, NamedTuple, Protocol
 
-from command_line.output import json_text, unwritten
+from command_line.output import json_text, try_write
 from command_line.parser import COULD_NOT_START
 from command_line.process import NOT_COMPLETED, Events, StopRequest
 from sitl.arguments import SitlOptions
@@ -85,7 +85,7 @@ class Flight:
         described = self._as_json(result, timing, counts)
         text = json_text(described, 2) + "\n"
         in_directory = None if options.out is None else options.out / "sitl.json"
-        lost = [*unwritten(options.json, text), *unwritten(in_directory, text)]
+        lost = [*try_write(options.json, text), *try_write(in_directory, text)]
         sentence = f"sitl: {_summary(result, timing)}"
         self._events.report("ended", sentence, result=described, vehicle_silent=flown.silent)
         for what in lost:

@@ -21,8 +21,8 @@ from sitl.scenario import V3, Range, Scenario, ScenarioWall, ScenarioZone, Senso
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
-_MOST_BYTES = 2 * 1024 * 1024  # of a file: a reference of 20,000 points; zones are a hundredth
-_MOST_CSV = 2 * 1024 * 1024  # of a table of points
+_MAX_BYTES = 2 * 1024 * 1024  # of a file: a reference of 20,000 points; zones are a hundredth
+_MAX_CSV = 2 * 1024 * 1024  # of a table of points
 COLUMNS = ["time_s", "north_m", "east_m", "down_m", "yaw_deg"]  # of one, the last if there is yaw
 _SHOWN = 80  # characters of a value in a sentence
 _UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
@@ -111,7 +111,7 @@ def _path(name_or_path: str) -> Path:
 
 def _content(path: Path) -> bytes:
     try:
-        return read_bounded(path, _MOST_BYTES)
+        return read_bounded(path, _MAX_BYTES)
     except OSError as error:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
 
@@ -177,7 +177,7 @@ def read_points(path: Path) -> tuple[dict[str, list[Any]], bytes]:
         ScenarioError: It cannot be read, or a line of it is not what the first one says.
     """
     try:
-        data = read_bounded(path, _MOST_CSV)
+        data = read_bounded(path, _MAX_CSV)
         lines = data.decode("utf-8-sig").splitlines()
     except OSError as error:
         raise ScenarioError(f"cannot read points {path}: {error.strerror}") from error

@@ -20,11 +20,11 @@ from sitl.scenario import (
 from sitl.scenario_file import ScenarioError
 from sitl.sensors.keys import MeasuredSensors
 
-MOST_POINTS = 20_000  # of a trajectory
-_LEAST_APART_S = 0.002  # two points of a trajectory
-_MOST_POWERS = 12  # coefficients of a polynomial
+MAX_POINTS = 20_000  # of a trajectory
+_MIN_APART_S = 0.002  # two points of a trajectory
+_MAX_POWERS = 12  # coefficients of a polynomial
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
-_LEAST_INERTIA = 1e-4  # kg·m²; a lighter motor crosses its gap within a step of the plant
+_MIN_INERTIA = 1e-4  # kg·m²; a lighter motor crosses its gap within a step of the plant
 
 
 def check(scenario: Scenario) -> None:
@@ -61,9 +61,9 @@ def check_trajectory(curve: Trajectory) -> None:
         )
     if isinstance(curve, Polynomial):
         for name in ("north", "east", "down"):
-            if not 0 < len(getattr(curve, name)) <= _MOST_POWERS:
+            if not 0 < len(getattr(curve, name)) <= _MAX_POWERS:
                 raise ScenarioError(
-                    f"trajectory.{name}: must have 1 to {_MOST_POWERS} coefficients, has "
+                    f"trajectory.{name}: must have 1 to {_MAX_POWERS} coefficients, has "
                     f"{len(getattr(curve, name))}"
                 )
     if isinstance(curve, Points):
@@ -72,16 +72,16 @@ def check_trajectory(curve: Trajectory) -> None:
 
 def _check_points(curve: Points) -> None:
     count = len(curve.time_s)
-    if not 2 <= count <= MOST_POINTS:
-        raise ScenarioError(f"trajectory.time_s: must have 2 to {MOST_POINTS} times, has {count}")
+    if not 2 <= count <= MAX_POINTS:
+        raise ScenarioError(f"trajectory.time_s: must have 2 to {MAX_POINTS} times, has {count}")
     for name in ("position_m", "yaw_deg"):
         given = len(getattr(curve, name))
         if given != count and not (name == "yaw_deg" and given == 0):
             raise ScenarioError(f"trajectory.{name}: {given} entries for {count} times")
     for k, (time_s, next_s) in enumerate(itertools.pairwise(curve.time_s), start=1):
-        if not next_s - time_s >= _LEAST_APART_S:
+        if not next_s - time_s >= _MIN_APART_S:
             raise ScenarioError(
-                f"trajectory.time_s[{k}] = {next_s:g}: must be at least {_LEAST_APART_S:g} s after "
+                f"trajectory.time_s[{k}] = {next_s:g}: must be at least {_MIN_APART_S:g} s after "
                 f"{time_s:g}, the one before"
             )
 
@@ -107,10 +107,10 @@ def _check_start(start: Start) -> None:
 
 
 def _check_gears(keys: ActuatorKeys) -> None:
-    if keys.backlash_deg > 0.0 and not (keys.motor_inertia_kg_m2 >= _LEAST_INERTIA):
+    if keys.backlash_deg > 0.0 and not (keys.motor_inertia_kg_m2 >= _MIN_INERTIA):
         raise ScenarioError(
             f"actuators.backlash_deg = {keys.backlash_deg:g}: needs the inertia of a motor that "
-            f"crosses the gap, actuators.motor_inertia_kg_m2 of at least {_LEAST_INERTIA:g}"
+            f"crosses the gap, actuators.motor_inertia_kg_m2 of at least {_MIN_INERTIA:g}"
         )
 
 

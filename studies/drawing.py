@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 TARGET, BASE, END_EFFECTOR, BOUND = "#2da44e", "#0969da", "#e36209", "#8c959f"
 WALL = "#cf222e"
 
-_MOST_DRAWN: Final = 1e12  # of a number: bins of a range up to the largest double overflow
+_MAX_DRAWN: Final = 1e12  # of a number: bins of a range up to the largest double overflow
 
 _METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
 
@@ -44,7 +44,7 @@ class Sheet:
 
 def drawable(values: Iterable[float]) -> list[float]:
     """The values that a histogram can show: a flight that diverged leaves NaN, or any size."""
-    return [value for value in values if abs(value) <= _MOST_DRAWN]
+    return [value for value in values if abs(value) <= _MAX_DRAWN]
 
 
 def sheet(rows: int, columns: int, width: float, height: float, **options: Any) -> Sheet:

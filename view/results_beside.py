@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 
 from command_line.bounded_json import JsonError, read_json
 
-_MOST_BYTES: Final = 16 * 1024 * 1024  # of a file
+_MAX_BYTES: Final = 16 * 1024 * 1024  # of a file
 _NUMBER: Final = (int, float)
 _MAYBE_NUMBER: Final = (int, float, type(None))
 _WORDS: Final = {str: "a text", int: "a number", float: "a number", bool: "true or false"}
@@ -89,7 +89,7 @@ def results_beside(log: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     for stem, shape in _SHAPES.items():
         path = log.parent / f"{stem}.json"
         try:
-            read = read_json(path, _MOST_BYTES)
+            read = read_json(path, _MAX_BYTES)
             _check(read, shape, "")
             for inside, keys in _TOGETHER[stem]:
                 _check_together(read.get(inside, {}) if inside else read, inside, keys)

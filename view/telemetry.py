@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.signals import (
@@ -43,9 +43,9 @@ from view.vehicle import horizon
 
 _EVENTS: Final = 500
 # Of a vehicle and all that speak beside it; what is beyond somebody makes up.
-_MOST_HEARD: Final = 4096  # kinds of messages
-_MOST_PARAMETERS: Final = 4096
-_MOST_TEXT: Final = 255 * 50  # bytes of one sentence, as STATUSTEXT numbers its pieces
+_MAX_HEARD: Final = 4096  # kinds of messages
+_MAX_PARAMETERS: Final = 4096
+_MAX_TEXT: Final = 255 * 50  # bytes of one sentence, as STATUSTEXT numbers its pieces
 _IGNORE_POSITION: Final = 0x7
 _ARMED, _FAILSAFE, _TERMINATED = 128, 5, 8
 _ON_GROUND: Final = 1
@@ -124,7 +124,7 @@ class Telemetry:
         key = (frame.system_id, frame.component_id, frame.message_id)
         one = self.heard.get(key)
         if one is None:
-            if len(self.heard) >= _MOST_HEARD:
+            if len(self.heard) >= _MAX_HEARD:
                 return  # no vehicle says so much; somebody makes it up
             self.heard[key] = one = Heard(*key)
         if one.count:
@@ -315,7 +315,7 @@ class Telemetry:
         text = raw.rstrip(b"\0")
         if number:
             text = (self._pieces.get(number, b"") if piece else b"") + text
-            goes_on = len(raw.rstrip(b"\0")) == len(raw) and len(text) < _MOST_TEXT
+            goes_on = len(raw.rstrip(b"\0")) == len(raw) and len(text) < _MAX_TEXT
             self._pieces = {number: text} if goes_on else {}
             if self._pieces:
                 return
@@ -350,7 +350,7 @@ class Telemetry:
         if index < count:
             self.parameter_count = count
         known = _text(name)
-        room = known in self.parameters or len(self.parameters) < _MOST_PARAMETERS
+        room = known in self.parameters or len(self.parameters) < _MAX_PARAMETERS
         if room and value is not None:
             self.parameters[known] = value
 

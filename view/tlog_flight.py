@@ -27,9 +27,9 @@ from view.vehicle import places, tilt
 Array = NDArray[Any]
 
 _SCENE_S: Final = 0.04  # between two scenes that are kept
-_MOST_BYTES: Final = 128 * 1024 * 1024  # an hour of a vehicle's telemetry has 40 MB
-_MOST_SCENES: Final = 360_000
-_MOST_EVENTS: Final = 5_000
+_MAX_BYTES: Final = 128 * 1024 * 1024  # an hour of a vehicle's telemetry has 40 MB
+_MAX_SCENES: Final = 360_000
+_MAX_EVENTS: Final = 5_000
 _OF_VEHICLES: Final = frozenset({ATTITUDE, LOCAL_POSITION_NED})  # messages of no other component
 _BETWEEN_S: Final = 1.0  # from one flight to the next, as it is shown
 
@@ -44,7 +44,7 @@ class _Recording:
     def __init__(self, path: Path, frames: TlogFrames) -> None:
         self.telemetry = Telemetry()
         self.scenes: list[Scene] = []
-        self.events: deque[Event] = deque(maxlen=_MOST_EVENTS)
+        self.events: deque[Event] = deque(maxlen=_MAX_EVENTS)
         self._path = path
         self._frames = frames
         self._shift = 0.0  # s, from the vehicle's clock to the one that is shown
@@ -67,8 +67,8 @@ class _Recording:
             scene = telemetry.scene(at)
             if scene.estimate is not None:
                 self.scenes.append(replace(scene, t=scene.t + self._shift))
-            if len(self.scenes) > _MOST_SCENES:
-                longest = _MOST_SCENES * _SCENE_S / 3600.0
+            if len(self.scenes) > _MAX_SCENES:
+                longest = _MAX_SCENES * _SCENE_S / 3600.0
                 raise UlogError(f"{self._path} is too long: at most {longest:.0f} h can be shown")
 
     def remarks(self) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ class TlogFlight:
         """
         self.airframe = AIRFRAME
         try:
-            log = read_bounded(path, _MOST_BYTES)
+            log = read_bounded(path, _MAX_BYTES)
         except OSError as error:
             raise UlogError(f"cannot read {path}: {error.strerror}") from None
         recording = _Recording(path, TlogFrames(log))

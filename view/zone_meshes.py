@@ -15,7 +15,7 @@ from fsw.autopilot.signals import Shape, Vec3, Zone
 Array = NDArray[Any]
 
 _THIN = 0.02  # m, radius that a point or a line is drawn with
-_LEAST = 0.002  # m, half a thickness that is drawn; a hull of less may have no volume
+_MIN = 0.002  # m, half a thickness that is drawn; a hull of less may have no volume
 _ROUND = 32  # corners of a circle
 _TURNS = np.linspace(0.0, 2.0 * math.pi, _ROUND, endpoint=False)
 
@@ -59,7 +59,7 @@ def _zone_mesh(zone: Zone, region: tuple[Vec3, Vec3], target: Vec3 | None) -> Zo
     surface = _hull(points, radius)
     if clearance <= 0.0:
         return ZoneMesh(surface, None)
-    if zone.keep_in and radius <= clearance + _LEAST:
+    if zone.keep_in and radius <= clearance + _MIN:
         return ZoneMesh(surface, None)
     return ZoneMesh(surface, _hull(points, radius + inwards * clearance))
 
@@ -105,26 +105,26 @@ def _corners(
         radius = max(float(n[4]), _THIN)
         return _cylinder(np.array((*n[:2], top)), np.array((*n[:2], bottom)), radius), 0.0
     if shape.kind == "cylinder":
-        return _cylinder(n[:3], n[3:6], max(float(n[6]), _LEAST)), 0.0
+        return _cylinder(n[:3], n[3:6], max(float(n[6]), _MIN)), 0.0
     if shape.kind == "box":
         w, x, y, z = n[6:10].tolist()
         axes = np.array(matrix_from_quaternion((w, x, y, z))).reshape(3, 3)
         signs = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-        return n[:3] + (signs * np.maximum(n[3:6], _LEAST)) @ axes.T, 0.0
+        return n[:3] + (signs * np.maximum(n[3:6], _MIN)) @ axes.T, 0.0
     return None  # a kind that this build does not know
 
 
 def _ball_radius(radius: float) -> float:
     """A point is drawn larger than it is, a ball hardly."""
-    return max(radius, _LEAST) if radius > 0.0 else _THIN
+    return max(radius, _MIN) if radius > 0.0 else _THIN
 
 
 def _cylinder(begin: Array, end: Array, radius: float) -> Array:
     axis = end - begin
     length = float(np.linalg.norm(axis))
     axis = axis / length if length > 1e-9 else np.array((0.0, 0.0, 1.0))
-    if length < 2.0 * _LEAST:
-        begin, end = begin - (_LEAST - 0.5 * length) * axis, end + (_LEAST - 0.5 * length) * axis
+    if length < 2.0 * _MIN:
+        begin, end = begin - (_MIN - 0.5 * length) * axis, end + (_MIN - 0.5 * length) * axis
     a = np.cross(axis, (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0))
     a /= np.linalg.norm(a)
     b = np.cross(axis, a)

@@ -11,7 +11,7 @@ from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.signals import PlanRequest, SafeSet
 
-_MOST_ITERATIONS = 60
+_MAX_ITERATIONS = 60
 _STAYS = 1e-7  # m/s^2 and rad/s^2
 
 
@@ -37,7 +37,7 @@ class ConvergedOcp:
         """
         start, targets = to_vector(request.start), target_points(request)
         inputs, best = guess, (guess, self.cost(request, guess))
-        for _ in range(_MOST_ITERATIONS):
+        for _ in range(_MAX_ITERATIONS):
             self._ocp.linearise(start, inputs, targets)
             solution = self._ocp.solve()
             if not solution.usable:

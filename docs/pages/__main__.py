@@ -11,7 +11,7 @@ REFERENCE = Path(__file__).parents[1] / "reference"
 
 
 def main() -> None:
-    """Write all six."""
+    """Write all of them."""
     log, sensing = REFERENCE / "flight-log.md", REFERENCE / "sensors.md"
     manual = REFERENCE / "safety-manual.md"
     wrong = requirements.problems(requirements.load(), requirements.shown_by_tests())
@@ -24,6 +24,9 @@ def main() -> None:
         REFERENCE / "parameters.md": parameters.reference(),
         REFERENCE / "failsafes.md": failsafes.reference(),
         manual: safety_manual.inserted(manual.read_text(encoding="utf-8")),
+        REFERENCE / "requirements-traceability.csv": safety_manual.traceability(
+            requirements.load(), requirements.shown_by_tests()
+        ),
     }
     for page, text in pages.items():
         page.write_text(text, encoding="utf-8")

@@ -32,18 +32,19 @@ decoding: `messages/README.md`.
 
 ## On the ground links
 
-Rates are the defaults in Hz, written "to ground stations / to programs", and counted in simulated
-time. MAV_CMD_SET_MESSAGE_INTERVAL changes a rate for one link. MAV_CMD_REQUEST_MESSAGE sends any
-message with a rate, or marked "on request", once. Direction: ↓ sent by the vehicle, ↑ received by
-the vehicle. Fields are in the order of the definition, with array size and unit. The fields of
-private messages are listed below.
+Default rates in Hz of simulated time, to ground stations/to programs. MAV_CMD_SET_MESSAGE_INTERVAL
+changes a rate for one link, MAV_CMD_REQUEST_MESSAGE sends any message with a rate, or marked "on
+request", once. ↓ sent by the vehicle and ↑ received, where it is both. The number is the id; 25 is
+the component that sends it, else 1. Private messages are linked to their fields; those of the
+others are in MAVLink's `common.xml`.
 
 """
 _DIALECT_HEAD = """\
 ## The dialect
 
-"Bytes" is the payload size before trailing zeros are removed. Fields are in the order of the
-definition; on the wire larger types come first.
+Bytes are the payload size before trailing zeros are removed. Fields are in the order of the
+definition; on the wire larger types come first. `target_system` and `target_component` (uint8_t, 0
+for any) are left out.
 """
 # What the vehicle says in answer, or as it happens, beside the streams.
 ANSWERS: Final = (
@@ -53,6 +54,7 @@ ANSWERS: Final = (
     ids.LOG_DATA, ids.MESSAGE_INTERVAL, ids.STATUSTEXT, ids.EVENT, ids.CURRENT_EVENT_SEQUENCE,
     ids.RESPONSE_EVENT_ERROR, ids.LOGGING_DATA, ids.LOGGING_DATA_ACKED, *ON_REQUEST,
 )  # fmt: skip
+_TARGET: Final = ("target_system", "target_component")
 _OF_THE_LINK: Final = (ids.HEARTBEAT, ids.RADIO_STATUS, ids.SETUP_SIGNING)
 # What the mission service hears; it exists with a mission only.
 OF_MISSIONS: Final = (
@@ -83,7 +85,7 @@ def reference(rows: Sequence[Traffic], definition: Path = DEFINITION) -> str:
     messages = root.findall("messages/message")
     enums = root.findall("enums/enum")
     private = {int(message.attrib["id"]) for message in messages}
-    parts = [_HEAD + _traffic(rows, private), _DIALECT_HEAD, _contents(messages)]
+    parts = [_HEAD + _traffic(rows, private), _DIALECT_HEAD]
     parts += [_message(message) for message in messages]
     parts += ["## Enumerations\n"]
     parts += [_enum(enum) for enum in enums]
@@ -91,56 +93,45 @@ def reference(rows: Sequence[Traffic], definition: Path = DEFINITION) -> str:
 
 
 def _traffic(crossing: Sequence[Traffic], private: set[int]) -> str:
-    rows = ["| id | message | direction | component | Hz | fields |", "|---|---|---|---|---|---|"]
+    by_rate: dict[str, list[str]] = {}
     for row in crossing:
         name = dialect.mavlink_map[row.message_id].msgname
-        arrows = "".join("↓" * bool(row.component) + "↑" * row.heard)
-        component = str(row.component or "")
-        is_private = row.message_id in private
-        fields = "below" if is_private else _fields(row.message_id)
-        shown = f"[{name}](#{name.lower()})" if is_private else name
-        rows.append(
-            f"| {row.message_id} | {shown} | {arrows} | {component} | {row.rates} | {fields} |"
+        shown = f"[{name}](#{name.lower()})" if row.message_id in private else name
+        arrows = "↓" * bool(row.component) + "↑" * row.heard
+        of = f",{row.component}" if row.component not in (0, ids.AUTOPILOT) else ""
+        by_rate.setdefault(row.rates or "received", []).append(
+            f"{shown}({row.message_id}{of}){arrows if row.component and row.heard else ''}"
         )
+    rows = ["| Hz | messages |", "|---|---|"]
+    rows += [
+        f"| {rate} | {', '.join(names)} |" for rate, names in sorted(by_rate.items(), key=_order)
+    ]
     return "\n".join(rows) + "\n"
 
 
-def _fields(message_id: int) -> str:
-    """Fields of a message of common.xml, in one line."""
-    message = dialect.mavlink_map[message_id]
-    size = dict(zip(message.ordered_fieldnames, message.array_lengths, strict=True))
-    described = []
-    for name in message.fieldnames:
-        elements = f"[{size[name]}]" if size[name] else ""
-        unit = message.fieldunits_by_name.get(name, "").strip("[]")
-        described.append(f"`{name}{elements}` {unit}".strip())
-    return ", ".join(described)
-
-
-def _contents(messages: list[ET.Element]) -> str:
-    rows = ["| message | id | bytes | CRC_EXTRA |", "|---|---|---|---|"]
-    for message in messages:
-        name, number = message.attrib["name"], int(message.attrib["id"])
-        generated = dialect.mavlink_map[number]
-        rows.append(
-            f"| [{name}](#{name.lower()}) | {number} | {generated.unpacker.size} "
-            f"| {generated.crc_extra} |"
-        )
-    return "\n".join(rows) + "\n"
+def _order(row: tuple[str, list[str]]) -> tuple[bool, float, str]:
+    """The most frequent first, then what has no rate."""
+    number = row[0].partition("/")[0]
+    is_rate = "/" in row[0]
+    return not is_rate, -float(number) if is_rate else 0.0, row[0]
 
 
 def _message(message: ET.Element) -> str:
+    number = int(message.attrib["id"])
+    generated = dialect.mavlink_map[number]
     rows = [
         f"### {message.attrib['name']}\n",
-        f"{_description(message)}\n",
-        "| field | type | unit | meaning |",
-        "|---|---|---|---|",
+        f"{_description(message)} Id {number}, {generated.unpacker.size} bytes, "
+        f"CRC_EXTRA {generated.crc_extra}.\n",
     ]
     for field in message.findall("field"):
+        if field.attrib["name"] in _TARGET:
+            continue
         enum = field.attrib.get("enum")
         unit = f"`{enum}`" if enum else field.attrib.get("units", "")
         meaning = (field.text or "").strip()
-        rows.append(f"| `{field.attrib['name']}` | {field.attrib['type']} | {unit} | {meaning} |")
+        type_ = f"{field.attrib['type']} {unit}".rstrip()
+        rows.append(f"- `{field.attrib['name']}` {type_}: {meaning}")
     return "\n".join(rows) + "\n"
 
 
@@ -148,13 +139,9 @@ def _enum(enum: ET.Element) -> str:
     rows = [
         f"### {enum.attrib['name']}\n",
         f"{_description(enum)}\n",
-        "| value | name | meaning |",
-        "|---|---|---|",
     ]
     for entry in enum.findall("entry"):
-        rows.append(
-            f"| {entry.attrib['value']} | `{entry.attrib['name']}` | {_description(entry)} |"
-        )
+        rows.append(f"- {entry.attrib['value']} `{entry.attrib['name']}`: {_description(entry)}")
     return "\n".join(rows) + "\n"
 
 
@@ -177,8 +164,8 @@ def traffic() -> list[Traffic]:
     """Who sends what, and how often, by message."""
     rows: dict[int, Traffic] = {}
     for stream in STREAMS:
-        rates = f"{stream.ground_hz:g} / {stream.api_hz:g}"
-        if stream.ground_hz == 0.0:
+        rates = f"{stream.ground_hz:g}/{stream.api_hz:g}"
+        if stream.ground_hz == stream.api_hz == 0.0:
             rates = "on request"
         elif stream in AT_ONCE:
             rates += ", and at once"

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from fsw.autopilot.flight.arming import CHECKS
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
 
 ROOT: Final = Path(__file__).parents[2]
 FILE: Final = ROOT / "docs" / "reference" / "requirements.toml"

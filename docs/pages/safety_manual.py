@@ -1,43 +1,65 @@
-"""The tables in docs/reference/safety-manual.md: requirements, conditions, checks, tests."""
+"""The tables in docs/reference/safety-manual.md, and the traceability of the requirements."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import Final
 
 from docs.pages.failsafes import seconds
-from docs.pages.requirements import Manual, Requirement, ShowingTest, Shown, load, shown_by_tests
-from fsw.autopilot.flight.arming import CHECKS
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS, Failsafe
+from docs.pages.requirements import Manual, Requirement, Shown, load
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS, Failsafe
 from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 
 BEGIN: Final = "<!-- requirements: make pages -->\n"
 END: Final = "<!-- end -->"
 
-_HEAD: Final = ("requirement", "sentence", "by", "action", "tests")
 
-
-def reference(manual: Manual, shown: Shown) -> str:
+def reference(manual: Manual) -> str:
     """The tables in Markdown."""
     count, without = len(manual.requirements), len(manual.not_shown)
     parts = [
         f"{count} requirements, of which {without} are shown by no test.\n",
-        *_of_groups(manual, shown),
+        *_of_groups(manual),
         "### Not shown by a test\n",
-        _table(("requirement", "why"), sorted(manual.not_shown.items())),
-        "## Conditions and arming checks\n",
-        "The other direction: to which requirements each of them belongs.\n",
-        _reverse(manual),
-        "## Tests\n",
-        "*(long)*: run by `make test-long`, all others by `make test`.\n",
-        _tests(manual, shown),
+        "\n".join(f"- **{id_}**: {why}" for id_, why in sorted(manual.not_shown.items())) + "\n",
     ]
     return "\n".join(parts)
 
 
-def inserted(page: str, manual: Manual | None = None, shown: Shown | None = None) -> str:
+def traceability(manual: Manual, shown: Shown) -> str:
+    """What belongs to each requirement, as CSV: conditions, arming checks, files and tests.
+
+    A condition has the longest time until it is reported, a file what it does. A long test is run
+    by ``make test-long``, every other one by ``make test``.
+    """
+    written = io.StringIO()
+    rows = csv.writer(written, lineterminator="\n")
+    rows.writerow(("requirement", "kind", "name", "where", "remark"))
+    for row in manual.requirements:
+        rows.writerows(
+            (row.id, "condition", one.condition.value, f"Condition.{one.condition.name}",
+             seconds(one.within_us))
+            for one in (ROWS[Condition[name]] for name in row.conditions)
+        )  # fmt: skip
+        rows.writerows(
+            (row.id, "arming check", check.summary, check.subject.value, "")
+            for check in CHECKS
+            if check.summary in row.checks
+        )
+        rows.writerows((row.id, "file", "", file, row.action) for file in row.by)
+        rows.writerows(
+            (row.id, "long test" if test.is_long else "test", test.name, test.file, "")
+            for test in shown.get(row.id, ())
+        )
+    return written.getvalue()
+
+
+def inserted(page: str, manual: Manual | None = None) -> str:
     """The page with the tables as they should be.
 
     Raises:
@@ -47,29 +69,26 @@ def inserted(page: str, manual: Manual | None = None, shown: Shown | None = None
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError("the page has no place for the requirements")
-    tables = reference(manual or load(), shown_by_tests() if shown is None else shown)
+    tables = reference(manual or load())
     return f"{before}{begin}{tables}{end}{after}"
 
 
-def _of_groups(manual: Manual, shown: Shown) -> list[str]:
+def _of_groups(manual: Manual) -> list[str]:
     parts = []
     for group, heading in manual.groups.items():
         of_group = [row for row in manual.requirements if row.id.split("-")[1] == group]
-        parts += [f"### {heading}\n", _table(_HEAD, [_cells(row, shown) for row in of_group])]
+        lines = "\n".join(_line(row, row.id in manual.not_shown) for row in of_group)
+        parts += [f"### {heading}\n", f"{lines}\n"]
     return parts
 
 
-def _cells(row: Requirement, shown: Shown) -> tuple[str, ...]:
+def _line(row: Requirement, not_shown: bool) -> str:
+    """A requirement with the conditions that carry it out."""
     conditions = [ROWS[Condition[name]] for name in row.conditions]
-    by = [f"{one.condition.value} ({seconds(one.within_us)})" for one in conditions]
-    by += [f"arming: {check[0].lower()}{check[1:]}" for check in row.checks]
-    by += [f"`{file}`" for file in row.by]
-    actions = list(dict.fromkeys(_action(one) for one in conditions))
-    actions += ["arming denied"] if row.checks else []
-    actions += [row.action] if row.action else []
-    tests = len(shown.get(row.id, ()))
-    number = str(tests) if tests else "**none**"
-    return row.id, _sentence(row.shall, conditions), ", ".join(by), "; ".join(actions), number
+    by = "; ".join(one.condition.value for one in conditions)
+    carried_out = f" *({by})*" if by else ""
+    mark = " **No test.**" if not_shown else ""
+    return f"- **{row.id}**{carried_out} {_sentence(row.shall, conditions)}{mark}"
 
 
 def _sentence(shall: str, conditions: Collection[Failsafe]) -> str:
@@ -90,55 +109,3 @@ def _default(parameter: Parameter) -> str:
     if parameter.unit == "norm":
         return f"{100.0 * value:g} %" if value >= 0.0 else f"{value:g}"
     return f"{value:.4g} {parameter.unit}".rstrip()
-
-
-def _action(row: Failsafe) -> str:
-    """What is done by default."""
-    if row.does:
-        return row.does
-    chosen = [BY_NAME[name] for name in row.parameters if name in _ACTIONS]
-    done = [f"{dict(one.choices)[int(one.default)].lower()} (`{one.name}`)" for one in chosen]
-    return "; ".join(done)
-
-
-_ACTIONS: Final = frozenset(
-    name for name, one in BY_NAME.items() if one.choices and name.endswith(("_ACT", "GF_ACTION"))
-)
-
-
-def _reverse(manual: Manual) -> str:
-    rows = [
-        (row.condition.value, f"`Condition.{row.condition.name}`",
-         _ids(one for one in manual.requirements if row.condition.name in one.conditions))
-        for row in ROWS.values()
-    ]  # fmt: skip
-    rows += [
-        (check.summary, f"arming, {check.subject.value}",
-         _ids(one for one in manual.requirements if check.summary in one.checks))
-        for check in CHECKS
-    ]  # fmt: skip
-    return _table(("condition or check", "name", "requirements"), rows)
-
-
-def _ids(rows: Iterable[Requirement]) -> str:
-    return ", ".join(row.id for row in rows)
-
-
-def _tests(manual: Manual, shown: Shown) -> str:
-    rows = [(row.id, _names(shown[row.id])) for row in manual.requirements if row.id in shown]
-    return _table(("requirement", "tests"), rows)
-
-
-def _names(tests: Iterable[ShowingTest]) -> str:
-    """The tests, file by file."""
-    by_file: dict[str, list[str]] = {}
-    for test in tests:
-        name = f"`{test.name}`{' *(long)*' if test.is_long else ''}"
-        by_file.setdefault(test.file, []).append(name)
-    return "; ".join(f"`{file}`: {', '.join(names)}" for file, names in by_file.items())
-
-
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    lines += [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join(lines) + "\n"

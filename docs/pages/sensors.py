@@ -125,6 +125,7 @@ def reference() -> str:
     """The tables in Markdown."""
     suites = {name: (SUITES / f"{name}.toml").read_text(encoding="utf-8") for name in NAMES}
     parts = ["### Every sensor\n", _table("timing", keys.Timing, {}, {})]
+    parts.append("Below, these have a row where a suite gives a number, and no meaning again.\n")
     numbers = {name: tomllib.loads(text) for name, text in suites.items()}
     notes = {name: _comments(text) for name, text in suites.items()}
     for name, kind in TABLES.items():
@@ -133,9 +134,14 @@ def reference() -> str:
         said = {suite: found.get(name, {}) for suite, found in notes.items()}
         parts.append(_table(name, kind, values, said))
     parts.append("### Sources\n")
-    parts.append("Numbers of the brackets in the tables, suite by suite.\n")
+    cited: dict[str, list[str]] = {}
     for name, text in suites.items():
-        parts.append(f"- `{name}`: {'; '.join(_sources(text))}")
+        for source in _sources(text):
+            cited.setdefault(source, []).append(name)
+    marks = [source.split()[0] for source in cited]
+    for source, of in sorted(cited.items(), key=lambda row: int(row[0][1 : row[0].index("]")])):
+        only = f" (`{'`, `'.join(of)}`)" if marks.count(source.split()[0]) > 1 else ""
+        parts.append(f"- {source}{only}")
     return "\n".join(parts) + "\n"
 
 
@@ -159,27 +165,33 @@ def _table(
     notes: dict[str, dict[str, str]],
 ) -> str:
     """Every key of one sensor: its own, and those of all sensors that a suite gives."""
-    head = ["key", "allowed", "meaning", *(f"`{suite}`" for suite in values)]
-    if values:
-        head.append("source")
-    rows = [_row(head), _row(["---"] * len(head))]
+    rows = [f"On board in `{'`, `'.join(values)}`.\n"] if values else []
     hints = typing.get_type_hints(kind, include_extras=True)
     common = {field.name for field in dataclasses.fields(keys.Timing)}
     for field in dataclasses.fields(kind):
         given = [found.get(field.name) for found in values.values()]
         if kind is not keys.Timing and field.name in common and not any(given):
             continue
-        meaning = MEANINGS[name].get(field.name) or MEANINGS["timing"][field.name]
-        cells = [f"`{field.name}`", _allowed(hints[field.name]), meaning]
-        if values:
-            cells += ["" if value is None else _shown(value) for value in given]
-            cells.append(_source([notes[suite].get(field.name, "") for suite in values]))
-        rows.append(_row(cells))
+        repeated = kind is not keys.Timing and field.name in common
+        meaning = "" if repeated else MEANINGS[name][field.name]
+        allowed = "" if repeated else _allowed(hints[field.name])
+        value = _value(dict(zip(values, given, strict=True))) if values else ""
+        source = _source([notes[suite].get(field.name, "") for suite in values])
+        line = f"- `{field.name}`"
+        line += f" ({allowed})" if allowed else ""
+        line += f" = {value}" if value else ""
+        line += f": {meaning}" if meaning else ""
+        line += f" [{source}]" if source else ""
+        rows.append(line)
     return "\n".join(rows) + "\n"
 
 
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _value(given: dict[str, Any]) -> str:
+    """What the suites give: one number where they agree, else suite by suite."""
+    shown = {suite: _shown(value) for suite, value in given.items() if value is not None}
+    if len(shown) == len(given) and len(set(shown.values())) == 1:
+        return next(iter(shown.values()))
+    return ", ".join(f"`{suite}` {value}" for suite, value in shown.items())
 
 
 def _allowed(hint: Any) -> str:
@@ -187,7 +199,8 @@ def _allowed(hint: Any) -> str:
         return "true, false"
     plain, permitted = typing.get_args(hint)
     count = len(typing.get_args(plain))
-    return f"{count} numbers, {permitted}" if count else str(permitted)
+    span = str(permitted).replace(" to ", "…")
+    return f"{count} numbers, {span}" if count else span
 
 
 def _shown(value: Any) -> str:

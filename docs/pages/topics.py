@@ -1,7 +1,8 @@
-"""The table of topics in docs/reference/flight-log.md."""
+"""The topics in docs/reference/flight-log.md."""
 
 from __future__ import annotations
 
+import itertools
 from typing import Final
 
 from fsw.log.topics import TOPICS
@@ -13,11 +14,8 @@ END: Final = "<!-- end -->"
 
 
 def reference() -> str:
-    """The topics as Markdown: a table of them, then the fields of each."""
-    rows = ["| topic | written | content |", "|---|---|---|"]
-    every = (*TOPICS, *TRUTH_TOPICS)
-    rows += [f"| [`{t.name}`](#{t.name}) | {t.when} | {t.about} |" for t in every]
-    return "\n".join(rows) + "\n\n" + "\n".join(_fields(topic) for topic in every) + "\n"
+    """The topics as Markdown: when each is written, what it is, and its fields."""
+    return "\n".join(_topic(topic) for topic in (*TOPICS, *TRUTH_TOPICS)) + "\n"
 
 
 def inserted(page: str) -> str:
@@ -33,10 +31,27 @@ def inserted(page: str) -> str:
     return f"{before}{begin}{reference()}{end}{after}"
 
 
-def _fields(topic: Topic) -> str:
-    rows = [f"### {topic.name}\n", "| field | type | |", "|---|---|---|"]
-    rows += [f"| `{field.name}` | {_type(field)} | {field.note} |" for field in topic.fields]
-    return "\n".join(rows) + "\n"
+# The note of the time of a measurement.
+_STAMP: Final = "s, of the measurement, on the clock of the tick"
+# What the page says once, of every topic that has the mark.
+_MARKS: Final = {"; every tick with `LOG_PROFILE` 1": " †", "; none with exact sensors": " ‡"}
+
+
+def _when(topic: Topic) -> str:
+    when = topic.when
+    for words, mark in _MARKS.items():
+        when = when.replace(words, mark)
+    return when
+
+
+def _topic(topic: Topic) -> str:
+    """One topic; fields that follow each other with one type and note are in one line."""
+    lines = [f"### {topic.name}\n", f"{topic.about} ({_when(topic)}).\n"]
+    fields = [field for field in topic.fields if field.note != _STAMP]
+    for (type_, note), alike in itertools.groupby(fields, lambda f: (_type(f), f.note)):
+        names = ", ".join(f"`{field.name}`" for field in alike)
+        lines.append(f"- {names} {type_}{f': {note}' if note else ''}")
+    return "\n".join(lines) + "\n"
 
 
 def _type(field: Field) -> str:

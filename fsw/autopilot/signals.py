@@ -50,7 +50,7 @@ class Mode(Enum):
         return self is not _DISARMED and self is not _FAULT
 
 
-_DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT  # found in a tenth of the time
+_DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT  # ten times as fast as Mode.X
 
 
 class SolverStatus(IntEnum):
@@ -572,6 +572,7 @@ class PlanRequest:
     joint_targets: tuple[Vec2, ...] = ()
     # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
     recent_disturbance: float = math.inf
+    mode: Mode = Mode.TRAJECTORY  # in which the plan is flown
 
 
 @dataclass(frozen=True, slots=True)
@@ -694,7 +695,7 @@ class ConstraintReport:
     per_zone: tuple[int, ...] = ()  # how many of them belong to each zone
     # m, kept from each zone beyond its clearance because the estimate is not sure; empty: nothing
     added: tuple[float, ...] = ()
-    lacking: float = 0.0  # m, what there is no room for of that, of the zone that lacks most
+    shortfall: float = 0.0  # m, largest shortfall of that of a zone
 
     def shown(self, most: int) -> tuple[tuple[float, ...], tuple[float, ...], int | None]:
         """Margins [m] and barrier values [m/s] for a record with room for ``most``, and the least.
@@ -716,7 +717,7 @@ class ConstraintReport:
         return tuple(least)
 
 
-class Charge(IntEnum):
+class BatteryWarning(IntEnum):
     """How much is left, by the thresholds of the parameters."""
 
     OK = 0
@@ -733,7 +734,7 @@ class BatteryState:
     current: float = 0.0  # A
     consumed: float = 0.0  # A h
     remaining: float = 1.0  # share of the capacity
-    charge: Charge = Charge.OK
+    charge: BatteryWarning = BatteryWarning.OK
     usual_current: float = 0.0  # A, of late
     time_left: float = math.inf  # s, at the usual current
     voltage_error: float = 0.0  # V, measured minus modelled, when it was measured last

@@ -41,7 +41,7 @@ from messages.frames import Frame, Losses, as_version_1, is_version_1
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
 
-_LEAST_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
+_MIN_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
 _MEASURED_S: Final = 3  # calls of ``news``, one a second
@@ -112,7 +112,7 @@ class GcsLink:
             STREAMS,
             setup.rates_hz,
             context.facts.tick_period_us,
-            most_bytes_s=None if carried is None else TELEMETRY * carried,
+            max_bytes_s=None if carried is None else TELEMETRY * carried,
         )
         self._looks = 0  # for news
         self._told_slow = False
@@ -173,7 +173,7 @@ class GcsLink:
                 break
             datagram, sender = received
             self._read += 1
-            budget -= max(len(datagram), _LEAST_COST)
+            budget -= max(len(datagram), _MIN_COST)
             for frame, raw in self._endpoint.cut(datagram, self.losses):
                 if frame.system_id == SYSTEM_ID and raw in self._sent:
                     self.echoes += 1

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from enum import Enum
 from typing import Final, cast
 
 from fsw.autopilot.measurements import ImuSample, Sample
@@ -36,6 +35,7 @@ from fsw.link.outbox import packed
 from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sensor_clock import SensorClock
 from fsw.link.udp_endpoint import Address
+from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import decode, encode_replies, message_ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import (
@@ -86,13 +86,6 @@ _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
 _NO_JOINTS: Final = (math.nan, math.nan)
 _NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
-
-
-class Pacing(Enum):
-    """Lockstep or real time, from bit 0 of custom_mode in the simulator's HEARTBEAT."""
-
-    REALTIME = 0
-    LOCKSTEP = 1
 
 
 class SimLink:

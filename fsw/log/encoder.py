@@ -12,8 +12,8 @@ from dataclasses import astuple
 from operator import attrgetter
 from typing import Any, Final
 
-from fsw.autopilot.estimation.sensor_fault import Sensor
-from fsw.autopilot.flight.estimator_report import (
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.flight.estimate.estimator_report import (
     ABOVE_GROUND,
     ABSOLUTE,
     HEIGHT,
@@ -21,6 +21,7 @@ from fsw.autopilot.flight.estimator_report import (
     RELATIVE,
     VERTICAL_VELOCITY,
 )
+from fsw.autopilot.flight.modes import NAV_STATES
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import ImuSample
@@ -66,21 +67,6 @@ _UNAIDED_US: Final = 1_000_000
 # In the order of TestRatios.
 _INNOVATION_BITS: Final = (0, 1, 2, 6, 9)
 _ROTARY_WING: Final = 1  # VEHICLE_TYPE of PX4
-_LOITER: Final = 4
-# PX4's NAVIGATION_STATE of what a mode does; the modes' own names are in the log as well.
-NAV_STATES: Final[dict[str, int]] = {
-    "disarmed": _LOITER,  # what it would start in, as in custom_mode
-    "takeoff": 17,
-    "hold": _LOITER,
-    "trajectory": 14,  # offboard
-    "orbit": 21,
-    "offboard": 14,
-    "mission": 3,
-    "return": 5,
-    "land": 18,
-    "descend": 12,
-    "fault": 13,  # termination
-}
 
 
 # What a replay needs and what it is compared by: every tick in every profile.
@@ -285,7 +271,7 @@ class LogEncoder:
                 *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
                 *(safety.breaches, safety.departures, safety.interventions),
-                *(*_filled(report.added[: topics.MARGINS]), report.lacking),
+                *(*_filled(report.added[: topics.MARGINS]), report.shortfall),
                 *(_END_EFFECTOR, t_us, *p, *v, *wanted),
             )
         )
@@ -347,7 +333,7 @@ def _status(snapshot: FlightSnapshot, took_over: bool) -> bytes:
     rotors = 1 << known.rotor >> 1  # from 1; 0: none
     return _STATUS.pack(
         (
-            *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES.get(mode.value, _LOITER)),
+            *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES[mode]),
             *(bool(snapshot.failures), mode.value.encode(), ",".join(snapshot.failures).encode()),
             *(took_over, _ROTARY_WING, False),
             *(landing, snapshot.t_us, snapshot.landed),

@@ -8,9 +8,14 @@ from dataclasses import fields
 from typing import Any, Final
 
 from fsw.autopilot.control.attitude import attitude_reference
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.estimator_report import ABSOLUTE, HEIGHT, LEVEL_VELOCITY, RELATIVE
-from fsw.autopilot.flight.estimator_report import VERTICAL_VELOCITY as CLIMB
+from fsw.autopilot.flight.estimate.estimator_report import (
+    ABSOLUTE,
+    HEIGHT,
+    LEVEL_VELOCITY,
+    RELATIVE,
+)
+from fsw.autopilot.flight.estimate.estimator_report import VERTICAL_VELOCITY as CLIMB
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_global
 from fsw.autopilot.geometry.rotation import quaternion_from_euler
 from fsw.autopilot.geometry.vectors import dot

@@ -210,7 +210,7 @@ VEHICLE_STATUS: Final = Topic(
     "on change and every second",
     (
         Field("arming_state", "uint8_t", note="1 disarmed, 2 armed"),
-        Field("nav_state", "uint8_t", note="PX4's number of the nearest mode"),
+        Field("nav_state", "uint8_t", note="PX4's number of the mode"),
         Field("failsafe", "bool", note="a fault is active"),
         Field("mode", "char", 16, "Pandion's name of the mode"),
         Field("failures", "char", 96, "names of the active faults"),
@@ -287,7 +287,7 @@ LOOP_TIMING: Final = Topic(
         Field("group", "uint8_t", note="PANDION_RATE_GROUP"),
     ),
 )
-_MEASURED: Final = "every measurement, with the tick that it arrived for; none with exact sensors"
+_MEASURED: Final = "every measurement; none with exact sensors"
 _MEASURED_AT: Final = doubles("time", 0, "s, of the measurement, on the clock of the tick")
 SENSOR_COMBINED: Final = Topic(
     "sensor_combined",

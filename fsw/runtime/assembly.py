@@ -13,13 +13,13 @@ from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.control_choice import FULL, ControlChoice
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.ports import VehicleFacts
 from fsw.autopilot.signals import Origin
 from fsw.autopilot.tuning import flat
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.runtime import clock
 from fsw.runtime.program import FlightProgram
+from fsw.storage.parameter_store import ParameterStore
 
 
 def flight_software(
@@ -41,7 +41,7 @@ def flight_software(
         Site(
             locate=partial(to_local, config.origin),
             judge=lambda safe_set: flight.against(safe_set),
-            least_margin=flight.least_margin,
+            min_margin=flight.min_margin,
             clearance=lambda: flight.config.limits.fence_clearance,
             owner=lambda: int(flight.config.limits.safe_set_owner),
             ceiling=lambda: flight.config.steering.highest,

@@ -11,7 +11,7 @@ import threading
 from typing import Final
 
 from command_line.process import Events
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.text_limiter import REPEAT_US, TextLimiter
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from fsw.autopilot.flight.failsafe_evidence import JUMP_US, MISSED_TICKS
+from fsw.autopilot.flight.failsafe.evidence import JUMP_US, MISSED_TICKS
 from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import HostHealth
 from fsw.link.ground_links import GroundLinks
@@ -16,7 +16,7 @@ from fsw.link.ground_links import GroundLinks
 _FEW: Final = 100  # datagrams/s; fewer are not worth a number
 _ENOUGH_S: Final = 60.0  # for which a disk should take the log
 _STEP_S: Final = 5.0
-_LEAST_RATE: Final = 1e5  # bytes/s of a log that has only begun
+_MIN_RATE: Final = 1e5  # bytes/s of a log that has only begun
 
 
 class Disk(Protocol):
@@ -75,6 +75,6 @@ class HostWatch:
     def _disk_left_us(self, now_us: int) -> int:
         """How long the disk will take the log, where that is not long; -1: it is."""
         elapsed = 1e-6 * max(now_us - self._begun_us, 1_000_000)
-        rate = max(self._disk.size / elapsed, _LEAST_RATE)
+        rate = max(self._disk.size / elapsed, _MIN_RATE)
         left = self._disk.room() / rate
         return -1 if left >= _ENOUGH_S else round(1e6 * _STEP_S * (left // _STEP_S))

@@ -13,7 +13,7 @@ from fsw.link.services.mission_store import MissionStore
 
 if TYPE_CHECKING:
     # Its table of parameters imports everything that flies; a refusal need not wait for that.
-    from fsw.autopilot.parameters.store import ParameterStore
+    from fsw.storage.parameter_store import ParameterStore
 
 State = TypeVar("State")
 

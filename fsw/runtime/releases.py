@@ -16,7 +16,7 @@ from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import SensorFrame
 from fsw.frozen import dataclass
-from fsw.link.sim_link import SimLink
+from fsw.link.vehicle_link import VehicleLink
 from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.release_schedule import ReleaseSchedule
 
@@ -47,13 +47,13 @@ class StepReleases:
 
     stale = skipped = 0  # every step is taken
 
-    def __init__(self, sim: SimLink, clock: Clock) -> None:
-        self._sim = sim
+    def __init__(self, vehicle: VehicleLink, clock: Clock) -> None:
+        self._vehicle = vehicle
         self._clock = clock
 
     def next(self) -> Release | None:
         """Wait for the next step; None if none came."""
-        sensors = self._sim.wait_for_step()
+        sensors = self._vehicle.wait_for_step()
         if sensors is None:
             return None
         now_us = self._clock()
@@ -65,7 +65,7 @@ class ScheduledReleases:
 
     def __init__(
         self,
-        sim: SimLink,
+        vehicle: VehicleLink,
         clock: Clock,
         sleep: Callable[[float], None],
         first: SensorFrame,
@@ -77,7 +77,7 @@ class ScheduledReleases:
         ``sleep`` sleeps for seconds, on the same clock; ``deadlines`` takes the skipped releases.
         """
         self.stale = 0  # ticks without a frame of their own
-        self._sim = sim
+        self._vehicle = vehicle
         self._clock = clock
         self._sleep = sleep
         self._period_us = period_us
@@ -110,7 +110,7 @@ class ScheduledReleases:
 
     def _settle(self) -> Release | None:
         """Tick on arrival, and begin the schedule behind the promptest of the first frames."""
-        sensors, now_us = self._sim.wait_for_step(), self._clock()
+        sensors, now_us = self._vehicle.wait_for_step(), self._clock()
         if sensors is None:
             return None
         self._readings, self._t_us, self._expected_us = sensors, sensors.t_us, sensors.t_us
@@ -122,9 +122,9 @@ class ScheduledReleases:
 
     def _wait(self, schedule: ReleaseSchedule, due_us: int) -> None:
         """Sleep until the release; now and then measure when the frame comes, and follow it."""
-        if schedule.index % _PROBE_TICKS == 0 and not self._sim.wait(0.0):
+        if schedule.index % _PROBE_TICKS == 0 and not self._vehicle.wait(0.0):
             self._sleep_until(due_us - _PROBE_US)
-            arrived = self._sim.wait(1e-6 * max(due_us - self._clock(), 0))
+            arrived = self._vehicle.wait(1e-6 * max(due_us - self._clock(), 0))
             early_us = due_us - self._clock() if arrived else 0
             shift_us = _GAIN * (LEAD_US - early_us)
             schedule.shift(min(max(shift_us, -_MAX_SHIFT_US), _MAX_SHIFT_US))
@@ -137,8 +137,8 @@ class ScheduledReleases:
 
     def _release(self, due_us: int, steps: int) -> Release | None:
         begun_us = self._clock()
-        newest = self._sim.newest()
-        if newest is None and self._sim.shutdown:
+        newest = self._vehicle.newest()
+        if newest is None and self._vehicle.shutdown:
             return None  # not missed: the run is over
         self._expected_us += steps * self._period_us
         if newest is not None:

@@ -6,9 +6,9 @@ from dataclasses import asdict
 
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.ports import VehicleFacts
+from fsw.runtime.flight_loop import FlightEnd, FlightRecord
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, TELEMETRY
-from fsw.runtime.sim_loop import FlightEnd, FlightRecord
 from fsw.runtime.timing import GroupTimer, Histogram
 
 

@@ -37,7 +37,7 @@ _ALL_WELL: Final = 100  # quality
 _UNKNOWN: Final = (math.nan, *(0.0,) * 20)  # a covariance
 _NO_RATES: Final = (math.nan,) * 6
 _LASER, _DOWNWARD = 0, 25  # MAV_DISTANCE_SENSOR, MAV_SENSOR_ORIENTATION
-_MOST_JOINTS: Final = 4
+_MAX_JOINTS: Final = 4
 _U8, _U16, _I16 = 0xFF, 0xFFFF, 0x7FFF
 _WARM_C: Final = 15.0
 
@@ -55,9 +55,9 @@ class SensorEncoder:
         self._pose: LockstepFrame | None = None
         self._joints = {
             count: LockstepFrame(
-                writer, message_ids.JOINT_ENCODERS, *(0.0,) * (_MOST_JOINTS - count), count
+                writer, message_ids.JOINT_ENCODERS, *(0.0,) * (_MAX_JOINTS - count), count
             )
-            for count in range(1, _MOST_JOINTS + 1)
+            for count in range(1, _MAX_JOINTS + 1)
         }
 
     def frames(self, t_us: int, measurements: tuple[Measurement, ...]) -> list[bytes]:

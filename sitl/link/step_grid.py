@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-MOST_BEHIND_S: Final = 0.05  # is caught up with; the vehicle takes no part in steps that hurry
+MAX_BEHIND_S: Final = 0.05  # is caught up with; the vehicle takes no part in steps that hurry
 
 
 class StepGrid:
-    """A late step shortens the next one and shifts nothing, up to ``MOST_BEHIND_S``.
+    """A late step shortens the next one and shifts nothing, up to ``MAX_BEHIND_S``.
 
     Further behind, the process was suspended, and simulated time is paused with it:
     hundreds of steps in a row would fly an uncontrolled vehicle into a wall.
@@ -39,7 +39,7 @@ class StepGrid:
         if remaining_s > 0.0:
             self._sleep(remaining_s)
         behind_s = self._clock() - due_s
-        if behind_s <= MOST_BEHIND_S:
+        if behind_s <= MAX_BEHIND_S:
             return 0.0
         # Whole steps: the vehicle has laid its own grid behind the phase of this one.
         moved_s = behind_s // self._period_s * self._period_s

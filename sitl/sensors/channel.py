@@ -12,7 +12,7 @@ from sitl.sensors.exact import V4, SensorReadings
 from sitl.sensors.keys import Timing
 from sitl.sensors.measurements import Measurement
 
-_MOST_DEVIATIONS = 8.0  # of a jitter: one draw in 1e15 is below minus that
+_MAX_DEVIATIONS = 8.0  # of a jitter: one draw in 1e15 is below minus that
 
 
 class Sensor(Protocol):
@@ -58,7 +58,7 @@ class Channel:
         )
         self._prompt = self._steady and not self._latency_us  # nothing is ever under way
         # What is measured in a step arrives in a later one.
-        self.late = self._latency_us - _MOST_DEVIATIONS * self._jitter_us >= 1.0
+        self.late = self._latency_us - _MAX_DEVIATIONS * self._jitter_us >= 1.0
         self._start_us = start_us
         self._interval = -1  # of which the gap is known
         self._gap_begins_us = math.inf

@@ -8,61 +8,16 @@ why. Rows do not depend on order, process or machine: workers with other code ar
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Self
 
 from studies.campaign.journal import Journal
+from studies.campaign.ports import Flight, RowT, Scheduler
 from studies.campaign.worker import TIME_LIMIT_S, fly_one
 
 ProgressReport = Callable[[int, int], None]  # flights done, flights in all
-
-
-class Row(Protocol):
-    """What a flight leaves."""
-
-    @property
-    def error(self) -> bool:
-        """Whether the flight itself broke, not the vehicle: it is flown again on resuming."""
-
-    def as_line(self) -> Mapping[str, Any]:
-        """The row as it is kept in a journal."""
-
-
-RowT = TypeVar("RowT", bound=Row)
-RowT_co = TypeVar("RowT_co", bound=Row, covariant=True)
-
-
-class Flight(Protocol[RowT_co]):
-    """What is flown; it and its row can be pickled."""
-
-    def key(self) -> str:
-        """Its name: same flight, same name, in any process, while the code is the same."""
-
-    def row(self) -> RowT_co:
-        """Fly it here and now; an exception becomes a row with the error."""
-
-    def broken(self, reason: str) -> RowT_co:
-        """The row that stands for it if it cannot be flown."""
-
-    def from_line(self, line: Mapping[str, Any]) -> RowT_co:
-        """Its row as it was kept; a TypeError or KeyError if another version kept it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Scheduler:
-    """A running scheduler of Dask; files of TLS as Dask's own options have them."""
-
-    address: str | None = None
-    file: Path | None = None
-    tls_ca_file: Path | None = None
-    tls_cert: Path | None = None
-    tls_key: Path | None = None
-
-
-class SchedulerGoneError(Exception):
-    """No scheduler answers, in one sentence; what was flown is kept."""
 
 
 def silent(done: int, total: int) -> None:

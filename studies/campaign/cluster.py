@@ -20,9 +20,9 @@ import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, Security
 
 from fsw.runtime.process import pin_numerics_to_one_thread
-from studies.campaign.campaign import Scheduler, SchedulerGoneError
 from studies.campaign.dispatch import Came
 from studies.campaign.identity import identity
+from studies.campaign.ports import Scheduler, SchedulerGoneError
 from studies.flight.kernels import compile_first
 
 GIVE_UP_S: Final = 600.0  # without a scheduler

@@ -6,17 +6,14 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol
 
-if TYPE_CHECKING:
-    from studies.campaign.campaign import Flight, Row
-
-RowT = TypeVar("RowT", bound="Row")
+from studies.campaign.ports import Flight, RowT
 
 # A task costs the scheduler one or two milliseconds (python -m benchmarks scheduler): flights that
 # would be more go in batches.
 TASKS_A_SECOND: Final = 100.0
-_MOST_A_TASK: Final = 100
+_MAX_A_TASK: Final = 100
 AHEAD: Final = 2  # tasks out for each thread: one flies, one waits beside it
 _WAIT_S: Final = 0.5
 
@@ -138,7 +135,7 @@ class Dispatch(Generic[RowT]):
             return 1
         flight_s = max(self._took_s / self._flown, 1e-6)
         asked = math.ceil(self._cluster.threads / (self._rate * flight_s))
-        return min(max(asked, 1), _MOST_A_TASK)
+        return min(max(asked, 1), _MAX_A_TASK)
 
     def _give(self, batches: list[tuple[_Waiting[RowT], ...]]) -> list[int]:
         flights = [[one.flight for one in batch] for batch in batches]

@@ -81,7 +81,7 @@ class CampaignRow:
         return self.margin_m is not None and not self.margin_m >= 0.0
 
     def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.campaign.Row`."""
+        """See :class:`studies.campaign.ports.Row`."""
         return asdict(self)
 
     def compared(self) -> dict[str, Any]:
@@ -106,17 +106,17 @@ def row_of(plan: CampaignPlan, line: Mapping[str, Any]) -> CampaignRow:
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """Flight ``number`` of a plan; see :class:`studies.campaign.campaign.Flight`."""
+    """Flight ``number`` of a plan; see :class:`studies.campaign.ports.Flight`."""
 
     plan: CampaignPlan
     number: int
 
     def key(self) -> str:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return row_key(self.plan.digest, self.number, code())
 
     def row(self) -> CampaignRow:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         row, _ = self.flown()
         return row
 
@@ -142,11 +142,11 @@ class CampaignFlight:
         return row, result
 
     def broken(self, reason: str) -> CampaignRow:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return self._row(reason=reason, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> CampaignRow:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         row = row_of(self.plan, line)
         if row.flight != self.number:  # or the directory would never have a row of this flight
             raise TypeError(f"flight = {row.flight} under the key of flight {self.number}")

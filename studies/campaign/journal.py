@@ -22,7 +22,7 @@ from typing import Any, BinaryIO, Final
 from command_line.bounded_file import open_regular
 from command_line.bounded_json import JsonError, json_object
 
-MOST_LINE: Final = 1 << 20  # bytes; a flight of the fault matrix with all its texts has some 20 kB
+MAX_LINE: Final = 1 << 20  # bytes; a flight of the fault matrix with all its texts has some 20 kB
 _NO_LOCKS: Final = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)  # of a file system
 _BEGINS: Final = b'{"key": "'  # each line
 _FIRST: Final = hashlib.sha256(b"pandion-journal-1").hexdigest()  # before the first line
@@ -82,7 +82,7 @@ class Journal:
         if place is None:
             return None
         self._file.seek(place)
-        content = _object(self._file.readline(MOST_LINE))
+        content = _object(self._file.readline(MAX_LINE))
         if content is None or content.pop("key", None) != key:
             return None  # the file was changed by something that asks for no lock
         return content
@@ -142,10 +142,10 @@ def _verified(
     seal, place = Seal(), 0
     file.seek(0)
     while place < length:
-        line = file.readline(MOST_LINE)
+        line = file.readline(MAX_LINE)
         place += len(line)
         if not line.endswith(b"\n"):
-            if mends and len(line) < MOST_LINE and line[: len(_BEGINS)] == _BEGINS[: len(line)]:
+            if mends and len(line) < MAX_LINE and line[: len(_BEGINS)] == _BEGINS[: len(line)]:
                 break
             raise _damaged(path, seal, "has no end: it was cut short, or is still being written")
         found = _SEALED.fullmatch(line)

@@ -17,9 +17,9 @@ from studies.campaign.summary import CaseSummary, summaries, verdict, worst
 from studies.drawing import BASE, BOUND, WALL, NoMatplotlibError, drawable, sheet
 from studies.table_text import error_mm, millimetres
 
-_MOST_CASES: Final = 12  # that are drawn
-_MOST_POINTS: Final = 4000  # of a map
-_MOST_MAPS: Final = 8
+_MAX_CASES: Final = 12  # that are drawn
+_MAX_POINTS: Final = 4000  # of a map
+_MAX_MAPS: Final = 8
 _CASE: Final = ("scenario", "sensors", "controller", "fault")
 
 
@@ -135,7 +135,7 @@ def _of_cases(rows: Sequence[CampaignRow], result: CampaignResult) -> dict[str, 
 
 
 def _distributions(rows: Sequence[CampaignRow], result: CampaignResult) -> str:
-    cases = dict(list(_of_cases(rows, result).items())[:_MOST_CASES])
+    cases = dict(list(_of_cases(rows, result).items())[:_MAX_CASES])
     drawn = sheet(max(len(cases), 1), 2, 11.0, max(1.6 * len(cases), 1.6))
     for (left, right), (name, of) in zip(drawn.axes, cases.items(), strict=False):
         margins = drawable(1e3 * row.margin_m for row in of if row.margin_m is not None)
@@ -150,10 +150,10 @@ def _distributions(rows: Sequence[CampaignRow], result: CampaignResult) -> str:
 
 def _maps(rows: Sequence[CampaignRow], result: CampaignResult) -> list[str]:
     """For each varied key: the margins over it, violations marked."""
-    keys = [one.key for one in result.plan.varied][:_MOST_MAPS]
+    keys = [one.key for one in result.plan.varied][:_MAX_MAPS]
     if not keys or not rows:
         return []
-    some = rows[:: max(1, len(rows) // _MOST_POINTS)] if len(rows) > _MOST_POINTS else rows
+    some = rows[:: max(1, len(rows) // _MAX_POINTS)] if len(rows) > _MAX_POINTS else rows
     bad = [row for row in rows if row.violated]
     good = [row for row in some if not row.violated]
     lines = -(-len(keys) // 2)

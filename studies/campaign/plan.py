@@ -43,7 +43,7 @@ from studies.campaign.keys import (
     rounded,
 )
 from studies.campaign.values import (
-    MOST_FLIGHTS,
+    MAX_FLIGHTS,
     Choice,
     Design,
     Distribution,
@@ -66,7 +66,7 @@ Tracking: TypeAlias = Literal["lqr", "pid"]
 _INNER: Final[dict[str, Literal["tracking", "pid"]]] = {"lqr": "tracking", "pid": "pid"}
 # What can fail without processes, links and a battery that is read.
 _FAILING: Final = (*SENSORS, "motor", "joint")
-_MOST_BYTES: Final = 256 * 1024
+_MAX_BYTES: Final = 256 * 1024
 _DISTRIBUTIONS: Final = ("uniform", "normal", "choice")
 _DIGEST_DIGITS: Final = 32
 
@@ -86,7 +86,7 @@ class _Keys:
     """The keys of the file, but for the tables ``vary``, ``parameters`` and ``faults``."""
 
     scenarios: tuple[str, ...]
-    flights: Annotated[float, Range(1.0, float(MOST_FLIGHTS), step=1.0)] = 0.0
+    flights: Annotated[float, Range(1.0, float(MAX_FLIGHTS), step=1.0)] = 0.0
     duration_s: Annotated[float, Range(0.1, 86400.0)] = math.inf  # as long as the scenario
     seed: Annotated[float, Range(0.0, 2.0**53, step=1.0)] = 0.0
     design: Design = "random"
@@ -168,7 +168,7 @@ class CampaignPlan:
 
     def most(self) -> int:
         """How many flights the design has."""
-        return self.count if self.design == "latin-hypercube" else MOST_FLIGHTS
+        return self.count if self.design == "latin-hypercube" else MAX_FLIGHTS
 
     def check(self, count: int) -> None:
         """Refuse more flights than the design has.
@@ -176,8 +176,8 @@ class CampaignPlan:
         Raises:
             CampaignError: With what to do.
         """
-        if count > MOST_FLIGHTS:
-            raise CampaignError(f"{count} flights are too many: a campaign has {MOST_FLIGHTS}")
+        if count > MAX_FLIGHTS:
+            raise CampaignError(f"{count} flights are too many: a campaign has {MAX_FLIGHTS}")
         if count > self.most():
             raise CampaignError(
                 f"a {self.design} of {self.most()} flights has no flight {self.most()}; write "
@@ -242,7 +242,7 @@ def load_tables(
         CampaignError: As of ``load_plan``.
     """
     try:
-        content = read_bounded(path, _MOST_BYTES)
+        content = read_bounded(path, _MAX_BYTES)
     except OSError as error:
         raise CampaignError(f"cannot read {path}: {error.strerror}") from None
     try:
@@ -315,9 +315,9 @@ def _plan(
         if keys.design != "grid":
             raise CampaignError('missing key "flights" (how many there are to be, such as 200)')
         count = len(cases) * grid_size(tuple(one.distribution for one in varied))
-        if count > MOST_FLIGHTS:
+        if count > MAX_FLIGHTS:
             raise CampaignError(
-                f"the grid has {count} flights, and a campaign at most {MOST_FLIGHTS}: give fewer "
+                f"the grid has {count} flights, and a campaign at most {MAX_FLIGHTS}: give fewer "
                 'points, or the key "flights" to fly the first of them'
             )
     longest = max(base.scenario.duration_s for base in bases)

@@ -27,7 +27,7 @@ from studies.campaign.identity import packages
 from studies.campaign.journal import Journal, JournalError, Seal, lines, sealed_lines
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
-from studies.campaign.values import MOST_FLIGHTS
+from studies.campaign.values import MAX_FLIGHTS
 from studies.flight.kept_row import kept_row
 
 PLAN, JOURNAL, FACTS, TABLE, PAGE = (
@@ -37,7 +37,7 @@ PLAN, JOURNAL, FACTS, TABLE, PAGE = (
     "rows.parquet",
     "campaign.html",
 )
-_MOST_BYTES: Final = 16 * 1024 * 1024  # of the facts
+_MAX_BYTES: Final = 16 * 1024 * 1024  # of the facts
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def read_rows(directory: Path) -> KeptRows:
     if not rows:
         raise CampaignError(f"{directory} has no row that this version of Pandion can read")
     try:
-        file = read_bounded(directory / PLAN, _MOST_BYTES).decode("utf-8", "replace")
+        file = read_bounded(directory / PLAN, _MAX_BYTES).decode("utf-8", "replace")
     except OSError as error:
         raise CampaignError(f"{directory / PLAN} cannot be read: {error.strerror}") from None
     return KeptRows(rows, digests, facts, file)
@@ -135,13 +135,13 @@ def _known_facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal]:
 def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal] | None:
     """What campaign.json says, its digests, flights and seal; None if it cannot be read or used."""
     try:
-        facts = read_json(directory / FACTS, _MOST_BYTES)
+        facts = read_json(directory / FACTS, _MAX_BYTES)
         digests, asked = Digests(**facts["digests"]), facts["flights"]
         sealed = kept_row(Seal, facts.pop("journal"))
     except (OSError, ValueError, TypeError, KeyError):
         return None
     known = all(isinstance(one, str) for one in asdict(digests).values())
-    if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MOST_FLIGHTS:
+    if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MAX_FLIGHTS:
         return None
     return (facts, digests, asked, sealed) if known else None
 

@@ -19,8 +19,8 @@ Table: TypeAlias = np.ndarray[tuple[int, int], np.dtype[np.float64]]
 Design: TypeAlias = Literal["random", "latin-hypercube", "sobol", "grid"]
 
 _DESIGN_KEY: Final = 1 << 31  # of the designs' streams; flights have the numbers below
-MOST_FLIGHTS: Final = 10_000_000
-_LEAST_TABLE: Final = 1 << 10
+MAX_FLIGHTS: Final = 10_000_000
+_MIN_TABLE: Final = 1 << 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,7 @@ def design_point(
     A Latin hypercube has ``size`` points; a Sobol sequence goes on for ever.
     """
     if design == "sobol":
-        table = _sobol(root, case, max(_LEAST_TABLE, 1 << number.bit_length()), keys)
+        table = _sobol(root, case, max(_MIN_TABLE, 1 << number.bit_length()), keys)
     else:
         table = _latin_hypercube(root, case, size, keys)
     return tuple(float(one) for one in table[number])

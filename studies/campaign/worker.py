@@ -24,10 +24,10 @@ class Flyable(Protocol):
     """The part of a flight that flies."""
 
     def row(self) -> Any:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
 
     def broken(self, reason: str) -> Any:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
 
 
 class TimeLimitError(BaseException):

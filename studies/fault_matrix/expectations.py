@@ -23,10 +23,10 @@ Contact = Literal["none", "ground", "any"]
 _CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)
 _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
 _KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
-_MOST_BYTES: Final = 1 << 20
+_MAX_BYTES: Final = 1 << 20
 _SHOWN: Final = 60  # characters of a wrong value
-_MOST_MM: Final = 1e6  # of a margin
-_MOST_S: Final = 86400.0  # of a time
+_MAX_MM: Final = 1e6  # of a margin
+_MAX_S: Final = 86400.0  # of a time
 _NUMBERS: Final = ("duration_s", "share", "size", "axis", "delay_ms", "rate_hz", "jump_s")
 _EXPECTED: Final = ("told_within_s", "names", "then", "last", "contact", "margin_mm", "why")
 _KNOWN: Final = (
@@ -101,7 +101,7 @@ def expectations(path: Path = EXPECTATIONS) -> dict[str, Expected]:
 
 def _tables(path: Path) -> tuple[list[Any], NotFlown, dict[str, str]]:
     try:
-        content = read_bounded(path, _MOST_BYTES)
+        content = read_bounded(path, _MAX_BYTES)
     except OSError as error:
         raise ExpectationError(f"cannot read {path}: {error.strerror}") from error
     try:
@@ -260,10 +260,10 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
 
 def _margin_mm(keys: dict[str, Any]) -> float:
     margin = keys.get("margin_mm", 0.0)
-    if not _is_number(margin) or not -_MOST_MM <= margin <= _MOST_MM:
+    if not _is_number(margin) or not -_MAX_MM <= margin <= _MAX_MM:
         raise ExpectationError(
-            f"margin_mm = {_shown(margin)}: must be a length in mm, from {-_MOST_MM:g} to "
-            f"{_MOST_MM:g}"
+            f"margin_mm = {_shown(margin)}: must be a length in mm, from {-_MAX_MM:g} to "
+            f"{_MAX_MM:g}"
         )
     if margin < 0.0 and not keys.get("why"):
         raise ExpectationError(f"margin_mm = {margin:g} needs a reason: why")
@@ -272,9 +272,9 @@ def _margin_mm(keys: dict[str, Any]) -> float:
 
 def _told_within_s(keys: dict[str, Any]) -> float | None:
     told = keys.get("told_within_s", math.inf)
-    if not _is_number(told) or not (0.0 < told <= _MOST_S or told == math.inf):
+    if not _is_number(told) or not (0.0 < told <= _MAX_S or told == math.inf):
         raise ExpectationError(
-            f"told_within_s = {_shown(told)}: must be a time above 0, in seconds, up to {_MOST_S:g}"
+            f"told_within_s = {_shown(told)}: must be a time above 0, in seconds, up to {_MAX_S:g}"
             " or inf"
         )
     return float(told) if told < math.inf else None
@@ -322,9 +322,9 @@ def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[st
         found.append(f"{', then '.join(actions)}; must end with {' or '.join(expected.last)}")
     if seen.contact and expected.contact not in ("any", seen.contact):
         found.append(seen.ended)
-    least_mm = math.inf if seen.least_m is None else 1e3 * seen.least_m
-    if expected.contact == "none" and not least_mm >= expected.margin_mm:  # NaN is less
-        found.append(f"margin {least_mm:.1f} mm; must be {expected.margin_mm:g} mm")
+    min_mm = math.inf if seen.least_m is None else 1e3 * seen.least_m
+    if expected.contact == "none" and not min_mm >= expected.margin_mm:  # NaN is less
+        found.append(f"margin {min_mm:.1f} mm; must be {expected.margin_mm:g} mm")
     return tuple(found)
 
 

@@ -31,13 +31,13 @@ class Cell:
     seed: int
 
     def key(self) -> str:
-        """See :class:`studies.campaign.campaign.Flight`; what must happen is not part of it."""
+        """See :class:`studies.campaign.ports.Flight`; what must happen is not part of it."""
         one = (self.mode, self.expected.faults, self.expected.suite, self.seed)
         code = sources(closed_loop, flights)
         return hashlib.sha256((repr(one) + code).encode()).hexdigest()[:32]
 
     def row(self) -> FaultFlight:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         began_s = time.monotonic()
         try:
             flight = self._flown()
@@ -54,11 +54,11 @@ class Cell:
         return flight
 
     def broken(self, reason: str) -> FaultFlight:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return FaultFlight(problem=reason, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> FaultFlight:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return FaultFlight.from_line(line)
 
 

@@ -27,7 +27,7 @@ KNOWN_LIMITS: Final = Path(__file__).with_name("known_limits.toml")
 FINDINGS: Final = ("wall", "ground", "lost", "silent", "no flight")
 _FURTHEST_M: Final = 10.0  # from the start; no situation goes further than 2 m
 _TOLD_ANYHOW: Final = Expectation(then=ACTIONS, contact="any", why="findings are judged otherwise")
-_MOST_BYTES: Final = 1 << 20
+_MAX_BYTES: Final = 1 << 20
 # Processes, datagrams and the disk do not fail in process, and no suite has a camera for the flow.
 _ELSEWHERE: Final = (*LINKS, "simulator", "flight software", "disk", "optical flow")
 UNITS: Final = tuple(unit for unit in get_args(Unit) if unit not in _ELSEWHERE)
@@ -66,7 +66,7 @@ class Pair(Cell):
     __slots__ = ()
 
     def key(self) -> str:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return "pair " + super().key()
 
     def _flown(self) -> FaultFlight:
@@ -200,7 +200,7 @@ def known_limits(path: Path = KNOWN_LIMITS) -> tuple[Limit, ...]:
         ValueError: It is not one.
     """
     found = []
-    for table in toml_table(read_bounded(path, _MOST_BYTES).decode("utf-8"))["limits"]:
+    for table in toml_table(read_bounded(path, _MAX_BYTES).decode("utf-8"))["limits"]:
         every = {"suites": SUITE_NAMES, "modes": tuple(SITUATIONS)} | table
         keys: dict[str, Any] = {k: v if isinstance(v, str) else tuple(v) for k, v in every.items()}
         limit = Limit(**keys)

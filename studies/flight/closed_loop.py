@@ -1,6 +1,6 @@
 """One flight of the whole flight software in the full plant, in one process.
 
-The order of events is that of the lockstep shell (``fsw.runtime.sim_loop``): sense, tick,
+The order of events is that of the lockstep shell (``fsw.runtime.flight_loop``): sense, tick,
 actuate, then plan at once and hand the answer in with the first tick at or after the instant
 from which it applies. What the wire adds is left out: values stay doubles, and the arming and
 mode commands of the scenario's pilot come on the first two ticks.

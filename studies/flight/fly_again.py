@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fsw.autopilot.parameters.registry import BY_NAME
-from fsw.autopilot.parameters.storage import save
+from fsw.storage.parameter_file import save
 from sitl.scenario_file import load_scenario
 from sitl.scenario_text import scenario_text
 from studies.flight.job import Job, Outcome

@@ -79,7 +79,7 @@ class Job:
         return hashlib.sha256((repr(distinct) + sources()).encode()).hexdigest()[:32]
 
     def row(self) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         began_s = time.thread_time()
         try:
             return replace(score(self, fly_job(self)), took_s=time.thread_time() - began_s)
@@ -87,11 +87,11 @@ class Job:
             return self.broken(f"{type(error).__name__}: {error}")
 
     def broken(self, reason: str) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return Outcome(self.seed, completed=False, reason=reason, error=True)
 
     def from_line(self, line: Mapping[str, Any]) -> Outcome:
-        """See :class:`studies.campaign.campaign.Flight`."""
+        """See :class:`studies.campaign.ports.Flight`."""
         return kept_row(Outcome, line)
 
 
@@ -123,7 +123,7 @@ class Outcome:
     took_s: float = field(default=0.0, compare=False)  # processor time
 
     def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.campaign.Row`."""
+        """See :class:`studies.campaign.ports.Row`."""
         return asdict(self)
 
 

@@ -66,9 +66,9 @@ PushLaw: TypeAlias = Callable[[float], Any]
 HANDOVER_S: Final = 0.5  # for which our autopilot keeps a vehicle that it has caught
 _CALLS: Final = 50  # of which the median time counts
 _INPUTS: Final = 6  # numbers of a PlanInput
-_MOST_A: Final = 50.0  # m/s^2 and rad/s^2; more is a slip of unit
-_MOST_SHARE: Final = 3.0  # of a rotor's thrust or a joint's torque; the same
-_LEAST_LIFT: Final = 0.25  # of the weight, of the first command of a vehicle that hovers
+_MAX_A: Final = 50.0  # m/s^2 and rad/s^2; more is a slip of unit
+_MAX_SHARE: Final = 3.0  # of a rotor's thrust or a joint's torque; the same
+_MIN_LIFT: Final = 0.25  # of the weight, of the first command of a vehicle that hovers
 
 
 class OwnPartError(ValueError):
@@ -266,7 +266,7 @@ class _Pace:
     """Whether a part keeps up: the median processor time of its calls."""
 
     what: str
-    most_us: float
+    max_us: float
     allow_slow: bool
     took_us: list[float] = field(default_factory=list)
 
@@ -283,23 +283,24 @@ class _Pace:
             raise OwnPartError(f"{self.what} at {t:.3f} s: {_said(error)}") from error
         if len(self.took_us) < _CALLS and not self.allow_slow:
             self.took_us.append(processor_time_us() - begun)
-            if len(self.took_us) == _CALLS and median(self.took_us) > self.most_us:
+            if len(self.took_us) == _CALLS and median(self.took_us) > self.max_us:
                 raise OwnPartError(
                     f"{self.what} is too slow: the median of {_CALLS} calls is "
                     f"{1e-3 * median(self.took_us):.2f} ms, must be within "
-                    f"{1e-3 * self.most_us:g} ms; allow_slow=True flies it all the same"
+                    f"{1e-3 * self.max_us:g} ms; allow_slow=True flies it all the same"
                 )
         return answer
 
 
 class WatchedPlanner:
-    """An own planner whose answers are checked; see ``PlanningCycle``."""
+    """An own planner whose answers are checked; after a failsafe has ended the trajectory, ours."""
 
     def __init__(self, planner: OwnPlanner, config: FlightConfig, *, allow_slow: bool) -> None:
         plan: Any = getattr(planner, "plan", None)
         if not callable(plan):
             raise OwnPartError(f"planner {type(planner).__name__}: must have plan(request)")
         self._plan, self._period_us = plan, config.mpc_period_us
+        self._ours = Planner(config.planner, config.airframe, processor_time_us)
         self._pace = _Pace("planner", config.mpc_period_us, allow_slow)
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
@@ -308,6 +309,8 @@ class WatchedPlanner:
         Raises:
             OwnPartError: The answer cannot be flown.
         """
+        if request.mode is not Mode.TRAJECTORY:
+            return self._ours.plan(request)
         t = 1e-6 * (request.t_apply_us - START_US)
         begun = processor_time_us()
         answer = self._pace.call(self._plan, request, t)
@@ -322,10 +325,10 @@ class WatchedPlanner:
         found = numbers(f"plan for {t:.3f} s", given, (-1, _INPUTS))
         if not len(found):
             raise OwnPartError(f"plan for {t:.3f} s: must have at least one input")
-        if not np.abs(found).max() <= _MOST_A:
+        if not np.abs(found).max() <= _MAX_A:
             raise OwnPartError(
                 f"plan for {t:.3f} s: an acceleration of {np.abs(found).max():g}, must be within "
-                f"±{_MOST_A:g} m/s² and rad/s²"
+                f"±{_MAX_A:g} m/s² and rad/s²"
             )
         inputs = tuple([PlanInput((x, y, z), w, (j, k)) for x, y, z, w, j, k in found.tolist()])
         if isinstance(answer, Plan):
@@ -418,12 +421,12 @@ class WatchedController:
             ("thrust", thrust, airframe.rotor_thrust_max, "N"),
             ("joint torque", torque, airframe.joint_torque_max, "N m"),
         ):
-            if not np.abs(values).max() <= _MOST_SHARE * most:
+            if not np.abs(values).max() <= _MAX_SHARE * most:
                 raise OwnPartError(
                     f"{what}: a {name} of {np.abs(values).max():g}, a vehicle has {most:g} {unit}"
                 )
         weight = airframe.mass * GRAVITY
-        if self._first and not thrust.sum() >= _LEAST_LIFT * weight:
+        if self._first and not thrust.sum() >= _MIN_LIFT * weight:
             raise OwnPartError(
                 f"{what}: {thrust.sum():g} N in all for a vehicle that hovers with {weight:.1f} N; "
                 "thrusts are newtons, one a rotor"
@@ -470,9 +473,9 @@ class _OwnPush:
         except Exception as error:  # whatever a user's law raises
             raise OwnPartError(f"disturbance at {t:.3f} s: {_said(error)}") from error
         x, y, z = numbers(f"disturbance at {t:.3f} s", given, (3,)).tolist()
-        if not max(abs(x), abs(y), abs(z)) <= _MOST_A:
+        if not max(abs(x), abs(y), abs(z)) <= _MAX_A:
             raise OwnPartError(
-                f"disturbance at {t:.3f} s: {[x, y, z]}, must be within ±{_MOST_A:g} m/s²"
+                f"disturbance at {t:.3f} s: {[x, y, z]}, must be within ±{_MAX_A:g} m/s²"
             )
         return x, y, z
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.autopilot.signals import SensorFrame, Vec4
 from sitl.simulation import START_US

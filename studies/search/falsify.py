@@ -99,7 +99,7 @@ class Outcome:
     worst: Found
     worst_of_one_axis: Found | None  # None: no such disturbance was tried
     worst_of_all_axes: Found | None  # more than one
-    least_margin: Found
+    min_margin: Found
 
     @property
     def breaks_one_axis(self) -> bool:

@@ -37,7 +37,7 @@ EXAMPLE: Final = Path(__file__).parent / "tune_example.toml"
 TABLE: Final = "tune"
 COSTS: Final = ("te_m", "te_max_m", "cs_mean", "ce_mean")
 _FIRST_STEP: Final = 0.25  # of half a range
-_LEAST_PAIRS: Final = 10
+_MIN_PAIRS: Final = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class _Keys:
     """The numbers of the table ``tune``."""
 
     candidates: Annotated[float, Range(2.0, 1e6, step=1.0)] = 60.0
-    judge_flights: Annotated[float, Range(float(_LEAST_PAIRS), 1e6, step=1.0)] = 60.0
+    judge_flights: Annotated[float, Range(float(_MIN_PAIRS), 1e6, step=1.0)] = 60.0
     margin_m: Annotated[float, Range(-1.0, 10.0)] = 0.0
     probability: Annotated[float, Range(1e-6, 0.999)] = 0.1
     confidence: Annotated[float, Range(0.5, 0.999999)] = 0.95
@@ -456,7 +456,7 @@ def _by_chance(fewer: int, more: int) -> float:
 
 def _paired(pairs: Sequence[float], confidence: float) -> tuple[float, tuple[float, float]]:
     """Mean and Student's interval of differences; of too few, an interval that shows nothing."""
-    if len(pairs) < _LEAST_PAIRS:
+    if len(pairs) < _MIN_PAIRS:
         return math.nan, (-math.inf, math.inf)
     mean, deviation = float(np.mean(pairs)), float(np.std(pairs, ddof=1))
     half = float(stdtrit(len(pairs) - 1, 0.5 + 0.5 * confidence)) * deviation

@@ -23,7 +23,7 @@ from studies.flight.job import Job, Outcome
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 Report: TypeAlias = Callable[[int, float], None]  # flights so far, minimum margin [m]
 
-_MOST_CORRELATED: Final = 60  # numbers; above, their correlations would cost more than they tell
+_MAX_CORRELATED: Final = 60  # numbers; above, their correlations would cost more than they tell
 _FIRST_STEP: Final = 0.5  # of half a range
 _TOUCHED_M: Final = 1.0  # a contact counts so much more: where it ended says little of how bad
 _UNFLOWN: Final = 1e3
@@ -163,7 +163,7 @@ def _optimiser(flights: FlightSpace, random: np.random.Generator, together: int)
     mean = np.concatenate([random.uniform(-0.8, 0.8, flights.values), *(_swing(flights, random))])
     seed = int(random.integers(2**31))
     more: dict[str, Any] = {"seed": seed, "population_size": _generation(flights, together)}
-    if len(mean) > _MOST_CORRELATED:
+    if len(mean) > _MAX_CORRELATED:
         return SepCMA(mean, _FIRST_STEP, **more)
     if not flights.entries:
         more["bounds"] = np.tile((-1.0, 1.0), (len(mean), 1))

@@ -41,8 +41,8 @@ from studies.statistics.violations import ANY, VIOLATIONS, violates
 FORMAT: Final = "pandion-certificate-2"
 _DIGITS: Final = 10  # of what is computed, so that the last bits of another machine do not count
 _QUANTILES: Final = (0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0)
-_MOST_FITS: Final = 8
-_MOST_POINTS: Final = 20  # of a grid that are listed, for each key
+_MAX_FITS: Final = 8
+_MAX_POINTS: Final = 20  # of a grid that are listed, for each key
 _FIRST_FLIGHTS: Final = 20  # of a configuration, that are looked at for random numbers
 _CUT_S: Final = 0.01  # by which a flight may end before its time
 
@@ -261,8 +261,8 @@ def _no_tail(result: CampaignResult, place: int) -> dict[str, Any]:
             "none": f"the flights are of design {result.plan.design}, not drawn independently, as "
             "a fitted tail assumes, so no extreme-value law is fitted"
         }
-    if place >= _MOST_FITS:
-        return {"none": f"only the {_MOST_FITS} configurations with the minimum margins are fitted"}
+    if place >= _MAX_FITS:
+        return {"none": f"only the {_MAX_FITS} configurations with the minimum margins are fitted"}
     return {}
 
 
@@ -318,8 +318,8 @@ def _varied(result: CampaignResult) -> Iterator[str]:
             continue
         values = sorted({row.values[one.key] for row in result.rows if one.key in row.values})
         count = len(one.distribution.grid())
-        shown = ", ".join(f"{value:g}" for value in values[:_MOST_POINTS])
-        more = f", ... {values[-1]:g}" if len(values) > _MOST_POINTS else ""
+        shown = ", ".join(f"{value:g}" for value in values[:_MAX_POINTS])
+        more = f", ... {values[-1]:g}" if len(values) > _MAX_POINTS else ""
         yield f"{one.key}: {len(values)} of {count} values of a grid: {shown}{more}"
 
 

@@ -15,7 +15,7 @@ from studies.drawing import BASE, WALL, NoMatplotlibError, drawable, sheet
 from studies.statistics.violations import ANY, VIOLATIONS
 
 _HOLDER: Final = ('<script type="application/json" id="certificate">', "</script>")
-_MOST_DRAWN: Final = 8
+_MAX_DRAWN: Final = 8
 
 MEANING: Final = (
     "The bounds are of Clopper and Pearson. They hold for flights drawn as these were, whatever "
@@ -198,7 +198,7 @@ def _margin_sentence(one: dict[str, Any]) -> str:
 def _histograms(stated: dict[str, Any], result: CampaignResult) -> str:
     count = len(result.plan.cases)
     names = [str(case) for case in result.plan.cases]
-    shown = [one for one in stated["margins"] if one["quantiles_m"]][:_MOST_DRAWN]
+    shown = [one for one in stated["margins"] if one["quantiles_m"]][:_MAX_DRAWN]
     drawn = sheet(max(len(shown), 1), 1, 9.0, max(1.7 * len(shown), 1.7))
     for (ax,), one in zip(drawn.axes, shown, strict=False):
         margins = drawable(

@@ -21,7 +21,7 @@ from studies.campaign.store import KeptRows
 from studies.statistics.violations import ANY, violates
 
 _FEWEST: Final = 2  # values that have a spread
-_MOST_LINES: Final = 40  # of what differs between the plans
+_MAX_LINES: Final = 40  # of what differs between the plans
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +87,8 @@ def changes(first: KeptRows, second: KeptRows) -> list[str]:
     ours, theirs = _of_cases(first), _of_cases(second)
     lines += [f"configuration {name}: only in the first" for name in ours if name not in theirs]
     lines += [f"configuration {name}: only in the second" for name in theirs if name not in ours]
-    more = len(lines) - _MOST_LINES
-    return lines if more <= 0 else [*lines[:_MOST_LINES], f"and {more} more"]
+    more = len(lines) - _MAX_LINES
+    return lines if more <= 0 else [*lines[:_MAX_LINES], f"and {more} more"]
 
 
 def _of_files(one: str, other: str) -> Iterator[str]:

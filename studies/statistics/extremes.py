@@ -18,12 +18,12 @@ from studies.statistics.pareto_intervals import END, SCALE, SHAPE, Intervals, be
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 
-LEAST_FLIGHTS: Final = 100
-_LEAST_TAIL: Final = 30
+MIN_FLIGHTS: Final = 100
+_MIN_TAIL: Final = 30
 _TAIL_SHARE: Final = 0.1
-_LEAST_DISTINCT: Final = 20
+_MIN_DISTINCT: Final = 20
 REJECTED: Final = 0.05  # of goodness; below, the numbers are not to be used
-_MOST_SCALED: Final = 99  # refits that the intervals are scaled with
+_MAX_SCALED: Final = 99  # refits that the intervals are scaled with
 RARE: Final = (1e-2, 1e-3, 1e-4)  # shares of flights whose minimum margin is estimated
 _STRAIGHT: Final = 1e-9  # a quotient of shape and scale below which the law is exponential
 _WORST: Final = 1e6
@@ -80,10 +80,10 @@ def fit_tail(
     from scipy.stats import genpareto
 
     ordered = np.sort(np.asarray(margins, dtype=np.float64))
-    total, tail = len(ordered), max(_LEAST_TAIL, math.ceil(_TAIL_SHARE * len(ordered)))
-    if total < LEAST_FLIGHTS:
+    total, tail = len(ordered), max(_MIN_TAIL, math.ceil(_TAIL_SHARE * len(ordered)))
+    if total < MIN_FLIGHTS:
         raise NoFitError(
-            f"{total} flights have a margin: a tail needs at least {LEAST_FLIGHTS}, so no "
+            f"{total} flights have a margin: a tail needs at least {MIN_FLIGHTS}, so no "
             "extreme-value law is fitted"
         )
     if not np.isfinite(ordered).all():
@@ -91,7 +91,7 @@ def fit_tail(
     threshold = float(ordered[tail])
     excess = threshold - ordered[:tail]
     distinct = len(np.unique(excess[excess > 0.0]))
-    if distinct < _LEAST_DISTINCT:
+    if distinct < _MIN_DISTINCT:
         raise NoFitError(
             f"only {distinct} different margins are below the threshold of "
             f"{1e3 * threshold:.1f} mm: flights that are too much alike have no tail, so no "
@@ -105,7 +105,7 @@ def fit_tail(
     random = np.random.default_rng(seed)
     simulated = genpareto.rvs(shape, scale=scale, size=(refits, tail), random_state=random)
     worse = sum(anderson_darling(one, *most_likely(one)) >= statistic for one in simulated)
-    intervals = Intervals(excess, total, law, confidence, simulated[:_MOST_SCALED], random)
+    intervals = Intervals(excess, total, law, confidence, simulated[:_MAX_SCALED], random)
 
     def length(ends: tuple[float, float, float]) -> Estimate:
         return Estimate(*(unit * one for one in ends))

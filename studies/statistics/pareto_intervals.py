@@ -23,7 +23,7 @@ from scipy.special import chdtri, lambertw
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 
-LEAST_SHAPE: Final = -1.0  # below, the likelihood has no maximum
+MIN_SHAPE: Final = -1.0  # below, the likelihood has no maximum
 _SPAN: Final = 12.0  # of the logarithm of how far the largest excess is from the end of the law
 _STRAIGHT: Final = 1e-9  # a quotient [1/excess] below which the law is exponential
 _PLACES: Final = 98  # that the maximum is looked for at; even, so that 0 is not one of them
@@ -163,11 +163,11 @@ class Likelihood:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             shape = quantity.shape(value, quotients, shares)
             mean = self._means(quotients[:, 0])[:, None]
-            shape = np.where(np.isneginf(shape), np.maximum(mean, LEAST_SHAPE), shape)
+            shape = np.where(np.isneginf(shape), np.maximum(mean, MIN_SHAPE), shape)
             ratio = shape / mean
             loss = self.count * (np.log(ratio) + 1.0 / ratio - 1.0)
             found = self._ridge_of(quotients[:, 0], mean[:, 0])[:, None] - loss
-            found = np.where(shape >= LEAST_SHAPE, found - self._loss(shares), np.nan)
+            found = np.where(shape >= MIN_SHAPE, found - self._loss(shares), np.nan)
         if np.isnan(found).all():
             return _WIDE
         return min(max(2.0 * (self.most - float(np.nanmax(found))), 0.0), _WIDE)
@@ -189,8 +189,8 @@ class Likelihood:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             for branch in (0, -1):
                 inverse = -lambertw(-np.exp(-1.0 - np.maximum(spare, 0.0)), branch).real
-                shape = np.maximum(mean / inverse, LEAST_SHAPE)
-                possible = (spare >= 0.0) & ((shape > LEAST_SHAPE) | (inverse <= -mean))
+                shape = np.maximum(mean / inverse, MIN_SHAPE)
+                possible = (spare >= 0.0) & ((shape > MIN_SHAPE) | (inverse <= -mean))
                 ends.append(np.where(possible, quantity.of(shape, quotients, shares), np.nan))
         return float(np.nanmin(ends)), float(np.nanmax(ends))
 
@@ -213,7 +213,7 @@ class Likelihood:
 
     def _ridge_of(self, quotients: Array, means: Array) -> Array:
         """The logarithm of the likelihood for each quotient, at its most likely shape."""
-        shape = np.maximum(means, LEAST_SHAPE)
+        shape = np.maximum(means, MIN_SHAPE)
         found: Array = -self.count * (np.log(shape / quotients) + means * (1.0 + 1.0 / shape))
         return found
 

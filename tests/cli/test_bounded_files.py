@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from command_line.bounded_file import open_regular, read_bounded
-from command_line.bounded_json import MOST_DEPTH, JsonError, json_numbers, json_object, read_json
-from command_line.bounded_toml import MOST_PARTS, TomlError, toml_table
+from command_line.bounded_json import MAX_DEPTH, JsonError, json_numbers, json_object, read_json
+from command_line.bounded_toml import MAX_PARTS, TomlError, toml_table
 from pandion.__main__ import main
 from tests.cli.command import one_sentence
 
@@ -123,7 +123,7 @@ def test_a_file_of_its_length_is_read_and_a_longer_one_is_not(tmp_path: Path) ->
     ("text", "said"),
     [
         ("[" * 200_000, "is nested too deeply"),
-        ('{"a":' * (MOST_DEPTH + 1) + "1" + "}" * (MOST_DEPTH + 1), "is nested too deeply"),
+        ('{"a":' * (MAX_DEPTH + 1) + "1" + "}" * (MAX_DEPTH + 1), "is nested too deeply"),
         ("[]", "must be a JSON object"),
         ("", "is not JSON"),
         ('{"a": NaN}', "holds NaN"),
@@ -157,7 +157,7 @@ def test_json_in_a_file_that_is_missing_or_too_long(tmp_path: Path) -> None:
 
 
 LONG = 200_000  # bytes, as much as a scenario may have
-CHAIN = f"a{'.a' * (MOST_PARTS - 1)}"  # a key of as many parts as it may have
+CHAIN = f"a{'.a' * (MAX_PARTS - 1)}"  # a key of as many parts as it may have
 
 
 @pytest.mark.requirement("REQ-LINK-9")

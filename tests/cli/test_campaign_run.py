@@ -8,9 +8,9 @@ import pytest
 
 from pandion.campaign_run import begin, exit_code
 from pandion.search_task import SearchTaskOptions
-from studies.campaign.campaign import SchedulerGoneError
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import parse_plan
+from studies.campaign.ports import SchedulerGoneError
 
 PLAN = """
 flights = 2

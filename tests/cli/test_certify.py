@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line.output import complain
+from command_line.output import print_error
 from pandion.campaign import main as campaign
 from pandion.certify import main
 from studies.campaign.journal import Journal
@@ -29,7 +29,7 @@ def test_a_reader_that_leaves_is_nothing_to_complain_of(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(BrokenPipeError):
-        complain("pandion certify", BrokenPipeError(32, "Broken pipe"))
+        print_error("pandion certify", BrokenPipeError(32, "Broken pipe"))
     assert capsys.readouterr().err == ""
     _, directory, plan = begun(tmp_path)
     put(directory, plan, range(4))

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from command_line.bounded_json import json_object
-from command_line.bounded_toml import MOST_PARTS, toml_table
-from fsw.autopilot.parameters.storage import parse
+from command_line.bounded_toml import MAX_PARTS, toml_table
+from fsw.storage.parameter_file import parse
 from messages import ulog
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log
@@ -20,10 +20,10 @@ from studies.campaign.journal import Journal, lines
 
 SHORT, LONG = 10_000, 40_000  # pieces; a scenario may have 256 kB
 # Four times the text takes four times as long, or sixteen where time is quadratic.
-MOST_RATIO = 10.0
+MAX_RATIO = 10.0
 RESOLVED_S = 0.02  # what is quicker with the long one is linear enough
 
-CHAIN = ".".join("a" * (MOST_PARTS - 1))
+CHAIN = ".".join("a" * (MAX_PARTS - 1))
 TOML: dict[str, Callable[[int], str]] = {
     "escaped quotes, no end": lambda n: '"' + '\\"' * n,
     "escaped quotes, no end, in a key": lambda n: 'a.b."' + '\\"' * n,
@@ -93,7 +93,7 @@ def seconds(use: Callable[[], object]) -> float:
 
 def assert_linear(short: Callable[[], object], long: Callable[[], object]) -> None:
     took = seconds(long)
-    assert took < max(MOST_RATIO * seconds(short), RESOLVED_S)
+    assert took < max(MAX_RATIO * seconds(short), RESOLVED_S)
 
 
 @pytest.mark.drawn(5)

@@ -28,7 +28,7 @@ from fsw.link.link_choice import LinkChoice
 from pandion.certify import CertifyOptions
 from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions
-from pandion.falsify import FalsifyOptions
+from pandion.falsify_options import FalsifyOptions
 from pandion.fly_verb import FlyOptions
 from pandion.replay import ReplayOptions
 from pandion.report import ReportOptions

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line.output import complain, json_text, typed
+from command_line.output import command_name, json_text, print_error
 from command_line.printable import printable
 from fsw.link.wire import message_ids as ids
 from messages.frames import FrameWriter
@@ -37,7 +37,7 @@ def test_every_text_prints_as_one_line_and_printable_ones_as_they_are(text: str)
 
 
 def test_sentences_and_tables_show_escapes_as_text(capsys: pytest.CaptureFixture[str]) -> None:
-    complain("pandion", f"no file {ESCAPE}")
+    print_error("pandion", f"no file {ESCAPE}")
     stream = io.StringIO()
     display = Display(stream)
     display.say(f"text {ESCAPE}")
@@ -97,7 +97,7 @@ def test_a_parameter_file_with_escapes_is_reported_without_them(
 def test_an_error_of_the_system_is_said_without_its_number(
     error: OSError, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    complain("pandion", error)
+    print_error("pandion", error)
     assert capsys.readouterr().err.startswith(f"pandion: {sentence}")
 
 
@@ -194,8 +194,8 @@ def test_a_printed_command_can_be_typed_where_it_was_printed(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [str(program)])
     monkeypatch.setenv("PATH", "/nowhere")
-    assert typed() == "bin/pandion"
+    assert command_name() == "bin/pandion"
     monkeypatch.setenv("PATH", str(program.parent))
-    assert typed() == "pandion"
+    assert command_name() == "pandion"
     monkeypatch.setattr("sys.argv", ["pytest"])
-    assert typed() == "pandion"
+    assert command_name() == "pandion"

@@ -25,7 +25,6 @@ from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.signals import (
     Arm,
     Command,
@@ -45,6 +44,7 @@ from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService, SourcedService
 from fsw.link.wire import message_ids as ids
+from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
 from messages.frames import FrameWriter, split, wire_fields
 from sitl.result import EndKind
@@ -133,7 +133,7 @@ class Talkers:
             Site(
                 locate=partial(to_local, config.origin),
                 judge=lambda safe_set: self.flight.against(safe_set),
-                least_margin=self.flight.least_margin,
+                min_margin=self.flight.min_margin,
                 clearance=lambda: config.limits.fence_clearance,
             )
         )

@@ -97,7 +97,7 @@ def test_far_outside_the_vehicle_holds_and_then_lands_and_says_so() -> None:
     flight = hovering(force=True, before=SafeSet((wall((-1.0, 0.0, 0.0), 10.0, 0.1),)))
     assert fastest(flight, 4.0) < 0.3
     assert flight.mode is Mode.HOLD
-    assert any("too far outside to draw back" in text for text in flight.texts)
+    assert any("too far outside to retreat" in text for text in flight.texts)
     flight.run(3.0)
     assert flight.mode is Mode.LAND
     assert fastest(flight, 8.0) < 0.5

@@ -12,7 +12,7 @@ import pytest
 
 from fsw.autopilot.estimation.fusion_memory import Trail
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.state import AIDED, FlightState
 from fsw.autopilot.model.actuator_health import ActuatorHealth
 from fsw.autopilot.mpc.planner import Planner
@@ -88,7 +88,7 @@ class Flight:
 
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(
-    ("name", "ticks", "push", "least_calm"),
+    ("name", "ticks", "push", "min_calm"),
     [
         ("walls", 2000, 0.0, 0.88),
         in_long("workspace", 1500, 0.0, 0.88),
@@ -101,22 +101,22 @@ class Flight:
     ],
 )
 def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
-    name: str, ticks: int, push: float, least_calm: float
+    name: str, ticks: int, push: float, min_calm: float
 ) -> None:
     flight = Flight(name, push)
     flight.fly(ticks)
-    assert flight.calm >= least_calm * flight.loop.simulation.step
+    assert flight.calm >= min_calm * flight.loop.simulation.step
 
 
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(
-    ("suite", "push", "least_calm"),
+    ("suite", "push", "min_calm"),
     [("mocap", 0.0, 0.85), ("vio", 0.0, 0.7), in_long("rtk", 0.0, 0.7), ("mocap", 3.0, 0.0)],
 )
-def test_so_is_one_of_a_suite(suite: str, push: float, least_calm: float) -> None:
+def test_so_is_one_of_a_suite(suite: str, push: float, min_calm: float) -> None:
     flight = Flight("walls", push, suite)
     flight.fly(1500)
-    assert flight.calm >= least_calm * flight.loop.simulation.step
+    assert flight.calm >= min_calm * flight.loop.simulation.step
 
 
 @pytest.mark.drawn(1)

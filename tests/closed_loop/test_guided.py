@@ -16,7 +16,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits, f
 from fsw.autopilot.shapes.vertical_cylinder import column
 from fsw.autopilot.signals import (
     BatteryState,
-    Charge,
+    BatteryWarning,
     Command,
     MissionUpdate,
     Mode,
@@ -330,10 +330,7 @@ def test_a_battery_that_runs_low_is_told_once_a_level_and_acted_upon(
 def test_the_levels_of_the_battery() -> None:
     levels = (0.2, 0.1, 0.05)
     found = [charge_of(share, levels) for share in (1.0, 0.2, 0.19, 0.1, 0.09, 0.05, 0.04, NAN)]
-    assert found == [
-        Charge.OK, Charge.OK, Charge.LOW, Charge.LOW, Charge.CRITICAL, Charge.CRITICAL,
-        Charge.EMERGENCY, Charge.EMERGENCY,
-    ]  # fmt: skip
+    assert found == [one for one in BatteryWarning for _ in range(2)]
     assert FlightLimits().battery_low > FlightLimits().battery_critical
 
 

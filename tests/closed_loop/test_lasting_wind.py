@@ -28,4 +28,4 @@ def test_clearances_grow_with_the_memory_of_wind_and_shrink_with_it() -> None:
     assert grown == pytest.approx(0.0823 * (memory - 0.05), abs=2.5e-3)
     (source,), (kept,) = flight.state.kept.source.zones, flight.state.kept.safe_set.zones
     assert kept.clearance == pytest.approx(source.clearance + grown)
-    assert flight.state.kept.lacking == pytest.approx(0.0, abs=1e-9)
+    assert flight.state.kept.shortfall == pytest.approx(0.0, abs=1e-9)

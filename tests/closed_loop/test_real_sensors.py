@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sample
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario
@@ -224,7 +224,7 @@ def test_a_receiver_that_loses_its_fix_is_said_to_have_none() -> None:
     flight.run(2.2)
     assert flight.texts.count(sentence(Sensor.GNSS, SensorFault.NO_FIX)) == 1
     assert not [text for text in flight.texts if "silent" in text]
-    assert [text for text in flight.texts if "no position is measured: GNSS has no fix" in text]
+    assert [text for text in flight.texts if "no position measurement: GNSS no fix" in text]
     report = flight.snapshot.estimator
     assert report is not None
     assert report.fix is not None

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.flight.before_estimate import nowhere
+from fsw.autopilot.flight.estimate.before_estimate import nowhere
 from fsw.autopilot.flight.restart import restarted, rests
 from fsw.autopilot.flight.state import (
     Aiding,

@@ -13,7 +13,7 @@ from functools import partial
 
 import pytest
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Mode, Plan, PlanFailure, PlanRequest

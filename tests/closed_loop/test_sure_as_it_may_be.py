@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.error_state import TH, P, V
-from fsw.autopilot.estimation.lasting_error import lasting_error
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
@@ -57,7 +57,7 @@ def nees(suite: str, seed: int, seconds: float) -> list[float]:
     tuning = flight.config.estimator
     M = SensorFusion(tuning).covariance(memory, memory.now)
     at = [P, P + 1, P + 2, TH, TH + 1, TH + 2]
-    M[at, at] += lasting_error(memory, tuning)
+    M[at, at] += correlated_error(memory, tuning)
     turn = multiply(conjugate(quaternion_from_matrix(estimate.R_WB)), truth.q_WB)
     error = np.zeros(len(M))
     error[P : P + 3] = np.subtract(truth.p_WB, estimate.p_WB)

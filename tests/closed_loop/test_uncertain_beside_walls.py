@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.measurements import PoseSample
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Mode

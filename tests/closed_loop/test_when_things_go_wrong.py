@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.shapes.vertical_cylinder import vertical_cylinder

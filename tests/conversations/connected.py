@@ -18,7 +18,6 @@ from typing import Any
 
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.ports import LoopHealth
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
@@ -36,6 +35,7 @@ from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.runtime.assembly import vehicle_facts
+from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
 from messages.frames import as_version_1
 from tests.closed_loop.harness import Flight, on_the_ground
@@ -149,7 +149,7 @@ def connected(folder: Path, config: FlightConfig) -> Iterator[Connected]:
     parameters = ParameterStore(config, lambda tuning: None)
     parameters.open(AtOnce(), lambda values: None)
     site = Site(
-        partial(to_local, config.origin), flight.loop.against, lambda: 0.1, flight.loop.least_margin
+        partial(to_local, config.origin), flight.loop.against, lambda: 0.1, flight.loop.min_margin
     )
     missions = MissionStore(site)
     health = LoopHealth()

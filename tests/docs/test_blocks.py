@@ -238,7 +238,8 @@ def test_the_page_of_the_command_line_names_every_option_of_a_flight() -> None:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed), contextlib.suppress(SystemExit):
             main([verb, "--help"])
-        rows = [row for row in table.splitlines()[2:] if verb in row.split("|")[2]]
-        named_here = {option for row in rows for option in OPTION.findall(row.split("|")[1])}
+        rows = [row.partition(" (") for row in table.splitlines()]
+        of_verb = [option for option, _, rest in rows if verb in rest.partition(";")[0].split(", ")]
+        named_here = {option for row in of_verb for option in OPTION.findall(row)}
         given = set(OPTION.findall(printed.getvalue())) - {"--help"}
         assert named_here == given, verb

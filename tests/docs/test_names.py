@@ -18,12 +18,12 @@ CONSTANTS = {
     name.removeprefix("MAV_CMD_") for entries in dialect.enums.values() for name in
     (entry.name for entry in entries.values())
 } | set(dialect.enums)  # fmt: skip
-# The changelog names what is gone, the page of messages is generated, and decision 0018 lists
-# messages of PX4's that this vehicle does not have.
+# The changelog names what is gone, the page of messages is generated, and that of differences from
+# PX4 lists messages that this vehicle does not have.
 SKIPPED = (
     "CHANGELOG.md",
     "docs/reference/messages.md",
-    "docs/decisions/0018-px4-compatibility.md",
+    "docs/reference/px4-differences.md",
 )
 READ = [page for page in PAGES if named(page) not in SKIPPED]
 

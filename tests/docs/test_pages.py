@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from docs.pages.failsafes import WORDS, words
 from docs.pages.failsafes import reference as failsafe_reference
 from docs.pages.messages import OF_MISSIONS, reference, traffic
 from docs.pages.parameters import reference as parameter_reference
 from docs.pages.sensors import TABLES
 from docs.pages.sensors import inserted as with_sensors
 from docs.pages.topics import inserted
+from fsw.autopilot.flight.failsafe.table import FAILSAFES
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
@@ -98,7 +100,7 @@ def test_every_number_of_a_suite_has_a_place_in_a_table() -> None:
         table = page.split(f"### `[sensors.{name}]`")[1].split("###")[0]
         own = {field.name for field in dataclasses.fields(kind)}
         own -= {field.name for field in dataclasses.fields(Timing)}
-        assert own <= set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE)), name
+        assert own <= set(re.findall(r"^- `(\w+)`", table, re.MULTILINE)), name
 
 
 def test_the_reference_of_parameters_is_not_stale() -> None:
@@ -123,21 +125,17 @@ def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:
 
 
 def test_the_streams_on_the_page_are_those_that_are_sent() -> None:
-    text = (REFERENCE / "ground-links.md").read_text(encoding="utf-8")
-    table = text.split("<!-- streams -->\n")[1].split("<!-- end -->")[0]
-    shown = [
-        tuple(cell.strip() for cell in line.strip("|").split("|"))
-        for line in table.strip().splitlines()[2:]
-    ]
-    assert shown == [
-        (
-            dialect.mavlink_map[stream.message_id].msgname,
-            f"{stream.ground_hz:g}",
-            f"{stream.api_hz:g}",
-            str(stream.component),
-        )
-        for stream in STREAMS
-    ]
+    text = (REFERENCE / "messages.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| ([^|]+) \| (.+) \|$", text, re.MULTILINE))
+    for stream in STREAMS:
+        name = dialect.mavlink_map[stream.message_id].msgname
+        rate = f"{stream.ground_hz:g}/{stream.api_hz:g}"
+        of_rate = [
+            messages
+            for shown, messages in rows.items()
+            if shown == ("on request" if rate == "0/0" else rate) or shown.startswith(f"{rate},")
+        ]
+        assert any(re.search(rf"\b{name}\b", messages) for messages in of_rate), name
 
 
 def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
@@ -146,3 +144,10 @@ def test_the_barrier_constants_on_the_page_are_those_that_are_flown() -> None:
     for name, tuning in (("walls", config.walls), ("sphere", config.workspace)):
         cells = (tuning.alpha, tuning.slope, tuning.gamma, tuning.lambda_)
         assert f"| {name} | " + " | ".join(f"{value:g}" for value in cells) + " |" in text
+
+
+def test_the_pages_have_words_for_every_row_of_the_failsafe_table_and_for_no_other() -> None:
+    assert set(WORDS) == {row.condition.name for row in FAILSAFES}
+    for row in FAILSAFES:
+        acts = {name for name in row.parameters if name.endswith("_ACT") or name == "GF_ACTION"}
+        assert words(row).does or acts, f"nothing says what is done about {row.condition.value}"

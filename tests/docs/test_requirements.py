@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,15 +21,17 @@ from docs.pages.requirements import (
     problems,
     shown_by_tests,
 )
-from docs.pages.safety_manual import inserted, reference
+from docs.pages.safety_manual import inserted, reference, traceability
 from fsw.autopilot.control.tube import all_axes, all_axes_up_to
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.registry import BY_NAME
 from tests.docs.fences import DOCS
 
+TRACEABILITY = DOCS / "reference" / "requirements-traceability.csv"
 PAGE = (DOCS / "reference" / "safety-manual.md").read_text(encoding="utf-8")
 
 
@@ -39,15 +43,29 @@ def test_the_tables_of_the_safety_manual_are_not_stale() -> None:
     assert inserted(PAGE) == PAGE, "run make pages"
 
 
-def test_the_page_has_each_condition_with_its_time_and_each_test() -> None:
-    tables = reference(load(), shown_by_tests())
+def test_the_page_has_each_requirement_with_its_conditions_and_marks_those_without_a_test() -> None:
+    lines = dict(re.findall(r"^- \*\*(REQ-[A-Z]+-\d+)\*\* (.+)$", reference(load()), re.M))
+    assert list(lines) == [row.id for row in load().requirements]
+    for row in load().requirements:
+        assert all(
+            ROWS[Condition[name]].condition.value in lines[row.id] for name in row.conditions
+        )
+        assert ("**No test.**" in lines[row.id]) == (row.id in load().not_shown)
+
+
+def test_the_traceability_is_not_stale_and_has_each_condition_check_and_test() -> None:
+    text = TRACEABILITY.read_text(encoding="utf-8")
+    assert text == traceability(load(), shown_by_tests()), "run make pages"
+    rows = {tuple(row[1:]) for row in csv.reader(text.splitlines())}
     for condition in Condition:
-        assert f"{condition.value} ({seconds(ROWS[condition].within_us)})" in tables
-        assert f"| {condition.value} | `Condition.{condition.name}` | REQ-" in tables
+        within = seconds(ROWS[condition].within_us)
+        assert ("condition", condition.value, f"Condition.{condition.name}", within) in rows
+    for check in CHECKS:
+        assert ("arming check", check.summary, check.subject.value, "") in rows
     for tests in shown_by_tests().values():
         for test in tests:
-            assert f"`{test.file}`" in tables
-            assert f"`{test.name}`" in tables
+            kind = "long test" if test.is_long else "test"
+            assert (kind, test.name, test.file, "") in rows
 
 
 # ---------------------------------------------------------------- on a small scale
@@ -65,7 +83,7 @@ conditions = ["BATTERY_LOW"]
 id = "REQ-BAT-2"
 shall = "It shall not be armed."
 checks = ["Empty"]
-by = ["fsw/autopilot/flight/arming.py"]
+by = ["fsw/autopilot/flight/commands/arming.py"]
 [not_shown]
 REQ-BAT-2 = "nothing measures it"
 """

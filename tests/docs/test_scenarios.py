@@ -100,11 +100,11 @@ def expected(kind: Any) -> set[tuple[str, str, str]]:
 
 
 def documented(kind: Any) -> set[tuple[str, str, str]]:
-    """First three cells of the rows behind the marker of a dataclass."""
+    """Key, range and default in the lines behind the marker of a dataclass."""
     text = PAGE.read_text(encoding="utf-8")
-    table = text.split(f"<!-- {kind.__name__} -->\n")[1].split("\n\n")[0]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
-    return {(row[0], row[1], row[2]) for row in rows[2:]}
+    lines = text.split(f"<!-- {kind.__name__} -->\n")[1].split("\n\n")[0].splitlines()
+    rows = [re.fullmatch(r"- (`\w+`) \(([^;)]+)(?:; ([^)]+))?\)(?::.*)?", line) for line in lines]
+    return {(row[1], row[2].replace("…", " to "), row[3] or "required") for row in rows if row}
 
 
 @pytest.mark.parametrize("kind", TABLES, ids=lambda kind: kind.__name__)

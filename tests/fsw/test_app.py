@@ -20,12 +20,12 @@ from fsw.arguments import FswOptions
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import PARAMETERS
-from fsw.autopilot.parameters.storage import load as parameter_file
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest, TickInputs, TickOutputs
 from fsw.link.link_choice import NO_LINK, LinkChoice
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.runtime.program import FlightProgram
+from fsw.storage.parameter_file import load as parameter_file
+from fsw.storage.parameter_store import ParameterStore
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.whole_tick import parts_of
 

@@ -15,7 +15,6 @@ from pathlib import Path
 import fastcrc
 
 from docs.pages.messages import heard
-from fsw.autopilot.parameters import storage
 from fsw.autopilot.parameters.control_choice import choice_of
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.link.inbox import Inbox
@@ -29,6 +28,7 @@ from fsw.log.reader import open_flight
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
 from fsw.runtime.replay import fact, other_numbers, replay
+from fsw.storage import parameter_file as storage
 from messages import dialect, ulog
 from messages.frames import cut
 from messages.ulog_reader import UlogError, open_log
@@ -49,7 +49,7 @@ from view.log_flight import LogFlight
 from view.tlog_flight import TlogFlight
 
 Try = Callable[[bytes], None]
-_MOST_FRAMES = 8
+_MAX_FRAMES = 8
 _INPUT = struct.pack("<H", flights.NUMBERS["tick_input"])  # begins each of its records
 _STATION = 255  # MAVLink system
 # What a simulator reads of a vehicle; the controls come last in a datagram.
@@ -122,7 +122,7 @@ def _valid_frames(
 ) -> Iterator[bytes]:
     """Frames with right checksums: an index into ``listened``, a length, a payload, and so on."""
     at = 0
-    for sequence in range(_MOST_FRAMES):
+    for sequence in range(_MAX_FRAMES):
         if at + 2 > len(data):
             return
         message_id, size = listened[data[at] % len(listened)], data[at + 1]

@@ -86,10 +86,10 @@ def test_a_vehicle_that_lost_its_pose_acts_and_is_recovered(system: System) -> N
     assert eventually(lambda: telemetry.flight_mode().name == "HOLD")
     failure.inject(FailureUnit.SENSOR_VIO, FailureType.OFF, 0)
     assert eventually(lambda: telemetry.flight_mode().name == "LAND")
-    assert eventually(lambda: "no position is measured: dead reckoning" in announced), announced
+    assert eventually(lambda: "no position measurement: dead reckoning" in announced), announced
     assert eventually(lambda: "position unknown: descending" in announced), announced
     failure.inject(FailureUnit.SENSOR_VIO, FailureType.OK, 0)
-    assert eventually(lambda: "Over: no position is measured" in announced), announced
+    assert eventually(lambda: "Over: no position measurement" in announced), announced
     assert eventually(telemetry.health_all_ok), telemetry.health()
     assert telemetry.in_air()
     action.hold()

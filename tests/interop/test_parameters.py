@@ -20,7 +20,7 @@ from pymavlink.mavparm import MAVParmDict
 
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.parameters.registry import BY_NAME
-from fsw.autopilot.parameters.storage import load
+from fsw.storage.parameter_file import load
 from pandion import param
 from pandion.param_vehicle import NoAnswer, ParameterClient
 from tests.interop.vehicle import REAL_TIME, Vehicle, parameter_file

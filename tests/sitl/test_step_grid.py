@@ -10,7 +10,7 @@ import pytest
 
 from messages.frames import FrameWriter
 from sitl.link.exchange import STALL_S, RealTime, SimulatorError
-from sitl.link.step_grid import MOST_BEHIND_S, StepGrid
+from sitl.link.step_grid import MAX_BEHIND_S, StepGrid
 
 PERIOD_S = 0.002
 HIL_ACTUATOR_CONTROLS, ARMED = 93, 128
@@ -81,7 +81,7 @@ def test_every_step_ends_on_the_grid() -> None:
     assert (counts.missed, counts.pauses, counts.paused_s) == (0, 0, 0.0)
 
 
-@pytest.mark.parametrize("pause_s", [0.010, MOST_BEHIND_S - 0.003])
+@pytest.mark.parametrize("pause_s", [0.010, MAX_BEHIND_S - 0.003])
 def test_a_short_stop_is_caught_up_with(pause_s: float) -> None:
     clock = Clock()
     run = Run(clock)
@@ -92,7 +92,7 @@ def test_a_short_stop_is_caught_up_with(pause_s: float) -> None:
     assert run.exchange.counts.pauses == 0
 
 
-@pytest.mark.parametrize("pause_s", [MOST_BEHIND_S + 0.003, 1.0, 30.0])
+@pytest.mark.parametrize("pause_s", [MAX_BEHIND_S + 0.003, 1.0, 30.0])
 def test_a_long_stop_moves_the_grid_by_whole_steps(pause_s: float) -> None:
     clock = Clock()
     run = Run(clock)

@@ -2,7 +2,7 @@
 
 import math
 
-from fsw.autopilot.flight import damage_watch
+from fsw.autopilot.flight.safety import damage_watch
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import SafeSet
 from view import colours, panels

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
@@ -245,7 +245,7 @@ def test_a_telemetry_log_of_any_length_is_refused(
         path.touch()
         os.truncate(path, 1 << 40)
     else:
-        monkeypatch.setattr(tlog_flight, "_MOST_SCENES", 20)
+        monkeypatch.setattr(tlog_flight, "_MAX_SCENES", 20)
         path.write_bytes(a_log(50))
     with pytest.raises(UlogError, match=r"too long: (must be )?at most"):
         TlogFlight(path)

@@ -37,8 +37,8 @@ _SHOWN_MM: Final = 400.0  # of the margins at first; all of it can be zoomed out
 _DETAIL_S: Final = 0.5  # before and behind the worst moment
 # What axes show, the first kinds first where there is much of it.
 _MARKED: Final = (EventKind.FAULT, EventKind.MODE, EventKind.WARNING, EventKind.COMMAND)
-_MOST_MARKS: Final = 60
-_MOST_ZONES: Final = 8  # whose margins are drawn: the nearest
+_MAX_MARKS: Final = 60
+_MAX_ZONES: Final = 8  # whose margins are drawn: the nearest
 _DEADLINE_MS: Final = 20.0  # a plan that comes later is not flown
 _PERIOD_MS: Final = 100.0
 _INNER: Final = 0  # PANDION_RATE_GROUP
@@ -61,7 +61,7 @@ def charts(flights: Sequence[Reported]) -> list[Chart]:
 def event_marks(flight: Reported) -> list[tuple[float, str]]:
     """Time since the start [s] and number in the table of the events that axes show."""
     found = [(k, event) for k, event in enumerate(flight.events, 1) if event.kind in _MARKED]
-    shown = sorted(found, key=lambda pair: _MARKED.index(pair[1].kind))[:_MOST_MARKS]
+    shown = sorted(found, key=lambda pair: _MARKED.index(pair[1].kind))[:_MAX_MARKS]
     marks: dict[float, str] = {}
     for k, event in sorted(shown, key=lambda pair: pair[0]):
         t = round(event.t - flight.data.begin, 3)
@@ -89,8 +89,8 @@ def margins(flights: Sequence[Reported]) -> Chart:
         "circle is the minimum in the result, which the simulator checks every millisecond; the "
         "lines are the samples in the log."
     )
-    if any(len(flight.margins.of_zones()) > _MOST_ZONES for flight in flights if flight.margins):
-        note += f" Of more zones the {_MOST_ZONES} nearest are drawn."
+    if any(len(flight.margins.of_zones()) > _MAX_ZONES for flight in flights if flight.margins):
+        note += f" Of more zones the {_MAX_ZONES} nearest are drawn."
     own = [flight.label for flight in flights if flight.margins is None]
     if own:
         whose = "" if len(own) == len(flights) else f" of {', '.join(own)}"
@@ -111,7 +111,7 @@ def _margin_lines(flight: Reported, colour: str, *, alone: bool) -> list[Trace]:
         t = flight.since(truth.t)
         if alone:
             nearest = sorted(truth.of_zones().items(), key=lambda pair: float(pair[1].min()))
-            for k, (zone, values) in enumerate(nearest[:_MOST_ZONES]):
+            for k, (zone, values) in enumerate(nearest[:_MAX_ZONES]):
                 lines.append(line(zone, t, _MM * _finite(values), COLOURS[k % len(COLOURS)]))
         elif truth.keys:
             lines.append(line(flight.label, t, _MM * _finite(truth.least), colour))

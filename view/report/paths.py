@@ -23,7 +23,7 @@ _BODY_OPACITY, _CLEARANCE_OPACITY = 0.3, 0.1
 # Row of the places at which a part is marked; rotors and legs at the base.
 _NEAR: Final = {"link1": 2, "joint2": 2, "link2": 3, "end_effector": 3}
 _AXIS: Final = "#6e7781"  # seen on white and on a dark screen: a scene is not recoloured for paper
-_MOST_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
+_MAX_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
 
 
 def paths(flights: Sequence[Reported]) -> Chart:
@@ -122,7 +122,7 @@ def _zones(flight: Reported, region: tuple[Vec3, Vec3]) -> list[Trace]:
         if shown.shell is not None:
             meshes.append((shown.shell, _CLEARANCE_OPACITY, " with its clearance"))
         triangles += sum(len(part.faces) for part, _, _ in meshes)
-        if triangles > _MOST_TRIANGLES:
+        if triangles > _MAX_TRIANGLES:
             break
         traces += [_surface(part, opacity, f"zone {k}{more}") for part, opacity, more in meshes]
     return traces

@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 
 from fsw.autopilot.estimation import fusion, kernels
-from fsw.autopilot.estimation.confirmation import Confirmation
 from fsw.autopilot.estimation.drift import FrameDrift, least
 from fsw.autopilot.estimation.error_state import IMU_CAPACITY, Filter
+from fsw.autopilot.estimation.faults.confirmation import Confirmation
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, Waiting
-from fsw.autopilot.estimation.stated_variance import StatedVariance
+from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import normalised
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
@@ -28,7 +28,11 @@ class FilterStart:
     """Begins a filter as soon as its samples allow."""
 
     def __init__(
-        self, tuning: EstimatorTuning, law: Any, stated: StatedVariance, confirmation: Confirmation
+        self,
+        tuning: EstimatorTuning,
+        law: Any,
+        stated: MeasurementNoise,
+        confirmation: Confirmation,
     ) -> None:
         self._tuning = tuning
         self._law = law
@@ -69,7 +73,7 @@ class FilterStart:
 
     def _from_pose(self, memory: FusionMemory, sample: PoseSample) -> FusionMemory:
         stated = self._stated.of_pose(sample)
-        noise = self._least_stated(memory.waiting) if sample.drifts else stated
+        noise = self._min_stated(memory.waiting) if sample.drifts else stated
         state = sample.position, _REST, normalised(sample.attitude)
         self._begin(memory, sample.time, state, *noise)
         if not sample.drifts:
@@ -103,7 +107,7 @@ class FilterStart:
         variances = p_variance, (slow, slow, slow), q_variance
         kernels.begin(memory.numbers, self._law, time, *state, *variances)
 
-    def _least_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
+    def _min_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
         """The least variances of the poses so far: of a frame that drifts, the noise alone."""
         poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
         return reduce(least, (self._stated.of_pose(pose) for pose in poses))

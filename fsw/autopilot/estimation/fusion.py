@@ -30,13 +30,13 @@ from fsw.autopilot.estimation.error_state import (
     vec3,
     vec4,
 )
-from fsw.autopilot.estimation.stated_variance import followed
+from fsw.autopilot.estimation.measurement_noise import followed
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
 
-_LEAST_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
+_MIN_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
 _KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
 # What is not known of a state that poses contradict: standard deviations.
 _DOUBTED_SPEED = 0.5  # m/s
@@ -231,7 +231,7 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
     R = matrix_from_quaternion(turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2]))
     north, east, down = rotate(R, field)
     level = north * north + east * east
-    if not level > _LEAST_FIELD * _LEAST_FIELD:
+    if not level > _MIN_FIELD * _MIN_FIELD:
         return False
     x.residual[0] = wrap_angle(law.declination - math.atan2(east, north))
     # Turning the body by its axis a turns the field's heading by a_z - z (x a_x + y a_y) / level.

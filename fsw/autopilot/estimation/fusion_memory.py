@@ -8,13 +8,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fsw.autopilot.estimation.confirmation import Run
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import FILTER, Filter
-from fsw.autopilot.estimation.pace import Pace
-from fsw.autopilot.estimation.redundancy import LEAST_WALKS, Verdict
-from fsw.autopilot.estimation.sensor_checks import Aiding, Health
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.confirmation import Run
+from fsw.autopilot.estimation.faults.redundancy import MIN_WALKS, Verdict
+from fsw.autopilot.estimation.faults.sample_rate import SampleRate
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample, Sample
 from fsw.autopilot.signals import Vec2, Vec3, Vec4
 
@@ -97,7 +97,7 @@ class FusionMemory(NamedTuple):
     frame: FrameDrift = FrameDrift()  # of poses that drift
     reset: Reset = Reset()
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
-    paces: tuple[Pace, ...] = ()  # how often sensors are heard
+    sample_rates: tuple[SampleRate, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
     began: float = -math.inf  # s, the filter's own time when it began
     without_fix: GnssSample | None = None  # the newest one that has none
@@ -188,5 +188,5 @@ def copied(x: Filter) -> Filter:
 def at_start() -> FusionMemory:
     """Memory before the first sample."""
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
-    x["model_walk"] = LEAST_WALKS
+    x["model_walk"] = MIN_WALKS
     return FusionMemory(x)

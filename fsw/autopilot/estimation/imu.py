@@ -24,7 +24,7 @@ from fsw.autopilot.estimation.error_state import (
     RATE,
     TIME,
 )
-from fsw.autopilot.estimation.sensor_fault import SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable
 
@@ -117,7 +117,7 @@ def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> 
 def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bool) -> int:
     """What is wrong with one half of a reading; counts what comes in a row.
 
-    Of a unit that ``flies``, that it is steady is not enough: see ``redundancy.py``.
+    Of a unit that ``flies``, that it is steady is not enough: see ``faults/redundancy.py``.
     """
     last, at = x.imu[(x.end - 1) % IMU_CAPACITY], 3 * half
     if not math.isfinite(reading[0] + reading[1] + reading[2]):

@@ -20,9 +20,9 @@ import math
 from typing import Any, Final, NamedTuple
 
 from fsw.autopilot.estimation.error_state import PUSHES
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.imu import doubt
-from fsw.autopilot.estimation.sensor_fault import SensorFault
-from fsw.autopilot.estimation.stated_variance import followed
+from fsw.autopilot.estimation.measurement_noise import followed
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.signals import Vec2
 from fsw.compiled import compilable
@@ -34,7 +34,7 @@ _DISTURBANCE_AT_START: Final = 30.0  # rad/s^2
 # has held a joint for 0.05 rad.
 _FAR: Final = 0.1  # rad
 _SIGMAS: Final = 6.0
-_MOST_SIGMA: Final = 0.03  # rad; of a wider one garbage would pass
+_MAX_SIGMA: Final = 0.03  # rad; of a wider one garbage would pass
 # By what differences of surprises are beyond which are expected, the variance of readings grows;
 # one step of an encoder does not make it.
 _SCALE_FROM: Final = 4.0
@@ -128,7 +128,7 @@ def _less_zero(x: Any, angles: Vec2) -> Vec2:
 @compilable
 def _is_far(x: Any, angles: Vec2) -> bool:
     """Whether a reading is farther from what is expected than the filter may be wrong."""
-    sigma, stray = min(math.sqrt(x.joint_variance[0, 0]), _MOST_SIGMA), 0.0
+    sigma, stray = min(math.sqrt(x.joint_variance[0, 0]), _MAX_SIGMA), 0.0
     for i in range(2):
         stray = max(stray, abs(angles[i] - x.joints[i, 0]))
     return stray > _FAR + _SIGMAS * sigma

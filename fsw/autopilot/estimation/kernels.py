@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation import fusion, imu, joint_filter, redundancy
+from fsw.autopilot.estimation import fusion, imu, joint_filter
 from fsw.autopilot.estimation.error_state import (
     BA,
     BARO,
@@ -39,6 +39,7 @@ from fsw.autopilot.estimation.error_state import (
     vec3,
     vec4,
 )
+from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec2, Vec3, Vec4

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from fsw.autopilot.estimation import fusion, kernels
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding
 from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory, Waiting
-from fsw.autopilot.estimation.sensor_checks import Aiding
-from fsw.autopilot.estimation.stated_variance import StatedVariance
+from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, normalised
 from fsw.autopilot.measurements import (
@@ -29,7 +29,7 @@ _UNKNOWN: Vec3 = (math.inf, math.inf, math.inf)
 class MeasurementUpdate:
     """Changes a memory's filter by samples whose time it has."""
 
-    def __init__(self, tuning: EstimatorTuning, law: Any, stated: StatedVariance) -> None:
+    def __init__(self, tuning: EstimatorTuning, law: Any, stated: MeasurementNoise) -> None:
         self._law = law
         self._stated = stated
         self._pose_delay, self._gnss_delay = tuning.pose_delay, tuning.gnss_delay

@@ -16,9 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fsw.autopilot.estimation import fusion, kernels, redundancy
-from fsw.autopilot.estimation.arbitration import Arbitration, begun
-from fsw.autopilot.estimation.confirmation import Confirmation, Run
+from fsw.autopilot.estimation import fusion, kernels
 from fsw.autopilot.estimation.error_state import (
     DELAY,
     ERRORS,
@@ -27,6 +25,18 @@ from fsw.autopilot.estimation.error_state import (
     Array,
     Filter,
 )
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
+from fsw.autopilot.estimation.faults.confirmation import Confirmation, Run
+from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
+from fsw.autopilot.estimation.faults.sensor_checks import (
+    SENSOR_OF,
+    Aiding,
+    Health,
+    arrived,
+    is_attitude_stuck,
+)
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
@@ -50,17 +60,8 @@ from fsw.autopilot.estimation.kernels import (
     READING,
     Asked,
 )
+from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
 from fsw.autopilot.estimation.measurement_update import MeasurementUpdate, attitude
-from fsw.autopilot.estimation.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
-from fsw.autopilot.estimation.sensor_checks import (
-    SENSOR_OF,
-    Aiding,
-    Health,
-    arrived,
-    is_attitude_stuck,
-)
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
-from fsw.autopilot.estimation.stated_variance import StatedVariance
 from fsw.autopilot.estimation.tuning import EstimatorLaw, EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
@@ -108,7 +109,7 @@ class SensorFusion:
     def __init__(self, tuning: EstimatorTuning) -> None:
         self.tuning = tuning
         self.law = packed(EstimatorLaw(tuning, tuning.gates))
-        self._stated = StatedVariance(tuning)
+        self._stated = MeasurementNoise(tuning)
         self._confirmation = Confirmation(tuning, self._stated)
         self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
         self._update = MeasurementUpdate(tuning, self.law, self._stated)
@@ -220,7 +221,7 @@ class SensorFusion:
                 fault = _fault_of_encoders(sample, now, joints_came)
                 if fault:
                     memory = memory.noting_fault(Sensor.ENCODERS, fault, now)
-                    if fault is not SensorFault.SELDOM:
+                    if fault is not SensorFault.RATE_TOO_LOW:
                         continue
                 if joints_came < 0.0 or parts & JOINTS:
                     memory, parts = self._done(memory, x, parts, now), 0
@@ -516,7 +517,7 @@ def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFa
         return SensorFault.NONE
     if sample.time < now - ENCODERS_TOO_OLD:
         return SensorFault.TOO_OLD
-    return SensorFault.SELDOM if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
+    return SensorFault.RATE_TOO_LOW if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
 
 
 def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:

@@ -15,19 +15,18 @@ from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
 from fsw.autopilot.control.safety_gate import gate
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor
-from fsw.autopilot.flight.accuracy_watch import AccuracyMemory, AccuracyWatch
-from fsw.autopilot.flight.before_estimate import nothing_known, nowhere, told
-from fsw.autopilot.flight.bounds import bounded_update, target_problem
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.damage_watch import DamageWatch
+from fsw.autopilot.flight.commands.bounds import bounded_update, target_problem
 from fsw.autopilot.flight.descent import Descent
-from fsw.autopilot.flight.exact_state import ExactState
-from fsw.autopilot.flight.jump import moved_along
+from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
+from fsw.autopilot.flight.estimate.exact_state import ExactState
+from fsw.autopilot.flight.estimate.jump import moved_along
+from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
+from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.land_detector import with_range
-from fsw.autopilot.flight.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
 from fsw.autopilot.flight.plan_exchange import (
@@ -37,15 +36,20 @@ from fsw.autopilot.flight.plan_exchange import (
     requested,
     with_nominal,
 )
-from fsw.autopilot.flight.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.restart import restarted
-from fsw.autopilot.flight.safe_set import SafeSetCheck
-from fsw.autopilot.flight.safety_watch import SafetyWatch
-from fsw.autopilot.flight.sensed_state import CaughtUp, SensedState
+from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
+from fsw.autopilot.flight.safety.damage_watch import DamageWatch
+from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
+from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
+from fsw.autopilot.flight.safety.uncertain_clearance import (
+    InflatedSafeSet,
+    UncertainClearance,
+    pose_covariance,
+)
+from fsw.autopilot.flight.safety.zone_room import ZoneRoom
+from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet, UncertainClearance, pose_covariance
-from fsw.autopilot.flight.zone_room import ZoneRoom
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
@@ -91,7 +95,7 @@ _STILL = SensorFrame(
 )
 # N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
 _ARM_DAMPING: Vec2 = (0.15, 0.04)
-_DESCEND = Mode.DESCEND  # found in a tenth of the time
+_DESCEND = Mode.DESCEND  # ten times as fast as Mode.X
 
 
 class Controlled(NamedTuple):
@@ -117,7 +121,11 @@ class Autopilot:
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
         tick = config.tick_period_us * 1e-6
-        self._zones: tuple[KeptSet, EndEffectorTarget | None, Array] = (KeptSet(), None, NO_ZONES)
+        self._zones: tuple[InflatedSafeSet, EndEffectorTarget | None, Array] = (
+            InflatedSafeSet(),
+            None,
+            NO_ZONES,
+        )
         self._safe_sets = SafeSetCheck(config)
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
@@ -150,7 +158,7 @@ class Autopilot:
         self._room = ZoneRoom(config)
         self._tick_us = config.tick_period_us
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
-        self._most_us = config.catch_up_ticks * config.tick_period_us
+        self._max_us = config.catch_up_ticks * config.tick_period_us
 
     def warm_up(self) -> None:
         """Compile every kernel of the tick, before anything flies."""
@@ -168,11 +176,11 @@ class Autopilot:
         """Findings on whether this configuration can keep a safe set."""
         return self._safe_sets.analyse(safe_set)
 
-    def least_margin(
+    def min_margin(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> float:
         """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone."""
-        return self._safe_sets.least_margin(safe_set, estimate, target)
+        return self._safe_sets.min_margin(safe_set, estimate, target)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
@@ -211,7 +219,7 @@ class Autopilot:
         vehicle = state.vehicle
         armed = vehicle.armed
         flown = vehicle.flies and vehicle.unloaded is None and bool(state.cascade.has_plan)
-        if flown and now_us - state.t_us > self._most_us:
+        if flown and now_us - state.t_us > self._max_us:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
         if state.cascade is not began:  # loops or plan begin anew
             r = state.cascade.copy()
@@ -456,7 +464,7 @@ class Autopilot:
 
     def _jumped(self, state: FlightState, now_us: int) -> bool:
         """Whether time did: on by more than is made up for, or not on at all."""
-        return state.index >= 0 and not 0 < now_us - state.t_us <= self._most_us
+        return state.index >= 0 and not 0 < now_us - state.t_us <= self._max_us
 
     def _resumed(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """The state after a time without ticks: loops and plan go on from the measurement."""
@@ -505,6 +513,7 @@ class Autopilot:
             from_nominal=from_nominal,
             joint_targets=joints,
             recent_disturbance=state.cascade.observed.recent,
+            mode=state.vehicle.mode,
         )
         if safety.replan:
             safety = replace(safety, replan=False)
@@ -569,7 +578,7 @@ class Autopilot:
         are uncertain while a part of them is missing. None: certain.
         """
         if covariance is not None and fusion is not None:
-            return pose_covariance(covariance, estimate, self._sensed.lasting_error(fusion))
+            return pose_covariance(covariance, estimate, self._sensed.correlated_error(fusion))
         if fusion is None and state.aiding is not AIDED:
             position, attitude = state.aiding.position_sigma, state.aiding.attitude_sigma
             return np.diag((position**2,) * 3 + (attitude**2,) * 3)

@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.estimator import READINGS, read_into, reading_of
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.flight.active_failsafes import surely_none
-from fsw.autopilot.flight.damage_watch import DamageWatch
-from fsw.autopilot.flight.failsafe import SLOW_US
-from fsw.autopilot.flight.failsafe_evidence import PLAN_STALE_PERIODS
+from fsw.autopilot.flight.estimate.sensed_state import SensedState
+from fsw.autopilot.flight.failsafe.active import surely_none
+from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS
+from fsw.autopilot.flight.failsafe.table import SLOW_US
 from fsw.autopilot.flight.plan_exchange import planned_input
-from fsw.autopilot.flight.safety_watch import SafetyWatch
-from fsw.autopilot.flight.sensed_state import SensedState
+from fsw.autopilot.flight.safety.damage_watch import DamageWatch
+from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.state import AIDED, FlightState
 from fsw.autopilot.measurements import RangeSample, Sample
 from fsw.autopilot.model.actuator_health import HEALTHY

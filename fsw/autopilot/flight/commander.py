@@ -6,18 +6,17 @@ Every function takes a state and returns one; almost every tick it is the same o
 from __future__ import annotations
 
 from fsw.autopilot.control.cascade import at_rest, in_hover
-from fsw.autopilot.flight import arming
-from fsw.autopilot.flight.active_failsafes import active, quickly_active, surely_none
-from fsw.autopilot.flight.ailments import ailments
-from fsw.autopilot.flight.arming_health import arming_health
-from fsw.autopilot.flight.command_dedup import answered_before, remember, still_true
-from fsw.autopilot.flight.command_handlers import Decision, decide, decide_without_estimate
-from fsw.autopilot.flight.conditions import NOTHING_DONE, Action
-from fsw.autopilot.flight.failsafe import BLOCKING, SLOW_US
-from fsw.autopilot.flight.failsafe_evidence import FailsafeContext
-from fsw.autopilot.flight.failsafe_response import overridden, respond
+from fsw.autopilot.flight.commands import arming
+from fsw.autopilot.flight.commands.arming_health import arming_health
+from fsw.autopilot.flight.commands.dedup import answered_before, remember, still_true
+from fsw.autopilot.flight.commands.handlers import Decision, decide, decide_without_estimate
+from fsw.autopilot.flight.failsafe.active import active, quickly_active, surely_none
+from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
+from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
+from fsw.autopilot.flight.failsafe.response import overridden, respond
+from fsw.autopilot.flight.failsafe.table import BLOCKING, SLOW_US, unhealthy
 from fsw.autopilot.flight.land_detector import in_the_air, standing_unclear, stands
-from fsw.autopilot.flight.mission_sequencer import refusal as mission_refusal
+from fsw.autopilot.flight.mission.sequencer import refusal as mission_refusal
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.flight.modes.base import CONTINUE, CommandContext, FlightMode, Handover
 from fsw.autopilot.flight.modes.hold import stop
@@ -25,12 +24,12 @@ from fsw.autopilot.flight.modes.mission import left as mission_left
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import current_problem, is_fresh
 from fsw.autopilot.flight.plan_exchange import without_plan
-from fsw.autopilot.flight.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.restart import rests
-from fsw.autopilot.flight.retreat import retreat_place
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.safety.retreat import retreat_place
+from fsw.autopilot.flight.safety.zone_room import within_room
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
-from fsw.autopilot.flight.zone_room import within_room
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.kinematics import point_in_flight
 from fsw.autopilot.mpc.reference import still_at
@@ -53,7 +52,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.frozen import replace
 
-_DISARMED = Mode.DISARMED  # found in a tenth of the time
+_DISARMED = Mode.DISARMED  # ten times as fast as Mode.X
 _RESTARTS = "command refused: the flight software restarts; send it again"
 
 
@@ -152,7 +151,7 @@ class Commander:
         Empty if it could be armed, or is; of one that is armed, the report says what is ill.
         """
         if state.vehicle.armed:
-            sentence, report = "", ArmingReport(ill=ailments(state.vehicle.conditions))
+            sentence, report = "", ArmingReport(ill=unhealthy(state.vehicle.conditions))
         else:
             found = arming.failed(self.context(state, estimate))
             report = ArmingReport(tuple([number for number, _ in found]))

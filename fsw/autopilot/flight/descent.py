@@ -30,7 +30,7 @@ _HIGH: Final = 1.0  # m above the legs; with _MOST the vehicle is slow again 0.6
 _FAST: Final = 1.5  # m/s, as PX4's MPC_Z_VEL_MAX_DN
 _SLOW: Final = 0.3  # m above the legs, less ``_SIGMAS`` of the height
 _SIGMAS: Final = 3.0
-_MOST_HURRIED: Final = 2.0  # m/s^2
+_MAX_HURRIED: Final = 2.0  # m/s^2
 _BRAKING: Final = 1.2  # m/s^2 that are counted on; loops lag
 _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable velocity
 _SPEED_GOOD: Final = 0.5  # m/s; from here to there the vehicle draws back ever slower
@@ -93,7 +93,7 @@ class Descent:
         if not sure > 0.0:
             return usual, _MOST
         braked = math.sqrt(slow * slow + 2.0 * _BRAKING * sure)
-        return max(usual, min(_FAST, braked)), _MOST_HURRIED
+        return max(usual, min(_FAST, braked)), _MAX_HURRIED
 
     def _input(
         self, nominal: PredictionState, speed: float, most: float, across: Vec2

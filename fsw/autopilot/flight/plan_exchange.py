@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from fsw.autopilot.control.braking import Brake
-from fsw.autopilot.flight.failsafe_evidence import PLAN_STALE_PERIODS
+from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS
 from fsw.autopilot.flight.state import FlightState, PlanMemory
 from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.geometry.vectors import clamp_magnitude

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import (
     FlightState,
     OffboardMemory,
@@ -19,7 +20,6 @@ from fsw.autopilot.flight.state import (
     SafetyMemory,
     VehicleMemory,
 )
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.signals import StateEstimate
 
 RESTARTED: Final = "flight software restarted"
@@ -50,7 +50,7 @@ def restarted(state: FlightState) -> FlightState:
         # What was answered stays as well: the same command, sent again, is no second restart.
         vehicle=VehicleMemory(gcs_heard_us=vehicle.gcs_heard_us, answered=vehicle.answered),
         mission=state.mission,
-        kept=KeptSet().of(state.mission.safe_set),
+        kept=InflatedSafeSet().of(state.mission.safe_set),
         # Until margins are known anew, those of where it stands count for arming.
         constraints=state.constraints,
         aiding=state.aiding,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.autopilot.flight.failsafe import FAULTS
+from fsw.autopilot.flight.failsafe.table import FAULTS
 from fsw.autopilot.flight.modes.offboard import report
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.signals import FlightSnapshot, Mode, SensorFrame

@@ -6,16 +6,16 @@ from dataclasses import field
 from functools import partial
 from typing import Final, NamedTuple
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.frame_dropout import Dropout
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
-from fsw.autopilot.flight.accuracy_watch import AccuracyMemory
-from fsw.autopilot.flight.command_dedup import AnsweredCommand
-from fsw.autopilot.flight.conditions import Condition, FailsafeMemory
-from fsw.autopilot.flight.mission_sequencer import MissionFlight
-from fsw.autopilot.flight.offboard_setpoints import Tilt
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, ReferenceState
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
+from fsw.autopilot.flight.commands.dedup import AnsweredCommand
+from fsw.autopilot.flight.failsafe.conditions import Condition, FailsafeMemory
+from fsw.autopilot.flight.mission.sequencer import MissionFlight
+from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.setpoints.offboard import Tilt
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.autopilot.model.airframe import AIRFRAME
@@ -121,18 +121,18 @@ class OffboardMemory:
     told_us: int = -1  # when a problem was reported last
 
     @property
-    def heard_us(self) -> int:
+    def last_received_us(self) -> int:
         """When the newest setpoint of any kind came; -1: never."""
         return max(self.motion_us, self.joints_us)
 
     def is_fresh(self, now_us: int, timeout_us: int) -> bool:
         """Whether the newest setpoint is within the timeout."""
-        return is_young(self.heard_us, now_us, timeout_us)
+        return is_young(self.last_received_us, now_us, timeout_us)
 
 
-def is_young(heard_us: int, now_us: int, timeout_us: int) -> bool:
+def is_young(last_received_us: int, now_us: int, timeout_us: int) -> bool:
     """Whether what came at ``heard_us``, negative for never, is within the timeout."""
-    return heard_us >= 0 and now_us - heard_us < timeout_us
+    return last_received_us >= 0 and now_us - last_received_us < timeout_us
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ class MissionMemory:
     owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
     fence_owner: MessageSource | None = None  # who uploaded the fence
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
-    silent_zones: int = 0  # that moved, are not announced any more, and are held where they were
+    silent_zones: int = 0  # that moved, timed out, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
     flight: MissionFlight = field(default_factory=MissionFlight)
 
@@ -280,7 +280,9 @@ class FlightState:
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
     dropout: Dropout = COMPLETE  # where states are exact
-    kept: KeptSet = KeptSet()  # the safe set, with clearances for an estimate that is not sure
+    kept: InflatedSafeSet = (
+        InflatedSafeSet()
+    )  # the safe set, with clearances for an estimate that is not sure
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = Damage()

@@ -52,10 +52,10 @@ class TunedAutopilot:
         """Why what flies now could not keep a safe set; nothing if it is to fly all the same."""
         return () if self._config.soft else refusals(self._in_use[1].analyse(safe_set))
 
-    def least_margin(self, safe_set: SafeSet, snapshot: FlightSnapshot) -> float:
+    def min_margin(self, safe_set: SafeSet, snapshot: FlightSnapshot) -> float:
         """The least margin [m] the whole vehicle would have in a safe set now."""
         loop = self._in_use[1]
-        return loop.least_margin(safe_set, snapshot.estimate, snapshot.reference)
+        return loop.min_margin(safe_set, snapshot.estimate, snapshot.reference)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Both parts of a tick."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from fsw.autopilot.signals import BatteryReading, BatteryState, Charge, Vec4
+from fsw.autopilot.signals import BatteryReading, BatteryState, BatteryWarning, Vec4
 
 _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
@@ -27,16 +27,16 @@ Levels = tuple[float, float, float]
 """Shares of the capacity below which the charge is low, critical, and an emergency."""
 
 
-def charge_of(remaining: float, levels: Levels) -> Charge:
+def charge_of(remaining: float, levels: Levels) -> BatteryWarning:
     """Charge level at a ``remaining`` share [1] of the capacity; NaN is an emergency."""
     if remaining >= levels[0]:
-        return Charge.OK
+        return BatteryWarning.OK
     if remaining >= levels[1]:
-        return Charge.LOW
-    return Charge.CRITICAL if remaining >= levels[2] else Charge.EMERGENCY
+        return BatteryWarning.LOW
+    return BatteryWarning.CRITICAL if remaining >= levels[2] else BatteryWarning.EMERGENCY
 
 
-def _level(before: Charge, remaining: float, levels: Levels) -> Charge:
+def _level(before: BatteryWarning, remaining: float, levels: Levels) -> BatteryWarning:
     """The level after ``before``: the next one at once, the last one with some charge to spare."""
     now = charge_of(remaining, levels)
     return now if now >= before else min(before, charge_of(remaining - _ROSE, levels))

@@ -30,8 +30,9 @@ from fsw.autopilot.control.tube import (
 )
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.parameters.flight_config import FlightConfig, Surroundings
+from fsw.autopilot.parameters.flight_config import DisturbanceModel, FlightConfig
 from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.shapes.ball import is_point
 from fsw.autopilot.signals import SafeSet, Zone
 
 _SIGMAS = 3.0  # that count where clearances do not grow
@@ -85,7 +86,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         findings += _rooms_in_sphere(config, loop, radius)
     if others:
         findings.append(_actuation(config, planner.walls, surroundings, math.inf))
-        points = [zone.clearance for zone in others if _is_point(zone)]
+        points = [zone.clearance for zone in others if is_point(zone)]
         if points and planner.body == "points":
             findings.append(_links(config, min(points)))
     for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
@@ -103,10 +104,6 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
             findings += _returns(config, loop)
         findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
-
-
-def _is_point(zone: Zone) -> bool:
-    return zone.shape.kind == "ball" and zone.shape.numbers[-1] == 0.0
 
 
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
@@ -198,7 +195,7 @@ def _estimate(
     )
 
 
-def base_reach(loop: Tube, surroundings: Surroundings) -> float:
+def base_reach(loop: Tube, surroundings: DisturbanceModel) -> float:
     """How far a disturbance within the assumed one pushes the base off its plan [m], an axis.
 
     Without what clearances grow by while the memory of wind is in force.
@@ -223,7 +220,7 @@ def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float)
 
 
 def _actuation(
-    config: FlightConfig, tuning: BarrierTuning, surroundings: Surroundings, radius: float
+    config: FlightConfig, tuning: BarrierTuning, surroundings: DisturbanceModel, radius: float
 ) -> Finding:
     available = GRAVITY * math.tan(config.planner.limits.tilt)
     wanted = tuning.alpha + tuning.gamma * tuning.lambda_ + surroundings.target_acceleration
@@ -290,7 +287,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
     )
 
 
-def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: Surroundings) -> Finding:
+def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: DisturbanceModel) -> Finding:
     reach, room = base_reach(loop, surroundings), stand_off(tuning)
     return _finding(
         "tube",
@@ -462,12 +459,12 @@ def _proof(config: FlightConfig, reach: float) -> str:
     if left >= tuning.alpha:
         return f"lambda >= {least:.3f} m/s would be proof"
     if left > 0.0:
-        least_alpha = math.floor(1e2 * left) / 1e2
-        return f"lambda >= {least:.3f} m/s with alpha <= {least_alpha:.2f} m/s^2 would be proof"
+        min_alpha = math.floor(1e2 * left) / 1e2
+        return f"lambda >= {least:.3f} m/s with alpha <= {min_alpha:.2f} m/s^2 would be proof"
     return "no lambda that the tilt can keep would be proof"
 
 
-def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Finding:
+def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) -> Finding:
     """The tube is that of the linear loop: it holds while no limit is reached."""
     disturbance = surroundings.disturbance
     used = limits_used(config.airframe, config.tuning.tracking, loop, disturbance)
@@ -482,7 +479,7 @@ def _limits(config: FlightConfig, loop: Tube, surroundings: Surroundings) -> Fin
     )
 
 
-def _sampled(tuning: BarrierTuning, surroundings: Surroundings, period: float) -> Finding:
+def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: float) -> Finding:
     least = sampled_robustness(tuning, surroundings.disturbance, period)
     margin = (tuning.lambda_ - least) / tuning.slope
     return _finding(

@@ -114,7 +114,7 @@ class SetpointLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class DisturbanceModel:
     """What the vehicle must expect; ``consistency.py`` asks whether it can cope."""
 
     disturbance: float = 0.8  # m/s^2 an axis, d_m of Table II
@@ -135,7 +135,7 @@ class FlightConfig:
     planner: PlannerConfig = field(default_factory=PlannerConfig)
     tuning: LoopGains = field(default_factory=LoopGains)
     limits: FlightLimits = field(default_factory=FlightLimits)
-    surroundings: Surroundings = field(default_factory=Surroundings)
+    surroundings: DisturbanceModel = field(default_factory=DisturbanceModel)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
     safety_filter: FilterTuning = field(default_factory=FilterTuning)
     estimator: EstimatorTuning = field(default_factory=EstimatorTuning)

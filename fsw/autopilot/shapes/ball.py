@@ -5,11 +5,13 @@ Source: docs/equations.md E11, E12, E23.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.shapes.frame import CENTRE_BALL, outward_axis
-from fsw.autopilot.shapes.kind import ShapeKind, Surface
+from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface
 from fsw.autopilot.signals import Shape, Vec3, Zone
 from fsw.compiled import kernel
 
@@ -26,7 +28,12 @@ def point(position: Vec3, clearance: float) -> Zone:
     return Zone(ball(position, 0.0), clearance)
 
 
-def radius_problem(numbers: tuple[float, ...]) -> str | None:
+def is_point(zone: Zone) -> bool:
+    """Whether a zone is a ball of radius zero."""
+    return zone.shape.kind == KIND.name and zone.shape.numbers[-1] == 0.0
+
+
+def radius_problem(numbers: Numbers) -> str | None:
     """Why numbers that end with a radius [m] describe nothing round."""
     return None if numbers[-1] >= 0.0 else f"the radius is {numbers[-1]:g} m; it must not be < 0"
 
@@ -52,6 +59,18 @@ def ball_plane(
     return Surface(nx * x + ny * y + nz * z - radius, nx, ny, nz)
 
 
+def covers_inside(new: Zone, old: Zone) -> bool:
+    """A ball to stay in that lies in the other; to keep out, see ``ball_around``."""
+    a, b = new.shape.numbers, old.shape.numbers
+    apart = math.dist(a[:3], b[:3])
+    return new.keep_in and apart + a[3] - new.clearance <= b[3] - old.clearance
+
+
+def _ball_around(numbers: Numbers) -> tuple[Vec3, float]:
+    x, y, z, radius = numbers
+    return (x, y, z), radius
+
+
 KIND = ShapeKind(
     name="ball",
     number=1,
@@ -59,4 +78,6 @@ KIND = ShapeKind(
     planes_inside=PLANES_INSIDE,
     plane=ball_plane,
     problem=radius_problem,
+    covers=covers_inside,
+    ball_around=_ball_around,
 )

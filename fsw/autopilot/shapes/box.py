@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.shapes.kind import ShapeKind, Surface
-from fsw.autopilot.signals import Shape, Vec3, Vec4
+from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface
+from fsw.autopilot.signals import Shape, Vec3, Vec4, Zone
 from fsw.compiled import kernel
 
 
@@ -70,6 +70,20 @@ def _plane(
     return Surface(deepest, sign * ax, sign * ay, sign * az)
 
 
+def _covers(new: Zone, old: Zone) -> bool:
+    """One of the same place and attitude that is no smaller, or to stay in no larger."""
+    a, b = new.shape.numbers, old.shape.numbers
+    if new.clearance < old.clearance or (a[:3], a[6:]) != (b[:3], b[6:]):
+        return False
+    sizes = zip(a[3:6], b[3:6], strict=True)
+    return all(x <= y if new.keep_in else x >= y for x, y in sizes)
+
+
+def _ball_around(numbers: Numbers) -> tuple[Vec3, float]:
+    x, y, z, *half_size = numbers[:6]
+    return (x, y, z), math.hypot(*half_size)
+
+
 KIND = ShapeKind(
     name="box",
     number=5,
@@ -88,4 +102,6 @@ KIND = ShapeKind(
     planes_inside=6,
     plane=_plane,
     problem=_problem,
+    covers=_covers,
+    ball_around=_ball_around,
 )

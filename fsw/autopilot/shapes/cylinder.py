@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.shapes.frame import CENTRE_BALL
 from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface, place_moved
-from fsw.autopilot.signals import Shape, Vec3
+from fsw.autopilot.signals import Shape, Vec3, Zone
 from fsw.compiled import kernel
 
 PLANES_INSIDE = 6
@@ -99,6 +99,20 @@ def _moved(numbers: Numbers, shift: Vec3) -> Numbers:
     return (*place_moved(numbers[:3], shift), *end)
 
 
+def _covers(new: Zone, old: Zone) -> bool:
+    """One about the same line that is no thinner, or to stay in no thicker."""
+    a, b = new.shape.numbers, old.shape.numbers
+    if new.clearance < old.clearance or a[:6] != b[:6]:
+        return False
+    return a[6] <= b[6] if new.keep_in else a[6] >= b[6]
+
+
+def _ball_around(numbers: Numbers) -> tuple[Vec3, float]:
+    n = numbers
+    middle = (0.5 * (n[0] + n[3]), 0.5 * (n[1] + n[4]), 0.5 * (n[2] + n[5]))
+    return middle, math.hypot(0.5 * math.dist(n[:3], n[3:6]), n[6])
+
+
 KIND = ShapeKind(
     name="cylinder",
     number=4,
@@ -115,4 +129,6 @@ KIND = ShapeKind(
     plane=_plane,
     problem=_problem,
     moved=_moved,
+    covers=_covers,
+    ball_around=_ball_around,
 )

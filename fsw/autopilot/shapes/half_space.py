@@ -48,6 +48,12 @@ def _moved(numbers: Numbers, shift: Vec3) -> Numbers:
     return (*normal, numbers[3] + dot(normal, shift))
 
 
+def _covers(new: Zone, old: Zone) -> bool:
+    """A parallel one that is no further out."""
+    a, b, sign = new.shape.numbers, old.shape.numbers, -1.0 if new.keep_in else 1.0
+    return a[:3] == b[:3] and sign * a[3] + new.clearance >= sign * b[3] + old.clearance
+
+
 KIND = ShapeKind(
     name="half-space",
     number=0,
@@ -56,5 +62,6 @@ KIND = ShapeKind(
     plane=_plane,
     problem=_problem,
     moved=_moved,
+    covers=_covers,
     flat=True,
 )

@@ -5,7 +5,7 @@ Source: docs/equations.md E15, E23.
 
 from __future__ import annotations
 
-from fsw.autopilot.shapes.ball import PLANES_INSIDE, ball_plane
+from fsw.autopilot.shapes.ball import PLANES_INSIDE, ball_plane, covers_inside
 from fsw.autopilot.shapes.kind import ShapeKind
 from fsw.autopilot.signals import TARGET_SPHERE, Shape, Vec3, Zone
 
@@ -35,5 +35,6 @@ KIND = ShapeKind(
     planes_inside=PLANES_INSIDE,
     plane=ball_plane,
     problem=_problem,
+    covers=covers_inside,
     follows_target=True,
 )

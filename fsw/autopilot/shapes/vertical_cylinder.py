@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.shapes.cylinder import PLANES_INSIDE, cylinder_surface
 from fsw.autopilot.shapes.kind import ENDLESS, Numbers, ShapeKind, Surface
-from fsw.autopilot.signals import Shape, Vec2, Vec3, Zone
+from fsw.autopilot.signals import MAX_DISTANCE, Shape, Vec2, Vec3, Zone
 from fsw.compiled import kernel
 
 
@@ -46,6 +48,21 @@ def _moved(numbers: Numbers, shift: Vec3) -> Numbers:
     return north + shift[0], east + shift[1], top + shift[2], bottom + shift[2], radius
 
 
+def _covers(new: Zone, old: Zone) -> bool:
+    """A thicker one that reaches as high and as low; to stay in, nothing is shown."""
+    a, b = new.shape.numbers, old.shape.numbers
+    apart = math.dist(a[:2], b[:2])
+    high = a[2] <= max(b[2] - old.clearance, -MAX_DISTANCE)
+    low = a[3] >= min(b[3] + old.clearance, MAX_DISTANCE)
+    thick = apart + b[4] + old.clearance <= a[4] + new.clearance
+    return not new.keep_in and high and low and thick
+
+
+def _ball_around(numbers: Numbers) -> tuple[Vec3, float]:
+    north, east, top, bottom, radius = numbers
+    return (north, east, 0.5 * (top + bottom)), math.hypot(0.5 * (bottom - top), radius)
+
+
 KIND = ShapeKind(
     name="vertical cylinder",
     number=3,
@@ -54,5 +71,7 @@ KIND = ShapeKind(
     plane=_plane,
     problem=_problem,
     moved=_moved,
+    covers=_covers,
+    ball_around=_ball_around,
     endless=frozenset({2, 3}),
 )

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from fsw.autopilot.flight.ailments import AILMENTS
-from fsw.autopilot.flight.arming import CHECKS, Subject
-from fsw.autopilot.flight.conditions import Action, Condition
-from fsw.autopilot.flight.failsafe import ROWS
-from fsw.autopilot.signals import ArmingReport, FailsafeEvent, Mode, Severity
+from fsw.autopilot.flight.commands.arming import CHECKS, Subject
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
+from fsw.autopilot.flight.modes import MODES
+from fsw.autopilot.signals import ArmingReport, FailsafeEvent, Severity
 from fsw.link.wire.px4_mode import custom_mode
 
 ARGUMENTS: Final = 40  # bytes of an event
@@ -55,17 +55,8 @@ _BITS: Final = {
     Subject.STORAGE: 25,
 }
 _PRESENT: Final = sum(1 << bit for bit in _COMPONENTS)
-# PX4's navigation_mode_group_t: the bit is its number of the mode.
-_MODE_GROUPS: Final = {
-    Mode.MISSION: (3, "mission"),
-    Mode.HOLD: (4, "loiter"),
-    Mode.RETURN: (5, "rtl"),
-    Mode.OFFBOARD: (14, "offboard"),
-    Mode.TAKEOFF: (17, "takeoff"),
-    Mode.LAND: (18, "land"),
-    Mode.ORBIT: (21, "orbit"),
-    Mode.TRAJECTORY: (23, "external1"),
-}
+# PX4's navigation_mode_group_t: modes in which a vehicle can be armed.
+_MODE_GROUPS: Final = {mode: kind.px4 for mode, kind in MODES.items() if kind.px4.offered}
 # PX4's failsafe_action_t; behind its ten, ours.
 _ACTIONS: Final = {
     Action.NONE: 0,
@@ -103,9 +94,9 @@ def arming_events(report: ArmingReport) -> tuple[Event, ...]:
     for number in report.failed:
         errors |= 1 << _BITS[CHECKS[number].subject]
     for name in report.ill:
-        condition = Condition(name)
-        bit = 1 << _BITS[AILMENTS[condition]]
-        if ROWS[condition].severity <= Severity.CRITICAL:
+        row = ROWS[Condition(name)]
+        bit = 1 << _BITS[row.component] if row.component is not None else 0
+        if row.severity <= Severity.CRITICAL:
             errors |= bit
         else:
             warnings |= bit
@@ -214,7 +205,9 @@ def event_document() -> bytes:
         },
         "supported_protocols": ["health_and_arming_check"],
         "navigation_mode_groups": {
-            "groups": {str(bit): [custom_mode(mode)] for mode, (bit, _) in _MODE_GROUPS.items()}
+            "groups": {
+                str(px4.nav_state): [custom_mode(mode)] for mode, px4 in _MODE_GROUPS.items()
+            }
         },
     }
     document = {"version": _VERSION, "components": {str(_COMPONENT): described}}
@@ -228,7 +221,7 @@ def _argument(kind: str, name: str, enum: str = "") -> dict[str, str]:
 def _enumerations() -> dict[str, Any]:
     conditions = {_CONDITIONS[row]: (row.name.lower(), row.value) for row in ROWS}
     actions = {number: (action.name.lower(), action.value) for action, number in _ACTIONS.items()}
-    groups = {1 << bit: (name, name) for bit, name in _MODE_GROUPS.values()}
+    groups = {1 << px4.nav_state: (px4.name, px4.name) for px4 in _MODE_GROUPS.values()}
     components = {1 << bit: names for bit, names in _COMPONENTS.items()}
     return {
         "health_component_t": _enumeration("uint32_t", components, bitfield=True),

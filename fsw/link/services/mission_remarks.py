@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from fsw.autopilot.flight import mission_sequencer
+from fsw.autopilot.flight.mission import sequencer as mission_sequencer
 from fsw.autopilot.shapes.half_space import KIND as HALF_SPACE
 from fsw.autopilot.shapes.vertical_cylinder import KIND as VERTICAL_CYLINDER
 from fsw.autopilot.signals import FlightSnapshot, MissionAction, MissionStep, SafeSet, Vec2, Zone
@@ -64,7 +64,7 @@ def fence_remarks(
     for number, begin, end in _legs(steps, start):
         # A circle bulges out of the straight leg to its centre by its radius.
         bulge = abs(steps[number].radius)
-        margin = min((_least_margin(zone, begin, end) for zone in fence.zones), default=math.inf)
+        margin = min((_min_margin(zone, begin, end) for zone in fence.zones), default=math.inf)
         if margin < bulge:
             outside[number] = max(outside.get(number, 0.0), bulge - margin)
     if not outside:
@@ -107,7 +107,7 @@ def _place_of(step: MissionStep) -> Vec2 | None:
     return step.position[:2]
 
 
-def _least_margin(zone: Zone, begin: Vec2, end: Vec2) -> float:
+def _min_margin(zone: Zone, begin: Vec2, end: Vec2) -> float:
     """The least distance [m] that the way from ``begin`` to ``end`` [m, NED] has from a zone.
 
     A fence is made of upright walls and columns; the other shapes are none of its.

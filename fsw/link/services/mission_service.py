@@ -70,7 +70,7 @@ class _Download:
     address: str
     kind: Kind
     items: tuple[MissionItem, ...]
-    heard_us: int
+    last_received_us: int
 
 
 class MissionService:
@@ -247,7 +247,7 @@ class MissionService:
             download = _Download(peer, self._address, kind, self._store.items[kind], t_us)
         if seq >= len(download.items):
             return (encode_ack(INVALID_SEQUENCE, number, peer),)
-        download.heard_us = t_us
+        download.last_received_us = t_us
         return (encode_item(download.items[seq], seq, number, peer, as_int),)
 
     # ------------------------------------------------------------ the rest
@@ -296,7 +296,7 @@ class MissionService:
         if number not in ROOM:
             return (encode_ack(UNSUPPORTED, number, peer),)
         upload, download = self._upload, self._download
-        if download is not None and t_us - download.heard_us > SILENCE_US:
+        if download is not None and t_us - download.last_received_us > SILENCE_US:
             download = self._download = None
         busy = upload or download
         if busy is not None and not self._is_of(busy, peer):

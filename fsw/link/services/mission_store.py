@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
-from fsw.autopilot.flight.bounds import mission_problem, safe_set_problem
-from fsw.autopilot.flight.safe_set import may_grow_fence
-from fsw.autopilot.flight.safe_set_change import growth
+from fsw.autopilot.flight.commands.bounds import mission_problem, safe_set_problem
+from fsw.autopilot.flight.safety.safe_set import may_grow_fence
+from fsw.autopilot.flight.safety.safe_set_change import growth
 from fsw.autopilot.shapes.zones import surfaces
 from fsw.autopilot.signals import (
     FlightSnapshot,
@@ -84,7 +84,7 @@ class Site:
     locate: Locate
     judge: SafeSetCheck
     clearance: Callable[[], float]  # m, from the walls of a fence uploaded now
-    least_margin: MarginCheck
+    min_margin: MarginCheck
     owner: Callable[[], int] = lambda: 0  # system that may grow a fence in flight; 0: its uploader
     ceiling: Callable[[], float] = lambda: math.inf  # m above the origin
 
@@ -198,7 +198,7 @@ class MissionStore:
         stop the rotors. Disarmed, none acts, and the base's place is enough.
         """
         if seen.armed:
-            margin = self._site.least_margin(fence, seen)
+            margin = self._site.min_margin(fence, seen)
             if not margin >= 0.0:
                 reason = f"the vehicle would be outside the fence by {-1e3 * margin:.1f} mm"
                 raise BadItem(DENIED, reason)

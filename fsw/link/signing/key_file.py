@@ -16,7 +16,7 @@ from fsw.link.udp_endpoint import LinkError
 _MODE: Final = 0o600
 _KEY_SIZE: Final = 32  # bytes
 _TIME_DIGITS: Final = 15  # of a signing time, which has 48 bits
-_MOST_BYTES: Final = 1024  # of a file that is read
+_MAX_BYTES: Final = 1024  # of a file that is read
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class KeyFile:
         try:
             if stat.S_IMODE(self._path.stat().st_mode) & 0o077:
                 raise LinkError(f"{self._path} may be read by others; chmod 600 it")
-            content = read_json(self._path, _MOST_BYTES)
+            content = read_json(self._path, _MAX_BYTES)
             key, newest = bytes.fromhex(content["key"]), content["newest"]
             if len(key) != _KEY_SIZE or type(newest) is not int or not 0 <= newest < 1 << 48:
                 raise ValueError
@@ -134,7 +134,7 @@ class KeyFile:
         with contextlib.ExitStack() as opened:
             handle = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
             opened.callback(os.close, handle)
-            content = os.read(handle, _MOST_BYTES)
+            content = os.read(handle, _MAX_BYTES)
             others = os.fstat(handle).st_mode & 0o077
             digits = content[len(head) : -1]
             made = content[: len(head)] == head and content[-1:] == b"}"

@@ -18,8 +18,8 @@ OFF: Final = -1  # MESSAGE_INTERVAL: not sent
 UNKNOWN: Final = 0  # MESSAGE_INTERVAL: not available
 _RENEWED: Final = 0.2  # of a size by each frame
 _NOTICED: Final = 0.02  # change of the share
-_LEAST_SHARE: Final = 0.1  # of a line
-_MOST_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
+_MIN_SHARE: Final = 0.1  # of a line
+_MAX_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
 
 
 @dataclass(slots=True)
@@ -43,14 +43,14 @@ class StreamRates:
         rates_hz: Sequence[float],
         tick_us: int,
         *,
-        most_bytes_s: float | None = None,
+        max_bytes_s: float | None = None,
     ) -> None:
         """Lay out the defaults, at most one message a tick; a rate of 0 is sent on request only.
 
-        All of them together send no more than ``most_bytes_s`` [bytes/s] on average.
+        All of them together send no more than ``max_bytes_s`` [bytes/s] on average.
         """
         self._tick_us = tick_us
-        self._most_bytes_s = most_bytes_s
+        self._max_bytes_s = max_bytes_s
         self._begun = False
         self._rows = []
         for place, (stream, rate_hz) in enumerate(zip(streams, rates_hz, strict=True)):
@@ -107,10 +107,10 @@ class StreamRates:
             row.wanted_us = interval_us or row.default_us
             row.due_us = t_us + max(row.wanted_us, 0)
         per_second = sum(1e6 / row.wanted_us for row in self._rows if row.wanted_us != OFF)
-        if per_second > _MOST_PER_SECOND:
+        if per_second > _MAX_PER_SECOND:
             for row, wanted in zip(rows, before, strict=True):
                 row.wanted_us = wanted
-            return f"more than {_MOST_PER_SECOND} messages a second on one link"
+            return f"more than {_MAX_PER_SECOND} messages a second on one link"
         self._begun = True
         self._lay_out()
         return ""
@@ -125,12 +125,12 @@ class StreamRates:
         self.slot_us = self._tick_us if fast else SLOT_US  # how often to ask for what is due
 
     def _share(self) -> float:
-        if self._most_bytes_s is None:
+        if self._max_bytes_s is None:
             return 1.0
         wanted = {True: 0.0, False: 0.0}  # bytes/s, of what is vital and of the rest
         for row in self._rows:
             if row.wanted_us != OFF:
                 wanted[row.stream.vital] += 1e6 * row.size / row.wanted_us
         # What is vital is little; a line that has no room even for that has some for the rest.
-        left = max(self._most_bytes_s - wanted[True], _LEAST_SHARE * self._most_bytes_s)
+        left = max(self._max_bytes_s - wanted[True], _MIN_SHARE * self._max_bytes_s)
         return min(left / wanted[False], 1.0) if wanted[False] > 0.0 else 1.0

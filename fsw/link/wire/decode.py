@@ -1,7 +1,7 @@
 """From wire values to the boundary types; pure.
 
 A MAVLink payload that is no setpoint, shape or place in a set is refused here by returning None,
-and one with numbers out of ``fsw.autopilot.flight.bounds`` by ``RefusedError``, which says why; the
+and one with numbers out of ``flight.commands.bounds`` by ``RefusedError``, which says why; the
 caller counts both. NaN in a COMMAND_LONG is normal: clients put it into every parameter that they
 do not use.
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final, cast
 
-from fsw.autopilot.flight.bounds import point_problem, zone_problem
+from fsw.autopilot.flight.commands.bounds import point_problem, zone_problem
 from fsw.autopilot.shapes import BY_NUMBER, kind_of
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall

@@ -2,7 +2,7 @@
 
 Invalid parameters are refused here with a sentence; NaN means the vehicle's default, and infinity
 nothing. What depends on the state of the vehicle is decided in
-``fsw.autopilot.flight.command_handlers``.
+``fsw.autopilot.flight.commands.handlers``.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.autopilot.flight.bounds import CIRCLE_RADII, MAX_SPEED, MAX_YAW
-from fsw.autopilot.flight.command_handlers import MIN_SPEED
+from fsw.autopilot.flight.commands.bounds import CIRCLE_RADII, MAX_SPEED, MAX_YAW
+from fsw.autopilot.flight.commands.handlers import MIN_SPEED
 from fsw.autopilot.signals import (
     Arm,
     ChangeSpeed,

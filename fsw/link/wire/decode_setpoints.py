@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import Final, cast
 
-from fsw.autopilot.flight.bounds import motion_refusal
-from fsw.autopilot.flight.offboard_setpoints import attitude_refusal
+from fsw.autopilot.flight.commands.bounds import motion_refusal
+from fsw.autopilot.flight.setpoints.offboard import attitude_refusal
 from fsw.autopilot.signals import (
     AttitudeSetpoint,
     JointSetpoint,

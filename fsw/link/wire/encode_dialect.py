@@ -102,7 +102,7 @@ def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues 
         snapshot.safety.departures & _U16,
         snapshot.safety.interventions & _U16,
         *_padded(report.added[:_MAX_CONSTRAINTS], _MAX_CONSTRAINTS),
-        report.lacking,
+        report.shortfall,
     )
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, fault_name
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, fault_name
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import (
     BatteryState,
-    Charge,
+    BatteryWarning,
     EstimatorReport,
     FlightSnapshot,
     SensorReport,
@@ -60,10 +60,12 @@ _HEARD: Final[dict[str, int]] = {
     Sensor.RANGEFINDER.value: _RANGE,
 }
 # Faults with which a sensor is in use.
-_IN_USE: Final = frozenset(("", fault_name(SensorFault.REPEATED), fault_name(SensorFault.SELDOM)))
+_IN_USE: Final = frozenset(
+    ("", fault_name(SensorFault.REPEATED), fault_name(SensorFault.RATE_TOO_LOW))
+)
 _JUMP: Final = fault_name(SensorFault.JUMP)
 # MAV_BATTERY_CHARGE_STATE: 0 is undefined, OK is 1.
-_CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in Charge}
+_CHARGE_STATES: Final = {charge: int(charge) + 1 for charge in BatteryWarning}
 _LIPO, _FOR_EVERYTHING = 1, 1  # MAV_BATTERY_TYPE, MAV_BATTERY_FUNCTION
 _U16, _U32 = 0xFFFF, 0xFFFFFFFF
 _UNKNOWN_CELL: Final = 0xFFFF
@@ -91,7 +93,7 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
             health &= ~_LOST.get(sensor, 0)
     if snapshot.arming_refusal:
         health &= ~_PREARM
-    if battery.charge >= Charge.CRITICAL:
+    if battery.charge >= BatteryWarning.CRITICAL:
         health &= ~_BATTERY
     if snapshot.log_failure:
         health &= ~_LOGGING

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.geometry.geodesy import to_global
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.signals import FlightSnapshot, SatelliteFix, Vec3

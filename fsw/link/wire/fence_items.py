@@ -47,9 +47,9 @@ POLYGON_EXCLUSION: Final = 5002
 CIRCLE_INCLUSION: Final = 5003
 CIRCLE_EXCLUSION: Final = 5004
 
-MOST_WALLS: Final = 16
+MAX_WALLS: Final = 16
 _CIRCLE_WALLS: Final = 8
-MOST_CYLINDERS: Final = 16
+MAX_CYLINDERS: Final = 16
 _CYLINDERS_OF_ONE: Final = 6  # that a polygon is covered with at most
 _SHORTEST_EDGE: Final = 0.05  # m
 _ORDER: Final = (HALF_SPACE.name, VERTICAL_CYLINDER.name, TARGET_SPHERE)  # of the zones
@@ -76,8 +76,8 @@ def read_fence(items: tuple[MissionItem, ...], locate: Locate, clearance: float)
         zones += _zones(items[at - size : at], locate, clearance)
     zones.sort(key=lambda zone: _ORDER.index(zone.shape.kind))
     for kind, most, what in (
-        (HALF_SPACE.name, MOST_WALLS, "walls"),
-        (VERTICAL_CYLINDER.name, MOST_CYLINDERS, "cylinders of exclusion"),
+        (HALF_SPACE.name, MAX_WALLS, "walls"),
+        (VERTICAL_CYLINDER.name, MAX_CYLINDERS, "cylinders of exclusion"),
         (TARGET_SPHERE, 1, "workspace spheres"),
     ):
         count = sum(zone.shape.kind == kind for zone in zones)
@@ -97,8 +97,8 @@ def check_fence_item(item: MissionItem, locate: Locate) -> None:
     number = item.params[0]
     if item.command in _CIRCLES and not 0.0 < number < math.inf:
         raise BadItem(INVALID_PARAM1, f"a circle of radius {number:g} m")
-    if item.command in _POLYGONS and not 3.0 <= number <= MOST_WALLS:
-        raise BadItem(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MOST_WALLS} do")
+    if item.command in _POLYGONS and not 3.0 <= number <= MAX_WALLS:
+        raise BadItem(INVALID_PARAM1, f"a polygon of {number:g} vertices; 3 to {MAX_WALLS} do")
 
 
 def _vertex_count(item: MissionItem) -> int:

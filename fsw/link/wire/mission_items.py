@@ -12,7 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from fsw.autopilot.flight.bounds import MAX_REPEATS, MAX_SPEED, MAX_STAY, MAX_YAW, circle_problem
+from fsw.autopilot.flight.commands.bounds import (
+    MAX_REPEATS,
+    MAX_SPEED,
+    MAX_STAY,
+    MAX_YAW,
+    circle_problem,
+)
 from fsw.autopilot.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
 from messages import dialect
 
@@ -194,7 +200,7 @@ def _loiter(item: MissionItem, locate: Locate, hold: float) -> MissionStep:
 def _jump(item: MissionItem, _: Locate) -> MissionStep:
     """Parameter 1 is the item to go on with, 2 how often; -1: without end."""
     target, repeats = item.params[:2]
-    if not (0.0 <= target < _MOST_ITEMS and target == int(target)):
+    if not (0.0 <= target < _MAX_ITEMS and target == int(target)):
         raise _bad(1, f"{target:g} is no number of an item")
     if not (-1.0 <= repeats <= MAX_REPEATS and repeats == int(repeats)):
         raise _bad(2, f"{repeats:g} jumps are outside 0 to {MAX_REPEATS}, or -1 without end")
@@ -281,7 +287,7 @@ def _look(item: MissionItem, locate: Locate) -> MissionStep:
     raise _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
 
 
-_MOST_ITEMS: Final = float(1 << 16)
+_MAX_ITEMS: Final = float(1 << 16)
 _MAX_HEADING: Final = math.degrees(MAX_YAW)
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     NAV_WAYPOINT: _waypoint,

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.signals import SafeSet, Vec3
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
@@ -30,6 +29,7 @@ from fsw.link.signing.key_file import KeyFile
 from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
+from fsw.storage.parameter_store import ParameterStore
 from messages.frames import Frame, split
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
 

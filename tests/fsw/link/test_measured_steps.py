@@ -21,7 +21,8 @@ from fsw.autopilot.measurements import (
 )
 from fsw.autopilot.signals import Origin, SensorFrame
 from fsw.link.inbox import Inbox
-from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.sim_link import SimLink
+from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode_sensors import SampleDecoder
 from fsw.runtime.clock import now_us

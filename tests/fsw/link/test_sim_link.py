@@ -25,8 +25,9 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.inbox import Inbox
 from fsw.link.routed_commands import RoutedCommands
-from fsw.link.sim_link import Pacing, SimLink
+from fsw.link.sim_link import SimLink
 from fsw.link.text_limiter import TextLimiter
+from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import message_ids as ids
 from messages import status_text
 from messages.frames import FrameWriter, split

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.gcs_link import GcsLink, LinkSetup
@@ -23,6 +22,7 @@ from fsw.link.services.service import LinkService
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.link.wire import message_ids as ids
+from fsw.storage.parameter_store import ParameterStore
 from messages.addresses import LinkAddress, SerialLine, TcpEnd
 from messages.frames import Frame, FrameWriter, Losses
 from messages.stream_reader import StreamReader

@@ -16,12 +16,12 @@ from pyulog.px4 import PX4ULog
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.attitude import attitude_reference
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.measurements import ImuSample
 from fsw.autopilot.signals import (
     BatteryState,
-    Charge,
+    BatteryWarning,
     FlightSnapshot,
     Mode,
     Origin,
@@ -157,7 +157,9 @@ def test_failsafe_flags_change_with_the_conditions_and_battery_and_takeover_are_
         EXACT, failures=(Condition.DATALINK_LOST.value,), failsafe_from=Mode.MISSION, mode=Mode.HOLD
     )
     pilot = replace(lost, failsafe_from=None)
-    weak = replace(EXACT, battery=BatteryState(voltage=14.0, consumed=1.5, charge=Charge.LOW))
+    weak = replace(
+        EXACT, battery=BatteryState(voltage=14.0, consumed=1.5, charge=BatteryWarning.LOW)
+    )
     log = logged(tmp_path / "flight.ulg", iter([EXACT] * 10 + [lost] * 10 + [pilot] * 10 + [weak]))
     flags = rows(log, "failsafe_flags")
     assert flags["gcs_connection_lost"].tolist() == [0, 1, 0]

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.measurements import Sample
-from fsw.autopilot.signals import Mode, PlanTimings, SensorFrame, TickInputs
+from fsw.autopilot.signals import PlanTimings, SensorFrame, TickInputs
 from fsw.log import topics
-from fsw.log.encoder import NAV_STATES, SAMPLES, TYPED, LogEncoder
+from fsw.log.encoder import SAMPLES, TYPED, LogEncoder
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.json_codec import JsonCodec
 from fsw.log.reader import LoggedTick, open_flight, ticks
@@ -118,10 +118,6 @@ def test_the_schema_names_every_field_down_to_the_numbers() -> None:
     schema = json.loads(JsonCodec(TickInputs).schema)
     assert schema["sensors"]["p_WB"] == ["float", "float", "float"]
     assert set(schema["plan"]) == {"Plan", "PlanFailure"}
-
-
-def test_every_mode_has_a_number_of_px4() -> None:
-    assert set(NAV_STATES) == {mode.value for mode in Mode}
 
 
 def test_a_number_too_large_for_a_float_is_infinite_and_no_error() -> None:

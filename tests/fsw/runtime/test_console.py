@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import FailsafeEvent, Severity, StatusText
 from fsw.runtime.console import Console
 from tests.waiting import becomes

@@ -14,7 +14,7 @@ from fsw.autopilot.signals import (
     Mode,
     SwitchMode,
 )
-from fsw.runtime.sim_loop import to_route
+from fsw.runtime.flight_loop import to_route
 
 INJECT_FAILURE = 420
 GOES_ON, DENIED = CommandResult.IN_PROGRESS, CommandResult.DENIED

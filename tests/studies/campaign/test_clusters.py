@@ -16,7 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from studies.campaign.campaign import Campaign, Scheduler, SchedulerGoneError
+from studies.campaign.campaign import Campaign
+from studies.campaign.ports import Scheduler, SchedulerGoneError
 from studies.campaign.store import read
 from tests.studies.campaign.stub_flights import StubFlight, StubRow, noted
 from tests.waiting import wait_for

@@ -17,7 +17,7 @@ class OwnCluster:
         self.threads, self.took_s = threads, took_s
         self.out: dict[int, tuple[StubFlight, ...]] = {}
         self.given: list[tuple[str, ...]] = []
-        self.most_out = 0
+        self.max_out = 0
         self.loses = 0  # tasks that are lost once
 
     def submit(self, batches: Sequence[Sequence[Any]], limit_s: float) -> list[int]:
@@ -25,7 +25,7 @@ class OwnCluster:
         for flights in batches:
             self.given.append(tuple(one.key() for one in flights))
             self.out[len(self.given)] = tuple(flights)
-        self.most_out = max(self.most_out, len(self.out))
+        self.max_out = max(self.max_out, len(self.out))
         return list(range(first + 1, len(self.given) + 1))
 
     def came(self, wait_s: float) -> list[Came]:
@@ -59,7 +59,7 @@ def test_no_more_is_out_than_two_tasks_a_thread() -> None:
     cluster = OwnCluster(threads=3)
     rows = fly(cluster, [StubFlight(i) for i in range(50)])
     assert {row.number for row in rows.values()} == set(range(50))
-    assert cluster.most_out == 6
+    assert cluster.max_out == 6
 
 
 def test_flights_are_taken_as_they_are_needed() -> None:

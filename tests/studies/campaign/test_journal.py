@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from studies.campaign.journal import (
-    MOST_LINE,
+    MAX_LINE,
     Journal,
     JournalError,
     JournalInUseError,
@@ -97,7 +97,7 @@ FORGERIES: dict[str, Callable[[list[bytes]], list[bytes]]] = {
     "a line of something else": lambda kept: [*kept, b"and so on\n"],
     "the first cut": lambda kept: [kept[0][:-1]],
     "the last cut": lambda kept: [*kept[:-1], kept[-1][:-9]],
-    "a line without an end": lambda kept: [*kept, b'{"key": "' + b"a" * (3 * MOST_LINE)],
+    "a line without an end": lambda kept: [*kept, b'{"key": "' + b"a" * (3 * MAX_LINE)],
     "nothing but zeros": lambda kept: [*kept, bytes(100)],
 }
 

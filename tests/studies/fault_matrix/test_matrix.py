@@ -27,7 +27,7 @@ from studies.fault_matrix.matrix import Cell, judge
 from studies.fault_matrix.page import page
 from tests.fsw.link.snapshots import outputs_at
 
-TOLD = Said(0.2, int(Severity.WARNING), "pose is silent")
+TOLD = Said(0.2, int(Severity.WARNING), "pose silent")
 OTHER = Said(0.1, int(Severity.CRITICAL), "IMU jumps")
 MILD = Said(0.1, int(Severity.INFO), "pose is back")
 LATE = replace(TOLD, after_s=0.6)

@@ -28,7 +28,7 @@ from studies.fault_matrix.pairs import (
 )
 
 MANUAL = Path(__file__).parents[3] / "docs" / "reference" / "safety-manual.md"
-TOLD = Said(0.2, int(Severity.WARNING), "IMU is silent")
+TOLD = Said(0.2, int(Severity.WARNING), "IMU silent")
 FINE = FaultFlight((TOLD,), ("hold",), least_m=0.1, away_m=1.0)
 FALL = replace(FINE, contact="ground", ended="the legs hit the ground at 3 m/s")
 ROTOR = Limit("rotor", (r"motor \d off",), ("ground",), SUITE_NAMES, tuple(SITUATIONS), "It falls.")

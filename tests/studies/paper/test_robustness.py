@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.control.tube import beyond_covered
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.autopilot.parameters.registry import BY_NAME
@@ -260,7 +260,7 @@ class NothingFlown(Campaign):
                 margin_m=-0.1,
                 contact=True,
                 modes="hold, land",
-                reported="pose is silent" if job.fault is not None else "",
+                reported="pose silent" if job.fault is not None else "",
             )
             for job in jobs
         ]
@@ -307,4 +307,4 @@ def test_a_frozen_imu_is_flown_named_and_ends_the_trajectory() -> None:
     assert not row.error
     assert (row.contact, row.completed, row.modes) == (False, False, "hold")
     assert "left the trajectory for hold" in row.reason
-    assert "IMU is stuck" in row.reported
+    assert "IMU stuck" in row.reported

@@ -143,7 +143,7 @@ def test_what_was_found_is_a_scenario_that_reproduces_the_margin() -> None:
 def test_the_margins_of_a_full_body_are_those_of_the_referee(name: str) -> None:
     scenario = replace(load_scenario(name), duration_s=7.0)
     config = _of_one_plan(flight_config(body=scenario.body))
-    worst = search(scenario, config, 0.8, 8, 1, _silent).least_margin
+    worst = search(scenario, config, 0.8, 8, 1, _silent).min_margin
     flown = replay(scenario, config, worst.start.step, worst.pushes, _silent)
     assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
     assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)

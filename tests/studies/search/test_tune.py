@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import binomtest
 
 from fsw.autopilot.parameters.registry import BY_NAME
-from fsw.autopilot.parameters.storage import load
+from fsw.storage.parameter_file import load
 from pandion import tune as command
 from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.keys import CampaignError

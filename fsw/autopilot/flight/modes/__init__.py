@@ -19,3 +19,9 @@ def _found() -> dict[Mode, type[FlightMode]]:
 
 
 MODES: Final = _found()
+# PX4's NAVIGATION_STATE. It has none for a disarmed vehicle, which shows what it would start in.
+NAV_STATES: Final = {
+    Mode.DISARMED: MODES[Mode.HOLD].px4.nav_state,
+    **{mode: kind.px4.nav_state for mode, kind in MODES.items()},
+    Mode.FAULT: 13,  # termination
+}

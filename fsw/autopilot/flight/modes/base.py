@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fsw.autopilot.flight.arming_health import ArmingHealth
+from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.land_detector import feel_ground
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.body import Body
@@ -37,7 +37,9 @@ class Px4Mode:
     """A mode in PX4's numbers, so that ground stations name it and offer their buttons."""
 
     main: int  # PX4_CUSTOM_MAIN_MODE
-    sub: int = 0  # PX4_CUSTOM_SUB_MODE_*
+    sub: int  # PX4_CUSTOM_SUB_MODE_*; 0: none
+    nav_state: int  # NAVIGATION_STATE, and its bit in navigation_mode_group_t
+    name: str  # in that group
     standard: int = 0  # MAV_STANDARD_MODE as announced; 0: none
     also_standard: int = 0  # MAV_STANDARD_MODE that is understood though not announced
     selectable: bool = True  # offered to the operator; else entered by a command of its own

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fsw.autopilot.flight.descent import is_hurried
 from fsw.autopilot.flight.modes.base import FlightMode, ModeResult, Px4Mode, touch_down
-from fsw.autopilot.flight.retreat import retreat_place
-from fsw.autopilot.flight.setpoint_generator import PositionGoal
+from fsw.autopilot.flight.safety.retreat import retreat_place
+from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.mpc.reference import still_at
@@ -19,7 +19,7 @@ class Descend(FlightMode):
     """PX4's DESCEND, which it shows as AUTO.LAND; no command begins it."""
 
     mode = Mode.DESCEND
-    px4 = Px4Mode(4, 6, selectable=False, offered=False)
+    px4 = Px4Mode(4, 6, 12, "descend", selectable=False, offered=False)
 
     def __init__(self, config: FlightConfig) -> None:
         super().__init__(config)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fsw.autopilot.flight.modes.base import FlightMode, Handover, Px4Mode
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, SetpointGenerator
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.signals import Mode, MotionSetpoint, StateEstimate
 from fsw.frozen import replace
@@ -17,7 +17,7 @@ class Hold(FlightMode):
     """PX4's AUTO.LOITER; on the ground the rotors idle."""
 
     mode = Mode.HOLD
-    px4 = Px4Mode(4, 3)
+    px4 = Px4Mode(4, 3, 4, "loiter")
     interrupts_landing = True
     before_arming = True
     manual = True

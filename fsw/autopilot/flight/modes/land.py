@@ -14,7 +14,7 @@ class Land(FlightMode):
     """PX4's AUTO.LAND. To interrupt a landing, command Hold first."""
 
     mode = Mode.LAND
-    px4 = Px4Mode(4, 6, standard=7)
+    px4 = Px4Mode(4, 6, 18, "land", standard=7)
     interruptible = False
     interrupts_landing = True
     continues_reference = True

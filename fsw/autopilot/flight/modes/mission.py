@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from fsw.autopilot.flight import mission_sequencer as sequencer
-from fsw.autopilot.flight.mission_sequencer import MissionContext, Stage
+from fsw.autopilot.flight.mission import sequencer as sequencer
+from fsw.autopilot.flight.mission.sequencer import MissionContext, Stage
+from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
     CommandContext,
@@ -14,9 +15,8 @@ from fsw.autopilot.flight.modes.base import (
     ModeResult,
     Px4Mode,
 )
-from fsw.autopilot.flight.reference_governor import project
+from fsw.autopilot.flight.setpoints.reference_governor import project
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.flight.trajectory_segment import MotionLimits
 from fsw.autopilot.model.kinematics import point_in_flight
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -37,7 +37,7 @@ class Mission(FlightMode):
     """PX4's AUTO.MISSION."""
 
     mode = Mode.MISSION
-    px4 = Px4Mode(4, 4, standard=6)
+    px4 = Px4Mode(4, 4, 3, "mission", standard=6)
     before_arming = True
     lifts_off = True
     external_reference = True

@@ -13,7 +13,8 @@ from fsw.autopilot.flight.modes.base import (
     ModeResult,
     Px4Mode,
 )
-from fsw.autopilot.flight.offboard_setpoints import (
+from fsw.autopilot.flight.setpoints.generator import PositionGoal
+from fsw.autopilot.flight.setpoints.offboard import (
     Tilt,
     as_motion,
     attitude_refusal,
@@ -23,7 +24,6 @@ from fsw.autopilot.flight.offboard_setpoints import (
     tilted,
     turn_level,
 )
-from fsw.autopilot.flight.setpoint_generator import PositionGoal
 from fsw.autopilot.flight.state import FlightState, OffboardMemory, SetpointMemory, is_young
 from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.model.kinematics import point_in_flight
@@ -48,10 +48,10 @@ _NO_SETPOINTS = OffboardReport()
 
 
 class Offboard(FlightMode):
-    """PX4's OFFBOARD; what happens when setpoints stop is in ``failsafe.py``."""
+    """PX4's OFFBOARD; what happens when setpoints stop is in ``failsafe/``."""
 
     mode = Mode.OFFBOARD
-    px4 = Px4Mode(6)
+    px4 = Px4Mode(6, 0, 14, "offboard")
     before_arming = True
     manual = True
 
@@ -216,7 +216,7 @@ def report(state: FlightState, now_us: int) -> OffboardReport:
         joints=memory.joints,
         accepted=memory.accepted,
         refused=memory.refused,
-        age_us=now_us - memory.heard_us if memory.heard_us >= 0 else 0,
+        age_us=now_us - memory.last_received_us if memory.last_received_us >= 0 else 0,
     )
 
 

@@ -12,7 +12,7 @@ class Orbit(FlightMode):
     """PX4's POSCTL.ORBIT."""
 
     mode = Mode.ORBIT
-    px4 = Px4Mode(3, 1, standard=2, selectable=False)
+    px4 = Px4Mode(3, 1, 21, "orbit", standard=2, selectable=False)
     manual = True
 
     def activate(

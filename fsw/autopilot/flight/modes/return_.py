@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.autopilot.flight.mission_sequencer import nearest
+from fsw.autopilot.flight.mission.sequencer import nearest
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
     CommandContext,
@@ -12,7 +12,7 @@ from fsw.autopilot.flight.modes.base import (
     Px4Mode,
     moved,
 )
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, arrived
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, arrived
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.signals import Home, Mode, MotionSetpoint, StateEstimate, Vec3
 from fsw.frozen import replace
@@ -24,7 +24,7 @@ class Return(FlightMode):
     mode = Mode.RETURN
     # Standard mode 5, safe recovery, is not announced as PX4 does: QGroundControl 4.4 then renames
     # the mode, and does not find what its own Return button is looking for.
-    px4 = Px4Mode(4, 5, also_standard=5)
+    px4 = Px4Mode(4, 5, 5, "rtl", also_standard=5)
     interrupts_landing = True
 
     def refusal(self, context: CommandContext) -> str | None:

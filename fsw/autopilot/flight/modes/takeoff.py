@@ -18,7 +18,7 @@ class Takeoff(FlightMode):
     """PX4's AUTO.TAKEOFF; Hold follows."""
 
     mode = Mode.TAKEOFF
-    px4 = Px4Mode(4, 2, standard=8)
+    px4 = Px4Mode(4, 2, 17, "takeoff", standard=8)
     enter_from = frozenset({Mode.HOLD, Mode.MISSION, Mode.OFFBOARD})
     before_arming = True
     lifts_off = True

@@ -18,7 +18,7 @@ class Trajectory(FlightMode):
     """PX4's EXTERNAL1, its place for modes that are not its own; Hold follows."""
 
     mode = Mode.TRAJECTORY
-    px4 = Px4Mode(4, 11)
+    px4 = Px4Mode(4, 11, 23, "external1")
     external_reference = True
 
     def denial(self, context: CommandContext) -> str | None:

@@ -15,7 +15,7 @@ from fsw.autopilot.control.cascade import Cascade, Inner, close_loops, compare_w
 from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.tube import TubeAround
 from fsw.autopilot.estimation.estimator import attitude, estimate_state
-from fsw.autopilot.flight.damage_watch import DamageWatch
+from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
 from fsw.autopilot.model.nominal import NominalModel, next_state

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from fsw.autopilot.estimation import fusion
 from fsw.autopilot.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import at_start
-from fsw.autopilot.estimation.sensor_fault import Sensor
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned

@@ -18,8 +18,8 @@ from fsw.autopilot.estimation.error_state import (
     NOTHING,
     RATE,
 )
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.imu import STAYS, STAYS_LONG, add_imu
-from fsw.autopilot.estimation.sensor_fault import SensorFault
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import packed

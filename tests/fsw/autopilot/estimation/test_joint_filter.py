@@ -11,8 +11,8 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from fsw.autopilot.estimation.error_state import FILTER
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.joint_filter import begin, present_joints, push, read
-from fsw.autopilot.estimation.sensor_fault import SensorFault
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.signals import Vec2
 from fsw.compiled import packed

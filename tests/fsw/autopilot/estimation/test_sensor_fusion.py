@@ -11,11 +11,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning, chi_square
-from fsw.autopilot.flight.estimator_report import estimator_report
+from fsw.autopilot.flight.estimate.estimator_report import estimator_report
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import (
     GnssSample,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from fsw.autopilot.flight.command_handlers import Decision, decide
+from fsw.autopilot.flight.commands.handlers import Decision, decide
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.flight.modes.base import CommandContext
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from fsw.autopilot.flight.arming_health import ArmingHealth
+from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.modes.base import CommandContext
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of

@@ -11,13 +11,13 @@ import pytest
 
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.flight.arming import CHECKS
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.commands.arming import CHECKS
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
-from fsw.autopilot.flight.safe_set import joined
+from fsw.autopilot.flight.safety.safe_set import joined
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.measurements import ImuSample, JointSample, Sample
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
@@ -184,7 +184,7 @@ def test_without_one_valid_frame_of_exact_states_that_is_told_once() -> None:
 
 def test_sensors_that_fall_silent_before_the_first_estimate_are_told_once() -> None:
     texts, _ = started_blind(lambda t: (imu(t), encoders(t)) if t < 0.5 else (), 2.0)
-    assert [one.text for one in texts].count("IMU is silent") == 1
+    assert [one.text for one in texts].count("IMU silent") == 1
 
 
 def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
@@ -259,7 +259,7 @@ def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_u
     outside = frame(1_000_000, p_WB=(60.0, 0.0, -5.0))
     seen = estimate_state(outside)
     assert seen is not None
-    kept = KeptSet().of(mission.safe_set)
+    kept = InflatedSafeSet().of(mission.safe_set)
     state = replace(
         with_record(flying(), nominal=nominal_at_rest(seen)), mission=mission, kept=kept
     )

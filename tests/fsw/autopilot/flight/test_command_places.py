@@ -8,9 +8,9 @@ from functools import partial
 
 import pytest
 
-from fsw.autopilot.flight.command_handlers import Decision, decide
+from fsw.autopilot.flight.commands.handlers import Decision, decide
 from fsw.autopilot.flight.modes.base import CommandContext
-from fsw.autopilot.flight.setpoint_generator import PositionGoal
+from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.geometry.geodesy import to_global, to_local
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall

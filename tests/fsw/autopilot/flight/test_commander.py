@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.flight.arming import CHECKS, Subject
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.commands.arming import CHECKS, Subject
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.modes.land import Land
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import FlightState, PlanMemory, SafetyMemory, SetpointMemory
 from fsw.autopilot.model.kinematics import point_in_flight
 from fsw.autopilot.mpc.reference import still_at

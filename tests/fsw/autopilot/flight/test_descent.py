@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.descent import Descent
 from fsw.autopilot.flight.modes.descend import Descend
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import Aiding, LostSensor
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import Mode, SafeSet, StateEstimate, Vec3
 from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at
@@ -112,7 +112,9 @@ def test_the_place_is_off_zones_by_as_much_as_their_clearances_have_grown() -> N
     grown = wall((0.0, 1.0, 0.0), 0.0, 1.0)
     estimate = vehicle_at((0.0, 0.9, -3.0))
     state = replace(
-        flying(Mode.DESCEND), aiding=BLIND, kept=KeptSet(SafeSet((near,)), SafeSet((grown,)))
+        flying(Mode.DESCEND),
+        aiding=BLIND,
+        kept=InflatedSafeSet(SafeSet((near,)), SafeSet((grown,))),
     )
     state = MODE.aim(state, estimate)
     goal = state.setpoint.goal
@@ -123,7 +125,7 @@ def test_the_place_is_off_zones_by_as_much_as_their_clearances_have_grown() -> N
     assert 1.05 < y < 1.9, "the clearance, the body and what a plan at rest keeps"
     found = MODE.aim(replace(state, aiding=AIDED), estimate)
     assert found.setpoint.goal is None, "there is a position again"
-    assert MODE.aim(replace(state, kept=KeptSet()), estimate).setpoint.goal is None
+    assert MODE.aim(replace(state, kept=InflatedSafeSet()), estimate).setpoint.goal is None
 
 
 @pytest.mark.requirement("REQ-EST-5")

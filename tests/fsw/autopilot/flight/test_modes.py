@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import fsw.autopilot.flight.modes as modes_package
-from fsw.autopilot.flight.command_handlers import DENIED
-from fsw.autopilot.flight.modes import MODES
+from fsw.autopilot.flight.commands.handlers import DENIED
+from fsw.autopilot.flight.modes import MODES, NAV_STATES
 from fsw.autopilot.signals import CommandResult, Mode
 from tests.fsw.autopilot.flight.asked import FLIGHT_MODES, ask
 from tests.fsw.autopilot.flight.contexts import READY, flying
@@ -82,3 +82,13 @@ def test_any_other_mode_is_interrupted_by_any(mode: Mode, wanted: Mode) -> None:
 def test_an_inconsistent_configuration_follows_no_trajectory() -> None:
     decision = ask(flying(inconsistent="too small"), SET_MODE, *custom(Mode.TRAJECTORY))
     assert decision.result == DENIED
+
+
+def test_every_mode_has_the_number_that_px4_shows_for_its_main_and_sub_mode() -> None:
+    """As PX4's own get_px4_custom_mode has them; Descend is shown as AUTO.LAND."""
+    numbers = {
+        (4, 2): 17, (4, 3): 4, (4, 4): 3, (4, 5): 5, (4, 6): 18, (6, 0): 14, (3, 1): 21,
+        **{(4, 11 + k): 23 + k for k in range(8)},
+    }  # fmt: skip
+    shown = {mode: numbers[kind.px4.main, kind.px4.sub] for mode, kind in MODES.items()}
+    assert {**shown, Mode.DESCEND: 12, Mode.DISARMED: 4, Mode.FAULT: 13} == NAV_STATES

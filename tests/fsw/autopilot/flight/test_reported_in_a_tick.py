@@ -10,16 +10,16 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.flight.conditions import Condition
-from fsw.autopilot.flight.failsafe import ROWS
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory, PlanMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
     BatteryState,
-    Charge,
+    BatteryWarning,
     Mode,
     PlanFailure,
     PlanTimings,
@@ -27,9 +27,9 @@ from fsw.autopilot.signals import (
     SolverStatus,
     Zone,
 )
+from tests.fsw.autopilot.flight.failsafe.test_response import Watched
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
 from tests.fsw.autopilot.flight.test_autopilot import frame, tick
-from tests.fsw.autopilot.flight.test_failsafe_response import Watched
 from tests.fsw.records import with_record
 
 BEGIN_US = 1_002_000  # just after the table was looked at
@@ -50,7 +50,7 @@ def hovering(**changes: Any) -> FlightState:
         **changes,
     }
     nominal = given.pop("nominal", nominal_at_rest(seen))
-    kept = KeptSet().of(given["mission"].safe_set)
+    kept = InflatedSafeSet().of(given["mission"].safe_set)
     return replace(
         with_record(flying(), nominal=nominal), index=0, t_us=BEGIN_US - 2_000, kept=kept, **given
     )
@@ -144,8 +144,8 @@ def test_what_is_found_once_a_period_is_reported_in_time_in_any_phase(
 @pytest.mark.parametrize(
     ("battery", "mode"),
     [
-        (BatteryState(remaining=0.09, charge=Charge.CRITICAL), Mode.RETURN),
-        (BatteryState(remaining=0.04, charge=Charge.EMERGENCY), Mode.LAND),
+        (BatteryState(remaining=0.09, charge=BatteryWarning.CRITICAL), Mode.RETURN),
+        (BatteryState(remaining=0.04, charge=BatteryWarning.EMERGENCY), Mode.LAND),
         (BatteryState(time_left=20.0), Mode.RETURN),
     ],
     ids=["critical", "nearly empty", "flight time"],

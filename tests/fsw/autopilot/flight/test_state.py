@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.state import (
     Aiding,
     FlightState,
@@ -44,7 +44,7 @@ def test_a_pose_or_the_inertial_unit_holds_the_attitude(
 
 
 @pytest.mark.parametrize(
-    ("heard_us", "now_us", "young"),
+    ("last_received_us", "now_us", "young"),
     [
         (-1, 0, False),
         (-1, 10, False),
@@ -55,16 +55,16 @@ def test_a_pose_or_the_inertial_unit_holds_the_attitude(
     ],
 )
 def test_what_came_within_the_timeout_is_young_and_what_never_came_is_not(
-    heard_us: int, now_us: int, young: bool
+    last_received_us: int, now_us: int, young: bool
 ) -> None:
-    assert is_young(heard_us, now_us, timeout_us=100) is young
+    assert is_young(last_received_us, now_us, timeout_us=100) is young
 
 
 def test_a_stream_of_setpoints_is_as_fresh_as_its_newest_of_any_kind() -> None:
-    assert OffboardMemory().heard_us < 0
+    assert OffboardMemory().last_received_us < 0
     assert not OffboardMemory().is_fresh(0, 500_000)
     for memory in (OffboardMemory(motion_us=7, joints_us=3), OffboardMemory(joints_us=7)):
-        assert memory.heard_us == 7
+        assert memory.last_received_us == 7
         assert memory.is_fresh(106, 100)
         assert not memory.is_fresh(107, 100)
 

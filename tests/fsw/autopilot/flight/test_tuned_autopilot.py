@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.model.battery import BatteryModel, charge_of, corrected, drained
-from fsw.autopilot.signals import BatteryReading, BatteryState, Charge, Vec4
+from fsw.autopilot.signals import BatteryReading, BatteryState, BatteryWarning, Vec4
 
 LEVELS = (0.3, 0.2, 0.1)
-FULL = BatteryState(16.8, 0.0, 0.0, 1.0, Charge.OK)
+FULL = BatteryState(16.8, 0.0, 0.0, 1.0, BatteryWarning.OK)
 HOVER: Vec4 = (0.25 * AIRFRAME.mass * GRAVITY,) * 4
 NONE: Vec4 = (0.0, 0.0, 0.0, 0.0)
 
@@ -22,17 +22,19 @@ NONE: Vec4 = (0.0, 0.0, 0.0, 0.0)
 @pytest.mark.parametrize(
     ("remaining", "charge"),
     [
-        (1.0, Charge.OK), (0.3, Charge.OK), (0.299, Charge.LOW), (0.2, Charge.LOW),
-        (0.199, Charge.CRITICAL), (0.1, Charge.CRITICAL), (0.099, Charge.EMERGENCY),
-        (0.0, Charge.EMERGENCY), (math.nan, Charge.EMERGENCY),
+        (1.0, BatteryWarning.OK), (0.3, BatteryWarning.OK),
+        (0.299, BatteryWarning.LOW), (0.2, BatteryWarning.LOW),
+        (0.199, BatteryWarning.CRITICAL), (0.1, BatteryWarning.CRITICAL),
+        (0.099, BatteryWarning.EMERGENCY), (0.0, BatteryWarning.EMERGENCY),
+        (math.nan, BatteryWarning.EMERGENCY),
     ],
 )  # fmt: skip
-def test_each_level_begins_below_its_share(remaining: float, charge: Charge) -> None:
+def test_each_level_begins_below_its_share(remaining: float, charge: BatteryWarning) -> None:
     assert charge_of(remaining, LEVELS) is charge
 
 
 def test_a_quarter_of_an_hour_of_hover_empties_it_and_the_levels_come_in_order() -> None:
-    state, seconds, seen = FULL, 0.0, [Charge.OK]
+    state, seconds, seen = FULL, 0.0, [BatteryWarning.OK]
     while state.remaining > 0.0:
         state = drained(BatteryModel(), LEVELS, state, HOVER, 1.0)
         seconds += 1.0
@@ -40,7 +42,12 @@ def test_a_quarter_of_an_hour_of_hover_empties_it_and_the_levels_come_in_order()
             assert state.remaining == pytest.approx(LEVELS[len(seen) - 1], abs=2e-3)
             seen.append(state.charge)
     assert 12 * 60 < seconds < 18 * 60
-    assert seen == [Charge.OK, Charge.LOW, Charge.CRITICAL, Charge.EMERGENCY]
+    assert seen == [
+        BatteryWarning.OK,
+        BatteryWarning.LOW,
+        BatteryWarning.CRITICAL,
+        BatteryWarning.EMERGENCY,
+    ]
 
 
 def disc_power(thrust: float, area: float) -> float:
@@ -110,12 +117,12 @@ def test_a_measurement_corrects_the_model_which_goes_on_from_there() -> None:
     model = BatteryModel()
     drawn = drained(model, LEVELS, FULL, HOVER, 1.0)
     now = corrected(model, LEVELS, drawn, BatteryReading(14.2, 0.15))
-    assert (now.voltage, now.charge) == (14.2, Charge.CRITICAL)
+    assert (now.voltage, now.charge) == (14.2, BatteryWarning.CRITICAL)
     assert now.remaining == pytest.approx(0.15, abs=0.0051), "what is rounded to 15 %"
     later = drained(model, LEVELS, now, HOVER, 1.0)
     assert 0.14 < later.remaining < now.remaining
     assert later.voltage == pytest.approx(14.2, abs=0.2), "not the model's own"
-    assert corrected(model, LEVELS, later, BatteryReading(16.8, 1.0)).charge is Charge.OK
+    assert corrected(model, LEVELS, later, BatteryReading(16.8, 1.0)).charge is BatteryWarning.OK
 
 
 def test_the_flight_time_that_is_left_is_that_at_the_current_of_late() -> None:
@@ -143,7 +150,7 @@ def test_readings_of_whole_per_cent_undo_nothing_that_has_been_used(
 ) -> None:
     """A reading each second, and a model that uses more or less: each level begins once."""
     thrust = (2.0 * HOVER[0],) * 4
-    model, truth, state, seen = BatteryModel(), FULL, FULL, [Charge.OK]
+    model, truth, state, seen = BatteryModel(), FULL, FULL, [BatteryWarning.OK]
     for k in range(1, 6000):
         truth = drained(replace(model, capacity=10.0 / flow), LEVELS, truth, thrust, 0.1)
         before, state = state.remaining, drained(model, LEVELS, state, thrust, 0.1)
@@ -155,14 +162,25 @@ def test_readings_of_whole_per_cent_undo_nothing_that_has_been_used(
             assert state.remaining == pytest.approx(truth.remaining, abs=0.016)
         if state.charge is not seen[-1]:
             seen.append(state.charge)
-    assert seen == [Charge.OK, Charge.LOW, Charge.CRITICAL, Charge.EMERGENCY]
+    assert seen == [
+        BatteryWarning.OK,
+        BatteryWarning.LOW,
+        BatteryWarning.CRITICAL,
+        BatteryWarning.EMERGENCY,
+    ]
 
 
 def test_a_level_is_over_only_with_charge_to_spare() -> None:
-    def charge(remaining: float) -> Charge:
-        low = replace(FULL, remaining=0.15, charge=Charge.CRITICAL)
+    def charge(remaining: float) -> BatteryWarning:
+        low = replace(FULL, remaining=0.15, charge=BatteryWarning.CRITICAL)
         return corrected(BatteryModel(), LEVELS, low, BatteryReading(15.0, remaining)).charge
 
     assert [charge(one) for one in (0.21, 0.24, 0.31, 0.34, 0.05)] == [
-        *(Charge.CRITICAL, Charge.LOW, Charge.LOW, Charge.OK, Charge.EMERGENCY)
+        *(
+            BatteryWarning.CRITICAL,
+            BatteryWarning.LOW,
+            BatteryWarning.LOW,
+            BatteryWarning.OK,
+            BatteryWarning.EMERGENCY,
+        )
     ]

@@ -14,6 +14,7 @@ from fsw.autopilot.mpc.costs import CostWeights
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.mpc.soft_costs import SoftWeights
+from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import number_at
 
 CONFIG = PlannerConfig(body="points")
@@ -32,17 +33,20 @@ PARTS = {
     "planner.soft": SoftWeights(),
     "planner": PlannerConfig(),
 }
-ROW = re.compile(
-    r"^\| `\w+` \| (?:INT32|FLOAT) \| ([^|]+) \| ([^|]*) \|.*\| `([\w.]+)\.(\w+)` \|$", re.MULTILINE
-)
+ROW = re.compile(r"^- `(\w+)` = (?:INT32 )?(\S+) ?(.*?) \([^)]*…", re.MULTILINE)
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_an_operator_reads_the_figures_that_are_flown(part: str) -> None:
     page = Path(__file__).parents[4] / "docs/reference/parameters.md"
-    rows = [row for row in ROW.findall(page.read_text("utf-8")) if row[2] == part]
+    shown = {name: (figure, unit) for name, figure, unit in ROW.findall(page.read_text("utf-8"))}
+    rows = [
+        (*shown[name], parameter.path.rpartition(".")[2])
+        for name, parameter in BY_NAME.items()
+        if parameter.path.rpartition(".")[0] == part
+    ]
     assert len(rows) >= 3
-    for figure, unit, _, name in rows:
+    for figure, unit, name in rows:
         flown = float(figure) * UNITS.get(unit.strip(), 1.0)
         assert number_at(PARTS[part], name) == pytest.approx(flown, rel=1e-5), name
 

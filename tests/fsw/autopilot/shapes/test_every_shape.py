@@ -166,3 +166,17 @@ def test_what_is_drawn_here_describes_a_shape_and_other_numbers_do_not(kind: str
         bad = of.check(Shape(kind, tuple(numbers)))
         assert bad is not None
         assert "not finite" in bad
+
+
+@every_kind
+def test_the_ball_around_a_shape_holds_all_of_it(kind: str) -> None:
+    for seed in range(TRIES):
+        shape, random = drawn(kind, seed)
+        around = kind_of(shape).ball_around(shape.numbers)
+        assert (around is None) == (kind_of(shape).flat or kind_of(shape).follows_target)
+        if around is None:
+            continue
+        centre, radius = around
+        for n in random.standard_normal((20, 3)):
+            n /= np.linalg.norm(n)
+            assert reach(shape, n) <= float(n @ np.array(centre)) + radius + 1e-9

@@ -9,9 +9,9 @@ from typing import Any, cast
 
 import pytest
 
-from fsw.autopilot.flight.ailments import AILMENTS
-from fsw.autopilot.flight.arming import CHECKS, Subject
-from fsw.autopilot.flight.conditions import Action, Condition
+from fsw.autopilot.flight.commands.arming import CHECKS, Subject
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.table import FAILSAFES
 from fsw.autopilot.signals import (
     ArmingReport,
     Command,
@@ -153,7 +153,7 @@ def test_a_component_that_is_ill_in_flight_is_in_the_health(
 
 def test_every_ailment_is_one_of_a_component_that_the_document_knows() -> None:
     components = DESCRIBED["enums"]["health_component_t"]["entries"]
-    for condition in AILMENTS:
+    for condition in (one.condition for one in FAILSAFES if one.component is not None):
         health = explained(arming_events(ArmingReport(ill=(condition.value,)))[-1])[2]
         assert str(health["error"] | health["warning"]) in components
 

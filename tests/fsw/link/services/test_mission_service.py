@@ -90,7 +90,7 @@ class Vehicle:
 @pytest.fixture
 def vehicle() -> Iterator[Vehicle]:
     store = MissionStore(
-        Site(locate, judge, lambda: 0.1, TunedAutopilot(flight_config()).least_margin)
+        Site(locate, judge, lambda: 0.1, TunedAutopilot(flight_config()).min_margin)
     )
     with ground_station(services=(MissionService(store),)) as ground:
         yield Vehicle(ground, store)

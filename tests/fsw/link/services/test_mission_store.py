@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.flight.safe_set import SafeSetCheck
-from fsw.autopilot.flight.safety_watch import SafetyWatch
+from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
+from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import SafetyMemory
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import EndEffectorTarget, StateEstimate, Vec2
@@ -94,7 +94,7 @@ def _breaches(
 ) -> bool:
     """Whether the failsafe "outside the fence" would be active in the next tick."""
     fence = read_fence(items, lambda *_: (0.0, 0.0, 0.0), CONFIG.limits.fence_clearance)
-    report = CHECK.margins(KeptSet().of(fence), estimate, target)
+    report = CHECK.margins(InflatedSafeSet().of(fence), estimate, target)
     return WATCH.breach(SafetyMemory(), estimate, report, 0, flies=True).fence_us >= 0
 
 

@@ -11,15 +11,15 @@ from fsw.autopilot.parameters.facts import FACT_BY_NAME
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.param_type import field_of, value_of
 from fsw.autopilot.parameters.registry import BY_NAME
-from fsw.autopilot.parameters.store import ParameterStore
 from fsw.autopilot.signals import CommandRequest, StatusText
 from fsw.link.services.parameter_service import BURST, ParameterService
 from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
+from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
 from messages.frames import Frame, FrameWriter, split, wire_fields
-from tests.fsw.autopilot.parameters.test_store import ticks
-from tests.fsw.autopilot.parameters.threads import AtOnce
+from tests.fsw.storage.test_parameter_store import ticks
+from tests.fsw.storage.threads import AtOnce
 from tests.parameters_on_the_wire import LISTED
 
 NAMES = sorted([*BY_NAME, *FACT_BY_NAME])

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.estimation.sensor_fault import Sensor
-from fsw.autopilot.flight.conditions import Condition
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import (
     AttitudeSetpoint,
-    Charge,
+    BatteryWarning,
     ConstraintKind,
     ConstraintReport,
     FlightSnapshot,
@@ -227,7 +227,7 @@ def test_a_sensor_that_is_heard_has_its_bit_and_one_that_fails_loses_it(
     name, always = sensor.value, _GPS | _MAG  # position and heading are known all the same
     assert bits_with() == (always, 0)
     assert bits_with(SensorReport(name, 8_000)) == (always | bit, 0)
-    assert bits_with(SensorReport(name, 8_000, "seldom")) == (always | bit, 0)
+    assert bits_with(SensorReport(name, 8_000, "rate too low")) == (always | bit, 0)
     for fault in ("stale", "stuck", "not finite", "no fix", "too old"):
         assert bits_with(SensorReport(name, 600_000, fault)) == (always | bit, bit)
     # One outlier was refused, or the newest reading is.
@@ -422,7 +422,7 @@ def test_what_forbids_arming_takes_the_prearm_bit_alone() -> None:
 
 @pytest.mark.parametrize(("charge", "state"), [(0, 1), (1, 2), (2, 3), (3, 4)])
 def test_a_battery_that_runs_low_says_so(charge: int, state: int) -> None:
-    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, charge=Charge(charge)))
+    low = replace(SNAPSHOT, battery=replace(SNAPSHOT.battery, charge=BatteryWarning(charge)))
     assert read_back(stream_of(ids.BATTERY_STATUS), low).charge_state == state
 
 

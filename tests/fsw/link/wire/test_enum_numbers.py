@@ -12,7 +12,7 @@ from typing import Any, Final
 import pytest
 
 from fsw.autopilot import measurements
-from fsw.autopilot.flight import estimator_report
+from fsw.autopilot.flight.estimate import estimator_report
 from fsw.link.wire import (
     decode,
     decode_commands,

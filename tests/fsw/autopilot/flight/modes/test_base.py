@@ -11,7 +11,7 @@ from fsw.autopilot.flight.modes.hold import Hold
 from fsw.autopilot.flight.modes.land import Land
 from fsw.autopilot.flight.modes.takeoff import Takeoff
 from fsw.autopilot.flight.modes.trajectory import Trajectory
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import SetpointMemory
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.signals import Mode, MotionSetpoint, Vec3

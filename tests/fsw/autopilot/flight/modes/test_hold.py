@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.flight.modes.hold import Hold
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import SetpointMemory
 from fsw.autopilot.model.kinematics import point_in_flight
 from fsw.autopilot.signals import MotionSetpoint, Vec3

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.flight import mission_sequencer as sequencer
-from fsw.autopilot.flight.mission_sequencer import Stage
+from fsw.autopilot.flight.mission import sequencer as sequencer
+from fsw.autopilot.flight.mission.sequencer import Stage
 from fsw.autopilot.flight.modes.base import Handover
 from fsw.autopilot.flight.modes.mission import Mission, left, motion_limits, with_update
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.flight.uncertain_clearance import KeptSet
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
@@ -110,7 +110,7 @@ def test_the_reference_keeps_the_safe_set() -> None:
     late = 10**9
     assert MISSION.reference(state, late).p_WE == pytest.approx((1.0, 0.0, -2.0))
     fenced = SafeSet((wall((-1.0, 0.0, 0.0), -0.6, 0.1),))
-    state = replace(state, kept=KeptSet().of(fenced))
+    state = replace(state, kept=InflatedSafeSet().of(fenced))
     assert MISSION.reference(state, late).p_WE == pytest.approx((0.5, 0.0, -2.0))
 
 

@@ -15,7 +15,7 @@ from fsw.autopilot.flight.modes.offboard import (
     is_fresh,
     report,
 )
-from fsw.autopilot.flight.setpoint_generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import FlightState, OffboardMemory, SetpointMemory
 from fsw.autopilot.signals import (
     AttitudeSetpoint,

@@ -1,0 +1,1 @@
+"""Which measurement or sensor is wrong, and what the filter does about it."""

@@ -1,0 +1,352 @@
+"""What follows for the filter when sensors contradict each other, or one is named.
+
+Every 20 ms it is asked who is wrong (``redundancy.py``). Of suspects the biases are not known any
+more; without who is named the filter runs again, from before it was wrong.
+
+Source: docs/decisions/0041-one-law-for-who-is-wrong.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from fsw.autopilot.estimation.error_state import (
+    BA,
+    BG,
+    IMU_CAPACITY,
+    LOST,
+    MODELLED,
+    NO_FORCE,
+    NO_RATE,
+    NOTHING,
+    ON_TRIAL,
+    TH,
+    V,
+    watch_biases,
+)
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.redundancy import (
+    EVIDENCE,
+    NO_AID,
+    NOBODY,
+    Aid,
+    Source,
+    Verdict,
+)
+from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
+from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
+from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
+from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
+from fsw.autopilot.estimation.measurement_update import MeasurementUpdate
+from fsw.autopilot.estimation.tuning import EstimatorTuning
+from fsw.autopilot.geometry.quaternion import normalised
+from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample
+from fsw.autopilot.signals import StateEstimate
+
+_TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
+# Of a suspect: the most that its bias may be off, for how long it has been so [s], and the share of
+# it that residuals show. Places show a force late: half of it where windows are half full.
+_MOST: Final = (10.0, 0.5)  # m/s^2 and rad/s
+_FOR: Final = (0.1, 0.06)
+_SEEN: Final = (0.5, 1.0)
+_HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
+_USED: Final = 0.5  # s; what was refused for longer finds no bias
+_UNIT: Final = Source.GYRO | Source.ACCELEROMETER
+_PARTS: Final = {
+    Sensor.POSE: (Source.POSE, Source.ATTITUDE),
+    Sensor.GNSS: (Source.GNSS, Source.GNSS),
+}
+_FOLLOWED: Final = (
+    SensorFault.RATE_TOO_LOW,
+    SensorFault.NOISY,
+)  # encoders that are used all the same
+_ROUNDING: Final = 1e-9  # s
+
+Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
+"""What a tick makes of a memory."""
+
+
+class Arbitration:
+    """Asks who is wrong, for one configuration; holds nothing that changes in flight."""
+
+    def __init__(
+        self,
+        tuning: EstimatorTuning,
+        stated: MeasurementNoise,
+        update: MeasurementUpdate,
+        again: Again,
+    ) -> None:
+        self._tuning = tuning
+        self._stated = stated
+        self._update = update
+        self._again = again
+
+    def step(
+        self,
+        memory: FusionMemory,
+        now: float,
+        found: StateEstimate,
+        *,
+        aloft: bool,
+        flies: bool,
+        damaged: bool,
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory, and the state ``found`` at ``now`` [s], after what is due.
+
+        Nothing is, unless the vehicle ``flies``, and is ``aloft``: else the ground may hold it. Of
+        a ``damaged`` one a rotor or a joint is known to have failed.
+        """
+        evidence = memory.verdict.evidence
+        if evidence is None:
+            return begun(memory), found
+        if not aloft:
+            # What is in doubt is so until the rotors stand, on the ground too: else its bias would
+            # be the one of before.
+            if memory.verdict.is_on and flies:
+                return memory, found
+            if evidence[0]["count"] or memory.verdict.is_on:
+                memory = _anew(memory)
+            return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
+        if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
+            return memory, found
+        return self._look(memory, now, found, damaged)
+
+    def _look(
+        self, memory: FusionMemory, now: float, found: StateEstimate, damaged: bool
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory after a look at whether all sensors agree, and the state with it."""
+        before = memory.verdict
+        evidence = np.empty(1, EVIDENCE)
+        evidence[:] = before.evidence
+        newest = memory.newest_pose, memory.gnss, memory.newest_field
+        pose, fix, field = [
+            NO_AID if sample is None or sample is last else self._aid(memory, sample)
+            for sample, last in zip(newest, before.seen, strict=True)
+        ]
+        silent = _silent(memory, now) | _stuck(memory)
+        lost = redundancy.note_silence(evidence, silent, now)
+        learns = not (before.is_on or before.wrong or lost)
+        redundancy.look(evidence, memory.numbers, now, pose, fix, field, learns)
+        ratios = tuple(evidence[0]["ratio"].tolist())
+        verdict = before._replace(evidence=evidence, seen=newest)
+        if before.is_on or before.wrong or max(ratios) > 1.0:
+            held = Source.ATTITUDE in self._aided(memory, now)
+            verdict = redundancy.judged(
+                verdict,
+                ratios,
+                now,
+                holds_attitude=held,
+                lost=lost,
+                damaged=damaged,
+                sizes=tuple(evidence[0]["size"].tolist()),
+            )
+        memory = memory._replace(verdict=verdict)
+        state: StateEstimate | None = found
+        if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
+            memory, state = self._convicted(memory, before, now, found)
+        return _with_trail(memory, now), state
+
+    def _aid(self, memory: FusionMemory, sample: Aiding) -> Aid:
+        """What a measurement says to the law for who is wrong."""
+        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)
+        time = self._update.measured_at(memory, sample)
+        if isinstance(sample, PoseSample):
+            place, about = self._update.noise(memory, sample)
+            sigma, angle = math.sqrt(max(place) * scale[0]), math.sqrt(max(about) * scale[1])
+            return True, time, sample.position, normalised(sample.attitude), sigma, angle
+        if isinstance(sample, GnssSample):
+            place, speed = self._stated.of_gnss(sample)
+            sigma, fast = math.sqrt(max(place) * scale[2]), math.sqrt(max(speed) * scale[3])
+            return True, time, sample.position, (*sample.velocity, 0.0), sigma, fast
+        assert isinstance(sample, MagneticSample)
+        return True, time, sample.field, NO_TURN, self._tuning.mag_noise, 0.0
+
+    def _aided(self, memory: FusionMemory, now: float) -> Source:
+        """Who measures places, and attitudes, that are used at ``now`` [s], and is not named."""
+        found, wrong = NOBODY, memory.verdict.wrong
+        for sensor, parts in _PARTS.items():
+            health = memory.of(sensor)
+            fused = zip(parts, health.fused, strict=False)
+            used = min([at for part, at in fused if not part & wrong], default=-math.inf)
+            if now - used <= _USED and now - health.came <= self._tuning.stale_time:
+                found |= parts[0] | parts[1]
+        return found & ~wrong
+
+    def _convicted(
+        self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """The memory with a filter that knows the verdict, and the state with it."""
+        verdict = memory.verdict
+        x = memory.numbers.copy()
+        memory = memory._replace(numbers=x)
+        new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
+        # A half that has jumped is believed where the rotors are named for it, and where it agrees.
+        agrees = back or (before.is_on and not verdict.is_on and not verdict.wrong)
+        believes = bool(x["doubted"][0].any() and (agrees or verdict.named is Source.MODEL))
+        # So is what has jumped and come back meanwhile: an arm that hits its stop is a blow.
+        unit = memory.of(Sensor.IMU)
+        jumped = unit.fault is SensorFault.JUMP and now - unit.fault_at < _TRAIL
+        believes = believes or (jumped and verdict.explained and not before.explained)
+        x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
+        if verdict.is_on:
+            x["suspect"] |= ON_TRIAL
+            verdict = _widened(x.view(np.recarray)[0], verdict, bool(self._aided(memory, now)))
+            memory = memory._replace(verdict=verdict)
+        # What the rotors explain, nobody else was wrong about.
+        acquits = verdict.explained and not before.explained and any(before.unknown)
+        if not (new or believes or acquits):
+            return memory, found
+        x["believed"] = NOTHING if believes else 0
+        if new & _UNIT:
+            memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
+        return self._replayed(memory, now, found)
+
+    def _replayed(
+        self, memory: FusionMemory, now: float, found: StateEstimate
+    ) -> tuple[FusionMemory, StateEstimate | None]:
+        """Go back to before sensors contradicted, and do without what is wrong since then."""
+        trails = [one for one in (memory.trail_before, memory.trail) if one is not None]
+        x = memory.numbers[0]
+        believed = int(x["believed"])
+        x["believed"] = 0
+        if not trails:
+            return memory, found
+        back, state = trails[0].start, None
+        numbers = back.numbers.copy()
+        for name in ("out", "suspect"):
+            numbers[name] = x[name]
+        numbers["believed"] = believed
+        back = back._replace(numbers=numbers, verdict=memory.verdict)
+        for trail in trails:
+            for tick in trail.inputs():
+                back, state = self._again(back, tick)
+        if state is None:
+            return memory, found
+        numbers = back.numbers.copy()
+        numbers["believed"] = 0
+        for name in ("witness", "baseline", "model_walk"):
+            numbers[name] = memory.numbers[name]
+        health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
+        start = memory._replace(
+            numbers=numbers,
+            health=health,
+            waiting=back.waiting,
+            arrivals=back.arrivals,
+            runs=back.runs,
+            pose=back.pose,
+            reset_counter=back.reset_counter,
+            frame=back.frame,
+            replays=memory.replays + 1,
+            trail=None,
+            trail_before=None,
+        )
+        return start._replace(trail=Trail(start, now)), state
+
+
+def begun(memory: FusionMemory) -> FusionMemory:
+    """The memory of a filter that has just begun: what sensors say is compared from now on."""
+    verdict = memory.verdict._replace(evidence=redundancy.at_start())
+    return memory._replace(verdict=verdict, trail=None, trail_before=None)
+
+
+def _anew(memory: FusionMemory) -> FusionMemory:
+    """The memory without what has been compared so far: rotors do not explain what legs feel."""
+    x = memory.numbers.copy()
+    x["suspect"] = 0
+    return begun(memory._replace(numbers=x, verdict=memory.verdict.acquitted()))
+
+
+def _on_ground(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory at ``now`` [s] with what was named in flight believed again, once it is time."""
+    verdict = memory.verdict.on_ground(now)
+    x = memory.numbers
+    if verdict.wrong is not memory.verdict.wrong:
+        x = x.copy()
+        x["out"] = _halves(verdict.wrong)
+    return memory._replace(numbers=x, verdict=verdict)
+
+
+def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
+    """The memory with a new trail where the newest one is long enough.
+
+    None is begun while it may have to be said soon who is wrong.
+    """
+    newest, verdict = memory.trail, memory.verdict
+    if newest is not None:
+        decides = verdict.is_on and now - verdict.since < redundancy.UNDECIDED
+        if decides or now - newest.began < _TRAIL:
+            return memory
+    start = memory._replace(trail=None, trail_before=None)
+    return memory._replace(trail_before=newest, trail=Trail(start, now))
+
+
+def _silent(memory: FusionMemory, now: float) -> Source:
+    """What has said nothing of how the vehicle moves at ``now`` [s].
+
+    Rotors explain it only where it is known how the arm moves.
+    """
+    unit = now - memory.imu_came > IMU_SILENT
+    encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
+    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault not in _FOLLOWED
+    arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
+    return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
+
+
+def _stuck(memory: FusionMemory) -> Source:
+    """Halves of the inertial unit that repeat themselves."""
+    found, same = NOBODY, memory.numbers[0]["same"]
+    for place, (source, _) in enumerate(_HALVES):
+        if is_stuck(same, place):
+            found |= source
+    return found
+
+
+def _widened(x: Any, verdict: Verdict, aided: bool) -> Verdict:
+    """The ``verdict`` with a filter ``x`` that takes the biases of suspects for unknown.
+
+    By as much as residuals with them show, and so what that has led to. A bias that may walk alone
+    takes too long to be found; where the filter is not ``aided``, nothing would find it.
+    """
+    assert verdict.evidence is not None
+    M, unknown, k = x["covariance"], list(verdict.unknown), np.arange(3)
+    for half, ((source, _), bias, state) in enumerate(zip(_HALVES, (BA, BG), (V, TH), strict=True)):
+        if not source & verdict.suspects:
+            continue
+        seen = redundancy.size_of(verdict.evidence, source)
+        size = min(seen / _SEEN[half], _MOST[half])
+        x["model_walk"][half] = min(x["model_walk"][half], size)
+        grown = size**2 - unknown[half] ** 2
+        if aided and grown > 0.0:
+            if not unknown[half]:
+                _doubt(x, half)
+            unknown[half] = size
+            M[bias + k, bias + k] += grown
+            M[state + k, state + k] += _FOR[half] ** 2 * grown
+    return verdict._replace(unknown=(unknown[0], unknown[1]))
+
+
+def _doubt(x: Any, half: int) -> None:
+    """Keep what the filter ``x`` knows of the bias of a ``half``: its readings are in doubt now.
+
+    Those too that have come, but wait until measurements of their time have.
+    """
+    waiting = np.arange(x["first"], x["end"]) % IMU_CAPACITY
+    lost = x["imu"][waiting, LOST].astype(int) | MODELLED | 1 << half
+    x["imu"][waiting, LOST] = lost
+    watch_biases(x, x["covariance"], int(x["lost"]) | 1 << half)
+
+
+def _halves(sources: Source) -> int:
+    """Halves of the inertial unit, as ``FILTER`` counts them, among some ``sources``."""
+    return sum(half for source, half in _HALVES if source & sources)
+
+
+def _fused_as(health: Health, other: Health) -> Health:
+    """The ``health`` of a sensor of which other samples have been fused."""
+    return health.with_fused(other.fused, other.ratio, other.innovation)

@@ -1,0 +1,862 @@
+r"""Who is wrong: each sensor is predicted from the others and from the rotors' model.
+
+How the vehicle turns is said by the gyro (G), by what measures attitudes (the pose P, or the
+magnetometer B) and by the rotors' model (M). How it accelerates is said by the accelerometer (A),
+by what measures places (P, or satellites N), and by the model. The attitude of a pose (Q) may be
+wrong where its place is not; not the other way round. Of each two of them there is a residual: what
+they differ by, over windows of 0.1 to 3 s. Of a culprit X all residuals with X are large and all
+others are not, so
+
+.. math:: J(X) = \sum_{k \not\ni X} \min(r_k / t_k, 5)^2, \quad
+          t_k = \text{the largest that is nominal},
+
+is least for the culprit. It is named where by how much more the next hypothesis costs adds up to 3,
+in looks in a row in which that is more than 1. Until then all that are not excluded are suspects:
+the filter takes their biases for unknown.
+Thresholds of what contains the model follow from how well it has predicted so far in this flight,
+those of measurements from the noise that they state and turn out to have.
+
+Source: E. Chow, A. Willsky, Analytical Redundancy and the Design of Robust Failure Detection
+Systems, IEEE TAC 29 (1984) 603; docs/decisions/0041-one-law-for-who-is-wrong.md.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntFlag
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsw.autopilot.estimation.error_state import BA, WITNESS, vec3
+from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
+from fsw.autopilot.geometry.vectors import add_scaled, norm, subtract
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.signals import Mat3, Vec2, Vec3, Vec4
+from fsw.compiled import compilable, kernel, machine_code
+
+Array = NDArray[np.float64]
+
+
+class Source(IntFlag):
+    """What says something of how the vehicle moves."""
+
+    GYRO = 1
+    ACCELEROMETER = 2
+    MODEL = 4
+    POSE = 8
+    GNSS = 16
+    COMPASS = 32
+    ATTITUDE = 64  # of a pose; of a ``POSE`` that is wrong it is too
+
+
+_NAMES: Final = {
+    Source.GYRO: "gyro",
+    Source.ACCELEROMETER: "accelerometer",
+    Source.MODEL: "rotors",
+    Source.POSE: "pose",
+    Source.GNSS: "GNSS",
+    Source.COMPASS: "magnetometer",
+    Source.ATTITUDE: "attitude of the pose",
+}
+
+
+def names(sources: Source) -> str:
+    """What an operator reads."""
+    return " or ".join([name for source, name in _NAMES.items() if source & sources])
+
+
+NOBODY: Final = Source(0)
+G, A, M, P, N, B, Q = Source
+# Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
+# into the world is the gyro's and the magnetometer's as well: see ``_sources``.
+# The last two are of one alone: a bias that is larger than a sensor of its kind has.
+GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB, AA, GG = range(13)
+_PQ: Final = P | Q
+OF: Final = (G | M, G | _PQ, G | B, A | M, A | P, M | _PQ, M | P, A | N, M | N, N, M | B, A, G)
+COUNT: Final = len(OF)
+# What of them says nothing, if one of these does: attitudes turn what is felt.
+_MASKS: Final = tuple(int(one | (G | B if k in (AN, MN) else 0)) for k, one in enumerate(OF))
+# Whose measurements each of them is read at, as ``EVIDENCE.aids``; -1: at each look.
+_KINDS: Final = tuple(0 if one & P else 1 if one & N else 2 if one & B else -1 for one in OF)
+# Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
+# the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
+# makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], and what
+# is felt beside the rotors [m/s, FRD].
+SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
+WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
+EVERY: Final = 0.02  # s, between looks
+_LONG: Final = 3.0  # s, over which means of half a second are compared
+_MEAN: Final = 0.5  # s
+# For so long [s] a reading is in a window, or in the one before it.
+_CONTAINED: Final = (*(2.0 * window for window in WINDOWS), _LONG + 2.0 * _MEAN)
+_ROWS: Final = 256  # looks: 5 s
+_AIDS: Final = 256  # measurements of a kind, at most one a look
+_MEASURED: Final = 1  # column of what is measured, after the time: place and attitude, for example
+_AT: Final = 8  # column of the integrals at its time
+_SETTLING: Final = 1.0  # s in flight until residuals are looked at
+_BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
+_LATEST: Final = 0.3  # s, for which a measurement counts after it came
+# Of forces [m/s^3/sqrt(Hz)] and rates [rad/s^2/sqrt(Hz)] of the rotors' model: gusts and errors.
+MIN_WALKS: Final = (3.0, 0.15)
+_LEARNING: Final = 10.0  # s, of the mean squares of residuals with the model
+_MODEL_SIGMAS: Final = 5.0  # of them, that are nominal
+_NOISE_SIGMAS: Final = 4.0  # of the noise of measurements
+_BEND_SIGMAS: Final = 5.5  # the same of second differences of places: two in a row share noise
+# The least thresholds, by window [SI]. A gust is a force of 1 to 2 m/s^2 and no turn.
+_TURN_OFF: Final = 0.2  # rad/s
+_TURN_OFF_AIDED: Final = 0.15  # rad/s
+_FORCE_OFF: Final = (2.5, 1.8, 1.5, 1.3)  # m/s^2
+_FORCE_OFF_AIDED: Final = 0.9  # m/s^2
+_GYRO_OFF: Final = 0.012  # rad/s: scale, axes and bias
+_GYRO_OFF_LONG: Final = 0.004  # rad/s
+_FIELD_OFF_LONG: Final = 0.012  # rad/s: hard and soft iron of a vehicle that tilts
+_IRON: Final = 0.1  # rad: by how much they turn a field, for each radian that the vehicle turns
+_ACCEL_OFF: Final = 0.4  # m/s^2: scale, axes, bias and tilt
+_SPEED_OFF: Final = 0.08  # m/s
+# Biases, of which units of this kind are sold with a third or less (EstimatorTuning).
+_ACCEL_BIAS: Final = 0.8  # m/s^2
+_GYRO_BIAS: Final = 0.1  # rad/s
+_KNOWN: Final = 0.4  # of that
+# How a vehicle moves between two measurements, of which one may be an outlier: beside the velocity
+# that the last two of them show, or with any where there are none.
+_GAINS: Final = 15.0  # m/s^2, half of it
+_SPEED: Final = 10.0  # m/s
+_RATE: Final = 4.0  # rad/s
+_NOISE: Final = 20.0  # deviations of a place that is extrapolated
+# Deciding.
+_LEAD: Final = 1.0
+_DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
+_MOST: Final = 25.0  # of one residual
+_OF_PLACES: Final = (AP, MP_FORCE)
+_TILTED: Final = 1.5  # m/s^2, that a pose shows whose attitude is off by 0.15 rad
+# What is off shows at once in the first, while the trial is this young [s], and in others later.
+_SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
+_SHOWS: Final = 1.5
+_SURE: Final = 3.0  # sum of leads
+_QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
+_AGREES: Final = 5.0  # s of agreement, until what was named is believed again
+UNDECIDED: Final = 2.0  # s, after which suspects are not told apart any more
+
+EVIDENCE: Final = np.dtype(
+    [
+        ("looked", float),  # s, when last
+        ("silent", float, (len(Source),)),  # s, when each of them said nothing of use last
+        ("began", float),  # s, when the vehicle began to fly; -1: it does not
+        ("rows", float, (_ROWS, 1 + WITNESS)),  # ring: time [s] and integrals
+        ("count", np.int64),
+        # Of pose, satellites and compass: ring of measurements with the integrals at their times;
+        # one that is far from the last waits until another one says the same.
+        ("aids", float, (3, _AIDS, _AT + WITNESS)),
+        ("aid_count", np.int64, (3,)),
+        ("aid_first", np.int64, (3,)),
+        ("waiting", float, (3, _AT + WITNESS)),
+        ("waits", np.int64, (3,)),
+        ("squares", float, (COUNT, 4)),  # mean squares of residuals with the model, by window
+        # Residual over threshold, by window, the long one last: at the last look, what both of the
+        # last two looks have had, and the threshold [SI].
+        ("raw", float, (COUNT, 5)),
+        ("both", float, (COUNT, 5)),
+        ("threshold", float, (COUNT, 5)),
+        ("came", float, (COUNT,)),  # s, when it was computed last
+        ("ratio", float, (COUNT,)),  # the largest of all windows
+        ("size", float, (COUNT,)),  # SI, of that
+    ],
+    align=True,
+)
+Evidence = NDArray[Any]  # (1,) of EVIDENCE
+Aid = tuple[bool, float, Vec3, Vec4, float, float]
+"""Whether there is one, its time [s], what it measures, and deviations of both [SI]."""
+NO_AID: Final[Aid] = (False, 0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+
+
+@compilable
+def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
+    """Integrate what everybody says of the tick of ``dt`` [s] that ends now.
+
+    ``R`` [1, body to NED] and the ``model`` [SI, FRD] of ``imu.add_imu``, which is not known where
+    the vehicle does not fly: then all begins anew.
+    """
+    W = x.witness
+    if not model[3] > 0.0:
+        for i in range(4):
+            W[SAID + i] = 0.0
+        return
+    if _begins(W):
+        for i in range(WITNESS):
+            W[i] = 0.0
+        W[SAID] = 1.0
+        for i in range(3):
+            x.baseline[i], x.baseline[3 + i] = x.accel_bias[i], x.gyro_bias[i]
+            x.baseline[6 + i] = 0.0
+    f = (x.newest[0], x.newest[1], x.newest[2])
+    w = (x.newest[3], x.newest[4], x.newest[5])
+    q = turned(_quaternion(W, SAID), dt * w[0], dt * w[1], dt * w[2])
+    for i in range(4):
+        W[SAID + i] = q[i]
+    b = x.baseline
+    felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
+    made = rotate(R, (0.0, 0.0, -model[3]))
+    share = dt / _BASELINE
+    for i in range(3):
+        down = GRAVITY if i == 2 else 0.0
+        W[FELT + i] += dt * (felt[i] + down)
+        W[FELT2 + i] += dt * W[FELT + i]
+        W[MADE + i] += dt * (made[i] + down)
+        W[MADE2 + i] += dt * W[MADE + i]
+        W[SPUN + i] += dt * model[i]
+        W[SPUN2 + i] += dt * W[SPUN + i]
+        beside = f[i] + (model[3] if i == 2 else 0.0)
+        W[BESIDE + i] += dt * beside
+        W[TURN + i] += dt * w[i]
+        if not (x.suspect or x.out):
+            b[i] += share * (x.accel_bias[i] - b[i])
+            b[3 + i] += share * (x.gyro_bias[i] - b[3 + i])
+            b[6 + i] += share * (beside - b[6 + i])
+
+
+@machine_code
+@kernel
+def look(
+    e: Evidence, numbers: Any, now: float, pose: Aid, fix: Aid, field: Aid, learns: bool
+) -> None:
+    """Take in the newest measurements at ``now`` [s], and compute all residuals."""
+    s, x = e[0], numbers[0]
+    s.looked = now
+    if _begins(x.witness):
+        _begin_anew(s)
+        return
+    if s.began < 0.0:
+        s.began = now
+    row = s.rows[s.count % _ROWS]
+    row[0] = now
+    for i in range(WITNESS):
+        row[1 + i] = x.witness[i]
+    s.count += 1
+    _take(s, 0, pose)
+    _take(s, 1, fix)
+    _take(s, 2, field)
+    if now - s.began < _SETTLING:
+        return
+    bias, lasting = vec3(x.baseline, 3), vec3(x.baseline, 6)
+    for k in range(4):
+        _unit_and_model(s, now, k, lasting, learns)
+        _with_aids(s, now, k, pose, fix, field, bias, learns)
+    if pose[0]:
+        _over_long(s, now, 0, pose[5], bias)
+    if field[0]:
+        _over_long(s, now, 2, field[4], bias)
+    _note_bias(s, x, now, 0, AA, _ACCEL_BIAS)
+    _note_bias(s, x, now, 1, GG, _GYRO_BIAS)
+    for k in range(COUNT):
+        _note_largest(s, now, k)
+    # How quickly the model has been off, which is what a filter without a half of the unit needs.
+    x.model_walk[0] = MIN_WALKS[0]
+    x.model_walk[1] = max(MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
+
+
+@compilable
+def _note_largest(s: Any, now: float, k: int) -> None:
+    """Keep what is largest of a residual in all windows."""
+    s.ratio[k], s.size[k] = 0.0, 0.0
+    if not now - s.came[k] < _LATEST:
+        return
+    kind, heard = _KINDS[k], now
+    if kind >= 0:  # a measurement is of a time before
+        heard = s.aids[kind, (s.aid_count[kind] - 1) % _AIDS, 0]
+    silent = -math.inf
+    for i in range(len(s.silent)):
+        if _MASKS[k] & (1 << i):
+            silent = max(silent, s.silent[i])
+    for i in range(5):
+        if heard - silent >= _CONTAINED[i] and s.both[k, i] > s.ratio[k]:
+            s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
+
+
+@compilable
+def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> None:
+    """Keep how far the bias of a half is beyond the ``most`` [SI] that its kind has.
+
+    By the square, because it is no noise. Of one that is in doubt, it is the one from before. What
+    is known of it no better than when the filter began is no evidence.
+    """
+    bias = vec3(x.gyro_bias if half else x.accel_bias, 0)
+    if x.lost & (1 << half):
+        bias = vec3(x.kept_bias, 3 * half)
+    else:
+        for i in range(BA + 3 * half, BA + 3 * half + 3):
+            if x.covariance[i, i] > (_KNOWN * most) ** 2:
+                return
+    share = norm(bias) / most
+    _note(s, now, k, 0, (share * share * most, 0.0, 0.0), most)
+
+
+@compilable
+def _with_aids(
+    s: Any, now: float, k: int, pose: Aid, fix: Aid, field: Aid, bias: Vec3, learns: bool
+) -> None:
+    if pose[0]:
+        _unit_and_pose(s, now, k, pose[4], pose[5], bias, learns)
+    if fix[0]:
+        _unit_and_fix(s, now, k, fix[4], fix[5], learns)
+    if field[0]:
+        _unit_and_field(s, now, k, field[4], bias, learns)
+
+
+@compilable
+def _quaternion(row: Array, at: int) -> Vec4:
+    return row[at], row[at + 1], row[at + 2], row[at + 3]
+
+
+@compilable
+def _begins(W: Array) -> bool:
+    """Whether integrals have not begun: their turn is none."""
+    return not (W[SAID] != 0.0 or W[SAID + 1] != 0.0 or W[SAID + 2] != 0.0 or W[SAID + 3] != 0.0)
+
+
+@compilable
+def _begin_anew(s: Any) -> None:
+    s.began, s.count = -1.0, 0
+    for k in range(3):
+        s.aid_count[k], s.aid_first[k], s.waits[k] = 0, 0, 0
+    for k in range(COUNT):
+        s.came[k], s.ratio[k] = -1.0, 0.0
+        for i in range(5):
+            s.raw[k, i], s.both[k, i] = 0.0, 0.0
+        for i in range(4):
+            s.squares[k, i] = 0.0
+
+
+@compilable
+def _integrals(s: Any, time: float, row: Array) -> bool:
+    """Put into a ``row`` [SI] the integrals at its ``time`` [s]; False: they are not known."""
+    for k in range(s.count - 1, max(s.count - _ROWS, 0), -1):
+        a, b = s.rows[(k - 1) % _ROWS], s.rows[k % _ROWS]
+        if a[0] <= time <= b[0]:
+            share = (time - a[0]) / (b[0] - a[0])
+            for i in range(WITNESS):
+                row[_AT + i] = a[1 + i] + share * (b[1 + i] - a[1 + i])
+            return True
+    return False
+
+
+@compilable
+def _take(s: Any, kind: int, aid: Aid) -> None:
+    """Keep a measurement, unless it is far from the last one and nothing has confirmed it yet."""
+    there, time, place, q, sigma, about = aid
+    new = s.waiting[kind]
+    if not there:
+        return
+    n, first = s.aid_count[kind], s.aid_first[kind]
+    last = s.aids[kind, (n - 1) % _AIDS]
+    if n > first and time - last[0] < 0.9 * EVERY:
+        return
+    v, about_v = (0.0, 0.0, 0.0), _SPEED
+    if kind != 2 and n - first >= 2:
+        before = s.aids[kind, (n - 2) % _AIDS]
+        v, about_v = _difference(last, before, _MEASURED, last[0] - before[0]), 0.0
+    room = _NOISE * sigma, about_v, 9.0 * about if kind == 0 else math.inf
+    confirmed = s.waits[kind] > 0 and _is_near(new, time, place, q, v, room)
+    near = n == first or _is_near(last, time, place, q, v, room)
+    known = _integrals(s, time, new)
+    new[0] = time
+    for i in range(3):
+        new[_MEASURED + i] = place[i]
+    for i in range(4):
+        new[_MEASURED + 3 + i] = q[i]
+    s.waits[kind] = 0
+    if not known:
+        return
+    if not near and not confirmed:
+        s.waits[kind] = 1
+        return
+    if not near:  # the sensor has jumped: what it said before is of another frame
+        s.aid_first[kind] = n
+    row = s.aids[kind, n % _AIDS]
+    for i in range(_AT + WITNESS):
+        row[i] = new[i]
+    s.aid_count[kind] = n + 1
+
+
+@compilable
+def _is_near(row: Array, time: float, place: Vec3, q: Vec4, v: Vec3, room: Vec3) -> bool:
+    """Whether a place and an attitude may follow a ``row`` [SI], at a velocity ``v`` [m/s, NED].
+
+    ``room`` [m, m/s, rad]: of the place, of the velocity, and of the attitude.
+    """
+    dt, far = time - row[0], 0.0
+    for i in range(3):
+        off = place[i] - row[_MEASURED + i] - dt * v[i]
+        far += off * off
+    near: bool = math.sqrt(far) <= room[0] + room[1] * dt + _GAINS * dt * dt
+    if not room[2] < math.inf:
+        return near
+    turn = rotation_vector(multiply(conjugate(_quaternion(row, _MEASURED + 3)), q))
+    return near and norm(turn) <= _RATE * dt + room[2]
+
+
+@compilable
+def _before(s: Any, kind: int, at: int, window: float, room: float) -> int:
+    """The measurement a ``window`` [s] before that ``at`` [1], within ``room`` [s]; -1: none."""
+    wanted = s.aids[kind, at % _AIDS, 0] - window
+    best, least = -1, room
+    for k in range(at - 1, max(s.aid_first[kind], s.aid_count[kind] - _AIDS + 1) - 1, -1):
+        off = s.aids[kind, k % _AIDS, 0] - wanted
+        if abs(off) < least:
+            best, least = k, abs(off)
+        if off < -room:
+            break
+    return best
+
+
+@compilable
+def _note(s: Any, now: float, k: int, window: int, r: Vec3, threshold: float) -> None:
+    """Keep a residual ``r`` [SI] over its ``threshold`` [SI]; a single one may be off."""
+    ratio = norm(r) / threshold
+    s.threshold[k, window] = threshold
+    s.both[k, window] = min(ratio, s.raw[k, window])
+    s.raw[k, window] = ratio
+    s.came[k] = now
+
+
+@compilable
+def _note_model(
+    s: Any, now: float, k: int, window: int, r: Vec3, least: float, noise: float, learns: bool
+) -> None:
+    """The same of one with the rotors' model, of which it is learnt what is nominal."""
+    squares = s.squares[k]
+    usual = max(least, _MODEL_SIGMAS * math.sqrt(squares[window]))
+    _note(s, now, k, window, r, usual + noise)
+    if learns:
+        size = norm(r)
+        squares[window] += EVERY / _LEARNING * (size * size - squares[window])
+
+
+@compilable
+def _unit_and_model(s: Any, now: float, k: int, lasting: Vec3, learns: bool) -> None:
+    """How rates have changed, and the force, against rotors; ``lasting`` [m/s^2, FRD] of it."""
+    n, back = s.count, round(WINDOWS[k] / EVERY)
+    if n < back + 2:
+        return
+    a, b = s.rows[(n - 2) % _ROWS], s.rows[(n - 1) % _ROWS]
+    c, d = s.rows[(n - back - 2) % _ROWS], s.rows[(n - back - 1) % _ROWS]
+    last, first, over = b[0] - a[0], d[0] - c[0], b[0] - d[0]
+    turn, force = _difference(b, a, 1 + TURN, last), _difference(b, d, 1 + BESIDE, over)
+    turn0, spun0 = _difference(d, c, 1 + TURN, first), _difference(d, c, 1 + SPUN2, first)
+    spun = _difference(b, a, 1 + SPUN2, last)
+    r = _turned_beside(turn, turn0, spun, spun0)
+    _note_model(s, now, GM, k, r, _TURN_OFF, 0.0, learns)
+    _note_model(s, now, AM, k, subtract(force, lasting), _FORCE_OFF[k], 0.0, learns)
+
+
+@compilable
+def _difference(b: Array, a: Array, column: int, over: float) -> Vec3:
+    """Three integrals of row ``b`` [SI] less those of ``a`` [SI], ``over`` [s]."""
+    return (
+        (b[column] - a[column]) / over,
+        (b[column + 1] - a[column + 1]) / over,
+        (b[column + 2] - a[column + 2]) / over,
+    )
+
+
+@compilable
+def _over(a: Vec3, seconds: float) -> Vec3:
+    return a[0] / seconds, a[1] / seconds, a[2] / seconds
+
+
+@compilable
+def _turned_beside(rate: Vec3, rate0: Vec3, spun: Vec3, spun0: Vec3) -> Vec3:
+    """By how much a rate has changed [rad/s, FRD] beside what rotors have ``spun``."""
+    return add_scaled(subtract(subtract(rate, rate0), spun), spun0, 1.0)
+
+
+@compilable
+def _apart(a: Array, b: Array, column: int) -> Vec4:
+    """The turn from row ``a`` [SI] to ``b`` [SI]: quaternions, from a ``column`` on."""
+    return multiply(conjugate(_quaternion(a, column)), _quaternion(b, column))
+
+
+@compilable
+def _bend(c: Array, b: Array, a: Array, column: int) -> Vec3:
+    """The second difference of three places [m/s^2] in rows ``a``, ``b`` and ``c`` [SI]."""
+    first, second = b[0] - a[0], c[0] - b[0]
+    v0, v1 = _difference(b, a, column, first), _difference(c, b, column, second)
+    mean = 0.5 * (first + second)
+    return (v1[0] - v0[0]) / mean, (v1[1] - v0[1]) / mean, (v1[2] - v0[2]) / mean
+
+
+@compilable
+def _unit_and_pose(
+    s: Any, now: float, k: int, sigma: float, about: float, bias: Vec3, learns: bool
+) -> None:
+    """How poses turn and accelerate against gyro, accelerometer and rotors.
+
+    Poses are known to ``sigma`` [m] and ``about`` [rad], the gyro's ``bias`` [rad/s, FRD].
+    """
+    T, last = WINDOWS[k], s.aid_count[0] - 1
+    middle = _before(s, 0, last, T, 0.03)
+    if middle < 0:
+        return
+    c, b = s.aids[0, last % _AIDS], s.aids[0, middle % _AIDS]
+    over = c[0] - b[0]
+    seen, said = _apart(b, c, _MEASURED + 3), _apart(b, c, _AT + SAID)
+    off = rotation_vector(multiply(conjugate(said), seen))
+    r = (off[0] / over + bias[0], off[1] / over + bias[1], off[2] / over + bias[2])
+    turning = math.sqrt(6.0) * about / over
+    _note(s, now, GP, k, r, _GYRO_OFF + _NOISE_SIGMAS * turning)
+    first = _before(s, 0, middle, T, 0.03)
+    if first < 0:
+        return
+    a = s.aids[0, first % _AIDS]
+    before = b[0] - a[0]
+    turn0, turn = rotation_vector(_apart(a, b, _MEASURED + 3)), rotation_vector(seen)
+    spun0, spun = _difference(b, a, _AT + SPUN2, before), _difference(c, b, _AT + SPUN2, over)
+    r = _turned_beside(_over(turn, over), _over(turn0, before), spun, spun0)
+    _note_model(s, now, MP_TURN, k, r, _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning, learns)
+    bent = _bend(c, b, a, _MEASURED)
+    felt, made = _bend(c, b, a, _AT + FELT2), _bend(c, b, a, _AT + MADE2)
+    noise = _BEND_SIGMAS * math.sqrt(18.0) * sigma / (over * over)
+    _note(s, now, AP, k, subtract(bent, felt), _ACCEL_OFF + noise)
+    _note_model(s, now, MP_FORCE, k, subtract(bent, made), _FORCE_OFF_AIDED, noise, learns)
+
+
+@compilable
+def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns: bool) -> None:
+    """How a receiver's velocity changes against accelerometer and rotors, and its place with it.
+
+    They are known to ``sigma`` [m] and ``speed`` [m/s].
+    """
+    last = s.aid_count[1] - 1
+    first = _before(s, 1, last, WINDOWS[k], 0.06)
+    if first < 0:
+        return
+    b, a = s.aids[1, last % _AIDS], s.aids[1, first % _AIDS]
+    over, velocity = b[0] - a[0], _MEASURED + 3
+    change = _difference(b, a, velocity, over)
+    felt, made = _difference(b, a, _AT + FELT, over), _difference(b, a, _AT + MADE, over)
+    noise = 2.5 * speed / over
+    _note(s, now, AN, k, subtract(change, felt), _ACCEL_OFF + noise)
+    _note_model(s, now, MN, k, subtract(change, made), _FORCE_OFF_AIDED, noise, learns)
+    x, y, z = 0.0, 0.0, 0.0
+    for j in range(first, last):
+        c, d = s.aids[1, j % _AIDS], s.aids[1, (j + 1) % _AIDS]
+        h = 0.5 * (d[0] - c[0])
+        x += h * (c[velocity] + d[velocity])
+        y += h * (c[velocity + 1] + d[velocity + 1])
+        z += h * (c[velocity + 2] + d[velocity + 2])
+    moved = _difference(b, a, _MEASURED, over)
+    r = (moved[0] - x / over, moved[1] - y / over, moved[2] - z / over)
+    _note(s, now, NN, k, r, _SPEED_OFF + _NOISE_SIGMAS * math.sqrt(6.0) * sigma / over)
+
+
+@compilable
+def _field_off(a: Array, b: Array) -> Vec3:
+    """The turn [rad, FRD] that the field in row ``b`` [SI] shows beside what the gyro said."""
+    said = matrix_from_quaternion(_apart(a, b, _AT + SAID))
+    u = rotate_back(said, vec3(a, _MEASURED))
+    v = vec3(b, _MEASURED)
+    size = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    return (
+        (u[1] * v[2] - u[2] * v[1]) / -size,
+        (u[2] * v[0] - u[0] * v[2]) / -size,
+        (u[0] * v[1] - u[1] * v[0]) / -size,
+    )
+
+
+@compilable
+def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns: bool) -> None:
+    """How the Earth's field turns in body axes against gyro and rotors.
+
+    It is known to ``noise`` [Gauss], the gyro's ``bias`` [rad/s, FRD]; a turn about it is not seen.
+    """
+    T, last = WINDOWS[k], s.aid_count[2] - 1
+    middle = _before(s, 2, last, T, 0.03)
+    if middle < 0:
+        return
+    c, b = s.aids[2, last % _AIDS], s.aids[2, middle % _AIDS]
+    over, off, v = c[0] - b[0], _field_off(b, c), vec3(c, _MEASURED)
+    off = _over(off, over)
+    iron = _IRON * norm(rotation_vector(_apart(b, c, _AT + SAID)))
+    noise = _NOISE_SIGMAS * noise / max(norm(v), 1e-3)
+    _note(s, now, GB, k, _across(bias, v, off), _GYRO_OFF + (iron + noise) / over)
+    first = _before(s, 2, middle, T, 0.03)
+    if first < 0:
+        return
+    a = s.aids[2, first % _AIDS]
+    before, off0 = b[0] - a[0], _field_off(a, b)
+    turn, turn0 = _difference(c, b, _AT + TURN, over), _difference(b, a, _AT + TURN, before)
+    spun, spun0 = _difference(c, b, _AT + SPUN2, over), _difference(b, a, _AT + SPUN2, before)
+    rate, rate0 = add_scaled(turn, off, 1.0), add_scaled(turn0, off0, 1.0 / before)
+    r = _turned_beside(rate, rate0, spun, spun0)
+    iron += _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
+    room = (iron + 2.0 * noise) / over
+    _note_model(s, now, MB, k, _across(r, v, (0.0, 0.0, 0.0)), _TURN_OFF_AIDED, room, learns)
+
+
+@compilable
+def _across(a: Vec3, v: Vec3, r: Vec3) -> Vec3:
+    """What of ``a`` is at right angles to the field ``v`` [Gauss], added to ``r``, both [rad/s]."""
+    size = max(norm(v), 1e-3)
+    along = (a[0] * v[0] + a[1] * v[1] + a[2] * v[2]) / (size * size)
+    return r[0] + a[0] - along * v[0], r[1] + a[1] - along * v[1], r[2] + a[2] - along * v[2]
+
+
+@compilable
+def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
+    """Means over half a second, 3 s apart, of how far gyro and attitudes have turned apart.
+
+    Attitudes are known to ``about`` [rad], or the field [Gauss]; the gyro's ``bias`` [rad/s, FRD].
+    """
+    last = s.aid_count[kind] - 1
+    time = s.aids[kind, last % _AIDS, 0]
+    first = _before(s, kind, last, _LONG + _MEAN, 0.1)
+    if first < 0:
+        return
+    a, n, m = s.aids[kind, first % _AIDS], 0, 0
+    x0, y0, z0, x1, y1, z1, t0, t1 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(first, last + 1):
+        b = s.aids[kind, j % _AIDS]
+        early, late = b[0] <= a[0] + _MEAN, b[0] >= time - _MEAN
+        if not (early or late):
+            continue
+        off = (
+            rotation_vector(
+                multiply(conjugate(_apart(a, b, _AT + SAID)), _apart(a, b, _MEASURED + 3))
+            )
+            if kind == 0
+            else _field_off(a, b)
+        )
+        if early:
+            x0, y0, z0, t0, n = x0 + off[0], y0 + off[1], z0 + off[2], t0 + b[0], n + 1
+        else:
+            x1, y1, z1, t1, m = x1 + off[0], y1 + off[1], z1 + off[2], t1 + b[0], m + 1
+    if n < 2 or m < 2:
+        return
+    over = t1 / m - t0 / n
+    r = (
+        (x1 / m - x0 / n) / over,
+        (y1 / m - y0 / n) / over,
+        (z1 / m - z0 / n) / over,
+    )
+    if kind == 0:
+        r = (r[0] + bias[0], r[1] + bias[1], r[2] + bias[2])
+        noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about / over
+        _note(s, now, GP, 4, r, _GYRO_OFF_LONG + noise)
+    else:
+        b = s.aids[kind, last % _AIDS]
+        iron = _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
+        _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron / over)
+
+
+class Verdict(NamedTuple):
+    """What is known of who is wrong; times are in seconds."""
+
+    evidence: Evidence | None = None
+    since: float = -1.0  # of the trial that is on; -1: none
+    fired: float = -math.inf  # when a residual did last
+    suspects: Source = NOBODY
+    # By how much the biases of accelerometer [m/s^2] and gyro [rad/s] were unknown in this trial.
+    unknown: Vec2 = (0.0, 0.0)
+    explained: bool = False  # in this trial the rotors' model was named
+    leader: Source = NOBODY  # the one that is named once that is sure
+    sum: float = 0.0  # of its leads
+    wrong: Source = NOBODY  # not used
+    agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
+    named: Source = NOBODY  # by the last look
+    seen: tuple[object, ...] = (None, None, None)  # the last samples of pose, satellites, compass
+
+    @property
+    def is_on(self) -> bool:
+        """Whether sensors, or one and the rotors' model, contradict each other."""
+        return self.since >= 0.0
+
+    def acquitted(self) -> Verdict:
+        """The verdict after the trial is over."""
+        return self._replace(
+            since=-1.0,
+            suspects=NOBODY,
+            unknown=(0.0, 0.0),
+            explained=False,
+            leader=NOBODY,
+            sum=0.0,
+            named=NOBODY,
+        )
+
+    def on_ground(self, now: float) -> Verdict:
+        """The verdict at ``now`` [s] on the ground, where nothing is compared.
+
+        What was named is believed again after as long as if it agreed: its own checks are left.
+        """
+        agreed = tuple([now if since == math.inf else since for since in self.agreed])
+        wrong = self.wrong
+        for one, since in zip(Source, agreed, strict=True):
+            if now - since >= _AGREES:
+                wrong &= ~one
+        return self._replace(wrong=wrong, agreed=agreed)
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether that is so, and not because the rotors do not give what the model says."""
+        return self.is_on and self.suspects not in (NOBODY, Source.MODEL)
+
+
+def judged(
+    verdict: Verdict,
+    ratios: tuple[float, ...],
+    now: float,
+    *,
+    holds_attitude: bool,
+    lost: Source = NOBODY,
+    damaged: bool = False,
+    sizes: tuple[float, ...] = (0.0,) * COUNT,
+) -> Verdict:
+    """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
+
+    Their ``sizes`` are in SI. Where nothing that is used ``holds_attitude``, gyro and magnetometer
+    do. What is ``lost`` says nothing, and is known to be of no use without this law. Of a
+    ``damaged`` vehicle it is known that the rotors' model is off.
+    """
+    of = _sources(holds_attitude, verdict.wrong)
+    # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's.
+    known = range(AA if holds_attitude or verdict.wrong & Q else COUNT)
+    used = [k for k in known if not of[k] & (verdict.wrong | lost)]
+    fires = [k for k in used if ratios[k] > 1.0]
+    verdict = _with_return(verdict, ratios, of, now, lost)
+    if not fires:
+        if verdict.is_on and now - verdict.fired > _QUIET:
+            return verdict.acquitted()
+        return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
+    young = not verdict.is_on or now - verdict.since < _SHOWS
+    cost = _costs(ratios, sizes, of, used, verdict.wrong | lost, young)
+    first, *others = sorted(cost, key=cost.__getitem__)
+    lead = cost[others[0]] - cost[first] if others else math.inf
+    suspects = NOBODY
+    for one in cost:
+        # Of a bias that is too large the filter knows already.
+        if cost[one] - cost[first] < _LEAD and fires[0] < AA:
+            suspects |= one
+    leader = first if lead > _LEAD else NOBODY
+    total = lead if leader else 0.0
+    if leader and leader is verdict.leader:
+        total += verdict.sum
+    named = leader if total > _SURE else NOBODY
+    # What the rotors have been named for shows in some windows for longer than in others.
+    explained = verdict.explained or named is M or damaged
+    verdict = verdict._replace(
+        since=verdict.since if verdict.is_on else now,
+        fired=now,
+        suspects=M if explained else suspects,
+        explained=explained,
+        leader=leader,
+        sum=total,
+        named=named,
+    )
+    return verdict if not named or named is M else _convicted(verdict, named)
+
+
+def _convicted(verdict: Verdict, named: Source) -> Verdict:
+    agreed = list(verdict.agreed)
+    agreed[list(Source).index(named)] = math.inf
+    convicted = verdict._replace(wrong=verdict.wrong | named, agreed=tuple(agreed))
+    return convicted.acquitted()._replace(named=named)
+
+
+def _costs(
+    ratios: tuple[float, ...],
+    sizes: tuple[float, ...],
+    of: tuple[Source, ...],
+    used: list[int],
+    gone: Source,
+    young: bool,
+) -> dict[Source, float]:
+    """What each hypothesis costs, of a trial that is ``young`` or not."""
+    cost = {}
+    for one in Source:
+        if one & gone or not any(of[k] & one and ratios[k] > 0.0 for k in used):
+            continue
+        left = [k for k in used if not of[k] & one]
+        if one is Q:
+            # The filter has turned what is felt by it for as long as it agreed.
+            left = [k for k in left if k not in _OF_PLACES or sizes[k] > _TILTED]
+        cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in left)
+        cost[one] -= _DISTURBED if one is B else 0.0
+        cost[one] += _not_shown(one, ratios, sizes, used) if young else 0.0
+    if not any(ratios[k] > 1.0 for k in used if of[k] & Q):
+        cost.pop(Q, None)
+    if P in cost and cost.get(Q, math.inf) - cost[P] < _LEAD:
+        del cost[P]  # nothing contradicts its place
+    return cost
+
+
+def _not_shown(
+    one: Source, ratios: tuple[float, ...], sizes: tuple[float, ...], used: list[int]
+) -> float:
+    """What it costs that a half of the unit is off by more than it differs from the rotors."""
+    at_once, others = _SHOWN.get(one, (GM, ()))
+    fired = [sizes[k] for k in others if k in used and ratios[k] > 1.0]
+    if not fired or at_once not in used or not sizes[at_once] > 0.0:
+        return 0.0
+    threshold = sizes[at_once] / ratios[at_once]
+    unseen = max(max(fired) - sizes[at_once], 0.0)
+    return min((unseen / threshold) ** 2, _MOST)
+
+
+def at_start() -> Evidence:
+    """What is known before anything was compared."""
+    evidence = np.zeros(1, EVIDENCE)
+    evidence["silent"] = -math.inf
+    return evidence
+
+
+def note_silence(evidence: Evidence, silent: Source, now: float) -> Source:
+    """Note what says nothing of use at ``now`` [s]; what has not for the shortest window."""
+    for place, one in enumerate(Source):
+        if one & silent:
+            evidence[0]["silent"][place] = now
+    lost = NOBODY
+    for one, at in zip(Source, evidence[0]["silent"].tolist(), strict=True):
+        if now - at < _CONTAINED[0]:
+            lost |= one
+    return lost
+
+
+def size_of(evidence: Evidence, source: Source) -> float:
+    """The largest residual [SI] of a ``source`` that fires; 0: none does."""
+    s = evidence[0]
+    fired = np.where(s["ratio"] > 1.0, s["size"], 0.0)
+    return float(max(fired[k] for k in range(COUNT) if OF[k] & source))
+
+
+def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:
+    if holds_attitude:
+        return OF
+    # A magnetometer that is used turns the heading, and with it what is felt.
+    turn = G | B & ~wrong
+    return tuple([one | turn if k in (AN, MN) else one for k, one in enumerate(OF)])
+
+
+def _with_return(
+    verdict: Verdict,
+    ratios: tuple[float, ...],
+    of: tuple[Source, ...],
+    now: float,
+    lost: Source,
+) -> Verdict:
+    """The verdict with what was named and has agreed with all others for long believed again."""
+    if not verdict.wrong:
+        return verdict
+    agreed, wrong = list(verdict.agreed), verdict.wrong
+    for place, one in enumerate(Source):
+        if not one & wrong:
+            continue
+        others = (wrong | lost) & ~one
+        heard = [ratios[k] for k in range(COUNT) if of[k] & one and not of[k] & others]
+        if max(heard, default=0.0) > 1.0 or not any(heard):
+            agreed[place] = math.inf
+        elif agreed[place] == math.inf:
+            agreed[place] = now
+        elif now - agreed[place] >= _AGREES:
+            wrong &= ~one
+    return verdict._replace(wrong=wrong, agreed=tuple(agreed))

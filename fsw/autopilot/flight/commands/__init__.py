@@ -1,0 +1,1 @@
+"""What commands and arming are decided on: one file a question."""

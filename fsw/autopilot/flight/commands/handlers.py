@@ -1,0 +1,472 @@
+"""Command handlers: one pure function for each kind of command, which returns a decision."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from fsw.autopilot.flight.commands import arming
+from fsw.autopilot.flight.commands.bounds import motion_refusal, place_problem
+from fsw.autopilot.flight.commands.dedup import COURSE
+from fsw.autopilot.flight.modes.base import CommandContext, FlightMode
+from fsw.autopilot.flight.restart import RESTARTED
+from fsw.autopilot.flight.setpoints.generator import PositionGoal
+from fsw.autopilot.flight.setpoints.offboard import joints_refusal
+from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
+from fsw.autopilot.model.body import hull_reach
+from fsw.autopilot.shapes.zones import surface, surfaces
+from fsw.autopilot.signals import (
+    Arm,
+    ChangeSpeed,
+    Command,
+    CommandAction,
+    CommandResult,
+    Disarm,
+    FlyOrbit,
+    GoTo,
+    Home,
+    InjectFailure,
+    LookAt,
+    Mode,
+    MotionSetpoint,
+    MoveJoints,
+    Orbit,
+    Order,
+    Place,
+    Rejected,
+    SetHome,
+    SetMissionStep,
+    StartMission,
+    SwitchMode,
+    TakeOff,
+    Vec2,
+    Vec3,
+)
+from fsw.frozen import replace
+
+ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
+LATER: Final = CommandResult.TEMPORARILY_REJECTED
+MIN_SPEED: Final = 0.01  # m/s
+_CIRCLE_PLACES: Final = 64  # looked at, before the nearest is sought
+_CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from its last altitude
+_SETTINGS: Final = ("home", "mission_step", "look_at", "speed")  # of a decision
+
+
+@dataclass(frozen=True, slots=True)
+class NewHeading:
+    """Where the nose points from now on; a decision without one leaves the heading."""
+
+    place: Vec3 | None  # m; None: along the flight
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Result of a command and its effects."""
+
+    result: CommandResult
+    reason: str = ""  # of a refusal, or what the operator must read though it is accepted
+    alarming: bool = False
+    arm: bool = False
+    mode: Mode | None = None  # to switch to
+    intended_mode: Mode | None = None  # what arming is to lead to
+    stop: bool = False  # holding already, but perhaps on the way to a place
+    climb: float | None = None  # m, of a takeoff; None: the usual one
+    goal: PositionGoal | None = None
+    joints: Vec2 | None = None  # rad
+    home: Home | None = None
+    mission_step: int | None = None  # to fly next
+    look_at: NewHeading | None = None
+    speed: ChangeSpeed | None = None
+    restart: bool = False
+
+    @property
+    def changes(self) -> frozenset[str]:
+        """What another command may undo: COURSE, and the names of what stays set."""
+        named = {name for name in _SETTINGS if getattr(self, name) is not None}
+        ways = (self.mode, self.intended_mode, self.goal, self.joints)
+        if self.arm or self.stop or self.restart or any(way is not None for way in ways):
+            named.add(COURSE)
+        return frozenset(named)
+
+
+Modes = Mapping[Mode, FlightMode]
+
+
+def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
+    """Accept a command with its effects, or refuse it with a reason."""
+    handler = COMMAND_HANDLERS[type(command.action)]
+    decision: Decision = handler(command.action, context, modes)
+    if decision.alarming:
+        request = command.request
+        sender = f"{request.source_system}/{request.source_component}"
+        return replace(decision, reason=decision.reason.replace("{sender}", sender))
+    return decision
+
+
+def decide_without_estimate(command: Command, context: CommandContext, modes: Modes) -> Decision:
+    """The same before the first estimate: what needs one is put off."""
+    action = command.action
+    if isinstance(action, _NEED_NO_ESTIMATE) or action in _ORDERS_WITHOUT_ESTIMATE:
+        return decide(command, replace(context, estimate_valid=False, rests=True), modes)
+    return Decision(LATER, "command refused: there is no valid state estimate yet")
+
+
+def _reject(action: Rejected, context: CommandContext, modes: Modes) -> Decision:
+    """Refuse a command that the link could not decode.
+
+    What is not supported has no reason: ground stations probe for cameras, gimbals and much else,
+    and a text for each would hide the texts that matter.
+    """
+    return Decision(action.result, action.reason)
+
+
+def _arm(action: Arm, context: CommandContext, modes: Modes) -> Decision:
+    if context.mode is Mode.FAULT:
+        return Decision(LATER, "arm is not possible while fault: restart the flight software")
+    if context.mode is not Mode.DISARMED:
+        return Decision(ACCEPTED)
+    refusal = arming.refusal(context, force=action.force)
+    if refusal is not None:
+        return Decision(DENIED if arming.is_permanent(context) else LATER, refusal)
+    ignored = arming.refusal(context) if action.force else None
+    if ignored is not None:
+        return Decision(ACCEPTED, f"armed by force; {ignored}", alarming=True, arm=True)
+    return Decision(ACCEPTED, arm=True)
+
+
+def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
+    if not _is_armed(context):
+        return Decision(ACCEPTED)
+    if context.landed:
+        return Decision(ACCEPTED, mode=Mode.DISARMED)
+    if not action.force:
+        return Decision(LATER, "not disarmed: the vehicle is in the air; land first or force")
+    reason = "disarmed in the air, by force of {sender}: the rotors stop"
+    return Decision(ACCEPTED, reason, alarming=True, mode=Mode.DISARMED)
+
+
+def _switch_mode(action: SwitchMode, context: CommandContext, modes: Modes) -> Decision:
+    return _switch(action.mode, context, modes)
+
+
+def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
+    """Change the mode if everything that the new one needs is there."""
+    mode = modes[wanted]
+    if context.blocked:
+        return Decision(LATER, f"no {wanted.value}: {context.blocked}")
+    denial = mode.denial(context)
+    if denial is not None:
+        return Decision(DENIED, denial)
+    refusal = mode.refusal(context)
+    if refusal is not None:
+        return Decision(LATER, refusal)
+    if context.mode is Mode.DISARMED and mode.before_arming:
+        return Decision(ACCEPTED, intended_mode=wanted)
+    if context.mode is wanted:
+        return Decision(ACCEPTED, stop=wanted is Mode.HOLD)
+    current = modes.get(context.mode)
+    if current is None or not mode.can_follow(current):
+        return Decision(LATER, f"{wanted.value} is not possible while {context.mode.value}")
+    return Decision(ACCEPTED, mode=wanted)
+
+
+def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decision:
+    """Take off vertically; a command before arming takes effect at arming."""
+    decision = _switch(Mode.TAKEOFF, context, modes)
+    height = _height(action.to, context)
+    if height is None or Mode.TAKEOFF not in (decision.mode, decision.intended_mode):
+        return decision
+    here = -context.position[2]
+    least, most = context.climb_range
+    most = min(most, context.highest - here)
+    climb = height - here
+    if not least - _CLIMB_TOLERANCE <= climb <= most + _CLIMB_TOLERANCE:
+        range_text = f"{here + least:.1f} to {here + most:.1f} m"
+        reason = f"no takeoff: height {height:.1f} m above the origin is outside {range_text}"
+        return Decision(LATER, reason)
+    return replace(decision, climb=min(max(climb, least), most))
+
+
+def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
+    """Hold at another place, height or heading."""
+    refusal = _hovering_refusal(context)
+    if refusal is not None:
+        return Decision(LATER, f"no goto: {refusal}")
+    if context.mode is not Mode.HOLD and not action.may_switch_mode:
+        reason = "not in hold, and the command does not ask to change the mode"
+        return Decision(LATER, f"no goto: {reason}")
+    place = _place(action.place, context)
+    blocked = _out_of_bounds(place, context) or _too_close(place, context)
+    if blocked is not None:
+        return Decision(DENIED, f"no goto: {blocked}")
+    decision = _switch(Mode.HOLD, context, modes)
+    if decision.result != ACCEPTED:
+        return decision
+    motion, speed = MotionSetpoint(False, place, yaw=action.yaw), action.speed
+    refusal = motion_refusal(motion)
+    if refusal is not None or not (speed is None or 0.0 < speed < math.inf):
+        return Decision(DENIED, f"no goto: {refusal or 'speed out of range'}")
+    slower = ""
+    if speed is not None and speed > context.max_speed:
+        slower = f"goto at {context.max_speed:g} m/s: faster is not flown (STR_V_MAX)"
+    return replace(decision, goal=PositionGoal(motion, speed=speed), reason=slower)
+
+
+def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
+    refusal = _hovering_refusal(context)
+    if refusal is not None:
+        return Decision(LATER, f"no orbit: {refusal}")
+    centre, radius = _place(action.centre, context), action.radius
+    blocked = _out_of_bounds(centre, context) or _circle_too_close(centre, radius, context)
+    if blocked is not None:
+        return Decision(DENIED, f"no orbit: {blocked}")
+    most = max_orbit_speed(radius, context.yaw_rate, context.acceleration)
+    most = min(most, context.max_speed)
+    asked = min(context.speed, most) if action.speed is None else action.speed
+    decision = _switch(Mode.ORBIT, context, modes)
+    if decision.result != ACCEPTED:
+        return decision
+    flown = min(asked, most)
+    orbit = Orbit(
+        centre=centre, radius=radius, speed=flown, clockwise=action.clockwise, facing=action.facing
+    )
+    slower = f"orbit at {flown:.2f} m/s: faster cannot be flown at {radius:g} m"
+    goal = PositionGoal(MotionSetpoint(False, centre), orbit=orbit)
+    return replace(decision, goal=goal, reason=slower if asked > most else "")
+
+
+def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
+    """The nose, and so the arm's plane, turns to a place and follows it."""
+    if action.place is None:
+        return Decision(ACCEPTED, look_at=NewHeading(None))
+    place = _place(action.place, context)
+    far = place_problem(place)
+    if far is not None:
+        return Decision(DENIED, f"no region of interest: {far}")
+    if not _is_armed(context):
+        return Decision(LATER, "no region of interest: the vehicle is not armed")
+    return Decision(ACCEPTED, look_at=NewHeading(place))
+
+
+def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) -> Decision:
+    """Change the speed towards position goals; in a mission from the next segment."""
+    speed = action.speed
+    if speed is not None and not MIN_SPEED <= speed <= context.max_speed:
+        reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {context.max_speed:g} m/s"
+        return Decision(DENIED, f"speed unchanged: {reason}")
+    return Decision(ACCEPTED, speed=action)
+
+
+def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> Decision:
+    """Joint 1 as a share of its limit, joint 2 of the limit of both together."""
+    refusal = _hovering_refusal(context)
+    if refusal is None and context.mode is not Mode.HOLD:
+        refusal = f"the arm is not free while {context.mode.value}; hold first"
+    if refusal is not None:
+        return Decision(LATER, f"joints not moved: {refusal}")
+    airframe, (q1, q2) = context.airframe, context.joints
+    if action.joint1 is not None:
+        q1 = action.joint1 * airframe.joint1_limit
+    if action.joint2 is not None:
+        q2 = action.joint2 * airframe.joint12_limit
+    refusal = joints_refusal((q1, q2), airframe)
+    if refusal is not None:
+        return Decision(DENIED, f"joints not moved: {refusal}")
+    return Decision(ACCEPTED, joints=(q1, q2))
+
+
+def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decision:
+    if not context.estimate_valid:
+        return Decision(LATER, "home not set: the estimate is invalid")
+    place = context.position if action.place is None else _place(action.place, context)
+    far = place_problem(place)
+    if far is not None:
+        return Decision(DENIED, f"home not set: {far}")
+    return Decision(ACCEPTED, home=Home(place, context.yaw))
+
+
+def _start_mission(action: StartMission, context: CommandContext, modes: Modes) -> Decision:
+    """Start the mission; this arms a disarmed vehicle, as in PX4."""
+    first, total = action.first, context.mission.total
+    if 0.0 < action.last < total - 1:
+        return Decision(DENIED, "no mission: it can only be flown to its last step")
+    decision = _switch(Mode.MISSION, context, modes)
+    if decision.result == ACCEPTED and context.mode is Mode.DISARMED:
+        armed = _arm(Arm(), context, modes)
+        decision = replace(armed, intended_mode=Mode.MISSION) if armed.arm else armed
+    if decision.result != ACCEPTED or not first > 0.0:
+        return decision
+    if not first < total:
+        return Decision(DENIED, _no_step(first, total))
+    return replace(decision, mission_step=int(first))
+
+
+def _set_mission_step(action: SetMissionStep, context: CommandContext, modes: Modes) -> Decision:
+    number, total = action.number, context.mission.total
+    if number == -1.0:
+        number = 0.0 if action.reset else float(context.mission.current)
+    if not 0.0 <= number < total:
+        return Decision(DENIED, _no_step(number, total))
+    return Decision(ACCEPTED, mission_step=int(number))
+
+
+def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes) -> Decision:
+    """The simulator answers; a vehicle without one never does."""
+    if not context.failures_allowed:
+        return Decision(DENIED, "no failure injected: SYS_FAILURE_EN is 0; set it to 1 to allow it")
+    return Decision(CommandResult.IN_PROGRESS)
+
+
+def _order(action: Order, context: CommandContext, modes: Modes) -> Decision:
+    return _ORDERS[action](context, modes)
+
+
+def _terminate(context: CommandContext, modes: Modes) -> Decision:
+    """Stop the rotors until the flight software is restarted."""
+    if not _is_armed(context):
+        return Decision(DENIED, "not terminated: the vehicle is not armed")
+    reason = "flight terminated by {sender}: the rotors stop"
+    return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
+
+
+def _pause_mission(context: CommandContext, modes: Modes) -> Decision:
+    """Hold where the vehicle is."""
+    if context.mode not in (Mode.MISSION, Mode.HOLD):
+        return Decision(LATER, f"not paused: no mission is flown while {context.mode.value}")
+    return _switch(Mode.HOLD, context, modes)
+
+
+def _continue_mission(context: CommandContext, modes: Modes) -> Decision:
+    """Go on with the current step."""
+    return _switch(Mode.MISSION, context, modes)
+
+
+def _check_arming(context: CommandContext, modes: Modes) -> Decision:
+    if _is_armed(context):
+        return Decision(LATER, "no checks: the vehicle is armed")
+    refusal = arming.refusal(context)
+    if refusal is not None and context.mode is Mode.FAULT:
+        return Decision(DENIED, refusal)
+    return Decision(ACCEPTED, refusal or "ready to arm")
+
+
+def _restart(context: CommandContext, modes: Modes) -> Decision:
+    """Begin anew: what had failed is well again, says the operator."""
+    if _is_armed(context):
+        return Decision(DENIED, "not restarted: the vehicle is armed; disarm first")
+    if not context.rests:
+        return Decision(LATER, "not restarted: the vehicle must have been at rest for a second")
+    if context.mode is Mode.FAULT:
+        reason = f"{RESTARTED} by {{sender}}; the termination is over"
+        return Decision(ACCEPTED, reason, alarming=True, restart=True)
+    return Decision(ACCEPTED, RESTARTED, restart=True)
+
+
+def _nothing(context: CommandContext, modes: Modes) -> Decision:
+    return Decision(ACCEPTED)
+
+
+_ORDERS: Final[dict[Order, Callable[[CommandContext, Modes], Decision]]] = {
+    Order.TERMINATE: _terminate,
+    Order.PAUSE_MISSION: _pause_mission,
+    Order.CONTINUE_MISSION: _continue_mission,
+    Order.CHECK_ARMING: _check_arming,
+    Order.RESTART: _restart,
+    Order.NOTHING: _nothing,
+}
+
+_Handler = Callable[[Any, CommandContext, Modes], Decision]
+COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
+    Arm: _arm,
+    Disarm: _disarm,
+    SwitchMode: _switch_mode,
+    TakeOff: _take_off,
+    GoTo: _go_to,
+    FlyOrbit: _orbit,
+    LookAt: _look_at,
+    ChangeSpeed: _change_speed,
+    MoveJoints: _move_joints,
+    SetHome: _set_home,
+    StartMission: _start_mission,
+    SetMissionStep: _set_mission_step,
+    InjectFailure: _inject_failure,
+    Order: _order,
+    Rejected: _reject,
+}
+# The vehicle cannot be armed then, and so is not.
+_NEED_NO_ESTIMATE: Final = (Arm, Disarm, InjectFailure, Rejected)
+_ORDERS_WITHOUT_ESTIMATE: Final = frozenset(
+    {Order.TERMINATE, Order.CHECK_ARMING, Order.RESTART, Order.NOTHING}
+)
+
+
+def _is_armed(context: CommandContext) -> bool:
+    return context.mode not in (Mode.DISARMED, Mode.FAULT)
+
+
+def _hovering_refusal(context: CommandContext) -> str | None:
+    """Why the vehicle cannot accept a position goal now."""
+    if not _is_armed(context):
+        return "the vehicle is not armed"
+    return "the vehicle is on the ground; take off first" if context.landed else None
+
+
+def _height(place: Place, context: CommandContext) -> float | None:
+    """Height above the origin [m], None if the command gives none."""
+    if place.height is None or not place.above_home:
+        return place.height
+    return place.height - (context.home.p[2] if context.home is not None else 0.0)
+
+
+def _place(place: Place, context: CommandContext) -> Vec3:
+    """Position in the local frame [m]; coordinates that are not given stay as they are."""
+    north, east = place.north_east or context.position[:2]
+    height = _height(place, context)
+    return north, east, context.position[2] if height is None else -height
+
+
+def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
+    """Why the body is not to be at a place, whatever the safe set."""
+    far = place_problem(place)
+    if far is not None:
+        return far
+    least, most = context.airframe.leg_length + context.climb_range[0], context.highest
+    if not -place[2] >= least:
+        return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
+    if not -place[2] <= most:
+        return f"{-place[2]:.1f} m above the origin is too high; the maximum is {most:g} m"
+    return None
+
+
+def _too_close(place: Vec3, context: CommandContext) -> str | None:
+    """Why the body cannot be at a place."""
+    for number, at in enumerate(surfaces(context.safe_set, place, context.now_us), start=1):
+        if not at.distance > hull_reach(context.body, at.normal):
+            return f"the place is too close to zone {number} of the safe set, or beyond it"
+    return None
+
+
+def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
+    """Why the body cannot fly a circle."""
+    for number in range(len(context.safe_set.zones)):
+
+        def room(angle: float, number: int = number) -> float:
+            x, y, z = centre
+            place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
+            at = surface(context.safe_set, number, place, context.now_us)
+            return 1.0 if at is None else at.distance - hull_reach(context.body, at.normal)
+
+        # The nearest of some places on the circle, then of as many between its neighbours.
+        apart, best = math.pi, 0.0  # rad
+        for _ in range(2):
+            begin, apart = best - apart, 2.0 * apart / _CIRCLE_PLACES
+            best = min((begin + apart * k for k in range(_CIRCLE_PLACES + 1)), key=room)
+        if not room(best) > 0.0:
+            return f"the circle comes too close to zone {number + 1} of the safe set"
+    return None
+
+
+def _no_step(number: float, total: int) -> str:
+    return f"there is no mission step {number:g}; {total} were uploaded"

@@ -1,0 +1,188 @@
+"""When a condition of the failsafe table is active."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.flight.safety.uncertain_clearance import SHORTFALL
+from fsw.autopilot.flight.state import FlightState, LostSensor
+from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits
+from fsw.autopilot.periods import TICK_US
+from fsw.autopilot.signals import Mode, StateEstimate
+from fsw.frozen import dataclass
+
+PLAN_STALE_PERIODS: Final = 3
+INVALID_TICKS: Final = 10_000 // TICK_US  # without an estimate
+# A filter that starts anew has poses that agree long before.
+BLIND_TICKS: Final = 250_000 // TICK_US
+# Of a second's, that are too many. A gap of 50 ms, in which the rotors hold their last
+# command, is 25 of 2 ms, of which at least 12 are in the same second.
+MISSED_TICKS: Final = 10
+JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
+JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
+_HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be believed again
+_LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
+
+
+@dataclass(frozen=True, slots=True)
+class FailsafeContext:
+    """What the table looks at, once a tick: all that the vehicle knows, and its limits."""
+
+    state: FlightState
+    estimate: StateEstimate
+    config: FlightConfig
+    against: str = ""  # which parameters contradict each other, whatever the safe set
+
+    @property
+    def limits(self) -> FlightLimits:
+        """Timeouts, and the parameters of actions."""
+        return self.config.limits
+
+    @property
+    def gcs_silent_us(self) -> int:
+        """Time since a ground station was heard."""
+        return self.estimate.t_us - self.state.vehicle.gcs_heard_us
+
+    @property
+    def contradiction(self) -> str:
+        """Which parameters contradict each other, or the safe set in force; empty: none."""
+        refusals = self.state.mission.refusals
+        return "; ".join((self.against, *refusals) if self.against else refusals)
+
+
+def plan_age_us(context: FailsafeContext) -> int:
+    """Since the running plan began, or the vehicle was taken over."""
+    return context.estimate.t_us - context.state.plan.since_us
+
+
+def plans(context: FailsafeContext) -> bool:
+    """Whether a plan is being flown, or should be."""
+    vehicle = context.state.vehicle
+    return vehicle.flies and vehicle.unloaded is None and vehicle.mode is not Mode.DESCEND
+
+
+def plan_is_stale(context: FailsafeContext) -> bool:
+    """In flight, the running plan (or taking over) began more than three periods ago."""
+    stale_us = PLAN_STALE_PERIODS * context.config.planner.period_us
+    return plan_age_us(context) > stale_us and plans(context)
+
+
+def planner_is_lost(context: FailsafeContext) -> bool:
+    """In flight, no plan has begun for COM_PLN_LOSS_T."""
+    vehicle = context.state.vehicle
+    plans = vehicle.flies and vehicle.unloaded is None
+    return plans and plan_age_us(context) > context.limits.planner_loss_us
+
+
+def setpoints_are_lost(context: FailsafeContext) -> bool:
+    """In Offboard, or while its failsafe lasts, no setpoint for COM_OF_LOSS_T."""
+    vehicle = context.state.vehicle
+    if Mode.OFFBOARD is not vehicle.mode and (
+        Mode.OFFBOARD is not vehicle.failsafe_from
+        or Condition.SETPOINTS_LOST not in vehicle.conditions
+    ):
+        return False
+    timeout_us = context.limits.setpoint_timeout_us
+    return not context.state.offboard.is_fresh(context.estimate.t_us, timeout_us)
+
+
+def datalink_is_lost(context: FailsafeContext) -> bool:
+    """There was a ground station, and it has been silent for COM_DL_LOSS_T."""
+    if context.state.vehicle.gcs_heard_us < 0:
+        return False  # there never was one
+    return context.gcs_silent_us >= context.limits.station_timeout_us
+
+
+def lacks_room(context: FailsafeContext) -> bool:
+    """In flight, for half a second, walls leave less than clearances should grow by."""
+    kept = context.state.kept
+    lasts = context.estimate.t_us - kept.sufficient_us >= _LACKING_US
+    return kept.shortfall > SHORTFALL and lasts and context.state.vehicle.flies
+
+
+def is_unaided(context: FailsafeContext) -> bool:
+    """In flight, no position could be used for COM_AID_LOSS_T."""
+    aiding = context.state.aiding
+    return aiding.unaided_us >= context.limits.aiding_loss_us and context.state.vehicle.flies
+
+
+def is_blind(context: FailsafeContext) -> bool:
+    """Nothing is known but what was known: sensors say what is not a number, for example."""
+    return context.state.invalid_ticks >= BLIND_TICKS
+
+
+def attitude_is_lost(context: FailsafeContext) -> bool:
+    """In flight, roll or pitch is uncertain by more than COM_ATT_LOSS, or nothing is known."""
+    known = context.state.aiding.attitude_sigma <= context.limits.attitude_loss
+    return (not known or is_blind(context)) and context.state.vehicle.flies
+
+
+def position_is_off(context: FailsafeContext, most: float) -> bool:
+    """Positions are missing, and the estimate has drifted by more than ``most`` [m] perhaps."""
+    return is_unaided(context) and not context.state.aiding.position_sigma <= most
+
+
+def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
+    """Those that have been of no use for COM_SENS_LOSS_T, but for those that give the position."""
+    since_us = context.estimate.t_us - context.limits.sensor_loss_us
+    return tuple([one for one in context.state.aiding.lost if one.since_us <= since_us])
+
+
+def sensor_is_lost(context: FailsafeContext) -> bool:
+    """In flight, at least one of ``lost_sensors``."""
+    return bool(lost_sensors(context)) and context.state.vehicle.flies
+
+
+def sensors_contradict(context: FailsafeContext, seconds: float) -> bool:
+    """In flight, sensors contradict each other for so many ``seconds`` [s], whoever is wrong."""
+    disputed_us = context.state.aiding.disputed_us
+    return disputed_us > 1e6 * seconds and context.state.vehicle.flies
+
+
+def inertial_is_lost(context: FailsafeContext) -> bool:
+    """In flight, the inertial unit was of no use for a while, and no pose holds the attitude.
+
+    Satellites and rotors hold it for longer where only one half of the unit is lost.
+    """
+    aiding, now_us = context.state.aiding, context.estimate.t_us
+    held = aiding.holds_attitude(context.limits.aiding_loss_us)
+    if held or not context.state.vehicle.flies:
+        return False
+    return any(
+        one.sensor is Sensor.IMU
+        and now_us - one.since_us > (0 if one.fault is SensorFault.STALE else _HALF_LOST_US)
+        for one in lost_sensors(context)
+    )
+
+
+def tilt_is_lost(context: FailsafeContext) -> bool:
+    """Roll or pitch has been above FD_FAIL_R or FD_FAIL_P for the time of each, PX4's."""
+    safety = context.state.safety
+    if safety.rolled_us < 0 and safety.pitched_us < 0:
+        return False
+    limits, now_us = context.limits, context.estimate.t_us
+    over = 0 <= safety.rolled_us <= now_us - limits.roll_failure_us
+    return over or 0 <= safety.pitched_us <= now_us - limits.pitch_failure_us
+
+
+def way_home_s(context: FailsafeContext) -> float:
+    """Time to return and land from here [s], with RTL_TIME_FACTOR and RTL_TIME_MARGIN."""
+    home, limits = context.state.vehicle.home, context.limits
+    if home is None:
+        return 0.0
+    (x, y, z), (hx, hy, hz) = context.estimate.p_WB, home.p
+    cruise = context.config.steering.cruise_speed
+    top = min(z, hz - limits.return_height)
+    wait = max(limits.return_wait, 0.0)
+    seconds = (math.hypot(x - hx, y - hy) + z - top) / cruise + wait
+    seconds += max(hz - top, 0.0) / limits.land_speed
+    return limits.return_time_factor * seconds + limits.return_time_margin
+
+
+def flight_time_is_short(context: FailsafeContext) -> bool:
+    """In flight, the battery lasts no longer than the way home takes."""
+    left = context.state.battery.time_left
+    return context.state.vehicle.flies and left < way_home_s(context)

@@ -1,0 +1,466 @@
+"""The failsafe table: when a condition is active, and what the vehicle does about it.
+
+A condition is reported once, when it becomes active. The strongest action that any active condition
+asks for is taken, for as long as no command of the pilot overrides it: that is
+``response.py``. Some actions are parameters, in PX4's names and numbers. To act on another
+condition, name it in ``conditions.py`` and add a row; docs/reference/failsafes.md is made from the
+rows and what ``docs/pages/failsafes.toml`` says of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from fsw.autopilot.estimation.faults.redundancy import UNDECIDED
+from fsw.autopilot.flight.commands.arming import Subject
+from fsw.autopilot.flight.failsafe import actions as actions
+from fsw.autopilot.flight.failsafe import evidence as evidence
+from fsw.autopilot.flight.failsafe import wording as wording
+from fsw.autopilot.flight.failsafe.conditions import Action, Condition
+from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
+from fsw.autopilot.flight.safety.zone_room import is_deep
+from fsw.autopilot.periods import PLANNING_US, TICK_US
+from fsw.autopilot.signals import BatteryWarning, Severity
+
+AT_ONCE_US: Final = TICK_US
+SLOW_US: Final = PLANNING_US  # after which the other rows are looked at again
+SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
+
+Evidence = Callable[[FailsafeContext], bool]
+
+
+class UserTakeoverAllowed(Enum):
+    """Whether the pilot can fly another mode while a condition acts, in PX4's words."""
+
+    ALWAYS = "always"
+    NEVER = "never"  # nothing but Descend can be flown
+
+
+@dataclass(frozen=True, slots=True)
+class Failsafe:
+    """One row of the table."""
+
+    condition: Condition
+    active: Evidence
+    action: Callable[[FailsafeContext], Action]
+    severity: Severity = Severity.WARNING  # of a report without a change of mode
+    detail: Callable[[FailsafeContext], str] = lambda _: ""  # behind the condition's name
+    of_vehicle: bool = False  # a fault of the vehicle, shown by telemetry for as long as it lasts
+    slow: bool = False  # looked at once a planning period, not every tick
+    delayed: bool = False  # holds for COM_FAIL_ACT_T before it returns or lands
+    within_us: int = AT_ONCE_US  # until it is reported, beyond the time of a parameter
+    parameters: tuple[str, ...] = ()  # that belong to it
+    component: Subject | None = None  # which is reported as unhealthy while it lasts
+    takeover: UserTakeoverAllowed = UserTakeoverAllowed.ALWAYS
+
+
+def _always(action: Action) -> Callable[[FailsafeContext], Action]:
+    return lambda _: action
+
+
+_SLOWLY: Final = SLOW_US + AT_ONCE_US
+_TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
+
+FAILSAFES: Final = (
+    Failsafe(
+        Condition.ATTITUDE_LOST,
+        evidence.attitude_is_lost,
+        _always(Action.TERMINATE),
+        Severity.EMERGENCY,
+        lambda c: ": no estimate for 0.25 s" if evidence.is_blind(c) else wording.unaided(c),
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("COM_ATT_LOSS",),
+        component=Subject.ATTITUDE,
+    ),
+    Failsafe(
+        Condition.TILT_LOST,
+        evidence.tilt_is_lost,
+        actions.on_tilt_lost,
+        Severity.EMERGENCY,
+        wording.tilted,
+        of_vehicle=True,
+        parameters=(
+            *("FD_FAIL_R", "FD_FAIL_R_TTRI", "FD_FAIL_P", "FD_FAIL_P_TTRI"),
+            "CBRK_FLIGHTTERM",
+        ),
+        component=Subject.ATTITUDE,
+    ),
+    Failsafe(
+        Condition.POSITION_LOST,
+        lambda c: evidence.position_is_off(c, c.limits.position_lost),
+        _always(Action.DESCEND),
+        Severity.CRITICAL,
+        wording.uncertain,
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("COM_AID_LOSS_T", "COM_POS_FS_EPH"),
+        component=Subject.ESTIMATOR,
+        takeover=UserTakeoverAllowed.NEVER,
+    ),
+    Failsafe(
+        Condition.PLANNER_LOST,
+        evidence.planner_is_lost,
+        _always(Action.DESCEND),
+        Severity.CRITICAL,
+        wording.no_plan,
+        of_vehicle=True,
+        slow=True,
+        within_us=_SLOWLY,
+        parameters=("COM_PLN_LOSS_T",),
+        takeover=UserTakeoverAllowed.NEVER,
+    ),
+    Failsafe(
+        Condition.BREACH,
+        lambda c: c.state.safety.breach_us >= 0,
+        lambda c: actions.on_breach(c, c.limits.breach_action),
+        Severity.CRITICAL,
+        detail=lambda c: wording.by_mm(c.state.safety.breach_by),
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("SAFE_BREACH_ACT",),
+    ),
+    Failsafe(
+        Condition.FENCE_BREACH,
+        lambda c: c.state.safety.fence_us >= 0,
+        lambda c: actions.on_breach(c, c.limits.fence_action),
+        Severity.CRITICAL,
+        detail=lambda c: wording.by_mm(c.state.safety.fence_by),
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("GF_ACTION",),
+    ),
+    Failsafe(
+        Condition.FAR_OUTSIDE,
+        lambda c: is_deep(c.state.constraints) and c.state.vehicle.flies,
+        actions.on_far_outside,
+        Severity.CRITICAL,
+        of_vehicle=True,
+        slow=True,
+        delayed=True,
+        within_us=_TWICE,
+        parameters=("SAFE_BREACH_ACT", "COM_FAIL_ACT_T"),
+    ),
+    Failsafe(
+        Condition.ROTOR_LOST,
+        lambda c: c.state.damage.report.lost and c.state.vehicle.flies,
+        actions.on_rotor_lost,
+        Severity.EMERGENCY,
+        detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
+        of_vehicle=True,
+        parameters=("FD_ACT_EN", "CBRK_FLIGHTTERM"),
+        component=Subject.ACTUATORS,
+    ),
+    Failsafe(
+        Condition.ROTOR_FAILED,
+        lambda c: bool(c.state.damage.rotor) and c.state.vehicle.flies,
+        actions.on_rotor_failed,
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
+        of_vehicle=True,
+        slow=True,
+        within_us=_SLOWLY,
+        parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
+        component=Subject.ACTUATORS,
+    ),
+    Failsafe(
+        Condition.JOINT_FAILED,
+        lambda c: bool(c.state.damage.joint) and c.state.vehicle.flies,
+        actions.on_actuator_failure,
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.damage.joint}{wording.lasting(c, c.state.damage.joint_us)}",
+        of_vehicle=True,
+        slow=True,
+        within_us=_SLOWLY,
+        parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
+        component=Subject.ACTUATORS,
+    ),
+    Failsafe(
+        Condition.POSITION_LOW,
+        lambda c: evidence.position_is_off(c, c.limits.position_low),
+        lambda c: actions.by_number(c.limits.position_low_action),
+        Severity.CRITICAL,
+        wording.uncertain,
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("COM_AID_LOSS_T", "COM_POS_LOW_EPH", "COM_POS_LOW_ACT"),
+        component=Subject.ESTIMATOR,
+    ),
+    Failsafe(
+        Condition.SENSOR_LOST,
+        evidence.sensor_is_lost,
+        lambda c: actions.by_number(c.limits.sensor_loss_action),
+        Severity.CRITICAL,
+        wording.lost_sensor,
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
+        component=Subject.SENSORS,
+    ),
+    Failsafe(
+        Condition.INERTIAL_LOST,
+        evidence.inertial_is_lost,
+        _always(Action.DESCEND),
+        Severity.CRITICAL,
+        wording.lost_sensor,
+        of_vehicle=True,
+        slow=True,
+        within_us=_TWICE,
+        parameters=("COM_SENS_LOSS_T",),
+        component=Subject.SENSORS,
+    ),
+    Failsafe(
+        Condition.SENSORS_UNDECIDED,
+        lambda c: evidence.sensors_contradict(c, UNDECIDED),
+        _always(Action.LAND),
+        Severity.CRITICAL,
+        wording.suspects,
+        of_vehicle=True,
+        slow=True,
+        within_us=_TWICE,
+        component=Subject.SENSORS,
+    ),
+    Failsafe(
+        Condition.SENSORS_CONTRADICT,
+        lambda c: evidence.sensors_contradict(c, 0.1),
+        _always(Action.RETREAT),
+        Severity.CRITICAL,
+        wording.suspects,
+        of_vehicle=True,
+        slow=True,
+        within_us=_TWICE,
+        component=Subject.SENSORS,
+    ),
+    Failsafe(
+        Condition.ROOM_LACKING,
+        evidence.lacks_room,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {1e3 * c.state.kept.shortfall:.0f} mm less than SAFE_SIGMAS asks for",
+        slow=True,
+        within_us=_TWICE,
+        parameters=("SAFE_SIGMAS",),
+    ),
+    Failsafe(
+        Condition.TUBE_LEFT,
+        lambda c: c.state.safety.off_plan_us >= 0,
+        _always(Action.REPLAN),
+        Severity.CRITICAL,
+        detail=lambda c: wording.by_mm(c.state.safety.off_plan_by),
+        of_vehicle=True,
+        within_us=2 * AT_ONCE_US,
+    ),
+    Failsafe(
+        Condition.FILTER_ACTIVE,
+        lambda c: c.state.safety.filter_us >= 0,
+        _always(Action.PUSH),
+        Severity.CRITICAL,
+        of_vehicle=True,
+        within_us=2 * AT_ONCE_US,
+    ),
+    Failsafe(
+        Condition.PLAN_STALE,
+        evidence.plan_is_stale,
+        _always(Action.BRAKE),
+        detail=wording.no_plan,
+        of_vehicle=True,
+    ),
+    Failsafe(
+        Condition.AIDING_LOST,
+        evidence.is_unaided,
+        _always(Action.DEAD_RECKON),
+        detail=wording.unaided,
+        of_vehicle=True,
+        within_us=_SLOWLY,
+        parameters=("COM_AID_LOSS_T",),
+        component=Subject.ESTIMATOR,
+    ),
+    Failsafe(
+        Condition.ESTIMATE_INVALID,
+        lambda c: c.state.invalid_ticks >= evidence.INVALID_TICKS,
+        _always(Action.WARN),
+        of_vehicle=True,
+        component=Subject.ESTIMATOR,
+    ),
+    Failsafe(
+        Condition.OUTPUT_NOT_FINITE,
+        lambda c: c.state.output_replaced,
+        _always(Action.WARN),
+        of_vehicle=True,
+        within_us=2 * AT_ONCE_US,
+        component=Subject.ACTUATORS,
+    ),
+    Failsafe(
+        Condition.PLAN_REFUSED,
+        lambda c: c.state.plan.refused,
+        _always(Action.WARN),
+        detail=wording.refused_plan,
+        of_vehicle=True,
+        within_us=2 * AT_ONCE_US,
+    ),
+    Failsafe(
+        Condition.PLAN_LATE,
+        # In every tick: a plan may come before the next look, and would have been late in silence.
+        lambda c: c.state.plan.awaited_missed and evidence.plans(c),
+        _always(Action.WARN),
+        within_us=2 * AT_ONCE_US,
+    ),
+    Failsafe(
+        Condition.TIME_JUMPED,
+        lambda c: (
+            c.state.safety.jumped_us >= 0
+            and c.estimate.t_us - c.state.safety.jumped_us < evidence.JUMP_SHOWN_US
+        ),
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        wording.jumped,
+        slow=True,
+        within_us=_SLOWLY,
+    ),
+    Failsafe(
+        Condition.LOOP_OVERRUN,
+        lambda c: c.state.host.missed_ticks >= evidence.MISSED_TICKS,
+        _always(Action.WARN),
+        detail=lambda c: f": {c.state.host.missed_ticks} in the last second",
+        slow=True,
+        within_us=SECOND_US,
+    ),
+    Failsafe(
+        Condition.CLOCK_JUMPED,
+        lambda c: abs(c.state.host.clock_jump_us) >= evidence.JUMP_US,
+        _always(Action.WARN),
+        detail=lambda c: f" by {1e-6 * c.state.host.clock_jump_us:+.1f} s",
+        slow=True,
+        within_us=SECOND_US,
+    ),
+    Failsafe(
+        Condition.LINK_FLOODED,
+        lambda c: c.state.host.datagrams > c.limits.flood_rate,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.host.datagrams} datagrams in the last second",
+        slow=True,
+        within_us=SECOND_US,
+        parameters=("COM_FLOOD_RATE",),
+    ),
+    Failsafe(
+        Condition.LOG_STOPPED,
+        lambda c: bool(c.state.host.log_failure),
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.host.log_failure}",
+        slow=True,
+        within_us=SECOND_US,
+        parameters=("COM_ARM_SDCARD",),
+        component=Subject.STORAGE,
+    ),
+    Failsafe(
+        Condition.DISK_FULL,
+        lambda c: c.state.host.disk_left_us >= 0,
+        _always(Action.WARN),
+        Severity.CRITICAL,
+        detail=lambda c: f": room for {1e-6 * c.state.host.disk_left_us:.0f} s of the flight log",
+        slow=True,
+        within_us=SECOND_US,
+        component=Subject.STORAGE,
+    ),
+    Failsafe(
+        Condition.SETPOINTS_LOST,
+        evidence.setpoints_are_lost,
+        actions.on_setpoints_lost,
+        detail=wording.refused_setpoints,
+        parameters=("COM_OF_LOSS_T", "COM_OBL_RC_ACT"),
+    ),
+    Failsafe(
+        Condition.ZONES_SILENT,
+        lambda c: c.state.mission.silent_zones > 0,
+        _always(Action.WARN),  # a place to go to is not known: nothing is known of the zone
+        Severity.CRITICAL,
+        detail=lambda c: f": {c.state.mission.silent_zones} held where predicted",
+        slow=True,
+        within_us=_TWICE,
+        parameters=("SAFE_MOVE_T",),
+    ),
+    Failsafe(
+        Condition.DATALINK_LOST,
+        evidence.datalink_is_lost,
+        actions.on_datalink_lost,
+        detail=lambda c: f" for {c.gcs_silent_us * 1e-6:.0f} s",
+        slow=True,
+        delayed=True,
+        within_us=_SLOWLY,
+        parameters=("COM_DL_LOSS_T", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
+    ),
+    Failsafe(
+        Condition.FLIGHT_TIME_LOW,
+        evidence.flight_time_is_short,
+        lambda c: actions.by_number(c.limits.flight_time_action),
+        detail=wording.time_left,
+        slow=True,
+        delayed=True,
+        within_us=_TWICE,
+        parameters=(
+            *("RTL_TIME_FACTOR", "RTL_TIME_MARGIN", "COM_FLTT_LOW_ACT"),
+            "COM_FAIL_ACT_T",
+        ),
+    ),
+    Failsafe(
+        Condition.BATTERY_LOW,
+        lambda c: c.state.battery.charge is BatteryWarning.LOW,
+        actions.on_battery,
+        detail=wording.charge_left,
+        slow=True,
+        within_us=_TWICE,
+        parameters=("BAT_LOW_THR",),
+        component=Subject.BATTERY,
+    ),
+    Failsafe(
+        Condition.BATTERY_CRITICAL,
+        lambda c: c.state.battery.charge is BatteryWarning.CRITICAL,
+        actions.on_battery,
+        Severity.CRITICAL,
+        wording.charge_left,
+        slow=True,
+        delayed=True,
+        within_us=_TWICE,
+        parameters=("BAT_CRIT_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
+        component=Subject.BATTERY,
+    ),
+    Failsafe(
+        Condition.BATTERY_EMERGENCY,
+        lambda c: c.state.battery.charge is BatteryWarning.EMERGENCY,
+        actions.on_battery,
+        Severity.EMERGENCY,
+        wording.charge_left,
+        slow=True,
+        delayed=True,
+        within_us=_TWICE,
+        parameters=("BAT_EMERGEN_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
+        component=Subject.BATTERY,
+    ),
+    Failsafe(
+        Condition.PARAMETERS_CONTRADICT,
+        lambda c: bool(c.contradiction),
+        _always(Action.WARN),
+        detail=lambda c: f": {c.contradiction}",
+        slow=True,
+        within_us=_SLOWLY,
+    ),
+)
+
+ROWS: Final = {row.condition: row for row in FAILSAFES}
+FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
+BLOCKING: Final = frozenset(
+    row.condition for row in FAILSAFES if row.takeover is UserTakeoverAllowed.NEVER
+)
+
+
+def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
+    """Those of the active conditions that make a component unhealthy, by name.
+
+    On the ground the arming checks say it. They are about arming, and an armed vehicle has none.
+    """
+    return tuple([one.value for one in conditions if ROWS[one].component is not None])

@@ -1,0 +1,1 @@
+"""The steps of an uploaded mission, and the way between its places."""

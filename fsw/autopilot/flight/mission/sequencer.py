@@ -1,0 +1,354 @@
+"""A mission in flight: which step, which segment, and what follows; pure.
+
+Each step that names a place is one segment from rest to rest (``trajectory_segment.py``), a stay
+there, and the next step. A circle begins with the straight one to its nearest point. A step is
+reached where the end-effector really is within its acceptance.
+A place that the vehicle cannot get to, beyond a wall say, is given up after a while, with a text
+and without being called reached.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+from fsw.autopilot.flight.commands.bounds import MOVES_NOTHING
+from fsw.autopilot.flight.mission.trajectory_segment import (
+    TOO_NEAR_TO_LOOK,
+    CircleSegment,
+    MotionLimits,
+    Segment,
+    braking_segment,
+    circle_from,
+    segment_to,
+)
+from fsw.autopilot.flight.setpoints.reference_governor import project_to_safe_set
+from fsw.autopilot.signals import (
+    MAX_MISSION_SPEED,
+    EndEffectorTarget,
+    Home,
+    MissionAction,
+    MissionProgress,
+    MissionState,
+    MissionStep,
+    Mode,
+    SafeSet,
+    Vec2,
+    Vec3,
+)
+
+ARRIVAL_TIMEOUT_US = 5_000_000  # at the end of a segment, for the end-effector to arrive
+
+
+class Stage(Enum):
+    """What the vehicle does about its current step."""
+
+    IDLE = "idle"  # the mission is not being flown
+    BEGIN = "begin"
+    BRAKE = "brake"  # before it begins with another step
+    MOVE = "move"
+    ARRIVE = "arrive"
+    STAY = "stay"
+    GONE = "gone"  # handed over to Land or Return
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFlight:
+    """What the vehicle remembers of its mission."""
+
+    steps: tuple[MissionStep, ...] = ()
+    stage: Stage = Stage.IDLE
+    segment: Segment | None = None
+    place: Vec3 | None = (
+        None  # m, where the step is to be reached; the segment may stop before a wall
+    )
+    since_us: int = 0  # when the stage began
+    speed: float | None = None  # m/s, as the mission says
+    jumps: tuple[int, ...] = ()  # the steps whose jump was taken, once for each time
+    progress: MissionProgress = field(default_factory=MissionProgress)
+
+
+@dataclass(frozen=True, slots=True)
+class MissionContext:
+    """The vehicle's state as a mission needs it."""
+
+    now_us: int
+    p_WE: Vec3  # m, estimate
+    height: float  # m, base above the origin
+    home_z: float  # m, NED, of home
+    safe_set: SafeSet = field(default_factory=SafeSet)
+    look_at: Vec3 | None = None  # m, where the nose is to point
+
+
+@dataclass(frozen=True, slots=True)
+class MissionEvent:
+    """Result of a mission tick."""
+
+    next_mode: Mode | None = None
+    cause: str = ""  # of that change
+    text: str = ""
+    unmet: bool = False  # the text is a warning
+    looks: bool = False  # the nose points elsewhere from now on
+    look_at: Vec3 | None = None  # m, there; None: along the flight
+
+
+NOTHING = MissionEvent()
+
+
+def loaded(steps: tuple[MissionStep, ...], count: int = 0) -> MissionFlight:
+    """A mission that was received, not begun; ``count`` steps were reached in earlier missions."""
+    state = MissionState.NOT_STARTED if steps else MissionState.NO_MISSION
+    progress = MissionProgress(state, total=len(steps), reached_count=count)
+    return MissionFlight(steps, progress=progress)
+
+
+def refusal(flight: MissionFlight, landed: bool) -> str | None:
+    """Why this mission cannot start or continue now."""
+    if not flight.steps:
+        return "no mission: none was uploaded"
+    first = flight.progress
+    at = 0 if first.state is MissionState.COMPLETE else first.current
+    moves = [step for step in flight.steps[at:] if step.action not in MOVES_NOTHING]
+    if landed and (not moves or moves[0].action is not MissionAction.TAKE_OFF):
+        return f"no mission: on the ground, and step {at} is not a takeoff; take off first"
+    return None
+
+
+def nearest(home: Home, rally: tuple[Vec2, ...], p: Vec3) -> Home:
+    """The nearest to p [m, NED] of home and the rally points; all have home's height."""
+    x, y, z = home.p
+    places = ((x, y), *rally)
+    x, y = min(places, key=lambda place: math.dist(place, p[:2]))
+    return Home((x, y, z), home.yaw)
+
+
+def begun(
+    flight: MissionFlight, reference: EndEffectorTarget, limits: MotionLimits
+) -> MissionFlight:
+    """Begin, or go on with the current step, from a reference; brake first if it moves."""
+    progress = flight.progress
+    if progress.state is MissionState.COMPLETE:
+        progress = replace(progress, current=0, reached=-1)
+        flight = replace(flight, jumps=())
+    return replace(
+        flight,
+        stage=Stage.BRAKE,
+        segment=braking_segment(reference, limits),
+        since_us=reference.t_us,
+        speed=_speed_before(flight.steps, progress.current),
+        progress=replace(progress, state=MissionState.ACTIVE),
+    )
+
+
+def paused(flight: MissionFlight) -> MissionFlight:
+    """Pause the mission: its current step will start again."""
+    if flight.progress.state is not MissionState.ACTIVE:
+        return replace(flight, stage=Stage.IDLE, segment=None)
+    progress = replace(flight.progress, state=MissionState.PAUSED)
+    return replace(flight, stage=Stage.IDLE, segment=None, progress=progress)
+
+
+def jumped(flight: MissionFlight, step: int, now_us: int, limits: MotionLimits) -> MissionFlight:
+    """Make another step the current one; in flight, brake first."""
+    state = flight.progress.state
+    if state is MissionState.COMPLETE:
+        state = MissionState.NOT_STARTED
+    progress = replace(flight.progress, current=step, state=state)
+    flight = replace(flight, jumps=())
+    if flight.segment is None:
+        return replace(flight, progress=progress)
+    return replace(
+        flight,
+        stage=Stage.BRAKE,
+        segment=braking_segment(flight.segment.at(now_us), limits),
+        since_us=now_us,
+        speed=_speed_before(flight.steps, step),
+        progress=progress,
+    )
+
+
+def advance(
+    flight: MissionFlight, context: MissionContext, limits: MotionLimits
+) -> tuple[MissionFlight, MissionEvent]:
+    """One tick of a mission that has begun: at most one thing happens, in almost every tick none.
+
+    The limits are those of a segment where the mission names no speed.
+    """
+    segment, now_us = flight.segment, context.now_us
+    if segment is None:
+        return flight, NOTHING
+    if flight.stage is Stage.BEGIN:
+        return _begin(flight, segment.at(now_us), context, limits)
+    if now_us < segment.end_us:
+        return flight, NOTHING
+    if flight.stage is Stage.BRAKE:
+        return replace(flight, stage=Stage.BEGIN), NOTHING
+    if flight.stage is Stage.MOVE:
+        return replace(flight, stage=Stage.ARRIVE, since_us=now_us), NOTHING
+    step = flight.steps[flight.progress.current]
+    if flight.stage is Stage.ARRIVE:
+        return _arrive(flight, step, context, limits)
+    if flight.stage is Stage.STAY and now_us - flight.since_us >= 1e6 * step.hold_s:
+        return _hand_over(flight, step)
+    return flight, NOTHING
+
+
+def touched_down(flight: MissionFlight) -> MissionFlight:
+    """Complete a mission whose last step was a landing."""
+    if flight.stage is not Stage.GONE:
+        return flight
+    return replace(_reached(flight), stage=Stage.IDLE, segment=None)
+
+
+def _begin(
+    flight: MissionFlight, at: EndEffectorTarget, context: MissionContext, limits: MotionLimits
+) -> tuple[MissionFlight, MissionEvent]:
+    number = flight.progress.current
+    step = flight.steps[number]
+    if step.action is MissionAction.SPEED:
+        following, event = _next(_reached(replace(flight, speed=step.speed)))
+        if step.speed is not None and step.speed > MAX_MISSION_SPEED:
+            text = (
+                f"mission step {number}: {step.speed:g} m/s is flown as {MAX_MISSION_SPEED:g} m/s"
+            )
+            event = replace(event, text="; ".join(filter(None, (text, event.text))))
+        return following, event
+    if step.action is MissionAction.LOOK_AT:
+        following, event = _next(_reached(flight))
+        return following, replace(event, looks=True, look_at=step.position)
+    if step.action is MissionAction.SKIP:
+        return _next(_reached(flight))
+    if step.action is MissionAction.JUMP:
+        return _jump(flight, step)
+    limits = _paced(flight, limits)
+    place = _destination(step, at, context)
+    end = project_to_safe_set(place, context.safe_set, context.now_us)
+    segment = segment_to(at, end, _heading(step, end, context.look_at), limits)
+    text = f"mission step {number}: {step.action.value}"
+    moving = replace(
+        flight, stage=Stage.MOVE, segment=segment, place=place, since_us=context.now_us
+    )
+    return moving, MissionEvent(text=text)
+
+
+def _paced(flight: MissionFlight, limits: MotionLimits) -> MotionLimits:
+    """The limits with the speed that the mission asked for."""
+    if flight.speed is None:
+        return limits
+    return replace(limits, speed=min(flight.speed, MAX_MISSION_SPEED))
+
+
+def _jump(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
+    """Go on with another step, until that was done as often as the mission says."""
+    number = flight.progress.current
+    taken = flight.jumps.count(number)
+    if 0 <= step.repeats <= taken:
+        return _next(_reached(flight))
+    if step.repeats > 0:
+        flight = replace(flight, jumps=(*flight.jumps, number))
+    following, event = _next(_reached(flight, over=False), step.target)
+    count = f"{taken + 1} of {step.repeats}" if step.repeats > 0 else "without end"
+    text = f"mission step {number}: jump to step {step.target}, {count}"
+    return following, replace(event, text="; ".join(filter(None, (text, event.text))))
+
+
+def _heading(step: MissionStep, end: Vec3, look_at: Vec3 | None) -> float | None:
+    """The heading at the end of a segment [rad]: towards the place that is looked at, if any."""
+    if look_at is None or math.dist(look_at[:2], end[:2]) < TOO_NEAR_TO_LOOK:
+        return step.yaw
+    return math.atan2(look_at[1] - end[1], look_at[0] - end[0])
+
+
+def _destination(step: MissionStep, at: EndEffectorTarget, context: MissionContext) -> Vec3:
+    if step.position is None:
+        return at.p_WE
+    x, y, z = step.position
+    if step.above_home:
+        z = min(z + context.home_z, 0.0)  # home may have been set below the ground
+    if step.here:
+        x, y = at.p_WE[:2]
+    if step.action is MissionAction.LAND:
+        return x, y, at.p_WE[2]  # the descent is the landing's
+    if step.action is MissionAction.CIRCLE:
+        dx, dy = at.p_WE[0] - x, at.p_WE[1] - y
+        bearing = math.atan2(dy, dx)  # above the centre: north
+        return x + abs(step.radius) * math.cos(bearing), y + abs(step.radius) * math.sin(bearing), z
+    if step.action is MissionAction.TAKE_OFF:
+        # The height is the base's, and a vehicle that is higher already does not come down.
+        return at.p_WE[0], at.p_WE[1], at.p_WE[2] - max(-z - context.height, 0.0)
+    return x, y, z
+
+
+def _arrive(
+    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
+) -> tuple[MissionFlight, MissionEvent]:
+    place = flight.place
+    off = 0.0 if step.position is None or place is None else math.dist(context.p_WE, place)
+    if off <= step.acceptance:
+        if step.action is MissionAction.CIRCLE and not isinstance(flight.segment, CircleSegment):
+            return _circle(flight, step, context, limits), NOTHING
+        return replace(flight, stage=Stage.STAY, since_us=context.now_us), NOTHING
+    if context.now_us - flight.since_us < ARRIVAL_TIMEOUT_US:
+        return flight, NOTHING
+    following, event = _next(flight)
+    text = f"mission step {flight.progress.current} not reached: {off:.2f} m away"
+    return following, replace(event, text=text, unmet=True)
+
+
+def _circle(
+    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
+) -> MissionFlight:
+    """The circle itself, from the end of the way to it."""
+    assert flight.segment is not None
+    assert step.position is not None
+    at = flight.segment.at(context.now_us)
+    x, y, _ = step.position
+    if step.here:  # the way led straight from the centre to the north
+        x, y = at.p_WE[0] - abs(step.radius), at.p_WE[1]
+    centre = (x, y, at.p_WE[2])
+    circle = circle_from(
+        at, centre, step.radius, step.turns, context.look_at, _paced(flight, limits)
+    )
+    end = circle.at(circle.end_us).p_WE
+    return replace(flight, stage=Stage.MOVE, segment=circle, place=end, since_us=context.now_us)
+
+
+def _hand_over(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, MissionEvent]:
+    """Complete the step: continue with the next one or switch to its mode."""
+    if step.action is MissionAction.LAND:
+        return replace(flight, stage=Stage.GONE), MissionEvent(Mode.LAND, "land")
+    if step.action is MissionAction.RETURN:
+        return replace(_reached(flight), stage=Stage.GONE), MissionEvent(Mode.RETURN, "return")
+    return _next(_reached(flight))
+
+
+def _reached(flight: MissionFlight, *, over: bool = True) -> MissionFlight:
+    """The current step is done; with the last one the mission is, unless it is not ``over``."""
+    now = flight.progress
+    last = over and now.current == now.total - 1
+    state = MissionState.COMPLETE if last else now.state
+    progress = replace(now, state=state, reached=now.current, reached_count=now.reached_count + 1)
+    return replace(flight, progress=progress)
+
+
+def _next(
+    flight: MissionFlight, following: int | None = None
+) -> tuple[MissionFlight, MissionEvent]:
+    """Go on with the step that follows, by default the next one."""
+    now = flight.progress
+    following = now.current + 1 if following is None else following
+    if following == now.total:
+        done = replace(flight, progress=replace(now, state=MissionState.COMPLETE))
+        return done, MissionEvent(Mode.HOLD, "mission done", "mission complete")
+    stops = flight.steps[now.current].stop_after
+    begins = replace(flight, stage=Stage.BEGIN, progress=replace(now, current=following))
+    if stops:
+        return begins, MissionEvent(Mode.HOLD, "hold", f"mission holds before step {following}")
+    return begins, NOTHING
+
+
+def _speed_before(steps: tuple[MissionStep, ...], number: int) -> float | None:
+    """The speed in force where the mission is begun at a step."""
+    speeds = [step.speed for step in steps[:number] if step.action is MissionAction.SPEED]
+    return speeds[-1] if speeds else None

@@ -1,0 +1,152 @@
+"""Failed rotors and joints as the flight software knows them: sentences, and what loops count on.
+
+``fsw/autopilot/control/actuator_watch.py`` finds them; the failsafe table acts on them. What has
+failed stays so until the flight software is restarted, but for a weak rotor that gives what it is
+commanded again.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from fsw.autopilot.control.actuator_watch import watch
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.flight.state import Damage
+from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.rotors import rotor_decay
+from fsw.autopilot.signals import ActuatorReport, Vec2, Vec4
+from fsw.autopilot.tick_record import NO_ROTOR, Tick, Watched
+from fsw.compiled import machine_code, packed
+
+ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
+_HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
+_WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
+_MIN_GIVEN: Final = 0.1  # N, of a rotor that does not obey
+_UNDECIDED: Final = 0.4  # s, for which a joint that gives no torque may be encoders that are stuck
+
+
+class DamageWatch:
+    """The watch over the actuators of one configuration."""
+
+    def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
+        """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
+        self._law = packed(airframe)
+        self._top = airframe.rotor_thrust_max
+        self._hover = 0.25 * airframe.mass * GRAVITY
+        self._tick = tick
+        self._decay = rotor_decay(airframe, tick)
+        self._reallocates = reallocates
+        example = Tick().array
+        self._watch = machine_code(watch, example, example, self._law, 1.0, 1.0, True)
+
+    def see(
+        self,
+        damage: Damage,
+        before: Tick,
+        after: Tick,
+        ticks: int,
+        *,
+        angles_repeat: bool = False,
+        angles_known: bool = True,
+    ) -> Damage:
+        """What is known of actuators a tick, or some ``ticks``, later.
+
+        Reads what was commanded in the record ``before``; writes the watch of that ``after``.
+        Where the encoders' ``angles_repeat``, a joint without torque may be one that is not seen.
+        Where the angles are not known by encoders, joints are not judged.
+        """
+        dt, decay = self._tick, self._decay
+        if ticks != 1:
+            dt, decay = ticks * dt, decay**ticks
+        failed = self._watch(before.array, after.array, self._law, decay, dt, angles_known)
+        if failed or damage.rotor:
+            s, now_us = after.watch, after.estimate.t_us
+            back = before.watch.failed != NO_ROTOR and s.failed == NO_ROTOR
+            damage = self._of_rotors(damage, s, now_us, back=back)
+            damage = _of_joints(damage, s, now_us, angles_repeat)
+        return damage
+
+    def finds(self, before: Tick, after: Tick) -> bool:
+        """Watch healthy actuators over a tick, as ``see``; whether any of them has failed."""
+        return self._watch(before.array, after.array, self._law, self._decay, self._tick, True)
+
+    def _of_rotors(self, before: Damage, s: Watched, now_us: int, *, back: bool) -> Damage:
+        """What is known of rotors; the one that had failed is ``back``, or not seen any more."""
+        k, known = s.failed, before.report
+        if k == NO_ROTOR:
+            if not back:
+                return before
+            joints = before.health.joints
+            health = ActuatorHealth(joints=joints) if any(joints) else HEALTHY
+            report = known._replace(rotor=0, effect=1.0)
+            return before._replace(rotor="", report=report, health=health)
+        found = known._replace(
+            rotor=k + 1,
+            effect=s.effect,
+            lost=bool(s.lost),
+            disobeys=bool(s.disobeys),
+        )
+        after, health = before, before.health
+        if found._replace(effect=known.effect) != known:
+            since_us = before.rotor_us
+            if found.rotor != known.rotor:
+                since_us = now_us - round(1e6 * s.suspected)
+            after = before._replace(rotor=_sentence(s, found), rotor_us=since_us)
+        if self._reallocates:
+            health = self._health(s, k, found, before.health.joints)
+        return after._replace(report=found, health=health)
+
+    def _health(self, s: Watched, k: int, found: ActuatorReport, joints: Vec2) -> ActuatorHealth:
+        """What loops reckon with for rotor ``k`` (from 0)."""
+        if not found.disobeys:
+            return ActuatorHealth(_with(HEALTHY.effectiveness, k, found.effect), joints=joints)
+        # It is commanded what it gives in hover, and reckoned with as what it really gives.
+        gives = min(max(s.gives, _MIN_GIVEN), self._top)
+        return ActuatorHealth(
+            _with(HEALTHY.effectiveness, k, gives / self._hover),
+            _with(HEALTHY.least, k, gives),
+            _with(HEALTHY.most, k, gives),
+            joints,
+        )
+
+
+def _of_joints(before: Damage, s: Watched, now_us: int, angles_repeat: bool) -> Damage:
+    kinds = (
+        float(s.joint[0]) or before.report.joints[0],
+        float(s.joint[1]) or before.report.joints[1],
+    )
+    if kinds == before.report.joints:
+        return before
+    failed = [k for k in range(2) if kinds[k] != SOUND]
+    undecided = angles_repeat and LIMP in kinds and not before.joint
+    if undecided and max(s.joint_for[k] for k in failed) < _UNDECIDED:
+        return before  # a joint that hangs loose would move: encoders that are stuck show soon
+    text = " and ".join([f"joint {k + 1} {_HOWS[kinds[k]]}" for k in failed])
+    if angles_repeat and LIMP in kinds:  # one that hangs loose hardly ever stands so still
+        text += f", or {sentence(Sensor.ENCODERS, SensorFault.STUCK)}"
+    since_us = before.joint_us
+    if not before.joint:
+        since_us = now_us - round(1e6 * float(s.joint_for[failed[0]]))
+    report, health = before.report._replace(joints=kinds), before.health._replace(joints=kinds)
+    return before._replace(joint=text, joint_us=since_us, report=report, health=health)
+
+
+def _with(values: Vec4, k: int, value: float) -> Vec4:
+    a, b, c, d = (value if i == k else one for i, one in enumerate(values))
+    return a, b, c, d
+
+
+def _sentence(s: Watched, found: ActuatorReport) -> str:
+    """What is wrong with a rotor."""
+    k = found.rotor - 1
+    name = f"rotor {ROTORS[k]}"
+    if found.lost:
+        return f"{name} gives nothing"
+    if found.disobeys:
+        return f"{name} does not obey"
+    # As it is at the moment: means of a tenth of a second are behind when a rotor has just failed.
+    share = 1.0 + float(s.extra[k]) / max(float(s.thrust[k]), 1.0)
+    if share > _WEAK_AT_MOST:
+        return f"{name} gives another thrust than is commanded"
+    return f"{name} gives {100.0 * max(share, 0.0):.0f} % of what is commanded"

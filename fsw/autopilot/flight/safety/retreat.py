@@ -1,0 +1,46 @@
+"""Where a vehicle goes that is outside its safe set: along the normals, until it is clear."""
+
+from __future__ import annotations
+
+from fsw.autopilot.geometry.vectors import add_scaled
+from fsw.autopilot.model.body import ON_LINK1, ON_LINK2, Body, hull_reach
+from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.shapes.zones import surfaces
+from fsw.autopilot.signals import SafeSet, StateEstimate, Vec2, Vec3
+
+_PASSES = 30  # one zone after the other; in a corner they have to settle
+_TOLERANCE = 1e-3  # m
+# m; from deeper than this the way out along a normal is a guess, and a step at a time is enough
+_FARTHEST = 1.0
+
+
+def retreat_place(
+    safe_set: SafeSet, estimate: StateEstimate, body: Body, links: Vec2, room: float
+) -> Vec3:
+    """A place for the base [m, NED] from which no zone is closer than ``room`` [m].
+
+    The arm keeps its pose, of ``links`` [m]. A sphere that follows the target comes along and is
+    left out. Between zones that leave no such place it is one in their middle.
+    """
+    ends = [
+        (point_in_flight(estimate, reach)[0], max(p.radius for p in body.parts if p.on == on))
+        for on, reach in ((ON_LINK1, (links[0], 0.0)), (ON_LINK2, links))
+    ]
+    shift: Vec3 = (0.0, 0.0, 0.0)
+    for _ in range(_PASSES):
+        before = shift
+        for k in range(len(safe_set.zones)):
+            zone = SafeSet(safe_set.zones[k : k + 1])
+            for at in surfaces(zone, add_scaled(estimate.p_WB, shift, 1.0), estimate.t_us):
+                shortfall = room - (at.distance - hull_reach(body, at.normal))
+                if shortfall > _TOLERANCE:
+                    shift = add_scaled(shift, at.normal, shortfall)
+            for p, radius in ends:
+                for at in surfaces(zone, add_scaled(p, shift, 1.0), estimate.t_us):
+                    shortfall = room - (at.distance - radius)
+                    if shortfall > _TOLERANCE:
+                        shift = add_scaled(shift, at.normal, shortfall)
+        if shift is before:
+            break
+    length = sum(value * value for value in shift) ** 0.5
+    return add_scaled(estimate.p_WB, shift, min(1.0, _FARTHEST / max(length, _FARTHEST)))

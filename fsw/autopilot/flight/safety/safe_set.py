@@ -1,0 +1,383 @@
+"""Which safe set is in force: the announced one and the fence together, if they can be kept.
+
+One source owns what is announced, the first or the configured one, and one the fence. In flight any
+source may shrink either, and only its owner may grow it (``safe_set_change.growth``); every change
+and every refusal is a text that says who and what. Disarmed, another source may become the
+owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
+nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the
+way in which it could stop, outside. A moving zone that has timed out is not predicted for ever: it
+is held where it is then.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fsw.autopilot.barriers.margins import Margins
+from fsw.autopilot.flight.commands.bounds import safe_set_problem
+from fsw.autopilot.flight.safety.safe_set_change import (
+    growth,
+    held,
+    is_moving,
+    is_update,
+    is_update_of,
+    summary,
+)
+from fsw.autopilot.flight.safety.safety_watch import least
+from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
+from fsw.autopilot.flight.state import MissionMemory
+from fsw.autopilot.model.body import body_of
+from fsw.autopilot.mpc.reference import still_at
+from fsw.autopilot.parameters.consistency import (
+    Finding,
+    analyse,
+    loop_tube,
+    part_tube,
+    refusals,
+    warnings,
+)
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.shapes.zones import surfaces
+from fsw.autopilot.signals import (
+    ConstraintReport,
+    EndEffectorTarget,
+    MessageSource,
+    MissionUpdate,
+    SafeSet,
+    SafeSetAnnouncement,
+    Severity,
+    StateEstimate,
+    StatusText,
+    TickInputs,
+)
+from fsw.frozen import replace
+
+_SAME = 1e-3  # m; a zone that is where it was predicted is off by rounding
+_ACCEPTED = 8  # sources whose last announcement is remembered
+
+
+class _Vehicle(NamedTuple):
+    """The vehicle that must be inside what is announced."""
+
+    estimate: StateEstimate | None  # None: it stands disarmed, and need not be
+    target: EndEffectorTarget | None  # that zones follow
+
+
+class SafeSetCheck:
+    """Analyses a safe set for one configuration before it is in force."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self.loop_tube = loop_tube(config)
+        part_tube(config)  # takes a moment, and is then known
+        planner, airframe = config.planner, config.airframe
+        body = body_of(planner.body, airframe)
+        links = airframe.link_length
+        self._margins = Margins(body, links, planner.tunings, planner.period)
+
+    def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
+        """Findings on whether this configuration can keep a safe set."""
+        return analyse(self._config, safe_set, self.loop_tube)
+
+    def update(
+        self,
+        mission: MissionMemory,
+        inputs: TickInputs,
+        estimate: StateEstimate | None,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+        armed: bool | None = None,
+        target: EndEffectorTarget | None = None,
+    ) -> MissionMemory:
+        """Take in what was uploaded and announced; in flight only what can be kept.
+
+        A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
+        that follow the ``target`` if there is one.
+        """
+        armed = flies if armed is None else armed
+        here = _Vehicle(estimate if armed else None, target)
+        update = inputs.mission
+        if update is not None:
+            if update.rally is not None:
+                mission = replace(mission, rally=update.rally)
+            if update.fence is not None:
+                mission = self._take_fence(mission, update, here, texts, flies=flies)
+        for announcement in inputs.announced:
+            now_us = inputs.sensors.t_us
+            owns = self._owns(mission, announcement.source, now_us, armed=armed)
+            problem = safe_set_problem(announcement.safe_set, self._config.surroundings.zone_speed)
+            if problem is None:
+                if owns and now_us != mission.owner_heard_us:
+                    mission = replace(mission, owner_heard_us=now_us)
+                problem = "" if owns else self._against(mission, announcement.safe_set)
+            mission = self._take(
+                mission, announcement, problem, here, texts, owns=owns, flies=flies
+            )
+        return mission
+
+    def _take_fence(
+        self,
+        mission: MissionMemory,
+        update: MissionUpdate,
+        here: _Vehicle,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+    ) -> MissionMemory:
+        """A fence that was uploaded; in flight only its owner may grow it."""
+        fence, source = update.fence or SafeSet(), update.fence_source
+        entitled = not flies or may_grow_fence(mission.fence_owner, source, self._chosen)
+        against = safe_set_problem(fence, self._config.surroundings.zone_speed) or ""
+        if not (against or entitled):
+            grown = growth(mission.fence, fence)
+            against = f"{grown}, which {mission.fence_owner} owns" if grown else ""
+        against = against or self._outside(mission, mission.fence, fence, here)
+        if against:
+            text = f"fence of {source} refused: {against}"
+            texts.append(StatusText(Severity.CRITICAL, text))
+            return replace(mission, refused_count=mission.refused_count + 1)
+        wanted = replace(
+            mission, fence=fence, fence_owner=source if entitled else mission.fence_owner
+        )
+        if fence == mission.fence:
+            return wanted
+        who = "fence" if source is None else f"fence of {source}"
+        return self._kept(mission, wanted, f"{who}: {summary(fence)}", texts, flies=flies)
+
+    def _take(
+        self,
+        mission: MissionMemory,
+        announcement: SafeSetAnnouncement,
+        against: str,
+        here: _Vehicle,
+        texts: list[StatusText],
+        *,
+        owns: bool,
+        flies: bool,
+    ) -> MissionMemory:
+        """An announced safe set, unless something speaks ``against`` it or it is repeated."""
+        source, owner = announcement.source, mission.owner
+        becomes_owner = owns and not source.is_same(owner)
+        if announcement in mission.accepted and not becomes_owner:
+            return mission  # in case a datagram was lost
+        repeated = _is_repeated(announcement, mission.refused)
+        who, safe_set = f"safe set of {source}", announcement.safe_set
+        against = against or self._outside(mission, mission.announced, safe_set, here)
+        refused = replace(mission, refused=announcement, refused_count=mission.refused_count + 1)
+        if against:
+            if not repeated:
+                texts.append(StatusText(Severity.CRITICAL, f"{who} refused: {against}"))
+            return refused
+        if announcement == mission.refused and flies:
+            return refused
+        others = [one for one in mission.accepted if not one.source.is_same(source)]
+        wanted = replace(
+            mission,
+            announced=safe_set,
+            silent_zones=0,
+            owner=source if owns else owner,
+            accepted=(*([] if becomes_owner else others)[1 - _ACCEPTED :], announcement),
+        )
+        change = f"{who}: {summary(safe_set)}"
+        if becomes_owner:
+            change += "; it owns the safe set now"
+        kept = self._kept(mission, wanted, change, texts, flies=flies)
+        return refused if kept is mission else kept
+
+    def _against(self, mission: MissionMemory, safe_set: SafeSet) -> str:
+        """Why a source that does not own the safe set may not change it so."""
+        grown = growth(mission.announced, safe_set)
+        if not grown:
+            return ""
+        whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
+        return f"{grown}, which {whose}"
+
+    def _outside(self, mission: MissionMemory, old: SafeSet, new: SafeSet, here: _Vehicle) -> str:
+        """Why the vehicle ``here`` cannot be in a ``new`` set that replaces an ``old`` one.
+
+        Zones in force are not asked again. One that has only moved on must leave the vehicle no
+        further outside than it is already; how it turns is what was measured of it.
+        """
+        estimate, target = here
+        if estimate is None or new == old:
+            return ""
+        # Nor where it will stand if its stamp is too far from now.
+        standing, silent = self._standing(new, estimate.t_us)
+        if silent:
+            against = self._outside(mission, old, standing, here)
+            if against:
+                return against
+        inside = self._values(new, estimate, target)
+        was = self._values(old, estimate, target) if is_update(old, new) else {}
+        for number, (margin, h) in inside.items():
+            zone = new.zones[number]
+            if zone in mission.safe_set.zones:
+                continue
+            which = f"zone {number + 1} ({zone.shape.kind})"
+            moves_on = number in was and is_update_of(old.zones[number], zone)
+            if not margin >= (min(was[number][0] - _SAME, 0.0) if moves_on else 0.0):
+                return f"the vehicle is not inside {which}, by {-margin:.2f} m"
+            if not (moves_on or h >= 0.0):
+                return f"the vehicle could not stop before {which}: it is {-h:.2f} m/s too fast"
+        return ""
+
+    def _values(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> dict[int, tuple[float, float]]:
+        """The least margin [m] and h [m/s] of each zone, by its number; of all that there are now.
+
+        Without a target, zones that follow it are left out.
+        """
+        numbers = [
+            number
+            for number, zone in enumerate(safe_set.zones)
+            if target is not None or not kind_of(zone.shape).follows_target
+        ]
+        asked = safe_set
+        if len(numbers) < len(safe_set.zones):
+            asked = SafeSet(tuple([safe_set.zones[number] for number in numbers]))
+        report, first, found = self._margins.report(asked, estimate, target), 0, {}
+        for number, count in zip(numbers, report.per_zone, strict=True):
+            of_zone = slice(first, first + count)
+            found[number] = least(report.margins[of_zone]), least(report.barrier[of_zone])
+            first += count
+        return found
+
+    def _owns(
+        self, mission: MissionMemory, source: MessageSource, now_us: int, *, armed: bool
+    ) -> bool:
+        """Whether a source owns what is announced, or may from now on."""
+        chosen, owner = self._chosen, mission.owner
+        if chosen not in (0, source.system):
+            return False
+        if owner is None or source.is_same(owner):
+            return True
+        if chosen and owner.system != chosen:
+            return True
+        silent_us = now_us - mission.owner_heard_us
+        gone = mission.owner_heard_us < 0 or silent_us >= self._config.limits.owner_timeout_us
+        return gone and not armed
+
+    @property
+    def _chosen(self) -> int:
+        return self._config.limits.safe_set_owner
+
+    def _kept(
+        self,
+        mission: MissionMemory,
+        wanted: MissionMemory,
+        change: str,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+    ) -> MissionMemory:
+        """The memory with what is wanted; as it was where that cannot be kept in flight."""
+        safe_set = joined(wanted.announced, wanted.fence)
+        against: tuple[str, ...] = wanted.refusals
+        if safe_set != mission.safe_set:
+            findings = self.analyse(safe_set)
+            against = refusals(findings)
+            # Where a zone moves, there is another set ten times a second: what is known is not
+            # said again.
+            last = mission.refused.safe_set if mission.refused else mission.safe_set
+            known = {finding.statement for finding in self.analyse(last)}
+            new = [StatusText(Severity.WARNING, text) for text in against if text not in known]
+            weak = [
+                StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known
+            ]
+            refused = bool(against) and not self._config.soft and flies
+            # What is taken on the ground all the same is told by a row of the failsafe table.
+            texts += (new if refused or self._config.soft else []) + weak
+            if refused:
+                if new or weak:
+                    text = f"safe set refused: the old one is kept; wanted: {change}"
+                    texts.append(StatusText(Severity.WARNING, text))
+                return mission
+            if self._config.soft:
+                against = ()
+        if not is_update(mission.safe_set, safe_set) or wanted.owner != mission.owner:
+            texts.append(StatusText(Severity.INFO, change))
+        return replace(wanted, safe_set=safe_set, refused=None, refusals=against)
+
+    def hold_silent_zones(self, mission: MissionMemory, now_us: int) -> MissionMemory:
+        """Let zones stand whose announcements have stopped, where they are predicted to be then.
+
+        What is predicted longer than that is a guess, and one that leaves the vehicle's way free. A
+        time stamp that far ahead is of another clock: the zone stands where its numbers say.
+        """
+        standing, silent = self._standing(mission.announced, now_us)
+        if not silent:
+            return mission
+        return replace(
+            mission,
+            announced=standing,
+            safe_set=joined(standing, mission.fence),
+            silent_zones=mission.silent_zones + silent,
+        )
+
+    def _standing(self, safe_set: SafeSet, now_us: int) -> tuple[SafeSet, int]:
+        """The set with the zones standing whose stamp is too far from now, and how many there are.
+
+        The same object where there is none.
+        """
+        timeout_us = self._config.limits.zone_timeout_us
+        zones = safe_set.zones
+        silent = [is_moving(zone) and abs(now_us - zone.t_us) >= timeout_us for zone in zones]
+        if not any(silent):
+            return safe_set, 0
+        stood = [
+            held(zone, timeout_us if now_us > zone.t_us else 0) if stops else zone
+            for zone, stops in zip(zones, silent, strict=True)
+        ]
+        return SafeSet(tuple(stood)), sum(silent)
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel of distances and margins, before anything flies."""
+        walled = SafeSet((wall((0.0, 0.0, -1.0), 0.0, 0.0),))
+        surfaces(walled, estimate.p_WB, estimate.t_us)
+        self._margins.report(walled, estimate, still_at(estimate.p_WB))
+
+    def min_margin(
+        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> float:
+        """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone.
+
+        Below 0 the failsafe of a breach would be active at once. Without a target, zones that
+        follow it are left out.
+        """
+        if target is None:
+            zones = [one for one in safe_set.zones if not kind_of(one.shape).follows_target]
+            safe_set = SafeSet(tuple(zones))
+        return least(self._margins.report(safe_set, estimate, target).margins)
+
+    def margins(
+        self, kept: InflatedSafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
+    ) -> ConstraintReport:
+        """Margins and barrier values of the vehicle in the safe set in force."""
+        report = self._margins.report(kept.source, estimate, target)
+        return replace(report, added=kept.added, shortfall=kept.shortfall) if kept.added else report
+
+
+def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:
+    """Whether it is the refused one again, or where that has moved to in the meantime."""
+    if refused is None or announcement.source != refused.source:
+        return False
+    return is_update(refused.safe_set, announcement.safe_set)
+
+
+def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, chosen: int) -> bool:
+    """Whether a source may put any other fence in place in flight.
+
+    The owner is the source that uploaded the one in force, or all of a ``chosen`` system.
+    """
+    if source is None or (owner is None and not chosen):
+        return True
+    return source.system == chosen if chosen else source.is_same(owner)
+
+
+def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:
+    """Both safe sets at once."""
+    return SafeSet(announced.zones + fence.zones)

@@ -1,0 +1,416 @@
+r"""Clearances that grow with what the estimator does not know.
+
+A place of the vehicle at :math:`\ell` from the base is where the estimate says but for
+:math:`\delta p + \phi\times\ell`, with the attitude's error :math:`\phi` in the world. Along a
+zone's normal n its standard deviation is
+
+.. math:: \sigma^2 = n^T C\,n, \qquad C = (I, -[\ell]_\times)\,P\,(I, -[\ell]_\times)^T,
+
+P being the covariance of position and attitude. Each zone's clearance grows by k sigma of the part
+of the body that is least certain along its normal; for zones that are not flat, along any. A
+radius adds nothing: it lies along the normal, which no rotation moves.
+
+So a vehicle whose pose is lost draws back from walls by itself. Where walls leave no room for that,
+they are given what there is: the planner's rows could not be kept otherwise, and would outbid each
+other unseen. What is lacking is a row of the failsafe table.
+
+Source: docs/equations.md T7; docs/decisions/0031-barriers-that-know-the-uncertainty.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
+from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.autopilot.geometry.rotation import rotate
+from fsw.autopilot.model.body import ON_BASE, ON_LINK1, Body
+from fsw.autopilot.model.kinematics import links
+from fsw.autopilot.parameters.consistency import stand_off
+from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.shapes.kind import ShapeKind
+from fsw.autopilot.shapes.zones import all_planes
+from fsw.autopilot.signals import Mat3, SafeSet, StateEstimate, Vec2, Vec4
+from fsw.compiled import kernel
+from fsw.frozen import replace
+
+_STEP: Final = 1e-3  # m, by which clearances grow, so that most ticks have the same ones
+_SLACK: Final = 4e-3  # m, by which one must be too large before it shrinks
+# m; a place that is lost altogether is none to plan from. With 0.5 m a vehicle without satellites
+# was at the wall before it had come down.
+_MOST: Final = 2.0
+# m/s; what grows faster is uncertain for a moment only, and a vehicle that flees from it flies into
+# the wall behind.
+_RISE: Final = 0.8
+_AMPLE: Final = 0.01  # m; zones that grow by less are not searched for room
+SHORTFALL: Final = 0.01  # m of room; a workspace has 1 mm to spare, motion capture asks for 3
+_NEAR: Final = 2.0  # m; zones farther off leave room enough
+_RIM: Final = 8  # places around a disc: an octagon around its rim, in which a convex function is
+_SHARES: Final = 6  # bisections of what there is room for
+_PASSES: Final = 60  # over all planes; in a corner they have to settle
+
+
+_LOST: Final = np.eye(6)  # m^2, rad^2
+_SURE: Final = np.zeros((6, 6))
+_NO_NORMALS: Final = np.empty((0, 3))
+_NOTHING: Final[Vec6] = (0.0,) * 6
+
+
+class InflatedSafeSet(NamedTuple):
+    """The safe set as it is kept: that in force, and more where the estimate is not sure."""
+
+    source: SafeSet = SafeSet()  # in force
+    safe_set: SafeSet = SafeSet()  # kept; the same object where nothing was added
+    added: tuple[float, ...] = ()  # m, to the clearance of each zone; empty: nothing
+    shortfall: float = 0.0  # m, largest margin shortfall of a zone
+    sufficient_us: int = -1  # when there was room enough last; -1: not known yet
+    spread: tuple[float, ...] = ()  # m, k sigma at each zone
+    t_us: int = 0  # at that time
+    given: tuple[float, ...] = ()  # m, that each clearance is less for want of room; empty: nothing
+
+    @property
+    def whole(self) -> InflatedSafeSet:
+        """The same without what was given."""
+        if not self.given:
+            return self
+        whole = _grown(self.source, self.added)
+        return self._replace(safe_set=whole.safe_set, given=())
+
+    @property
+    def beyond(self) -> tuple[float, ...]:
+        """What of each zone's clearance is no margin [m]; empty: nothing."""
+        if not self.given:
+            return self.added
+        added = self.added or (0.0,) * len(self.given)
+        return tuple(map(float.__sub__, added, self.given))
+
+    def of(self, safe_set: SafeSet) -> InflatedSafeSet:
+        """The same for another safe set in force, until the next planning tick knows better."""
+        if safe_set is self.source:
+            return self
+        added = (max(self.added, default=0.0),) * len(safe_set.zones)
+        alike = [zone.shape.kind for zone in safe_set.zones] == [
+            zone.shape.kind for zone in self.source.zones
+        ]
+        return _grown(safe_set, added)._replace(
+            shortfall=self.shortfall,
+            sufficient_us=self.sufficient_us,
+            spread=self.spread if alike else (),
+            t_us=self.t_us,
+        )
+
+
+class UncertainClearance:
+    """Grows the clearances of one configuration."""
+
+    def __init__(
+        self,
+        sigmas: float,
+        body: Body,
+        lengths: Vec2,
+        tunings: tuple[BarrierTuning, BarrierTuning],
+        lag: float,
+    ) -> None:
+        """Keep ``sigmas`` [1] standard deviations for a body with links of ``lengths`` [m].
+
+        A plan takes effect, and the vehicle follows it, after ``lag`` [s] on average.
+        """
+        # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
+        self._lead = 1.0 / tunings[0].slope + lag
+        self._sigmas, self._lengths = sigmas, lengths
+        self._places, self._radii = _places(body, lengths[0])
+        self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
+        self._known = (SafeSet(), *_kinds_and_normals(SafeSet()))
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel."""
+        self.deviation(estimate, pose_covariance(np.zeros((ERRORS, ERRORS)), estimate))
+
+    def keep(
+        self,
+        before: InflatedSafeSet,
+        safe_set: SafeSet,
+        estimate: StateEstimate,
+        pose: Array | None,
+        wind: Vec2 = (0.0, 0.0),
+    ) -> InflatedSafeSet:
+        """The safe set to keep from now on.
+
+        ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
+        None where states are exact. ``wind`` [m, NED] is what the memory of wind can add to the
+        tube; what there is no room for of that is not ``lacking``: the analysis says it before.
+        """
+        sure = pose is None or not self._sigmas > 0.0
+        if (sure and wind == (0.0, 0.0)) or not safe_set.zones:
+            return before if before.safe_set is safe_set else InflatedSafeSet(safe_set, safe_set)
+        pose = _SURE if sure or pose is None else _finite(pose)
+        spread, levers = self._spread(safe_set, estimate, pose)
+        turned = _turned(safe_set, wind)
+        spread = tuple(map(float.__add__, spread, turned))
+        wanted = self._ahead(before, spread, estimate.t_us)
+        granted = self._granted(safe_set, estimate, levers, wanted)
+        short = [
+            max(more - there - gust, 0.0)
+            for more, there, gust in zip(wanted, granted, turned, strict=True)
+        ]
+        shortfall = max(short)
+        kept = before
+        if safe_set is not before.source or granted != before.added:
+            kept = _grown(safe_set, granted)
+        t_us, lacks = estimate.t_us, shortfall > SHORTFALL and before.sufficient_us >= 0
+        sufficient_us = before.sufficient_us if lacks else t_us
+        return InflatedSafeSet(
+            kept.source, kept.safe_set, kept.added, shortfall, sufficient_us, spread, t_us
+        )
+
+    def deviation(self, estimate: StateEstimate, pose: Array) -> float:
+        """Standard deviation [m] of the least certain part of the body, along its worst axis.
+
+        ``pose`` (6, 6) [m, rad, NED] as for ``keep``.
+        """
+        pose = _finite(pose)
+        return float(_along_any(pose, self._look(estimate, pose)[0]).max())
+
+    def _look(
+        self, estimate: StateEstimate, pose: Array, normals: Array = _NO_NORMALS
+    ) -> tuple[Array, list[float]]:
+        """From the base to each place of the body (places, 3) [m, NED], and see ``_look``."""
+        th1, th2 = estimate.q_arm
+        first, second = links((1.0, 1.0), th1, th1 + th2)
+        levers, most = np.empty((len(self._places), 3)), np.empty(len(normals))
+        arm = (*first, *second)
+        _look(pose, estimate.R_WB, arm, self._places, normals, levers, most)
+        return levers, most.tolist()
+
+    def _ahead(
+        self, before: InflatedSafeSet, spread: tuple[float, ...], now_us: int
+    ) -> tuple[float, ...]:
+        """What clearances are to grow by [m], in steps: k sigma as it will be when plans can act.
+
+        A boundary that comes nearer is met by a plan that is on its way back from it.
+        """
+        elapsed = 1e-6 * (now_us - before.t_us)
+        wanted = list(spread)
+        if len(before.spread) == len(spread) and elapsed > 0.0:
+            for k, then in enumerate(before.spread):
+                wanted[k] += self._lead * max(spread[k] - then, 0.0) / elapsed
+        stepped = [min(_stepped(more), _MOST) for more in wanted]
+        if len(before.added) == len(stepped):
+            rise = _RISE * elapsed if elapsed > 0.0 else 0.0
+            bounded = [
+                min(more, _stepped(old + rise))
+                for more, old in zip(stepped, before.added, strict=True)
+            ]
+            return tuple(map(_settled, bounded, before.added))
+        return tuple(stepped)
+
+    def _spread(
+        self, safe_set: SafeSet, estimate: StateEstimate, pose: Array
+    ) -> tuple[tuple[float, ...], Array]:
+        """k sigma at each zone [m], and the levers of ``_look``."""
+        if safe_set is not self._known[0]:  # looked at ten times a second, and the same
+            self._known = (safe_set, *_kinds_and_normals(safe_set))
+        _, kinds, normals = self._known
+        levers, most = self._look(estimate, pose, normals)
+        if len(normals) < len(kinds):
+            along_any, along = _along_any(pose, levers), iter(most)
+            base, worst = float(along_any[0]), float(along_any.max())
+            # Of the base alone where a zone keeps only that.
+            round_ = [base if kind.follows_target else worst for kind in kinds]
+            most = [
+                next(along) if kind.flat else one for kind, one in zip(kinds, round_, strict=True)
+            ]
+        return tuple([self._sigmas * one for one in most]), levers
+
+    def _granted(
+        self, safe_set: SafeSet, estimate: StateEstimate, levers: Array, wanted: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """What of the wanted growth [m] there is room for, with the stand-off of a plan at rest."""
+        granted = list(wanted)
+        for k, zone in enumerate(safe_set.zones):
+            if kind_of(zone.shape).follows_target:
+                room = zone.shape.numbers[-1] - zone.clearance - self._stand_off_inside
+                granted[k] = min(granted[k], max(math.floor(room / _STEP) * _STEP, 0.0))
+        if not max(wanted) > _AMPLE:
+            return tuple(granted)
+        found = all_planes(safe_set, estimate.p_WB, estimate.t_us)
+        near = [(k, at) for k, at in found if at.distance < _NEAR]
+        if len(near) > 1:
+            normals = np.array([at.normal for _, at in near])
+            body = (levers @ normals.T - self._radii[:, None]).min(axis=0)
+            room_now = np.array([at.distance for _, at in near]) + body - self._stand_off
+            growth = np.array([wanted[k] for k, _ in near])
+            for (k, _), room in zip(near, _rooms(normals, growth, room_now), strict=True):
+                if room < granted[k]:
+                    granted[k] = max(math.floor(room / _STEP) * _STEP, 0.0)
+        return tuple(granted)
+
+
+def _kinds_and_normals(safe_set: SafeSet) -> tuple[list[ShapeKind], Array]:
+    """The kind of each zone, and the normals (flat zones, 3) [NED] of those that are flat."""
+    kinds = [kind_of(zone.shape) for zone in safe_set.zones]
+    flat = [zone for zone, kind in zip(safe_set.zones, kinds, strict=True) if kind.flat]
+    if not flat:
+        return kinds, _NO_NORMALS
+    return kinds, np.array([zone.shape.numbers[:3] for zone in flat])
+
+
+def _turned(safe_set: SafeSet, wind: Vec2) -> tuple[float, ...]:
+    """How far ``wind`` [m, NED] can lead towards each zone [m]."""
+    x, y = wind
+    return tuple(
+        [
+            abs(x * n[0]) + abs(y * n[1]) if kind_of(zone.shape).flat else math.hypot(x, y)
+            for zone in safe_set.zones
+            for n in (zone.shape.numbers,)
+        ]
+    )
+
+
+def _grown(safe_set: SafeSet, added: tuple[float, ...]) -> InflatedSafeSet:
+    if not max(added, default=0.0) > 0.0:
+        return InflatedSafeSet(safe_set, safe_set, added)
+    zones = [
+        replace(zone, clearance=zone.clearance + more)
+        for zone, more in zip(safe_set.zones, added, strict=True)
+    ]
+    return InflatedSafeSet(safe_set, SafeSet(tuple(zones)), added)
+
+
+def _stepped(more: float) -> float:
+    return math.ceil(more / _STEP) * _STEP
+
+
+def _settled(wanted: float, before: float) -> float:
+    """Growth [m] that follows at once upwards, and not for a little downwards."""
+    return before if before - _SLACK <= wanted <= before else wanted
+
+
+def _rooms(normals: Array, growth: Array, there: Array) -> list[float]:
+    """How much each plane (planes, 3) may grow by [m] so that some place keeps off them all.
+
+    ``growth`` (planes,) [m] is wanted, room is ``there`` (planes,) [m] now. All are given the same
+    share of what they want, and those that are not in the way of others the rest.
+    """
+    shift = _kept_off(normals, there - growth)
+    if shift is not None:
+        return list(growth)
+    low, high, best = 0.0, 1.0, _kept_off(normals, there)
+    if best is None:
+        return [0.0] * len(there)  # there is none for a plan that is sure of its place, either
+    for _ in range(_SHARES):
+        share = 0.5 * (low + high)
+        shift = _kept_off(normals, there - share * growth)
+        if shift is None:
+            high = share
+        else:
+            low, best = share, shift
+    return [float(one) for one in np.maximum(low * growth, there + normals @ best)]
+
+
+def _kept_off(normals: Array, room: Array) -> Array | None:
+    """A shift (3,) [m] after which ``room`` (planes,) [m] is nowhere negative, or None."""
+    shift = np.zeros(3)
+    for _ in range(_PASSES):
+        left = room + normals @ shift
+        if not (left < -_STEP).any():
+            return shift
+        for n, there in zip(normals, room, strict=True):
+            shortfall = -(there + float(n @ shift))
+            if shortfall > 0.0:
+                shift = shift + shortfall * n
+    return None
+
+
+def pose_covariance(covariance: Array, estimate: StateEstimate, besides: Vec6 = _NOTHING) -> Array:
+    """Covariance (6, 6) of position [m, NED] and attitude [rad, NED].
+
+    From the filter's ``covariance`` (17, 17) [SI], whose attitude is about the body's axes, and
+    variances ``besides`` [m^2, NED] [rad^2, FRD].
+    """
+    return turned_covariance(covariance, (P, TH), (SAME_AXES, estimate.R_WB), besides)
+
+
+def _finite(pose: Array) -> Array:
+    # By itself: a sum of NumPy's takes 1 us, and 10 us where it is not in the caches.
+    return pose if math.isfinite(sum(pose.ravel().tolist())) else _LOST
+
+
+@kernel
+def _look(
+    pose: Array, turn: Mat3, arm: Vec4, places: Array, normals: Array, levers: Array, most: Array
+) -> None:
+    """Each place's lever (places, 3) [m, NED], and the most uncertain one's along each normal.
+
+    That is the deviation ``most`` (planes,) [m] along ``normals`` (planes, 3) [NED] of all places.
+    """
+    x1, z1, x2, z2 = arm
+    for i in range(places.shape[0]):
+        x, y, z, first, second = places[i]
+        at = rotate(turn, (x + first * x1 + second * x2, y, z + first * z1 + second * z2))
+        levers[i, 0], levers[i, 1], levers[i, 2] = at
+    for k in range(normals.shape[0]):
+        n, variance = (normals[k, 0], normals[k, 1], normals[k, 2]), 0.0
+        for i in range(places.shape[0]):
+            x, y, z = levers[i]
+            slope = (*n, y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0])
+            total = 0.0
+            for a in range(6):
+                for b in range(6):
+                    total += slope[a] * pose[a, b] * slope[b]
+            variance = max(variance, total)
+        most[k] = math.sqrt(variance)
+
+
+def _along_any(pose: Array, levers: Array) -> Array:
+    """Deviation of each place along its worst axis (places,) [m]."""
+    covariances = place_covariances(pose, levers)
+    found: Array = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances)[:, -1], 0.0))
+    return found
+
+
+def place_covariances(pose: Array, levers: Array) -> Array:
+    """Covariances (places, 3, 3) [m^2, NED] of places at ``levers`` (places, 3) [m, NED].
+
+    ``pose`` (6, 6) [m, rad, NED] is that of the base.
+    """
+    slope = np.zeros((len(levers), 3, 6))
+    slope[:, 0, 0] = slope[:, 1, 1] = slope[:, 2, 2] = 1.0
+    x, y, z = levers.T
+    # phi x lever
+    slope[:, 0, 4], slope[:, 0, 5] = z, -y
+    slope[:, 1, 3], slope[:, 1, 5] = -z, x
+    slope[:, 2, 3], slope[:, 2, 4] = y, -x
+    found: Array = slope @ pose @ slope.transpose(0, 2, 1)
+    return found
+
+
+def _places(body: Body, length: float) -> tuple[Array, Array]:
+    """Places (places, 5) [m], and their radii (places,) [m]; link 1 has a ``length`` [m].
+
+    A place is its coordinates along the body's axes and along both links. The deviation is a convex
+    function of it, so the ends of a part are its most uncertain places. The first is the base.
+    """
+    base: list[tuple[tuple[float, ...], float]] = []
+    arm: list[tuple[tuple[float, ...], float]] = []
+    for part in body.parts:
+        x, y, z = part.begin
+        if part.on != ON_BASE:
+            along = (z, 0.0) if part.on == ON_LINK1 else (length, z)
+            arm.append(((0.0, 0.0, 0.0, *along), part.radius))
+            continue
+        if not part.rim > 0.0:
+            # A capsule's ends are parts of their own.
+            base.append(((x, y, z, 0.0, 0.0), part.radius))
+            continue
+        around = part.rim / math.cos(math.pi / _RIM)
+        for k in range(_RIM):
+            angle = 2.0 * math.pi * k / _RIM
+            rim = (x + around * math.cos(angle), y + around * math.sin(angle), z, 0.0, 0.0)
+            base.append((rim, part.radius))
+    places, radii = zip(*base, *arm, strict=True)
+    return np.array(places), np.array(radii)

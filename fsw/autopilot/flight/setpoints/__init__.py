@@ -1,0 +1,1 @@
+"""Where the vehicle should be: generated setpoints, offboard ones, references and their limits."""

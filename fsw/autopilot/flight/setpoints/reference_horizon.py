@@ -1,0 +1,151 @@
+"""The reference over the planner's horizon, from the flight mode through the reference governor."""
+
+from __future__ import annotations
+
+import math
+
+from fsw.autopilot.flight.land_detector import height_above_ground
+from fsw.autopilot.flight.modes.base import FlightMode
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived
+from fsw.autopilot.flight.setpoints.reference_governor import ReferenceGovernor
+from fsw.autopilot.flight.state import FlightState, SetpointMemory
+from fsw.autopilot.geometry.vectors import norm, subtract
+from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.mpc.reference import sample, still_at
+from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.signals import (
+    EndEffectorTarget,
+    MotionSetpoint,
+    SafeSet,
+    StateEstimate,
+    Vec2,
+    Vec3,
+)
+from fsw.frozen import replace
+
+_LEAD = 0.4  # m that a reference may be ahead of a vehicle at rest, as of one from outside
+_NEAR = 0.1  # m, of a vehicle at the largest speed
+_OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
+
+Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]
+"""Targets at the nodes; joints at the nodes, or none where the arm is the planner's choice."""
+
+
+class ReferenceHorizon:
+    """Makes the horizons of one configuration."""
+
+    def __init__(self, config: FlightConfig) -> None:
+        self._config = config
+        self._governor = ReferenceGovernor(config)
+
+    def warm_up(self, estimate: StateEstimate) -> None:
+        """Compile every kernel."""
+        here, rest = estimate.p_WB, (0.0, 0.0, 0.0)
+        stream = still_at(estimate.p_WB), still_at(estimate.p_WB, 100_000)
+        between = sample(stream, 50_000)
+        self._governor.limit_external((between,), here, rest, SafeSet())
+
+    def __call__(
+        self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
+    ) -> tuple[FlightState, Horizon]:
+        """Move the mode's setpoint on by a planning period; its horizon from ``t_us`` on."""
+        state = mode.aim(state, estimate)
+        reference, goal = state.setpoint.reference, state.setpoint.goal
+        if reference is not None and goal is not None:
+            state, (targets, joints) = self._generated(mode, state, reference, goal, estimate, t_us)
+        else:
+            nodes, period_us = self._config.planner.horizon + 1, self._config.mpc_period_us
+            targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
+            joints = ()
+        p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        if not mode.external_reference and (reference is None or goal is None):
+            targets = _led_aside(targets, p_WE, v_WE, self._config.steering.speed)
+            return replace(state, limited="") if state.limited else state, (targets, joints)
+        safe_set, why = state.kept.safe_set, ""
+        if mode.external_reference:
+            state, lowest = self._came_up(state, targets[0])
+            targets, why = self._governor.limit_external(targets, p_WE, v_WE, safe_set, lowest)
+        else:
+            targets = self._governor.limit_horizon(targets, p_WE, v_WE, safe_set)
+            if goal is not None:
+                why = self._governor.left_by(goal.motion)
+        return replace(state, limited=why) if why != state.limited else state, (targets, joints)
+
+    def target(
+        self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
+    ) -> EndEffectorTarget:
+        """Where a mode has the end-effector at an instant, if it is from outside as it is limited.
+
+        What follows the target, and the mode that takes over, go by this.
+        """
+        target = mode.target(state, t_us)
+        if not mode.external_reference:
+            return target
+        p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        _, lowest = self._came_up(state, target)
+        return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, lowest)
+
+    def _came_up(self, state: FlightState, target: EndEffectorTarget) -> tuple[FlightState, float]:
+        """The state, and the lowest z [m, NED] of a reference from outside besides the usual one.
+
+        One that takes off comes up from where its mode began. Once it was up it goes no lower.
+        """
+        vehicle = state.vehicle
+        if not vehicle.is_up and self._governor.is_up(target):
+            vehicle = replace(vehicle, is_up=True)
+            state = replace(state, vehicle=vehicle)
+        return state, -math.inf if vehicle.is_up else vehicle.mode_origin[2]
+
+    def _generated(
+        self,
+        mode: FlightMode,
+        state: FlightState,
+        reference: ReferenceState,
+        goal: PositionGoal,
+        estimate: StateEstimate,
+        t_us: int,
+    ) -> tuple[FlightState, Horizon]:
+        safe_set, waypoints, kept = state.kept.safe_set, state.setpoint.waypoints, goal
+        if self._is_off_plan(state, estimate):
+            still = MotionSetpoint(reference.of_end_effector, v=(0.0, 0.0, 0.0))
+            goal = replace(goal, motion=still, orbit=None)
+        else:
+            goal = mode.guided(goal, state)
+        reference = mode.generator.advance(reference, goal, estimate, safe_set)
+        if waypoints and goal.motion.p is not None and arrived(reference, goal.motion.p):
+            kept = goal = replace(goal, motion=replace(goal.motion, p=waypoints[0]))
+            waypoints = waypoints[1:]
+        state = replace(state, setpoint=SetpointMemory(reference, kept, waypoints))
+        return state, mode.generator.horizon(reference, goal, estimate, safe_set, t_us)
+
+    def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
+        """Whether the fast loop is off the plan: then the reference does not advance."""
+        nominal = state.nominal
+        if nominal is None:
+            return False
+        (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p
+        # On the ground the plan may well be lower.
+        low = height_above_ground(self._config, estimate) < self._config.limits.airborne_height
+        return math.hypot(px - x, py - y, 0.0 if low else pz - z) > _OFF_PLAN
+
+
+def _led_aside(
+    targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, fastest: float
+) -> tuple[EndEffectorTarget, ...]:
+    """The targets of a mode that generates no setpoint, as near as the ``fastest`` [m/s] leads.
+
+    The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED]. The height is left to
+    the mode: a landing asks for what is below the ground, at a speed of its own.
+    """
+    near = max(_LEAD * (1.0 - norm(v_WE) / fastest), _NEAR)
+    limited = []
+    for one in targets:
+        reach = near + 1e-6 * fastest * (one.t_us - targets[0].t_us)
+        north, east, _ = subtract(one.p_WE, p_WE)
+        away = math.hypot(north, east)
+        if away > reach:
+            share = reach / away
+            p = (p_WE[0] + share * north, p_WE[1] + share * east, one.p_WE[2])
+            one = replace(one, p_WE=p)
+        limited.append(one)
+    return tuple(limited)

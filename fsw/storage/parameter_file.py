@@ -1,0 +1,159 @@
+"""Parameters in files: QGroundControl's ``.params`` and MAVProxy's ``.parm``.
+
+Both are text, one parameter a line, and both are read wherever a file is read. What cannot be
+used is passed over with a sentence; what was in a file before it is overwritten for the first
+time is kept beside it, if any of it had to be passed over.
+"""
+
+from __future__ import annotations
+
+import codecs
+import contextlib
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from command_line.bounded_file import read_bounded
+from fsw.autopilot.parameters.facts import ALIASES, FACT_BY_NAME
+from fsw.autopilot.parameters.float32 import as_text, nearest_decimal
+from fsw.autopilot.parameters.param_type import field_of
+from fsw.autopilot.parameters.registry import BY_NAME
+
+VEHICLE: Final = 1  # MAVLink system of the vehicle
+COMPONENT: Final = 1  # and its autopilot's component
+
+_MAX_BYTES: Final = 1024 * 1024  # a file of all parameters has 12 kB
+# How the files of Windows' editors begin, and what is behind it.
+_MARKS: Final = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_MAX_COMPLAINTS: Final = 20  # sentences; of the rest the number
+
+_HEAD: Final = """\
+# Onboard parameters for Vehicle 1
+#
+# Stack: Pandion
+# Vehicle: Multi-Rotor
+#
+# Vehicle-Id Component-Id Name Value Type
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """What a file says."""
+
+    values: dict[str, float]  # by name, each within its range
+    complaints: tuple[str, ...]  # a sentence for each line of no use, of many for the first ones
+    unusable: int = 0  # lines of no use
+
+
+def parse(text: str) -> Loaded:
+    """Read either format; a later line for the same parameter wins."""
+    values: dict[str, float] = {}
+    complaints, unusable = list[str](), 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            found = _entry(words)
+        except ValueError as error:
+            unusable += 1
+            if unusable <= _MAX_COMPLAINTS:
+                complaints.append(f"line {number} is passed over: {error}")
+        else:
+            values.update(found)
+    if unusable > _MAX_COMPLAINTS:
+        complaints.append(f"{unusable - _MAX_COMPLAINTS} more lines are passed over")
+    return Loaded(values, tuple(complaints), unusable)
+
+
+def load(path: Path) -> Loaded:
+    """Read a file.
+
+    Raises:
+        OSError: It cannot be read, or is no file of parameters by its length.
+    """
+    data = read_bounded(path, _MAX_BYTES)
+    encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
+    # What is no text shows as lines of no use, not as an error.
+    return parse(data.decode(encoding, "replace"))
+
+
+def as_params(values: Mapping[str, float]) -> str:
+    """The text of a ``.params`` file."""
+    lines = [
+        f"{VEHICLE}\t{COMPONENT}\t{name}\t{as_text(value)}\t{field_of(value)[1]}\n"
+        for name, value in sorted(values.items())
+    ]
+    return _HEAD + "".join(lines)
+
+
+def as_parm(values: Mapping[str, float]) -> str:
+    """The text of a ``.parm`` file."""
+    return "".join(f"{name:<16s} {as_text(values[name])}\n" for name in sorted(values))
+
+
+def save(path: Path, values: Mapping[str, float]) -> None:
+    """Write a file, atomically: a concurrent reader finds the old one.
+
+    ``.parm`` makes it MAVProxy's format, anything else QGroundControl's. A symbolic link stays one:
+    what it leads to is written.
+
+    Raises:
+        OSError: It cannot be written; the old one is untouched.
+    """
+    text = as_parm(values) if path.suffix == ".parm" else as_params(values)
+    path = Path(os.path.realpath(path))
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(temporary).unlink()
+        raise
+    directory = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)
+
+
+def _entry(words: list[str]) -> dict[str, float]:
+    """The parameter of a line and its value; none where it cannot be changed."""
+    if len(words) == 5:
+        vehicle, component, name, number, _ = words
+        if (vehicle, component) != (str(VEHICLE), str(COMPONENT)):
+            raise ValueError(f"it is for component {vehicle}/{component}")
+    elif len(words) == 2:
+        name, number = words
+    else:
+        raise ValueError("it is not a parameter")
+    parameter, fact = BY_NAME.get(ALIASES.get(name, name)), FACT_BY_NAME.get(name)
+    if parameter is None and fact is None:
+        raise ValueError(f"{name[:40]} is unknown")
+    try:
+        value = float(number)
+    except ValueError:
+        raise ValueError(f"{number[:40]} is not a number") from None
+    if parameter is None:
+        assert fact is not None
+        # A file that a ground station saved holds them as well, and they say nothing new.
+        if nearest_decimal(value) != nearest_decimal(fact.value):
+            raise ValueError(f"{name} is read only and {as_text(fact.value)} here")
+        return {}
+    refusal = parameter.refusal(value)
+    if refusal is not None:
+        raise ValueError(refusal)
+    return {parameter.name: parameter.kept(value)}

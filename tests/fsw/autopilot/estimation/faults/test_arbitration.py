@@ -1,0 +1,240 @@
+"""Who is heard, and what suspicion does to a filter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from fsw.autopilot.estimation.error_state import BG, IMU_CAPACITY, LOST, NO_RATE
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
+from fsw.autopilot.estimation.sensor_fusion import SensorFusion
+from fsw.autopilot.estimation.tuning import EstimatorTuning
+from fsw.autopilot.geometry.quaternion import turned
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.signals import Vec3, Vec4
+
+FUSION = SensorFusion(EstimatorTuning())
+HOVERS: Vec4 = (0.0, 0.0, 0.0, 9.81)  # what rotors make of it
+STANDS: Vec4 = (0.0, 0.0, 0.0, 0.0)  # it does not fly
+TICK = 0.002
+POSES_UNTIL, WRONG_FROM = 3.0, 4.0  # s
+LEVEL: Vec4 = (1.0, 0.0, 0.0, 0.0)
+FINE: Vec3 = (1e-6, 1e-6, 1e-6)
+
+
+def hovering(
+    *,
+    turns: float = 0.0,
+    angle: float = 0.0,
+    poses: bool = True,
+    garbage: bool = False,
+    damaged: bool = False,
+    turned_by: Callable[[float], Vec3] | None = None,
+    moved_by: float = 0.0,
+) -> Iterator[FusionMemory]:
+    """The memories of 5 s.
+
+    In the last second the gyro says that the vehicle ``turns`` [rad/s] about its vertical, and
+    encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second, or
+    ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``. Poses may
+    be ``turned_by`` an angle [rad, FRD] at each time [s] of that second, and ``moved_by`` so much
+    [m].
+    """
+    memory, random = at_start(), np.random.default_rng(3)
+    for tick in range(round(5.0 / TICK)):
+        t, now = TICK * tick, 1.0 + TICK * tick
+        wrong = t > WRONG_FROM
+        a, b, c, d, e, f = random.standard_normal(6).tolist()
+        shakes = 1e-3 * a, 1e-3 * b, 1e-3 * c
+        rate = *shakes[:2], shakes[2] + (turns if wrong else 0.0)
+        reading = (angle if wrong else 1e-5) * (tick % 2)
+        samples: list[Sample] = [
+            JointSample(now, (reading, 0.0)),
+            ImuSample(now, (0.02 * d, 0.02 * e, -9.81 + 0.02 * f), rate),
+        ]
+        good = poses or t < POSES_UNTIL
+        if tick % 5 == 0 and (good or garbage):
+            scatter = 1e-3 if good else 20.0
+            place = scatter * d, scatter * e, -1.5 + scatter * f
+            attitude = turned(LEVEL, *shakes)
+            if wrong and turned_by is not None:
+                attitude = turned(attitude, *turned_by(t - WRONG_FROM))
+                place = place[0] + moved_by, *place[1:]
+            samples.insert(0, PoseSample(now, place, attitude, FINE, FINE))
+        memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged)
+        yield memory
+
+
+def hovered(
+    *, turns: float = 0.0, angle: float = 0.0, poses: bool = True, garbage: bool = False
+) -> tuple[FusionMemory, Source]:
+    """The last memory of ``hovering``, and all who were suspects."""
+    accused = NOBODY
+    for memory in hovering(turns=turns, angle=angle, poses=poses, garbage=garbage):
+        accused |= memory.verdict.suspects
+    return memory, accused
+
+
+def of_no_use(memory: FusionMemory) -> Source:
+    evidence = memory.verdict.evidence
+    assert evidence is not None
+    return redundancy.note_silence(evidence, NOBODY, memory.now)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("garbage", [False, True])
+def test_a_gyro_is_not_doubted_where_nothing_measured_could_find_its_bias(garbage: bool) -> None:
+    """Suspicion alone ended a flight whose tilt was known to 0.1 deg, because its sigma grew."""
+    memory, accused = hovered(turns=0.3, poses=False, garbage=garbage)
+    assert accused & Source.GYRO
+    M = memory.numbers[0]["covariance"]
+    assert max(math.sqrt(M[BG + k, BG + k]) for k in range(3)) < 0.25
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("turns", [0.25, 0.4])
+def test_a_bias_is_as_unknown_as_residuals_are_large(turns: float) -> None:
+    """Taken for 0.5 rad/s whatever was seen, sound gyros of vehicles with satellites tilted them.
+
+    What is known of it from before is kept, and taken up when the trial is over.
+    """
+    before, all_memories = at_start(), hovering(turns=turns)
+    for memory in all_memories:
+        if memory.verdict.suspects & Source.GYRO:
+            break
+        before = memory
+    assert 0.3 * turns < memory.verdict.unknown[1] < 1.3 * turns
+    x = memory.numbers[0]
+    assert x["lost"] & NO_RATE
+    assert x["kept_bias"][3:] == pytest.approx(before.numbers[0]["gyro_bias"], abs=1e-4)
+    waiting = np.arange(x["first"], x["end"]) % IMU_CAPACITY
+    assert all(int(lost) & NO_RATE for lost in x["imu"][waiting, LOST])
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("damaged", [False, True])
+def test_of_a_rotor_that_is_known_to_have_failed_no_gyro_is_a_suspect(damaged: bool) -> None:
+    suspects = NOBODY
+    for memory in hovering(turns=0.3, damaged=damaged):
+        suspects |= memory.verdict.suspects
+    assert bool(suspects & Source.GYRO) is not damaged
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_doubts_do_not_end_with_a_descent_but_where_the_rotors_stand() -> None:
+    """Near the ground a gyro that had drifted was taken for the one from before: 40 deg of tilt."""
+    for memory in hovering(turns=0.3):
+        if memory.verdict.suspects & Source.GYRO:
+            break
+    began, now, suspect = memory.verdict.since, memory.now, int(memory.numbers["suspect"][0])
+    # The ground that is felt leaves the rotors' model unknown, as it is where they stand.
+    for model, flies in ((HOVERS, True), (STANDS, True), (STANDS, True), (STANDS, False)):
+        now += TICK
+        samples: list[Sample] = [
+            JointSample(now, (1e-3 * (now % 0.1), 0.0)),
+            ImuSample(now, (0.0, 0.0, -9.81 + 1e-3 * (now % 0.1)), (1e-4 * (now % 0.3), 0.0, 0.3)),
+        ]
+        memory, found = FUSION.take_in(memory, samples, now, model=model)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, aloft=False, flies=flies)
+        assert memory.verdict.since == (began if flies else -1.0)
+        assert int(memory.numbers["suspect"][0]) == (suspect if flies else 0)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_rotors_are_no_witness_while_nobody_knows_how_the_arm_moves() -> None:
+    memory, accused = hovered()
+    assert (accused, of_no_use(memory)) == (NOBODY, NOBODY)
+    memory, _ = hovered(angle=0.5)
+    assert of_no_use(memory) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("source", [Source.POSE, Source.GYRO | Source.COMPASS])
+def test_what_was_named_in_flight_is_believed_again_after_five_seconds_on_the_ground(
+    source: Source,
+) -> None:
+    """Nobody compares it there: it would be out until the vehicle is started anew."""
+    memory, _ = hovered()
+    agreed = tuple([math.inf if one & source else -math.inf for one in Source])
+    memory = memory._replace(verdict=memory.verdict._replace(wrong=source, agreed=agreed))
+    memory.numbers["out"] = NO_RATE if source & Source.GYRO else 0
+    began, now = memory.now, memory.now
+    while memory.verdict.wrong:
+        now += TICK
+        samples: list[Sample] = [
+            JointSample(now, (0.0, 0.0)),
+            ImuSample(now, (0.0, 0.0, -9.81 + 1e-3 * (now % 0.1)), (1e-4 * (now % 0.3), 0.0, 0.0)),
+        ]
+        memory, found = FUSION.take_in(memory, samples, now)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, aloft=False)
+        assert now - began < 5.1
+    assert now - began > 4.9
+    assert memory.numbers[0]["out"] == 0
+
+
+def last(memories: Iterator[FusionMemory]) -> FusionMemory:
+    *_, memory = memories
+    return memory
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("rate", [(0.8, 0.0, 0.0), (0.0, -2.0, 0.0), (0.0, 0.0, 1.5)])
+def test_of_a_pose_whose_attitude_is_wrong_the_place_is_used(rate: Vec3) -> None:
+    """A frame that tilted was left for dead reckoning, at a tilt of 3 deg, and hit the ground."""
+    memory = last(hovering(turned_by=lambda t: (t * rate[0], t * rate[1], t * rate[2])))
+    assert memory.verdict.wrong == Source.ATTITUDE
+    health = memory.of(Sensor.POSE)
+    assert memory.now - health.fused[0] < 0.1
+    assert memory.now - health.fused[1] > 0.5
+    assert health.fault is SensorFault.DISAGREES
+    x, y = memory.numbers[0]["q"][1:3].tolist()
+    assert 2.0 * math.hypot(x, y) < 0.02
+    assert math.dist(memory.numbers[0]["p"], (0.0, 0.0, -1.5)) < 0.02
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_of_a_pose_whose_attitude_repeats_itself_the_place_is_used() -> None:
+    memory, random, said = at_start(), np.random.default_rng(5), LEVEL
+    for tick in range(round(2.0 / TICK)):
+        now = 1.0 + TICK * tick
+        a, b, c = (1e-3 * random.standard_normal(3)).tolist()
+        samples: list[Sample] = [
+            JointSample(now, (1e-5 * (tick % 2), 0.0)),
+            ImuSample(now, (0.0, 0.0, -9.81 + a), (a, b, c)),
+        ]
+        if tick % 5 == 0:
+            said = turned(LEVEL, a, b, c) if now < 2.0 else said
+            samples.insert(0, PoseSample(now, (a, b, c - 1.5), said, FINE, FINE))
+        memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
+        memory, _ = FUSION.catch_up(memory, samples, now, found)
+    health = memory.of(Sensor.POSE)
+    assert memory.now - health.fused[0] < 0.1
+    assert memory.now - health.fused[1] > 0.5
+    assert health.fault is SensorFault.STUCK
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("turn", "is_believed"),
+    [((0.15, 0.0, 0.0), False), ((0.0, -0.2, 0.0), False), ((0.0, 0.0, 0.2), True)],
+)
+def test_a_frame_may_jump_by_a_heading_and_never_by_a_tilt(turn: Vec3, is_believed: bool) -> None:
+    """Down stays where it is: a jump of 22 deg was believed, and flown into the ground."""
+    memory = last(hovering(turned_by=lambda _: turn, moved_by=0.5))
+    assert bool(memory.reset.number) is is_believed
+    assert (memory.now - memory.of(Sensor.POSE).fused[0] < 0.1) is is_believed
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_suspect_is_no_better_witness_of_a_tilt_than_its_residuals_say() -> None:
+    """Nothing finds the bias of a gyro without poses: by what it may be off, down is unknown."""
+    memory = last(hovering(turned_by=lambda t: (0.15, 0.0, 0.05 * t), moved_by=0.5))
+    assert memory.verdict.is_on or memory.verdict.wrong
+    assert not memory.reset.number

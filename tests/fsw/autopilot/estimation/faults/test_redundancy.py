@@ -1,0 +1,387 @@
+"""Who is named wrong when sensors contradict each other, and who is not."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from fsw.autopilot.estimation.error_state import FILTER
+from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults.redundancy import (
+    EVERY,
+    NO_AID,
+    UNDECIDED,
+    Aid,
+    Source,
+    Verdict,
+    judged,
+    look,
+)
+from fsw.autopilot.geometry.quaternion import turned
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
+from fsw.autopilot.signals import Vec3, Vec4
+
+TICK = 0.002
+G = 9.81
+FIELD = (0.2148, 0.0109, 0.4321)  # Gauss, NED
+SETTLED = 4.0  # s, before anything is wrong
+NONE: Vec3 = (0.0, 0.0, 0.0)
+
+
+class Wrong(NamedTuple):
+    """By how much a source is off from ``SETTLED`` on, for good."""
+
+    gyro: Vec3 = NONE  # rad/s
+    accelerometer: Vec3 = NONE  # m/s^2
+    push: Vec3 = NONE  # m/s^2, NED, that the model does not know
+    blow: Vec3 = NONE  # rad/s, at once, that the model does not know
+    turning: Vec3 = NONE  # rad/s, of the pose's attitude
+    gaining: Vec3 = NONE  # m/s^2, of the measured place
+    magnetic: Vec3 = NONE  # rad/s, of the field
+    iron: Vec3 = NONE  # Gauss, body
+
+
+def flown(
+    wrong: Wrong, suite: str, seconds: float, seed: int = 1, yaw: float = 0.0
+) -> list[Verdict]:
+    """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added.
+
+    It turns about its vertical at up to a rate ``yaw`` [rad/s].
+    """
+    random = np.random.default_rng(seed)
+    x: Any = np.zeros(1, FILTER)
+    evidence, verdict, found = redundancy.at_start(), Verdict(), []
+    evidence["began"] = -1.0
+    p, v, q, spun = np.array([0.0, 0.0, -1.2]), np.zeros(3), (1.0, 0.0, 0.0, 0.0), np.zeros(3)
+    place_off, turn_off, field_off = np.zeros(3), np.zeros(3), np.zeros(3)
+    speed_off = np.zeros(3)
+    for tick in range(round((SETTLED + seconds) / TICK)):
+        now, late = TICK * tick, TICK * tick > SETTLED
+        w = 0.1 * np.sin(now * np.array([1.3, 1.7, 0.9]) + (0.0, 1.0, 2.0))
+        w += (0.0, 0.0, yaw * math.sin(0.5 * now))
+        rates = w + (np.array(wrong.blow) if late else 0.0)
+        alpha = (w - spun) / TICK
+        spun = w
+        q = turned(q, *(TICK * rates))
+        R = matrix_from_quaternion(q)
+        gust = 0.4 * random.uniform(-1.0, 1.0, 3) + (np.array(wrong.push) if late else 0.0)
+        thrust = G + 0.3 * math.sin(now)
+        a = np.array(rotate(R, (0.0, 0.0, -thrust))) + (0.0, 0.0, G) + gust
+        p, v = p + TICK * v, v + TICK * a
+        force = np.array(rotate_back(R, tuple(gust))) - (0.0, 0.0, thrust)
+        said = rates + 0.01 * random.standard_normal(3)
+        felt = force + 0.5 * random.standard_normal(3)
+        if late:
+            said, felt = said + wrong.gyro, felt + wrong.accelerometer
+            turn_off += TICK * np.array(wrong.turning)
+            field_off += TICK * np.array(wrong.magnetic)
+            speed_off += TICK * np.array(wrong.gaining)
+            place_off += TICK * speed_off
+        s = x.view(np.recarray)[0]
+        s.newest[:3], s.newest[3:] = felt, said
+        s.suspect = int(verdict.is_on or bool(verdict.wrong))
+        redundancy.witness(s, R, TICK, (*alpha.tolist(), thrust))  # type: ignore[arg-type]
+        if tick % round(EVERY / TICK):
+            continue
+        pose: Aid = NO_AID
+        fix: Aid = NO_AID
+        field: Aid = NO_AID
+        if suite == "pose":
+            noisy = turned(q, *(turn_off + 2e-3 * random.standard_normal(3)))
+            where = tuple((p + place_off + 1e-3 * random.standard_normal(3)).tolist())
+            pose = (True, now, where, noisy, 2e-3, 2e-3)  # type: ignore[assignment]
+        else:
+            if tick % 50 == 0:
+                where = tuple((p + place_off + 0.01 * random.standard_normal(3)).tolist())
+                fast = (v + speed_off + 0.03 * random.standard_normal(3)).tolist()
+                fix = (True, now, where, (*fast, 0.0), 0.015, 0.1)  # type: ignore[assignment]
+            seen = matrix_from_quaternion(turned(q, *field_off))
+            body = np.array(rotate_back(seen, FIELD)) + 3e-3 * random.standard_normal(3)
+            body += np.array(wrong.iron)
+            field = (True, now, tuple(body.tolist()), (1.0, 0.0, 0.0, 0.0), 0.01, 0.0)  # type: ignore[assignment]
+        look(evidence, x, now, pose, fix, field, not verdict.is_on)
+        ratios = tuple(evidence[0]["ratio"].tolist())
+        sizes = tuple(evidence[0]["size"].tolist())
+        verdict = judged(verdict, ratios, now, holds_attitude=suite == "pose", sizes=sizes)
+        found.append(verdict)
+    return found
+
+
+def named(verdicts: list[Verdict]) -> Source:
+    """All that was named, the rotors' model included."""
+    total = Source(0)
+    for one in verdicts:
+        total |= one.wrong | one.named
+    return total
+
+
+def suspected(verdicts: list[Verdict]) -> Source:
+    total = Source(0)
+    for one in verdicts:
+        total |= one.suspects | one.wrong
+    return total
+
+
+directions = st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, 0.6, 0.52)])
+suites = st.sampled_from(["pose", "satellites"])
+
+
+def along(direction: Vec3, size: float) -> Vec3:
+    x, y, z = direction
+    return size * x, size * y, size * z
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("suite", ["pose", "satellites"])
+def test_nobody_is_suspected_while_all_are_well(suite: str) -> None:
+    for seed in range(2):
+        assert not suspected(flown(Wrong(), suite, 6.0, seed))
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=3, phases=[Phase.generate])
+@given(suite=suites, direction=directions, size=st.floats(0.3, 8.0), seed=st.integers(0, 99))
+def test_a_gyro_that_is_off_is_named_whatever_its_size(
+    suite: str, direction: Vec3, size: float, seed: int
+) -> None:
+    verdicts = flown(Wrong(gyro=along(direction, size)), suite, 1.2, seed)
+    assert named(verdicts) == Source.GYRO
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=3, phases=[Phase.generate])
+@given(suite=suites, direction=directions, size=st.floats(2.5, 30.0), seed=st.integers(0, 99))
+def test_an_accelerometer_that_is_off_is_named_whatever_its_size(
+    suite: str, direction: Vec3, size: float, seed: int
+) -> None:
+    verdicts = flown(Wrong(accelerometer=along(direction, size)), suite, 2.5, seed)
+    assert named(verdicts) == Source.ACCELEROMETER
+
+
+@pytest.mark.long
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=5, phases=[Phase.generate])
+@given(suite=suites, size=st.floats(2.5, 8.0), seed=st.integers(0, 99))
+def test_a_gust_is_no_sensor_s_fault(suite: str, size: float, seed: int) -> None:
+    verdicts = flown(Wrong(push=(size, 0.0, 0.0)), suite, 3.0, seed)
+    assert named(verdicts) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-7")
+@settings(deadline=None, max_examples=2, phases=[Phase.generate])
+@given(size=st.floats(0.5, 4.0), seed=st.integers(0, 99))
+def test_a_blow_is_no_gyro_s_fault(size: float, seed: int) -> None:
+    verdicts = flown(Wrong(blow=(0.0, size, 0.0)), "pose", 1.0, seed)
+    assert named(verdicts) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=2, phases=[Phase.generate])
+@given(direction=directions, size=st.floats(1.0, 6.0), seed=st.integers(0, 99))
+def test_a_frame_that_turns_is_suspected_and_the_accelerometer_is_not(
+    direction: Vec3, size: float, seed: int
+) -> None:
+    """Degrees a second: nothing but the gyro says otherwise, so both stay suspects."""
+    turning = along(direction, math.radians(size))
+    verdicts = flown(Wrong(turning=turning), "pose", 5.0, seed)
+    assert suspected(verdicts) & Source.ATTITUDE
+    assert not named(verdicts) & ~(Source.ATTITUDE | Source.GYRO)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_frame_that_gains_speed_is_named() -> None:
+    verdicts = flown(Wrong(gaining=(0.0, 3.0, 0.0)), "pose", 3.0)
+    assert named(verdicts) == Source.POSE
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_slow_turn_stays_undecided_for_long_and_is_over_when_it_ends() -> None:
+    verdicts = flown(Wrong(turning=(0.0, 0.0, math.radians(1.0))), "pose", 6.0)
+    last = verdicts[-1]
+    assert last.contradicts
+    assert last.suspects == Source.ATTITUDE | Source.GYRO
+    now = EVERY * len(verdicts)
+    assert now - last.since > UNDECIDED
+
+
+@pytest.mark.long
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("iron", [(0.015, 0.0, 0.0), (0.0, -0.012, 0.012)])
+def test_iron_that_turns_with_the_vehicle_is_nobody_s_fault(iron: Vec3) -> None:
+    for seed in range(2):
+        verdicts = flown(Wrong(iron=iron), "satellites", 12.0, seed, yaw=1.0)
+        assert not suspected(verdicts)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_where_rotors_half_know_it_the_field_is_suspected_and_not_the_gyro() -> None:
+    ratios = [0.0] * redundancy.COUNT
+    ratios[redundancy.GB], ratios[redundancy.MB] = 1.8, 0.7
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=False)
+    assert verdict.suspects == Source.COMPASS
+    ratios[redundancy.GM], ratios[redundancy.MB] = 1.3, 0.0
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=False)
+    assert verdict.suspects & Source.GYRO
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("turning", [(2.0, 0.0, 0.0), (0.0, -1.5, 1.5)])
+def test_a_field_that_turns_as_the_rotors_turn_nothing_is_named(turning: Vec3) -> None:
+    """Gyro and field contradict each other, and the rotors know who is right."""
+    verdicts = flown(Wrong(magnetic=turning), "satellites", 0.6)
+    assert named(verdicts) == Source.COMPASS
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@settings(deadline=None, max_examples=2, phases=[Phase.generate])
+@given(direction=directions, size=st.floats(0.04, 0.3), seed=st.integers(0, 99))
+def test_a_field_that_leaps_is_no_fault_of_a_gyro_that_agrees_with_the_rotors(
+    direction: Vec3, size: float, seed: int
+) -> None:
+    """A gyro that is off by so much would show beside the rotors at once."""
+    verdicts = flown(Wrong(iron=along(direction, size)), "satellites", 1.0, seed)
+    assert not suspected(verdicts) & Source.GYRO
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("residual", "source"),
+    [(redundancy.AA, Source.ACCELEROMETER), (redundancy.GG, Source.GYRO)],
+)
+def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
+    residual: int, source: Source
+) -> None:
+    """Satellites do not hold the tilt: an accelerometer that drifts turned it by 20 deg."""
+    ratios = [0.7] * redundancy.COUNT
+    ratios[residual] = 2.0
+    verdict = Verdict()
+    for look_ in range(3):
+        now = EVERY * look_
+        verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
+        assert not verdict.suspects
+    assert verdict.wrong == source
+    found_with = Verdict(wrong=Source.ATTITUDE)
+    found_with = judged(found_with, tuple(ratios), 1.0, holds_attitude=False)
+    assert not found_with.is_on, "it was found with an attitude that is wrong"
+    x: Any = np.zeros(1, FILTER)
+    evidence = redundancy.at_start()
+    x["witness"][0, 0] = 1.0
+    x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
+    for look_ in range(60):
+        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
+    assert evidence[0]["ratio"][redundancy.AA] > 1.0
+    assert evidence[0]["ratio"][redundancy.GG] > 1.0
+    x["covariance"][0] = 0.5**2 * np.eye(17)
+    for look_ in range(60, 90):
+        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
+    assert not evidence[0]["ratio"].any(), "nothing is known of them"
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(("gains", "source"), [(1.0, Source.ATTITUDE), (4.0, Source.POSE)])
+def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a_tilt_explains(
+    gains: float, source: Source
+) -> None:
+    ratios, sizes = [0.0] * redundancy.COUNT, [0.0] * redundancy.COUNT
+    for k in (redundancy.GP, redundancy.MP_TURN, redundancy.AP, redundancy.MP_FORCE):
+        ratios[k] = 3.0
+    sizes[redundancy.AP] = sizes[redundancy.MP_FORCE] = gains
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
+    assert verdict.wrong == source
+    ratios[redundancy.GP] = ratios[redundancy.MP_TURN] = 0.0
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
+    assert verdict.wrong == Source.POSE, "its attitude agrees"
+
+
+def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
+    fires = [0.0] * redundancy.COUNT
+    fires[redundancy.GM], fires[redundancy.GP] = 5.0, 5.0
+    agrees = tuple(0.2 for _ in range(redundancy.COUNT))
+    verdict, now = Verdict(), 10.0
+    for _ in range(3):
+        verdict, now = judged(verdict, tuple(fires), now, holds_attitude=True), now + EVERY
+    assert verdict.wrong == Source.GYRO
+    back: float | None = None
+    began = now
+    while back is None and now < began + 10.0:
+        verdict, now = judged(verdict, agrees, now, holds_attitude=True), now + EVERY
+        back = now - began if not verdict.wrong else None
+    assert back == pytest.approx(5.0, abs=0.1)
+    verdict = judged(verdict, tuple(fires), now, holds_attitude=True)
+    assert verdict.wrong == Source.GYRO, "and it can be named again"
+
+
+@given(st.lists(st.floats(0.0, 20.0), min_size=redundancy.COUNT, max_size=redundancy.COUNT))
+def test_who_is_named_has_fired_and_nobody_is_while_nothing_does(ratios: list[float]) -> None:
+    verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True)
+    fired = Source(0)
+    for k, ratio in enumerate(ratios):
+        fired |= redundancy.OF[k] if ratio > 1.0 else Source(0)
+    assert not verdict.wrong & ~fired
+    assert bool(verdict.is_on or verdict.wrong) == (max(ratios) > 1.0)
+
+
+@pytest.mark.parametrize(
+    ("since", "kept"), [(0.1, 0.0), (0.3, 1.5), (1.2, 2.0), (3.9, 3.0), (4.1, 4.0)]
+)
+def test_a_comparison_counts_as_soon_as_its_window_is_without_silence(
+    since: float, kept: float
+) -> None:
+    """Of a gyro that is garbage a second after a gap in its readings, nothing was heard for 4 s."""
+    e = redundancy.at_start()
+    redundancy.note_silence(e, Source.GYRO, 10.0)
+    s = SimpleNamespace(**{name: e[0][name] for name in redundancy.EVIDENCE.fields or ()})
+    s.came[redundancy.GM] = 10.0 + since
+    s.both[redundancy.GM] = 1.5, 2.0, 3.0, 4.0, 0.0
+    redundancy._note_largest(s, 10.0 + since, redundancy.GM)
+    assert s.ratio[redundancy.GM] == kept
+
+
+@given(st.sampled_from(list(Source)), st.floats(0.0, 0.19), st.floats(1.1, 20.0))
+def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
+    silent: Source, later: float, ratio: float
+) -> None:
+    """Encoders that send garbage leave the rotors' model without its arm, and no gyro is wrong."""
+    evidence = redundancy.at_start()
+    redundancy.note_silence(evidence, silent, 5.0)
+    lost = redundancy.note_silence(evidence, Source(0), 5.0 + later)
+    assert lost == silent
+    assert not redundancy.note_silence(evidence, Source(0), 5.0 + 2.0 * redundancy.WINDOWS[0])
+    fires = tuple([ratio if of & silent else 0.0 for of in redundancy.OF])
+    verdict = judged(Verdict(), fires, 5.0 + later, holds_attitude=True, lost=lost)
+    assert not verdict.is_on
+    assert not verdict.wrong
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_field_that_has_turned_the_heading_is_a_suspect_beside_the_gyro() -> None:
+    """It turns what is felt as well, where no pose holds the attitude."""
+    ratios = [0.0] * redundancy.COUNT
+    ratios[redundancy.GB], ratios[redundancy.AN] = 1.4, 1.1
+    verdict = Verdict()
+    for look_ in range(20):
+        now = EVERY * look_
+        verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
+    assert verdict.suspects == Source.GYRO | Source.COMPASS
+    assert not verdict.wrong
+    without = verdict._replace(wrong=Source.COMPASS)
+    without = judged(without, tuple(ratios), now, holds_attitude=False)
+    assert without.suspects & Source.GNSS, "the heading of one that is not used turns nothing"
+
+
+def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    level: NDArray[np.float64] = np.eye(3).ravel()
+    model: Vec4 = (0.1, 0.0, 0.0, G)
+    R = tuple(level.tolist())
+    redundancy.witness(x, R, TICK, model)  # type: ignore[arg-type]
+    assert x.witness.any()
+    redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0))  # type: ignore[arg-type]
+    assert not x.witness[:4].any()

@@ -1,0 +1,85 @@
+"""An estimate that jumps: what the loops see of plan and observer stays what it was."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from fsw.autopilot.control.cascade import in_hover
+from fsw.autopilot.estimation.dead_reckoning import moved_on
+from fsw.autopilot.flight.estimate.jump import returned
+from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_nominal
+from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.geometry.rotation import wrap_angle, yaw_of
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.signals import StateEstimate, StatusText
+from tests.fsw.autopilot.flight.in_flight import flying
+from tests.fsw.random_states import estimate_of
+
+SEEN = 1e-9
+
+
+def errors(state: FlightState, estimate: StateEstimate) -> np.ndarray:
+    """Position [m] and yaw [rad] from the plan, velocity [m/s] from the observer: (7,)."""
+    assert state.nominal is not None
+    return np.array(
+        [
+            *np.subtract(estimate.p_WB, state.nominal.p),
+            wrap_angle(yaw_of(estimate.R_WB) - state.nominal.yaw),
+            *np.subtract(estimate.v_WB, state.cascade.observed.v),
+        ]
+    )
+
+
+def moving(random: np.random.Generator) -> tuple[FlightState, StateEstimate]:
+    """In flight somewhere, off the plan, with an observer that is not quite right."""
+    estimate = estimate_of(
+        Rotation.from_euler("zyx", [random.uniform(-3.0, 3.0), 0.0, 0.0]),
+        p_WB=tuple(random.uniform(-2.0, 2.0, 3).tolist()),
+        v_WB=tuple(random.uniform(-1.0, 1.0, 3).tolist()),
+    )
+    cascade = with_nominal(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
+    cascade.observed.v[:] = random.uniform(-1.0, 1.0, 3)
+    return replace(flying(), cascade=cascade), estimate
+
+
+def turned_and_moved(
+    estimate: StateEstimate, shift: np.ndarray, faster: np.ndarray, yaw: float
+) -> StateEstimate:
+    turn = Rotation.from_rotvec([0.0, 0.0, yaw]) * Rotation.from_matrix(
+        np.reshape(estimate.R_WB, (3, 3))
+    )
+    return estimate._replace(
+        p_WB=tuple(np.add(estimate.p_WB, shift).tolist()),
+        v_WB=tuple(np.add(estimate.v_WB, faster).tolist()),
+        R_WB=tuple(turn.as_matrix().ravel().tolist()),
+    )
+
+
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize("seed", range(20))
+def test_plan_and_observer_come_along_when_positions_return(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    state, before = moving(random)
+    carried = moved_on(before, 0.002)._replace(t_us=before.t_us + 2_000)
+    found = turned_and_moved(
+        carried, random.uniform(-0.3, 0.3, 3), random.uniform(-0.3, 0.3, 3), random.uniform(-1, 1)
+    )
+    after = returned(state, found, before, [])
+    assert errors(after, found) == pytest.approx(errors(state, carried), abs=SEEN)
+
+
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize(("place", "texts"), [(0.019, 0), (0.021, 1)])
+def test_a_jump_of_more_than_20_mm_is_reported(place: float, texts: int) -> None:
+    state, before = moving(np.random.default_rng(1))
+    still = before._replace(v_WB=(0.0, 0.0, 0.0))
+    found = turned_and_moved(still, np.array([0.0, -place, 0.0]), np.zeros(3), 0.0)
+    said: list[StatusText] = []
+    returned(state, found, still, said)
+    assert [text.text for text in said] == [
+        "estimate moved by 21 mm, 0.000 rad: the plan moves along"
+    ] * texts
