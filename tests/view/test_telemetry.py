@@ -334,7 +334,7 @@ def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(
     flight, _ = places(tmp_path / "gap.tlog", whole + bytes(5_000_000) + a_flight(2000, 6, 2.0))
     assert "2 flights" in flight.unusable[0]
     assert flight.unusable[1].startswith("5000000 bytes")
-    monkeypatch.setattr(tlog_reader, "_MOST_FAILED", 100_000)  # a million take 4 s
+    monkeypatch.setattr(tlog_reader, "_MAX_FAILED", 100_000)  # a million take 4 s
     flooded, _ = places(tmp_path / "flood.tlog", whole + b"\xfd" * 200_000)
     assert flooded.unusable == (
         "100000 bytes are no frames, and are skipped",
