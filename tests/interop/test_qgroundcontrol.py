@@ -17,7 +17,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from fsw.autopilot.parameters.storage import load
 
 from fsw.autopilot.parameters.metadata import metadata_crc, parameter_document
 from fsw.autopilot.parameters.param_type import value_of
