@@ -45,13 +45,13 @@ def drag_force(air: Air, v: V3, rotation: Array) -> V3:
 
 @kernel
 def _height(air: Air, k: int, hub: V3) -> float:
-    """Distance of a hub at p [m, NED] from surface ``k`` [m]."""
+    """Distance of a hub [m, NED] from surface ``k`` [m]."""
     return dot(row(air.surfaces, k), hub) - float(air.surfaces[k, 3])
 
 
 @kernel
 def rotor_gain(air: Air, hub: V3, i: int) -> float:
-    """Thrust of rotor ``i`` over that in free air [1], with its hub at a place [m, NED]."""
+    """Thrust of rotor ``i`` over that in free air [1], with its hub [m, NED]."""
     gain = 1.0
     for k in range(air.surface_count):
         up = -air.surfaces[k, 2]
@@ -64,10 +64,7 @@ def rotor_gain(air: Air, hub: V3, i: int) -> float:
 
 @kernel
 def wall_force(air: Air, hub: V3, i: int, thrust: float) -> V3:
-    """Force [N, NED] of all walls on rotor ``i``, its hub at a place [m, NED].
-
-    It gives a ``thrust`` [N].
-    """
+    """Force [N, NED] of all walls on rotor ``i``, with its hub [m, NED] and its ``thrust`` [N]."""
     force = (0.0, 0.0, 0.0)
     for k in range(air.surface_count):
         if abs(air.surfaces[k, 2]) < _UPRIGHT:

@@ -10,10 +10,10 @@ from sitl.plant.vector import V3, Array, add, cross, row, times, times_one, trip
 
 @kernel
 def places_of_bodies(plant: Plant, state: Array, work: Workspace, k: int, out: Array) -> None:
-    """Rows of ``sitl.plant.places``, in W, of a state (n,) [SI], into entry k of out [m, NED].
+    """Rows of ``sitl.plant.places``, of a state (n,) [SI], into entry k.
 
-    Where out (steps, rows, 3) has room for three more, they are the base's axes [1, NED]. ``work``
-    has placed the bodies.
+    Of out (steps, rows, 3) [m, NED]; where it has room for three more rows, they are the base's
+    axes [1, NED]. ``work`` has placed the bodies.
     """
     frames, points, at = plant.chain.joints + 2, plant.points, work.posture
     base = triple(state, P_WB)

@@ -24,7 +24,7 @@ def own_points(vehicle: Vehicle) -> tuple[tuple[int, V3], ...]:
 
 
 def row_of(vehicle: Vehicle, body: int, place: V3) -> int:
-    """Row of a point of ``own_points``, or of a joint or end-effector that is at its place [m]."""
+    """Row of a point of ``own_points``, or of a joint or end-effector at its place [m, link]."""
     row = _frame_row(vehicle, body, place)
     if row is None:
         row = 2 + len(vehicle.joints) + own_points(vehicle).index((body, place))
