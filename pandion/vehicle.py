@@ -158,12 +158,12 @@ def _check(options: _Check) -> int:
 def _import(options: _Import) -> int:
     from command_line.bounded_file import read_bounded
     from vehicles.rotor_files import read_rotors
-    from vehicles.urdf_reader import MOST_BYTES, vehicle_from_urdf
+    from vehicles.urdf_reader import MAX_BYTES, vehicle_from_urdf
     from vehicles.vehicle_file import VehicleError, parse_vehicle, vehicle_text
 
     rotors = read_rotors(options.rotors)
     try:
-        robot = read_bounded(options.urdf, MOST_BYTES).decode("utf-8-sig")
+        robot = read_bounded(options.urdf, MAX_BYTES).decode("utf-8-sig")
     except OSError as error:
         raise VehicleError(f"cannot read {options.urdf}: {error.strerror}") from error
     except UnicodeDecodeError:

@@ -33,7 +33,7 @@ from vehicles.vehicle_file import VehicleError, checked, inertia_matrix
 
 Array = NDArray[np.float64]
 
-MOST_BYTES: Final = 4 * 1024 * 1024
+MAX_BYTES: Final = 4 * 1024 * 1024
 _MOST_LINKS: Final = 500
 _MOST: Final = 1e6  # of any number, whatever its unit
 _HALF_TURN: Final = np.diag([1.0, -1.0, -1.0])  # about x, from FLU to FRD and back
