@@ -172,7 +172,7 @@ def _narrowed(low: float, high: float, slope: float, least: float, most: float) 
 
 @compilable
 def _cut(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
-    """Less of roll or pitch, so that the rotor with the least room has enough, at the best thrust and yaw."""
+    """Less of roll or pitch, until the worst rotor has room at the best thrust and yaw."""
     yaw = _nearest(_room(m, n, roll, pitch, YAW, THRUST, lift), 0.0)
     lift = _nearest(_room(m, n, roll, pitch, THRUST, YAW, yaw), lift)
     found, worst = 0, 0.0
