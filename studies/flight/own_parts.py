@@ -301,6 +301,7 @@ class WatchedPlanner:
             raise OwnPartError(f"planner {type(planner).__name__}: must have plan(request)")
         self._plan, self._period_us = plan, config.mpc_period_us
         self._ours = Planner(config.planner, config.airframe, processor_time_us)
+        self._begun = False
         self._pace = _Pace("planner", config.mpc_period_us, allow_slow)
 
     def plan(self, request: PlanRequest) -> Plan | PlanFailure:
@@ -309,7 +310,8 @@ class WatchedPlanner:
         Raises:
             OwnPartError: The answer cannot be flown.
         """
-        if request.mode is not Mode.TRAJECTORY:
+        self._begun = self._begun or request.mode is Mode.TRAJECTORY
+        if self._begun and request.mode is not Mode.TRAJECTORY:
             return self._ours.plan(request)
         t = 1e-6 * (request.t_apply_us - START_US)
         begun = processor_time_us()

@@ -14,7 +14,7 @@ from scipy.linalg import solve_discrete_are
 import pandion
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
-from fsw.autopilot.signals import PlanFailure, PlanRequest, SolverStatus
+from fsw.autopilot.signals import Mode, PlanFailure, PlanRequest, SolverStatus
 from studies.flight.closed_loop import RefusedError
 from studies.flight.own_parts import OwnParts, named_part
 from studies.flight.result import processor_time_us
@@ -84,6 +84,25 @@ def test_a_planner_that_fails_is_braked_for_as_ours_is() -> None:
     assert result.row is not None
     assert result.row.failures == 4
     assert result.metrics["mpc"]["fallbacks"] == 4
+
+
+def test_after_a_failsafe_our_planner_flies_not_the_own_one() -> None:
+    asked: list[Mode] = []
+
+    class Astray:
+        """Sideways, whatever is there."""
+
+        def plan(self, request: PlanRequest) -> Any:
+            asked.append(request.mode)
+            return np.tile([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], (10, 1))
+
+    result = pandion.fly("walls-calm", duration_s=6.0, planner=Astray(), log=False)
+    assert not result.completed
+    assert "left the trajectory" in result.reason
+    begun = asked.index(Mode.TRAJECTORY)
+    assert set(asked[begun:]) == {Mode.TRAJECTORY}
+    assert len(asked) < 40, "ours planned the rest of 60"
+    assert "hit" not in result.reason
 
 
 def test_an_lqr_flies_the_workspace_and_is_judged_by_our_referee() -> None:

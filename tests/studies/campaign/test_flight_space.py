@@ -138,7 +138,7 @@ def test_the_seed_counts_where_a_fault_draws_and_only_there(unit: str, kind: str
     random = np.random.default_rng(1)
     before = random.bit_generator.state
     if unit == "motor":
-        MotorFault(fault, random, 10.0, 2000).through((1.0, 1.0, 1.0, 1.0), 0)
+        MotorFault(fault, random, (10.0,) * 4, 2000).through((1.0, 1.0, 1.0, 1.0), 0)
     else:
         SignalFault[Any](fault, random).read(0, Gyro((0.0, 0.0, 0.0)))
     draws = random.bit_generator.state != before
