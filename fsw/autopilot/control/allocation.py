@@ -4,7 +4,8 @@ With the rotors' effectiveness B (roll, pitch, yaw and thrust per newton of each
 by the pseudoinverse of B. Where that asks for more than rotors have, yaw is given up first, then
 thrust, as far as it takes and no further: with roll and pitch as they are, rotor i gives
 :math:`c_i + a_i T + b_i y`, and which thrust T leaves room for some yaw y follows from each pair of
-limits. Roll and pitch are cut only where no thrust and no yaw make room for them.
+limits. Roll and pitch are cut only where no thrust and no yaw make room for them: each to
+what is possible without the other, then both by one share.
 
 Source: PX4's sequential desaturation, whose order of what is given up this is.
 """
@@ -25,6 +26,7 @@ ROLL, PITCH, THRUST, YAW = 0, 1, 2, 3  # of a rotor's share, in the order of wha
 AXES: Final = 4
 _NONE: Final = 1e-9  # N a unit; a rotor with less has no share
 _FAR: Final = 1e9
+_HALVINGS: Final = 40
 
 
 @compilable
@@ -43,12 +45,11 @@ def allocate(r: Tick, airframe: Airframe, torque: Vec3, thrust: float, yaw_limit
     yaw = clamp_magnitude(yaw, yaw_limit / max(most, _NONE))
     low, high = _yaw_room(m, n, roll, pitch, lift)
     if not low <= high:
-        for _ in range(n):
-            least, greatest = _thrust_room(m, n, roll, pitch)
-            if least <= greatest:
-                lift = clamp(lift, least, greatest)
-                break
-            roll, pitch = _cut(m, n, roll, pitch, lift)
+        roll *= _share_that_fits(m, n, roll, 0.0)
+        pitch *= _share_that_fits(m, n, 0.0, pitch)
+        share = _share_that_fits(m, n, roll, pitch)
+        roll, pitch = share * roll, share * pitch
+        lift = clamp(lift, *_thrust_room(m, n, roll, pitch))
         low, high = _yaw_room(m, n, roll, pitch, lift)
     yaw = clamp(yaw, low, high)
     for i in range(n):
@@ -116,27 +117,14 @@ def _level(m: Mixer, i: int, roll: float, pitch: float) -> float:
 
 
 @compilable
-def _room(m: Mixer, n: int, roll: float, pitch: float, along: int, by: int, value: float) -> Vec2:
-    """Range of thrust or yaw, ``along``, within all rotors' limits at a ``value`` of the other."""
+def _yaw_room(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
+    """Range of yaw [N m] within every rotor's limits."""
     low, high = -_FAR, _FAR
     for i in range(n):
-        share = m.share[AXES * i + along]
-        if m.low[i] < m.top[i] and abs(share) > _NONE:
-            rest = _level(m, i, roll, pitch) + m.share[AXES * i + by] * value
-            a, b = (m.low[i] - rest) / share, (m.top[i] - rest) / share
-            low, high = max(low, min(a, b)), min(high, max(a, b))
-    return low, high
-
-
-@compilable
-def _yaw_room(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
-    """Range of yaw [N m]; empty also where a rotor that does not yaw has no room."""
-    low, high = _room(m, n, roll, pitch, YAW, THRUST, lift)
-    for i in range(n):
-        if m.low[i] < m.top[i] and abs(m.share[AXES * i + YAW]) <= _NONE:
-            f = _level(m, i, roll, pitch) + m.share[AXES * i + THRUST] * lift
-            if not m.low[i] - _NONE <= f <= m.top[i] + _NONE:
-                return 1.0, -1.0
+        if m.low[i] < m.top[i]:
+            s = AXES * i
+            rest = _level(m, i, roll, pitch) + m.share[s + THRUST] * lift
+            low, high = _narrowed(low, high, m.share[s + YAW], m.low[i] - rest, m.top[i] - rest)
     return low, high
 
 
@@ -163,34 +151,24 @@ def _thrust_room(m: Mixer, n: int, roll: float, pitch: float) -> Vec2:
 
 @compilable
 def _narrowed(low: float, high: float, slope: float, least: float, most: float) -> Vec2:
-    """The range of x, as far as ``least <= slope x <= most``; (1, -1) where that is nowhere."""
+    """The range of x, as far as ``least <= slope x <= most``; empty where that is nowhere."""
     if abs(slope) > _NONE:
         a, b = least / slope, most / slope
         return max(low, min(a, b)), min(high, max(a, b))
-    return (low, high) if least <= _NONE and most >= -_NONE else (_FAR, -_FAR)
+    return (low, high) if least <= _NONE and most >= -_NONE else (_NONE, -_NONE)
 
 
 @compilable
-def _cut(m: Mixer, n: int, roll: float, pitch: float, lift: float) -> Vec2:
-    """Less of roll or pitch, until the worst rotor has room at the best thrust and yaw."""
-    yaw = _nearest(_room(m, n, roll, pitch, YAW, THRUST, lift), 0.0)
-    lift = _nearest(_room(m, n, roll, pitch, THRUST, YAW, yaw), lift)
-    found, worst = 0, 0.0
-    for i in range(n):
-        if m.low[i] < m.top[i]:
-            s = AXES * i
-            f = _level(m, i, roll, pitch) + m.share[s + THRUST] * lift + m.share[s + YAW] * yaw
-            lacks = max(f - m.top[i], 0.0) + min(f - m.low[i], 0.0)
-            if abs(lacks) > abs(worst):
-                found, worst = i, lacks
-    x, y = m.share[AXES * found + ROLL], m.share[AXES * found + PITCH]
-    if abs(x * roll) > abs(y * pitch):
-        return roll - worst / x, pitch
-    return (roll, pitch - worst / y) if abs(y) > _NONE else (roll, pitch)
-
-
-@compilable
-def _nearest(room: Vec2, value: float) -> float:
-    """The value in a range that is nearest; the middle of one that is empty."""
-    low, high = room
-    return clamp(value, low, high) if low <= high else 0.5 * (low + high)
+def _share_that_fits(m: Mixer, n: int, roll: float, pitch: float) -> float:
+    """The largest share [1] of roll and pitch together that leaves room for some thrust and yaw."""
+    fits, fails = 0.0, 1.0
+    for k in range(_HALVINGS):
+        share = 1.0 if k == 0 else 0.5 * (fits + fails)
+        low, high = _thrust_room(m, n, share * roll, share * pitch)
+        if low <= high:
+            fits = share
+        else:
+            fails = share
+        if fits >= fails:
+            break
+    return fits

@@ -69,6 +69,14 @@ def test_roll_and_pitch_are_kept_when_thrust_and_yaw_must_give_way(
     np.testing.assert_allclose(got[:2], [roll, pitch], atol=1e-9)
 
 
+@given(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-1.0, 1.0), st.floats(0.0, 100.0))
+def test_of_roll_and_pitch_that_are_too_much_each_pair_gives_all_it_can(
+    roll: float, pitch: float, yaw: float, thrust: float
+) -> None:
+    got = wrench(allocated(AIRFRAME, (roll, pitch, yaw), thrust, YAW_LIMIT))
+    np.testing.assert_allclose(got[:2], np.clip([roll, pitch], -0.3 * TOP, 0.3 * TOP), atol=1e-9)
+
+
 @given(st.floats(-3.0, 3.0), st.floats(10.0, 60.0))
 def test_yaw_spends_no_more_than_it_may(yaw: float, thrust: float) -> None:
     assume(abs(yaw) > 0.07)
@@ -224,6 +232,37 @@ def nearest(
         bounds=[(None, None)] * (count + 1),
     )
     return float(found.x[which]) if found.success else None
+
+
+@pytest.mark.parametrize("rotors", range(4, 9))
+def test_of_any_layout_roll_and_pitch_that_are_too_much_are_cut_by_no_more_than_they_must(
+    rotors: int,
+) -> None:
+    """Each to what can be had without the other, then both by one share."""
+    random = np.random.default_rng(rotors)
+    for _ in range(40):
+        airframe = any_airframe(random, rotors, float(random.uniform(0.0, 0.3)))
+        shares = np.array(airframe.share).reshape(-1, 4)[:rotors]
+        top, hover = airframe.rotor_thrust_max, airframe.mass * 9.81
+        wish = random.uniform([-40.0, -40.0], [40.0, 40.0])
+        f = np.array(allocated(airframe, (*wish, float(random.uniform(-0.5, 0.5))), hover, 1e9))
+        axes = [[wish[0], 0.0], [0.0, wish[1]]]
+        alone = np.array([largest_share(shares, axis, top) for axis in axes]) * wish
+        expected = largest_share(shares, alone, top) * alone
+        got = np.linalg.lstsq(shares, f, rcond=None)[0]
+        np.testing.assert_allclose(got[:2], expected, atol=1e-6)
+
+
+def largest_share(shares: Array, turn: Array | list[float], top: float) -> float:
+    """Of a roll and pitch, with any thrust and yaw, that no rotor's limits forbid."""
+    columns = np.column_stack((shares[:, :2] @ np.array(turn), shares[:, 2:]))
+    found = linprog(
+        [-1.0, 0.0, 0.0],
+        np.vstack((columns, -columns)),
+        np.concatenate((np.full(len(columns), top), np.zeros(len(columns)))),
+        bounds=[(0.0, 1.0), (None, None), (None, None)],
+    )
+    return float(found.x[0])
 
 
 @pytest.mark.parametrize("rotors", [4, 6, 8])
