@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from fsw.autopilot.model.multibody import bodies_of, posture
+from fsw.autopilot.model.multibody import bodies_of, posture, tip_in_body
 from vehicles.description import V3, Vehicle
 
 _WIDTH, _HEIGHT = 49, 17  # characters, of which one is twice as high as wide
@@ -25,11 +25,10 @@ def drawing(vehicle: Vehicle) -> str:
 
 
 def _marks(vehicle: Vehicle) -> Iterable[tuple[V3, str]]:
-    m = posture(bodies_of(vehicle), vehicle.rest_posture)
-    n = len(vehicle.joints)
-    R = np.array(m.rotation).reshape(-1, 3, 3)[n - 1]
-    origins = np.array(m.origin).reshape(-1, 3)[:n]
-    tip = origins[-1] + R @ vehicle.end_effector.position
+    bodies = bodies_of(vehicle)
+    m = posture(bodies, vehicle.rest_posture)
+    origins = np.array(m.origin).reshape(-1, 3)[: bodies.joints]
+    tip = np.array(tip_in_body(m, bodies)[0])
     chain = [*origins, tip]
     for foot in vehicle.feet.positions:
         yield foot, "'"

@@ -80,7 +80,7 @@ def quaternion_from_euler(euler: Vec3) -> Vec4:
 
 
 @compilable
-def rotate(R: Mat3, v: Vec3) -> Vec3:
+def rotate(R: Mat3 | Floats, v: Vec3) -> Vec3:
     """World components of ``v`` [any unit, FRD]."""
     x, y, z = v
     return (

@@ -31,6 +31,12 @@ def add_scaled(a: Vector, b: Vector, scale: float) -> Vec3:
 
 
 @compilable
+def add(a: Vector, b: Vector) -> Vec3:
+    """``a`` [any unit, any frame] plus ``b`` [unit of a, the same frame]."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compilable
 def subtract(a: Vector, b: Vector) -> Vec3:
     """``a`` [any unit, any frame] minus ``b`` [unit of a, the same frame]."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -28,7 +28,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from fsw.autopilot.geometry.vectors import add_scaled, cross, dot
+from fsw.autopilot.geometry.rotation import (
+    matrix_from_quaternion,
+    quaternion_from_euler,
+    rotate,
+)
+from fsw.autopilot.geometry.vectors import add, add_scaled, cross, dot
 from fsw.autopilot.signals import Mat3, StateEstimate, Vec3
 from fsw.autopilot.tick_record import Estimate, Multibody
 from fsw.compiled import compilable
@@ -37,7 +42,8 @@ from vehicles.description import V6, Vehicle
 
 Several = tuple[float, ...]
 _SINGULAR: Final = 1e-9  # share of a diagonal entry that is left of one that others determine
-_SUMS: Final = len(Multibody().of_link) // JOINTS
+_SUMS: Final = len(Multibody().of_link) // JOINTS  # numbers that a link adds: seven vectors
+_VECTORS: Final = _SUMS // 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,23 +78,15 @@ def bodies_of(vehicle: Vehicle) -> Bodies:
         base_com=vehicle.base.com,
         base_inertia=vehicle.base.inertia,
         offset=padded([joint.xyz for joint in joints], 3),
-        turned=padded([_fixed_axes(joint.rpy) for joint in joints], 9),
+        turned=padded(
+            [matrix_from_quaternion(quaternion_from_euler(joint.rpy)) for joint in joints], 9
+        ),
         axis=padded([joint.axis for joint in joints], 3),
         mass=padded([(joint.link.mass,) for joint in joints], 1),
         com=padded([joint.link.com for joint in joints], 3),
         inertia=padded([joint.link.inertia for joint in joints], 6),
         armature=padded([(joint.armature,) for joint in joints], 1),
         tip=vehicle.end_effector.position,
-    )
-
-
-def _fixed_axes(rpy: Vec3) -> Mat3:
-    """Rotation of roll, pitch and yaw about fixed axes, as in URDF."""
-    (cr, cp, cy), (sr, sp, sy) = map(math.cos, rpy), map(math.sin, rpy)
-    return (
-        *(cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        *(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        *(-sp, cp * sr, cp * cr),
     )
 
 
@@ -100,11 +98,6 @@ def _get(a: Floats | Several, k: int) -> Vec3:
 @compilable
 def _put(a: Floats, k: int, v: Vec3) -> None:
     a[3 * k], a[3 * k + 1], a[3 * k + 2] = v
-
-
-@compilable
-def _add(a: Vec3, b: Vec3) -> Vec3:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @compilable
@@ -135,15 +128,6 @@ def _product(a: Mat3, b: Mat3) -> Mat3:
         a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
         a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
         a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
-    )
-
-
-@compilable
-def _times(a: Mat3 | Floats, v: Vec3) -> Vec3:
-    return (
-        a[0] * v[0] + a[1] * v[1] + a[2] * v[2],
-        a[3] * v[0] + a[4] * v[1] + a[5] * v[2],
-        a[6] * v[0] + a[7] * v[1] + a[8] * v[2],
     )
 
 
@@ -192,9 +176,9 @@ def place_links(m: Multibody, b: Bodies, q: Several | Floats) -> None:
     R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     o: Vec3 = (0.0, 0.0, 0.0)
     for k in range(int(b.joints)):
-        o = _add(o, _times(R, _get(b.offset, k)))
+        o = add(o, rotate(R, _get(b.offset, k)))
         at_zero = _product(R, _nine(b.turned, k))
-        _put(m.axis, k, _times(at_zero, _get(b.axis, k)))
+        _put(m.axis, k, rotate(at_zero, _get(b.axis, k)))
         R = _product(at_zero, _about(_get(b.axis, k), q[k]))
         _put(m.origin, k, o)
         for i in range(9):
@@ -238,26 +222,26 @@ def _move_links(m: Multibody, b: Bodies, qd: Several | Floats, rate: Vec3) -> No
     for k in range(int(b.joints)):
         o, axis = _get(m.origin, k), _get(m.axis, k)
         d = add_scaled(o, before, -1.0)
-        a = _add(a, _add(cross(turning, d), cross(w, cross(w, d))))
-        v = _add(v, cross(w, d))
+        a = add(a, add(cross(turning, d), cross(w, cross(w, d))))
+        v = add(v, cross(w, d))
         turning = add_scaled(turning, cross(w, axis), qd[k])
         w = add_scaled(w, axis, qd[k])
         _put(m.rate, k, w)
         _put(m.speed, k, v)
         R = _nine(m.rotation, k)
         inertia = _rotated(R, _six(b.inertia, k))
-        arm = _times(R, _get(b.com, k))
+        arm = rotate(R, _get(b.com, k))
         swept = cross(w, arm)
         _note(
             m.of_link,
             k,
             b.mass[k],
-            _add(o, arm),
+            add(o, arm),
             inertia,
-            _add(v, swept),
+            add(v, swept),
             _symmetric(inertia, w),
-            _add(a, _add(cross(turning, arm), cross(w, swept))),
-            _add(_symmetric(inertia, turning), cross(w, _symmetric(inertia, w))),
+            add(a, add(cross(turning, arm), cross(w, swept))),
+            add(_symmetric(inertia, turning), cross(w, _symmetric(inertia, w))),
         )
         before = o
 
@@ -275,7 +259,7 @@ def _note(
     moment: Vec3,
 ) -> None:
     """What one link adds, about the origin: moments of mass, momentum, force that it takes."""
-    i = 7 * k
+    i = _VECTORS * k
     square = dot(c, c)
     _put(sums, i, (mass * c[0], mass * c[1], mass * c[2]))
     _put(
@@ -311,13 +295,13 @@ def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate
         if k < n - 1:
             for i in range(_SUMS):
                 sums[_SUMS * k + i] += sums[_SUMS * (k + 1) + i]
-        i = 7 * k
+        i = _VECTORS * k
         axis, o, h = _get(m.axis, k), _get(m.origin, k), _get(sums, i)
         s = cross(o, axis)  # velocity at B's origin of a body that turns about the joint
         x, y = _get(sums, i + 1), _get(sums, i + 2)
         inertia = (x[0], x[1], x[2], y[0], y[1], y[2])
         _put(m.vq, k, add_scaled(cross(axis, h), s, mass))
-        _put(m.wq, k, _add(cross(h, s), _symmetric(inertia, axis)))
+        _put(m.wq, k, add(cross(h, s), _symmetric(inertia, axis)))
         for j in range(k + 1):
             along, aside = _get(m.axis, j), cross(_get(m.origin, j), _get(m.axis, j))
             value = dot(along, _get(m.wq, k)) + dot(aside, _get(m.vq, k))
@@ -334,7 +318,7 @@ def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate
     swept = cross(rate, cross(rate, c))
     spin = cross(rate, _symmetric(_six(b.base_inertia, 0), rate))
     _put(m.bias_v, 0, add_scaled(_get(sums, 5), swept, base))
-    _put(m.bias_w, 0, add_scaled(_add(_get(sums, 6), spin), cross(c, swept), base))
+    _put(m.bias_w, 0, add_scaled(add(_get(sums, 6), spin), cross(c, swept), base))
     whole = 1.0 / (mass + base)
     h = add_scaled(_get(sums, 0), c, base)
     _put(m.centre, 0, (whole * h[0], whole * h[1], whole * h[2]))
@@ -445,7 +429,7 @@ def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Several | Floats)
     """
     c, mass = _get(m.centre, 0), mass_of(b)
     push = add_scaled(force, _get(m.bias_v, 0), -1.0)
-    load = _add(cross(c, push), _get(m.bias_w, 0))
+    load = add(cross(c, push), _get(m.bias_w, 0))
     for k in range(int(b.joints)):
         free = torque[k] - m.bias[k] - dot(_get(m.vq, k), push) / mass
         load = add_scaled(load, _get(m.reaction, k), free)
@@ -460,7 +444,7 @@ def base_acceleration(
 
     ``force`` [N, B] and ``torque`` (j,) [N m] as of ``load_on_base``.
     """
-    return _times(m.inverse, add_scaled(turn, load_on_base(m, b, force, torque), -1.0))
+    return rotate(m.inverse, add_scaled(turn, load_on_base(m, b, force, torque), -1.0))
 
 
 @compilable
@@ -472,8 +456,8 @@ def torque_to_turn(
     The paper's own loop does not know that the arm adds to the base's inertia.
     """
     if knows_arm:
-        return _add(_times(m.inertia, acceleration), load)
-    return _add(_symmetric(_six(b.base_inertia, 0), acceleration), load)
+        return add(rotate(m.inertia, acceleration), load)
+    return add(_symmetric(_six(b.base_inertia, 0), acceleration), load)
 
 
 @compilable
@@ -496,6 +480,6 @@ def joint_drift(m: Multibody, k: int, field: Vec3) -> float:
 def tip_in_body(m: Multibody, b: Bodies) -> tuple[Vec3, Vec3]:
     """Position [m, B] of the end-effector, and its velocity beside the base's own [m/s, B]."""
     last = int(b.joints) - 1
-    arm = _times(_nine(m.rotation, last), (b.tip[0], b.tip[1], b.tip[2]))
-    v = _add(_get(m.speed, last), cross(_get(m.rate, last), arm))
-    return _add(_get(m.origin, last), arm), v
+    arm = rotate(_nine(m.rotation, last), (b.tip[0], b.tip[1], b.tip[2]))
+    v = add(_get(m.speed, last), cross(_get(m.rate, last), arm))
+    return add(_get(m.origin, last), arm), v
