@@ -54,7 +54,9 @@ def test_paper_is_the_vehicle_that_the_flight_software_knows() -> None:
 
 
 def test_its_parts_are_the_sizes_that_the_flight_software_keeps_clear() -> None:
-    assert AIRFRAME.size == BodySize()
+    assert AIRFRAME.size == BodySize(
+        hull=0.08, blade=0.165, disc=0.02, feet_spread=0.2, leg=0.01, link=0.02, tool=0.025
+    )
     assert AIRFRAME.leg_length == 0.32
 
 

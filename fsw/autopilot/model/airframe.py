@@ -31,13 +31,13 @@ class AttitudeLag:
 class BodySize:
     """How far the vehicle reaches beyond its joints and its rotors' hubs."""
 
-    hull: float = 0.08  # m, radius of the sphere that holds frame and battery
-    blade: float = 0.165  # m, radius of a rotor
-    disc: float = 0.02  # m, half the thickness of the space that the blades sweep
-    feet_spread: float = 0.2  # m, feet at (+-spread, +-spread)
-    leg: float = 0.01  # m, radius
-    link: float = 0.02  # m, radius
-    tool: float = 0.025  # m, radius about the end-effector
+    hull: float  # m, radius of the sphere that holds frame and battery
+    blade: float  # m, radius of a rotor
+    disc: float  # m, half the thickness of the space that the blades sweep
+    feet_spread: float  # m, feet at (+-spread, +-spread)
+    leg: float  # m, radius
+    link: float  # m, radius
+    tool: float  # m, radius about the end-effector
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +66,18 @@ class Airframe:
     tilt_max: float  # rad, of the body's z axis against the vertical
     body_rate_max: Vec2  # rad/s, of roll and pitch together, and of yaw
     leg_length: float  # m, body origin above ground when standing
+    size: BodySize
     # kg m^2 of each joint's motor, times the square of its gear's ratio; beside the vehicle's own.
     joint_armature: float = 0.0
     attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
-    size: BodySize = field(default_factory=BodySize)
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
-    """What the controllers know of a vehicle."""
+    """What the controllers know of a vehicle.
+
+    Raises:
+        VehicleError: Planner and compensation do not know its arm yet.
+    """
     rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
     rows = [wrench_of(rotor) for rotor in rotors]
     wrench = [number for row in rows for number in row]
