@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, TypeAlias
 
-from command_line.ranges import Range as Range
+from command_line.ranges import Range
 
 V3: TypeAlias = tuple[float, float, float]
 V2: TypeAlias = tuple[float, float]

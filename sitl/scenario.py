@@ -11,12 +11,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
+from command_line.ranges import Range as Range
 from sitl.faults.keys import Fault
 from sitl.ranges import NORMAL as NORMAL
 from sitl.ranges import V2 as V2
 from sitl.ranges import V3 as V3
 from sitl.ranges import WORLD_M as WORLD_M
-from sitl.ranges import Range as Range
 from sitl.sensors.keys import MeasuredSensors
 from vehicles.description import Vehicle
 

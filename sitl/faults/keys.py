@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal, TypeAlias
 
-from sitl.ranges import Range
+from command_line.ranges import Range
 from vehicles.description import Vehicle
 
 Unit: TypeAlias = Literal[

@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
-from sitl.ranges import V3, Range
+from command_line.ranges import Range
+from sitl.ranges import V3
 
 SuiteName: TypeAlias = Literal["perfect", "mocap", "vio", "rtk", "gnss"]
 

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from sitl.ranges import Range
+from command_line.ranges import Range
 from sitl.scenario import Sequence, Uniform
 from sitl.simulation import STEP_US
 from studies.campaign.keys import CampaignError, Flown, applied, range_of, rounded

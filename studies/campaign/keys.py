@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
+from command_line.ranges import Range
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import tuned
-from sitl.ranges import Range
 from sitl.scenario import Scenario, Wind
 from sitl.sensors.keys import MeasuredSensors, Timing
 

@@ -13,12 +13,12 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias, cast
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
+from command_line.ranges import Range
 from fsw.autopilot.parameters.contradictions import contradictions
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
 from fsw.autopilot.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
-from sitl.ranges import Range
 from sitl.scenario import Scenario
 from sitl.scenario_file import (
     ScenarioError,

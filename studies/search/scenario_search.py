@@ -17,8 +17,8 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 import numpy as np
 from cmaes import CMA
 
+from command_line.ranges import Range
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from sitl.ranges import Range
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError, build_table
 from studies.campaign.campaign import Campaign

@@ -19,9 +19,9 @@ import numpy as np
 from cmaes import CMA
 from scipy.special import bdtrc, stdtrit
 
+from command_line.ranges import Range
 from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 from fsw.autopilot.tuning import tuned
-from sitl.ranges import Range
 from sitl.scenario_file import ScenarioError, build_table
 from studies.campaign.campaign import Campaign
 from studies.campaign.flight import CampaignFlight, CampaignRow
