@@ -127,8 +127,11 @@ def packed(numbers: Any) -> NDArray[Any]:
 
     A kernel reads ``packed(tuning)[0].kp`` as a law reads ``tuning.kp``; handing it over costs
     as much as one float, however many numbers are in it. Tuples become arrays: laws pick their
-    entries by index. Whole numbers and truth values become floats.
+    entries by index. Whole numbers and truth values become floats. Kernels that run as the Python
+    they are read the dataclass itself.
     """
+    if IN_PYTHON:
+        return [numbers]  # type: ignore[return-value]
     array = np.zeros(1, dtype=_layout(numbers))
     array[0] = _values(numbers)
     return array

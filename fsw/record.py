@@ -37,6 +37,12 @@ Nine = Annotated[Floats, 9]  # a rotation, row by row
 PerJoint = Annotated[Floats, JOINTS]
 PerRotor = Annotated[Floats, ROTORS]
 
+
+def padded(values: tuple[float, ...], size: int) -> tuple[float, ...]:
+    """``values`` (n,) and zeros behind them (size,) [any]: of one length for every vehicle."""
+    return values + (0.0,) * (size - len(values))
+
+
 _NUMBER: Final = 8  # bytes, of whole numbers and of others
 _NUMBERS, _ARRAY = -1, -2  # views of a whole record
 

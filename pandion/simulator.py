@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from fsw.autopilot.signals import StateEstimate, TickOutputs
+from fsw.autopilot.signals import ActuatorCommand, StateEstimate, TickOutputs
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.plant.integrator import held, step
 from sitl.plant.parameters import plant
@@ -100,9 +100,8 @@ class Simulator:
             raise RuntimeError(f"the flight is over: {self.end_reason}; reset() begins another")
         f = numbers("thrust", thrust, (4,)).tolist()
         t = numbers("torque", torque, (2,)).tolist()
-        self.simulation.advance(
-            controls(AIRFRAME, ((f[0], f[1], f[2], f[3]), (t[0], t[1])), armed=armed)
-        )
+        command = ActuatorCommand(tuple(f), tuple(t))
+        self.simulation.advance(controls(AIRFRAME, command, armed=armed))
         if self._pilot is not None:
             self._pilot.conclude()
         return self.observe()

@@ -13,6 +13,8 @@ from fsw.frozen import dataclass
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
+JointVector = tuple[float, ...]  # (j,), a number a joint of the vehicle, from the base on
+RotorVector = tuple[float, ...]  # (r,), a number a rotor of the vehicle, as actuators are numbered
 _LEVEL_FIX = 2  # GPS_FIX_TYPE_2D_FIX; those above it have a height
 
 
@@ -87,7 +89,7 @@ class JointSample:
     """Encoders of the arm."""
 
     time: float  # s
-    angles: Vec2  # rad, th1 from straight down, th2 relative to link 1
+    angles: JointVector  # rad
 
 
 Sample = (

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
 
+from fsw.autopilot.measurements import JointVector as JointVector
+from fsw.autopilot.measurements import RotorVector as RotorVector
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.measurements import Vec2 as Vec2
 from fsw.autopilot.measurements import Vec3 as Vec3
@@ -97,8 +99,8 @@ class SensorFrame:
     q_WB: Vec4  # unit quaternion [w, x, y, z]
     gyro_B: Vec3  # rad/s
     accel_B: Vec3  # m/s^2, specific force
-    q_arm: Vec2  # rad: th1 from straight down, th2 relative to link 1
-    qd_arm: Vec2  # rad/s
+    q_arm: JointVector  # rad
+    qd_arm: JointVector  # rad/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +152,7 @@ class AttitudeSetpoint:
 class JointSetpoint:
     """Where the arm's joints should be."""
 
-    q_arm: Vec2  # rad
+    q_arm: JointVector  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -527,8 +529,8 @@ class StateEstimate(NamedTuple):
     R_WB: Mat3
     w_WB_B: Vec3  # rad/s
     yaw: float  # rad, ZYX
-    q_arm: Vec2  # rad
-    qd_arm: Vec2  # rad/s
+    q_arm: JointVector  # rad
+    qd_arm: JointVector  # rad/s
     specific_force: float = 9.81  # m/s^2, accelerometer along -z of the body
 
 
@@ -545,8 +547,8 @@ class PredictionState(NamedTuple):
     s: Vec2  # m/s^4, horizontal
     yaw: float  # rad
     yaw_rate: float  # rad/s
-    q_arm: Vec2  # rad
-    qd_arm: Vec2  # rad/s
+    q_arm: JointVector  # rad
+    qd_arm: JointVector  # rad/s
 
 
 class PlanInput(NamedTuple):
@@ -554,7 +556,7 @@ class PlanInput(NamedTuple):
 
     a: Vec3  # m/s^2, commanded
     yaw_acc: float  # rad/s^2
-    qdd_arm: Vec2  # rad/s^2
+    qdd_arm: JointVector  # rad/s^2
 
 
 @dataclass(frozen=True, slots=True)
@@ -568,8 +570,8 @@ class PlanRequest:
     safe_set: SafeSet
     from_nominal: bool  # start carried over from the running plan, not measured
     tuning: Tuning = ()  # of the planner's configuration
-    # (2,) rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
-    joint_targets: tuple[Vec2, ...] = ()
+    # rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
+    joint_targets: tuple[JointVector, ...] = ()
     # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
     recent_disturbance: float = math.inf
     mode: Mode = Mode.TRAJECTORY  # in which the plan is flown
@@ -618,11 +620,8 @@ class PlanFailure:
 class ActuatorCommand(NamedTuple):
     """What leaves the flight software."""
 
-    rotor_thrust: Vec4  # N: rear, left, front, right
-    joint_torque: Vec2  # N m
-
-
-STOPPED = ActuatorCommand((0.0, 0.0, 0.0, 0.0), (0.0, 0.0))  # nothing moves
+    rotor_thrust: RotorVector  # N
+    joint_torque: JointVector  # N m
 
 
 @dataclass(frozen=True, slots=True)
@@ -838,7 +837,7 @@ class ActuatorReport(NamedTuple):
     effect: float = 1.0  # thrust over command of that rotor, as allocation takes it
     lost: bool = False  # it gives nothing
     disobeys: bool = False  # it gives something else than is commanded
-    joints: Vec2 = (0.0, 0.0)  # 0 sound, 1 stuck, 2 limp
+    joints: JointVector = ()  # 0 sound, 1 stuck, 2 limp; empty: all are sound
 
 
 @dataclass(frozen=True, slots=True)

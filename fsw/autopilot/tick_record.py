@@ -12,7 +12,14 @@ import math
 import struct
 from typing import Annotated, Any, Final
 
-from fsw.autopilot.signals import ActuatorCommand, PlanInput, PredictionState, StateEstimate, Vec2
+from fsw.autopilot.signals import (
+    ActuatorCommand,
+    JointVector,
+    PlanInput,
+    PredictionState,
+    StateEstimate,
+    Vec2,
+)
 from fsw.record import (
     JOINTS,
     ROTORS,
@@ -24,6 +31,7 @@ from fsw.record import (
     Six,
     Three,
     Two,
+    padded,
 )
 
 
@@ -213,6 +221,8 @@ class Tick(Record):
     u: Accelerations  # the plan's input
     has_estimate: int  # 1: there has been one
     has_plan: int  # 1: there is a plan's state
+    rotor_count: int  # of the vehicle
+    joint_count: int  # of the vehicle
     sent: Sent  # the last command; after a tick its own, which the safety gate has yet to pass
     rotors: PerRotor  # N, where the rotor model says they are
     mass: float  # kg, weighed in flight
@@ -235,12 +245,14 @@ class Tick(Record):
     @property
     def commanded(self) -> ActuatorCommand:
         """The last command."""
-        f1, f2, f3, f4, t1, t2 = _COMMAND.unpack_from(self.memory, _SENT_AT)
-        return ActuatorCommand((f1, f2, f3, f4), (t1, t2))
+        found = _COMMAND.unpack_from(self.memory, _SENT_AT)
+        end = ROTORS + self.joint_count
+        return ActuatorCommand(found[: self.rotor_count], found[ROTORS:end])
 
     @commanded.setter
     def commanded(self, command: ActuatorCommand) -> None:
-        _COMMAND.pack_into(self.memory, _SENT_AT, *command.rotor_thrust, *command.joint_torque)
+        thrust, torque = padded(command.rotor_thrust, ROTORS), padded(command.joint_torque, JOINTS)
+        _COMMAND.pack_into(self.memory, _SENT_AT, *thrust, *torque)
 
     @property
     def down(self) -> float:
@@ -259,21 +271,21 @@ class Tick(Record):
         return north, east
 
     @property
-    def joint_reference(self) -> Vec2:
-        """What the joints were asked for [rad]."""
-        first, second = _TWO.unpack_from(self.memory, _REFERENCE_AT)
-        return first, second
+    def joint_reference(self) -> JointVector:
+        """What the joints were asked for (j,) [rad]."""
+        return _JOINTS.unpack_from(self.memory, _REFERENCE_AT)[: self.joint_count]
 
     @property
     def known(self) -> StateEstimate | None:
         """The estimate; None: there has been none yet."""
-        return estimate_in(self, 0) if self.has_estimate else None
+        return estimate_in(self, 0, self.joint_count) if self.has_estimate else None
 
     @known.setter
     def known(self, x: StateEstimate) -> None:
         self.has_estimate = 1
         t_us, p, v, R, w, yaw, q, qd, force = x
-        _ESTIMATE.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *q, *qd, force)
+        arm = *padded(q, JOINTS), *padded(qd, JOINTS)
+        _ESTIMATE.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *arm, force)
 
     @property
     def nominal(self) -> PredictionState | None:
@@ -281,7 +293,8 @@ class Tick(Record):
         if not self.has_plan:
             return None
         n: Any = _PLAN.unpack_from(self.memory, _PLAN_AT)
-        p, v, a, j, s, q, qd = n[:3], n[3:6], n[6:9], n[9:11], n[11:13], n[15:17], n[17:]
+        p, v, a, j, s = n[:3], n[3:6], n[6:9], n[9:11], n[11:13]
+        q, qd = n[15 : 15 + self.joint_count], n[15 + JOINTS : 15 + JOINTS + self.joint_count]
         return PredictionState(p, v, a, j, s, n[13], n[14], q, qd)
 
     @nominal.setter
@@ -289,38 +302,38 @@ class Tick(Record):
         self.has_plan = int(x is not None)
         if x is not None:
             p, v, a, j, s, yaw, rate, q, qd = x
-            _PLAN.pack_into(self.memory, _PLAN_AT, *p, *v, *a, *j, *s, yaw, rate, *q, *qd)
+            arm = *padded(q, JOINTS), *padded(qd, JOINTS)
+            _PLAN.pack_into(self.memory, _PLAN_AT, *p, *v, *a, *j, *s, yaw, rate, *arm)
 
     @property
     def input(self) -> PlanInput:
         """The plan's input."""
-        a, b, c, yaw_acc, first, second = _INPUT.unpack_from(self.memory, _INPUT_AT)
-        return PlanInput((a, b, c), yaw_acc, (first, second))
+        n: Any = _INPUT.unpack_from(self.memory, _INPUT_AT)
+        return PlanInput(n[:3], n[3], n[4 : 4 + self.joint_count])
 
     @input.setter
     def input(self, u: PlanInput) -> None:
-        _INPUT.pack_into(self.memory, _INPUT_AT, *u.a, u.yaw_acc, *u.qdd_arm)
+        _INPUT.pack_into(self.memory, _INPUT_AT, *u.a, u.yaw_acc, *padded(u.qdd_arm, JOINTS))
 
     def take_given(self, other: Tick) -> None:
         """Take estimate, plan and input of another one."""
         self.memory[:_SENT_AT] = other.memory[:_SENT_AT]
 
 
-def estimate_in(record: Record, at: int) -> StateEstimate:
-    """The ``Estimate`` ``at`` [byte] of a record."""
+def estimate_in(record: Record, at: int, joints: int) -> StateEstimate:
+    """The ``Estimate`` ``at`` [byte] of a record, of a vehicle of so many ``joints``."""
     x: Any = _ESTIMATE.unpack_from(record.memory, at)
     p, v, R, w = x[1:4], x[4:7], x[7:16], x[16:19]
-    return StateEstimate(x[0], p, v, R, w, x[19], x[20:22], x[22:24], x[24])
+    q, qd = x[20 : 20 + joints], x[20 + JOINTS : 20 + JOINTS + joints]
+    return StateEstimate(x[0], p, v, R, w, x[19], q, qd, x[-1])
 
 
 NO_ROTOR: Final = -1
-FLOWN_ROTORS: Final = 4  # of the vehicle, of those that a record has room for
-_FLOWN: Final = 2  # joints, the same
-_OF_JOINTS: Final = f"{_FLOWN}d{8 * (JOINTS - _FLOWN)}x"
-_ESTIMATE: Final = struct.Struct(f"<q19d{2 * _OF_JOINTS}d")
-_PLAN: Final = struct.Struct(f"<15d{2 * _OF_JOINTS}")
-_INPUT: Final = struct.Struct(f"<4d{_OF_JOINTS}")
-_COMMAND: Final = struct.Struct(f"<4d{8 * (ROTORS - FLOWN_ROTORS)}x{_OF_JOINTS}")
+_ESTIMATE: Final = struct.Struct(f"<q{19 + 2 * JOINTS + 1}d")
+_PLAN: Final = struct.Struct(f"<{15 + 2 * JOINTS}d")
+_INPUT: Final = struct.Struct(f"<{4 + JOINTS}d")
+_COMMAND: Final = struct.Struct(f"<{ROTORS + JOINTS}d")
+_JOINTS: Final = struct.Struct(f"<{JOINTS}d")
 _ONE: Final = struct.Struct("<d")
 _TWO: Final = struct.Struct("<2d")
 
@@ -334,9 +347,10 @@ _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")
 
 
-def new_tick(mass: float) -> Tick:
+def new_tick(mass: float, rotors: int, joints: int) -> Tick:
     """One in which nothing is known yet, of a healthy vehicle of ``mass`` [kg]."""
     r = Tick()
+    r.rotor_count, r.joint_count = rotors, joints
     r.mass, r.margin = mass, math.inf
     r.health.effectiveness[:], r.health.most[:] = 1.0, math.inf
     r.observed.recent = _NOT_KNOWN

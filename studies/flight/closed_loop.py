@@ -18,11 +18,12 @@ from fsw.autopilot.estimation.estimator import READINGS
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.measurements import Sample, Vec2, Vec4
+from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.ports import PlanningCycle, PlanService
 from fsw.autopilot.signals import (
+    ActuatorCommand,
     Arm,
     BatteryReading,
     Command,
@@ -134,7 +135,7 @@ class ClosedLoop(Generic[State]):
             self.planner.submit(outputs.plan_request)
         return outputs
 
-    def controls(self, command: tuple[Vec4, Vec2], *, armed: bool) -> Controls:
+    def controls(self, command: ActuatorCommand, *, armed: bool) -> Controls:
         """See :func:`controls`."""
         return controls(self.airframe, command, armed=armed)
 
@@ -149,21 +150,18 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
         samples = tuple([sample(one) for one in arrived])
         return only_the_time(simulation.sensor_time_us, samples), samples
     now = simulation.sense()
-    (q1, q2), (qd1, qd2) = now.q_arm, now.qd_arm
     # By position: keywords take a third longer, in every step.
     frame = SensorFrame(
-        now.t_us, now.p_WB, now.v_WB, now.q_WB, now.gyro_B, now.accel_B, (q1, q2), (qd1, qd2)
+        now.t_us, now.p_WB, now.v_WB, now.q_WB, now.gyro_B, now.accel_B, now.q_arm, now.qd_arm
     )
     return frame, ()
 
 
-def controls(airframe: Airframe, command: tuple[Vec4, Vec2], *, armed: bool) -> Controls:
+def controls(airframe: Airframe, command: ActuatorCommand, *, armed: bool) -> Controls:
     """The shares of full thrust and torque that a ``command`` [N, N m] is."""
-    # Written out: each generator would take longer than all of this.
-    (f1, f2, f3, f4), (t1, t2) = command
     force, torque = airframe.rotor_thrust_max, airframe.joint_torque_max
-    thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
-    return Controls(thrust, (t1 / torque, t2 / torque), armed)
+    thrust = tuple([f / force for f in command.rotor_thrust])
+    return Controls(thrust, tuple([t / torque for t in command.joint_torque]), armed)
 
 
 class CalmStretch:

@@ -50,7 +50,7 @@ def with_record(state: FlightState, **fields: Any) -> FlightState:
 
 def placed(airframe: Airframe, estimate: StateEstimate, mass: float | None = None) -> Tick:
     """A record whose bodies are those of an estimate."""
-    r = new_tick(airframe.mass if mass is None else mass)
+    r = new_tick(airframe.mass if mass is None else mass, airframe.rotors, airframe.bodies.joints)
     r.known = estimate
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
     return r
@@ -72,7 +72,7 @@ def allocated(
     health: ActuatorHealth = HEALTHY,
 ) -> tuple[float, ...]:
     """Thrust [N] of each rotor for a torque [N m] and a thrust [N]."""
-    r = new_tick(airframe.mass)
+    r = new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints)
     note_health(r.health, health)
     allocate(r, airframe, torque, thrust, yaw_limit)
     return tuple(r.wanted.rotor_thrust[: airframe.rotors].tolist())

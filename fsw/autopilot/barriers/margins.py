@@ -15,6 +15,7 @@ from fsw.autopilot.shapes.zones import FOLLOWS, all_moving_zones, shifts, zone_a
 from fsw.autopilot.signals import (
     ConstraintReport,
     EndEffectorTarget,
+    JointVector,
     Mat3,
     SafeSet,
     StateEstimate,
@@ -100,7 +101,14 @@ def _known(safe_set: SafeSet, parts: int) -> _Known:
 
 @kernel
 def _put_vehicle(
-    frame: Array, links: Vec2, p: Vec3, v: Vec3, R: Mat3, w: Vec3, q_arm: Vec2, qd_arm: Vec2
+    frame: Array,
+    links: Vec2,
+    p: Vec3,
+    v: Vec3,
+    R: Mat3,
+    w: Vec3,
+    q_arm: JointVector,
+    qd_arm: JointVector,
 ) -> None:
     """The vehicle itself as a frame of ``fsw.autopilot.model.linearisation``."""
     put_pose(frame, p, R)

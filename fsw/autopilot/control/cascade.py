@@ -80,7 +80,7 @@ _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 def at_rest(airframe: Airframe, estimate: StateEstimate, before: Tick | None = None) -> Tick:
     """Record of a vehicle whose rotors stand still; ``before`` had its plan and its actuators."""
-    r = new_tick(airframe.mass)
+    r = new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints)
     if before is not None:
         r.take_given(before)
         r.watch = before.watch
@@ -156,7 +156,7 @@ class Cascade:
         )
         self.probes = filter_probes(clear.body)
         self.packed = packed(self.law)
-        example = self.packed, new_tick(airframe.mass).array
+        example = self.packed, Tick().array
         rest = NO_ZONES, self.probes, NO_TUBE
         self._close_loops = machine_code(_close_loops, *example, 1, *rest)
         self._expected = machine_code(_expected, *example)

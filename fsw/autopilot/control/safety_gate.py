@@ -6,7 +6,12 @@ import math
 
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import STOPPED, ActuatorCommand
+from fsw.autopilot.signals import ActuatorCommand
+
+
+def stopped(airframe: Airframe) -> ActuatorCommand:
+    """The command under which nothing moves."""
+    return ActuatorCommand((0.0,) * airframe.rotors, (0.0,) * airframe.bodies.joints)
 
 
 def gate(
@@ -14,18 +19,16 @@ def gate(
 ) -> tuple[ActuatorCommand, bool]:
     """What may be sent, and whether the last command replaces one that was not finite."""
     if not armed:
-        return STOPPED, False
-    (f1, f2, f3, f4), (t1, t2) = command
+        return stopped(airframe), False
     top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
     # What is within limits is finite as well: no comparison with NaN is true.
-    if (
-        (0.0 <= f1 <= top and 0.0 <= f2 <= top and 0.0 <= f3 <= top and 0.0 <= f4 <= top)
-        and -bound <= t1 <= bound
-        and -bound <= t2 <= bound
-    ):
+    thrusts, torques = command
+    allowed = all(0.0 <= f <= top for f in thrusts)
+    if allowed and all(-bound <= t <= bound for t in torques):
         return command, False
-    if not math.isfinite(f1 + f2 + f3 + f4 + t1 + t2):
+    if not math.isfinite(sum(thrusts) + sum(torques)):
         return last, True
-    f1, f2, f3, f4 = (clamp(thrust, 0.0, top) for thrust in command.rotor_thrust)
-    t1, t2 = (clamp_magnitude(torque, bound) for torque in command.joint_torque)
-    return ActuatorCommand((f1, f2, f3, f4), (t1, t2)), False
+    return ActuatorCommand(
+        tuple([clamp(f, 0.0, top) for f in thrusts]),
+        tuple([clamp_magnitude(t, bound) for t in torques]),
+    ), False

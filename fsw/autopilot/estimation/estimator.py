@@ -37,6 +37,7 @@ FORCE_LIMIT: Final = 1000.0  # m/s^2
 def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
     """The vehicle's state, or None where a reading is no number, out of range or no attitude."""
     r = Tick()
+    r.joint_count = len(sensors.q_arm)
     return None if read_frame(sensors, r) else r.known
 
 

@@ -15,7 +15,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, se
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.signals import SensorFrame, StateEstimate, Vec2, Vec3
+from fsw.autopilot.signals import JointVector, SensorFrame, StateEstimate, Vec3
 
 _PARTS: Final = ((POSE, Sensor.POSE), (INERTIAL, Sensor.IMU), (JOINTS, Sensor.ENCODERS))
 _RATE_SHARE: Final = 0.3  # of the newest rate from two poses
@@ -78,7 +78,7 @@ def filled(
     s: SensorFrame,
     read: StateEstimate,
     x: StateEstimate,
-    arm_acceleration: Callable[[], Vec2],
+    arm_acceleration: Callable[[], JointVector],
 ) -> StateEstimate:
     """The state ``read`` from a frame ``s``, what is ``missing`` carried on from an estimate ``x``.
 

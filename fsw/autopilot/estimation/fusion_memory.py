@@ -16,7 +16,7 @@ from fsw.autopilot.estimation.faults.sample_rate import SampleRate
 from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample, Sample
-from fsw.autopilot.signals import Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, Vec3, Vec4
 
 _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
 _REST: Vec3 = (0.0, 0.0, 0.0)
@@ -44,8 +44,8 @@ class Reset(NamedTuple):
 class EncoderWatch(NamedTuple):
     """Whether the joints' encoders still follow the joints."""
 
-    angles: Vec2 = (math.nan, math.nan)  # rad, the last reading
-    asked: Vec2 = (0.0, 0.0)  # rad, of the joints when it came first
+    angles: JointVector = (math.nan, math.nan)  # rad, the last reading
+    asked: JointVector = (0.0, 0.0)  # rad, of the joints when it came first
     repeats: int = 0  # readings in a row that were the same
     stuck: bool = False
 
@@ -55,7 +55,7 @@ class EncoderWatch(NamedTuple):
         return self.repeats >= _REPEATS
 
 
-TickInputs = tuple[Sequence[Sample], float, Vec2, Vec4]
+TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4]
 """Samples, now [s], the joints' acceleration and the rotors' model."""
 
 

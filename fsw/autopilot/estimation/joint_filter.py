@@ -24,7 +24,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.imu import doubt
 from fsw.autopilot.estimation.measurement_noise import followed
 from fsw.autopilot.geometry.vectors import clamp
-from fsw.autopilot.signals import Vec2
+from fsw.autopilot.signals import JointVector
 from fsw.compiled import compilable
 
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
@@ -66,7 +66,7 @@ def predicted(joint: JointState, u: float, dt: float) -> JointState:
 
 
 @compilable
-def push(x: Any, law: Any, now: float, dt: float, u: Vec2) -> None:
+def push(x: Any, law: Any, now: float, dt: float, u: JointVector) -> None:
     """Joints of ``x`` were accelerated by ``u`` [rad/s^2] for ``dt`` [s], until ``now`` [s]."""
     last = x.pushes[(x.pushes_end - 1) % PUSHES, 0] if x.pushes_end > 0 else x.joint_time
     # What was missed is as if it had not been.
@@ -79,7 +79,7 @@ def push(x: Any, law: Any, now: float, dt: float, u: Vec2) -> None:
 
 
 @compilable
-def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
+def read(x: Any, law: Any, now: float, angles: JointVector, age: float) -> int:
     """Take in ``angles`` [rad] that are ``age`` [s] old ``now`` [s]; returns what is wrong."""
     time, before = now - age, x.encoders[2]
     if not time > before:
@@ -121,12 +121,12 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
 
 
 @compilable
-def _less_zero(x: Any, angles: Vec2) -> Vec2:
+def _less_zero(x: Any, angles: JointVector) -> JointVector:
     return angles[0] - x.encoder_zero[0], angles[1] - x.encoder_zero[1]
 
 
 @compilable
-def _is_far(x: Any, angles: Vec2) -> bool:
+def _is_far(x: Any, angles: JointVector) -> bool:
     """Whether a reading is farther from what is expected than the filter may be wrong."""
     sigma, stray = min(math.sqrt(x.joint_variance[0, 0]), _MAX_SIGMA), 0.0
     for i in range(2):
@@ -146,7 +146,7 @@ def _move_zero(x: Any) -> None:
 
 
 @compilable
-def begin(x: Any, law: Any, time: float, angles: Vec2) -> None:
+def begin(x: Any, law: Any, time: float, angles: JointVector) -> None:
     """Start at ``time`` [s] from an arm at ``angles`` [rad] that hardly moves."""
     x.joint_time = time
     while x.pushed < x.pushes_end and x.pushes[x.pushed % PUSHES, 0] <= time:
@@ -163,7 +163,7 @@ def begin(x: Any, law: Any, time: float, angles: Vec2) -> None:
 
 
 @compilable
-def present_joints(x: Any, now: float) -> tuple[Vec2, Vec2]:
+def present_joints(x: Any, now: float) -> tuple[JointVector, JointVector]:
     """Angles [rad] and rates [rad/s] of the joints at ``now`` [s]."""
     a = JointState(x.joints[0, 0], x.joints[0, 1], x.joints[0, 2])
     b = JointState(x.joints[1, 0], x.joints[1, 1], x.joints[1, 2])
@@ -218,7 +218,7 @@ def _move(x: Any, law: Any, u1: float, u2: float, dt: float) -> None:
 
 
 @compilable
-def _correct(x: Any, law: Any, angles: Vec2) -> None:
+def _correct(x: Any, law: Any, angles: JointVector) -> None:
     C = x.joint_variance
     total = C[0, 0] + max(x.encoder_scale, 1.0) * law.encoder_noise * law.encoder_noise
     most = _SIGMAS * math.sqrt(total)  # of a reading that is just believed, and may be garbage

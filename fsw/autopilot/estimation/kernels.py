@@ -42,7 +42,7 @@ from fsw.autopilot.estimation.error_state import (
 from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.signals import Mat3, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate
 from fsw.compiled import compilable, kernel, machine_code
 from fsw.record import Four, Record, Three, Two
@@ -68,14 +68,14 @@ class Asked(Record):
     of_encoders: int
     present: Estimate
 
-    def begin(self, now: float, dt: float, u: Vec2, model: Vec4) -> None:
+    def begin(self, now: float, dt: float, u: JointVector, model: Vec4) -> None:
         """A tick of ``dt`` [s] that ends ``now`` [s].
 
         Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle.
         """
         _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *u, *model)
 
-    def read_joints(self, angles: Vec2, age: float) -> None:
+    def read_joints(self, angles: JointVector, age: float) -> None:
         """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
         _ENCODERS.pack_into(self.memory, _ENCODERS_AT, *angles, age)
 
@@ -151,7 +151,7 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
 
 @machine_code
 @kernel
-def set_joints(x: Filter, law: Law, time: float, angles: Vec2) -> None:
+def set_joints(x: Filter, law: Law, time: float, angles: JointVector) -> None:
     """Start from an arm that stands still at ``angles`` [rad] at a ``time`` [s]."""
     joint_filter.begin(x[0], law[0].tuning, time, angles)
 

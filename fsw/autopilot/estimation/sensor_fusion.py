@@ -76,7 +76,7 @@ from fsw.autopilot.measurements import (
     RangeSample,
     Sample,
 )
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import estimate_in
 from fsw.compiled import machine_code, packed
 
@@ -138,7 +138,7 @@ class SensorFusion:
         memory: FusionMemory,
         samples: Sequence[Sample],
         now: float,
-        joint_acceleration: Vec2 = (0.0, 0.0),
+        joint_acceleration: JointVector = (0.0, 0.0),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -154,7 +154,7 @@ class SensorFusion:
         memory: FusionMemory,
         samples: Sequence[Sample],
         now: float,
-        joint_acceleration: Vec2 = (0.0, 0.0),
+        joint_acceleration: JointVector = (0.0, 0.0),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -195,7 +195,7 @@ class SensorFusion:
             trail=trail,
         )
         if found & FINITE:
-            return memory, estimate_in(asked, PRESENT_AT)
+            return memory, estimate_in(asked, PRESENT_AT, 2)
         return (_anew(memory) if ready else memory), None
 
     def _take_each(
@@ -289,7 +289,7 @@ class SensorFusion:
             self._tick(x, self.law, self._requests, ADVANCE, now, memory.waiting[0].time)
             memory = self._fuse_first(memory, now)
         if self._tick(x, self.law, self._requests, ADVANCE | END, now, until) & FINITE:
-            return memory, estimate_in(self._asked, PRESENT_AT)
+            return memory, estimate_in(self._asked, PRESENT_AT, 2)
         return _anew(memory), None
 
     def _done(self, memory: FusionMemory, x: Filter, parts: int, now: float) -> FusionMemory:

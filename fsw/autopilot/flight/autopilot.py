@@ -12,7 +12,7 @@ import numpy as np
 
 from fsw.autopilot.control.actuator_watch import pause
 from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
-from fsw.autopilot.control.safety_gate import gate
+from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
@@ -60,12 +60,12 @@ from fsw.autopilot.parameters.consistency import Finding
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.autopilot.signals import (
-    STOPPED,
     ActuatorCommand,
     BatteryState,
     CommandAck,
     ConstraintKind,
     EndEffectorTarget,
+    JointVector,
     Mode,
     Plan,
     PlanFailure,
@@ -344,7 +344,8 @@ class Autopilot:
             state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
         )
         texts += told(state, self._tick_us)
-        outputs = TickOutputs(STOPPED, Mode.DISARMED, False, acks=tuple(acks), texts=tuple(texts))
+        still = stopped(self.config.airframe)
+        outputs = TickOutputs(still, Mode.DISARMED, False, acks=tuple(acks), texts=tuple(texts))
         return Controlled(outputs, inputs, state, r)
 
     def _with_evidence(self, state: FlightState, estimate: StateEstimate) -> FlightState:
@@ -636,7 +637,7 @@ class Autopilot:
             wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
             r = at_rest(airframe, estimate, r)
         else:
-            wanted = STOPPED
+            wanted = stopped(airframe)
         sent, replaced = gate(airframe, wanted, last.commanded, armed)
         if replaced:
             # The NaN is in the loops' new memory as well: discard that.
@@ -707,7 +708,7 @@ def _let_down(estimate: StateEstimate) -> Vec2:
     return -damping1 * rate1, -damping2 * rate2
 
 
-def freeze_arm(r: Tick, estimate: StateEstimate, kinds: Vec2) -> None:
+def freeze_arm(r: Tick, estimate: StateEstimate, kinds: JointVector) -> None:
     """Plan the failed joints, by their ``kinds`` [1], as they are. Writes plan, u."""
     for i in range(len(kinds)):
         if kinds[i] != SOUND:

@@ -42,13 +42,13 @@ from fsw.autopilot.signals import (
     CommandAck,
     CommandResult,
     Home,
+    JointVector,
     MissionUpdate,
     Mode,
     MotionSetpoint,
     Severity,
     StateEstimate,
     StatusText,
-    Vec2,
 )
 from fsw.frozen import replace
 
@@ -321,7 +321,7 @@ class Commander:
             return state
         return replace(state, setpoint=self._staying(estimate))
 
-    def _staying(self, estimate: StateEstimate, q_arm: Vec2 | None = None) -> SetpointMemory:
+    def _staying(self, estimate: StateEstimate, q_arm: JointVector | None = None) -> SetpointMemory:
         """A setpoint of the body that stays where it is."""
         reference = self._generator.begin(estimate)
         return SetpointMemory(reference, PositionGoal(MotionSetpoint(False, reference.p), q_arm))
@@ -339,7 +339,7 @@ class Commander:
         return SetpointMemory(reference, goal)
 
     def _with_joints(
-        self, state: FlightState, q_arm: Vec2, estimate: StateEstimate
+        self, state: FlightState, q_arm: JointVector, estimate: StateEstimate
     ) -> SetpointMemory:
         """Hold the body where it is or on its way, and the arm as asked, from now on."""
         setpoint, goal = state.setpoint, state.setpoint.goal

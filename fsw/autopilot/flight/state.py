@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import field
-from functools import partial
 from typing import Final, NamedTuple
 
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
@@ -254,6 +253,10 @@ AIDED: Final = Aiding()
 COMPLETE: Final = Dropout()
 
 
+def _of_paper() -> Tick:
+    return new_tick(AIRFRAME.mass, AIRFRAME.rotors, AIRFRAME.bodies.joints)
+
+
 @dataclass(frozen=True, slots=True)
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
@@ -262,7 +265,7 @@ class FlightState:
     t_us: int = 0  # of the last tick
     invalid_ticks: int = 0
     output_replaced: bool = False
-    cascade: Tick = field(default_factory=partial(new_tick, AIRFRAME.mass))
+    cascade: Tick = field(default_factory=_of_paper)
 
     vehicle: VehicleMemory = field(default_factory=VehicleMemory)
     mission: MissionMemory = field(default_factory=MissionMemory)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from fsw.autopilot.signals import Vec2, Vec4
+from fsw.autopilot.signals import JointVector, RotorVector
 from fsw.autopilot.tick_record import Health
 
 SOUND: Final = 0.0
@@ -14,13 +14,13 @@ LIMP: Final = 2.0  # torque has no effect
 
 
 class ActuatorHealth(NamedTuple):
-    """Of the rotors (rear, left, front, right) and of the joints."""
+    """Of each rotor and of each joint; those behind the last that is named are sound."""
 
-    effectiveness: Vec4 = (1.0, 1.0, 1.0, 1.0)  # thrust over what is commanded
+    effectiveness: RotorVector = ()  # thrust over what is commanded
     # A rotor that does not obey is left alone: its least and its most are what it gives.
-    least: Vec4 = (0.0, 0.0, 0.0, 0.0)  # N
-    most: Vec4 = (math.inf, math.inf, math.inf, math.inf)  # N, beside the rotor's own limit
-    joints: Vec2 = (SOUND, SOUND)  # or STUCK or LIMP
+    least: RotorVector = ()  # N
+    most: RotorVector = ()  # N, beside the rotor's own limit
+    joints: JointVector = ()  # SOUND, STUCK or LIMP
 
 
 HEALTHY: Final = ActuatorHealth()
@@ -28,7 +28,8 @@ HEALTHY: Final = ActuatorHealth()
 
 def note_health(into: Health, health: ActuatorHealth) -> None:
     """Write down what has been found out."""
-    rotors, joints = len(health.least), len(health.joints)
-    into.effectiveness[:rotors] = health.effectiveness
-    into.least[:rotors], into.most[:rotors] = health.least, health.most
-    into.joints[:joints] = health.joints
+    into.effectiveness[:], into.least[:], into.most[:], into.joints[:] = 1.0, 0.0, math.inf, SOUND
+    into.effectiveness[: len(health.effectiveness)] = health.effectiveness
+    into.least[: len(health.least)] = health.least
+    into.most[: len(health.most)] = health.most
+    into.joints[: len(health.joints)] = health.joints

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from fsw.autopilot.signals import BatteryReading, BatteryState, BatteryWarning, Vec4
+from fsw.autopilot.signals import BatteryReading, BatteryState, BatteryWarning, RotorVector
 
 _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
@@ -56,7 +56,7 @@ class BatteryModel:
 
 
 def drained(
-    model: BatteryModel, levels: Levels, state: BatteryState, thrust: Vec4, dt: float
+    model: BatteryModel, levels: Levels, state: BatteryState, thrust: RotorVector, dt: float
 ) -> BatteryState:
     """The battery after ``dt`` [s] of ``thrust`` [N] of each rotor."""
     power = model.idle_power

@@ -18,7 +18,7 @@ from fsw.autopilot.geometry.rotation import rotate
 from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, J, P, V
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
+from fsw.autopilot.signals import JointVector, StateEstimate, Vec2, Vec3
 from fsw.compiled import compilable, compiled
 
 JOINT2, END_EFFECTOR = 0, 1  # rows of arm_points
@@ -46,7 +46,7 @@ def links(lengths: Vec2, th1: float, th12: float) -> tuple[Vec2, Vec2]:
     return (x1, z1), (x2, z2)
 
 
-def end_effector_when_level(lengths: Vec2, q_arm: Vec2, yaw: float) -> Vec3:
+def end_effector_when_level(lengths: Vec2, q_arm: JointVector, yaw: float) -> Vec3:
     """From the body origin to the end-effector of a level vehicle [m, NED].
 
     Links of ``lengths`` [m], joints at ``q_arm`` [rad], the body at ``yaw`` [rad].
@@ -56,7 +56,7 @@ def end_effector_when_level(lengths: Vec2, q_arm: Vec2, yaw: float) -> Vec3:
     return ahead * math.cos(yaw), ahead * math.sin(yaw), z1 + z2
 
 
-def _tip_in_body(lengths: Vec2, q_arm: Vec2, qd_arm: Vec2) -> tuple[Vec3, Vec3]:
+def _tip_in_body(lengths: Vec2, q_arm: JointVector, qd_arm: JointVector) -> tuple[Vec3, Vec3]:
     """Position [m] and velocity [m/s] of the tip of links of these lengths in the body frame."""
     th1, th12 = q_arm[0], q_arm[0] + q_arm[1]
     x1, z1, vx1, vz1 = _link(lengths[0], math.sin(th1), math.cos(th1), qd_arm[0])

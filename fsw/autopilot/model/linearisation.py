@@ -31,7 +31,7 @@ from fsw.autopilot.model.prediction import (
     P,
     V,
 )
-from fsw.autopilot.signals import Mat3, Vec2, Vec3
+from fsw.autopilot.signals import JointVector, Mat3, Vec2, Vec3
 from fsw.compiled import compiled, kernel, machine_code
 
 # Prediction states that turn the body: the accelerations, by the tilt they take, and yaw.
@@ -207,7 +207,9 @@ def put_turning(frame: Array, v: Vec3, w: Vec3) -> None:
 
 
 @kernel
-def put_arm(frame: Array, q_arm: Vec2 | Array, qd_arm: Vec2 | Array, lengths: Vec2) -> None:
+def put_arm(
+    frame: Array, q_arm: JointVector | Array, qd_arm: JointVector | Array, lengths: Vec2
+) -> None:
     """The arm in a ``frame`` (FRAME,) [SI]: ``q_arm`` [rad], ``qd_arm`` [rad/s], lengths [m]."""
     angle, rate = 0.0, 0.0
     for link in range(2):

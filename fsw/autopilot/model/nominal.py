@@ -67,6 +67,7 @@ class NominalModel:
     def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
         """The state some ticks later under one input."""
         r = Tick()
+        r.joint_count = len(x.q_arm)
         r.nominal, r.input = x, u
         self.move(r, ticks)
         moved = r.nominal

@@ -13,11 +13,12 @@ from typing import Final
 from fsw.autopilot.model.kinematics import point_in_flight
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.shapes import kind_of
-from fsw.autopilot.signals import FlightSnapshot, SetpointKind, Vec2, Vec4
+from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind
 from fsw.link.wire import message_ids
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.record import padded
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
@@ -90,8 +91,8 @@ def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues 
     active = sum(1 << i for i, value in enumerate(barrier) if not value > 0.0)
     return (
         snapshot.t_us,
-        *_padded(margins, _MAX_CONSTRAINTS),
-        *_padded(barrier, _MAX_CONSTRAINTS),
+        *padded(margins, _MAX_CONSTRAINTS),
+        *padded(barrier, _MAX_CONSTRAINTS),
         snapshot.plan.slack_max if snapshot.plan is not None else 0.0,
         min(report.margins),
         active,
@@ -101,7 +102,7 @@ def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues 
         snapshot.safety.breaches & _U16,
         snapshot.safety.departures & _U16,
         snapshot.safety.interventions & _U16,
-        *_padded(report.added[:_MAX_CONSTRAINTS], _MAX_CONSTRAINTS),
+        *padded(report.added[:_MAX_CONSTRAINTS], _MAX_CONSTRAINTS),
         report.shortfall,
     )
 
@@ -139,7 +140,7 @@ def mpc_horizon(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | N
     x, steps = plan.start, plan.inputs[:_HORIZON_STEPS]
     start = (*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm)
     inputs = tuple(value for u in steps for value in (*u.a, u.yaw_acc, *u.qdd_arm))
-    filled = _padded(inputs, 6 * _HORIZON_STEPS)
+    filled = padded(inputs, 6 * _HORIZON_STEPS)
     return (plan.t_us, *start, *filled, plan.plan_id & _U32, plan.period_us, len(steps))
 
 
@@ -155,7 +156,7 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
             message_ids.OBSTACLE_SHAPE,
             (
                 *(zone.t_us, zone.clearance, *zone.velocity),
-                *_padded(zone.shape.numbers, _SHAPE_NUMBERS),
+                *padded(zone.shape.numbers, _SHAPE_NUMBERS),
                 *(0, 0, index, len(zones), kind_of(zone.shape).number, int(zone.keep_in)),
             ),
             message_ids.PANDION,
@@ -193,9 +194,5 @@ def _microseconds(value: float) -> int:
     return min(round(value), _U32) if 0.0 <= value < math.inf else _U32
 
 
-def _four(pair: Vec2) -> Vec4:
-    return (pair[0], pair[1], 0.0, 0.0)
-
-
-def _padded(values: tuple[float, ...], size: int) -> tuple[float, ...]:
-    return values + (0.0,) * (size - len(values))
+def _four(values: JointVector) -> JointVector:
+    return padded(values, 4)

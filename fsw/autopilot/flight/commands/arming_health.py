@@ -7,7 +7,7 @@ import math
 from fsw.autopilot.estimation.faults.sensor_fault import sentence
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import StateEstimate, Vec2
+from fsw.autopilot.signals import JointVector, StateEstimate
 from fsw.frozen import dataclass
 
 _DENIES = 2  # of COM_ARM_SDCARD
@@ -27,8 +27,8 @@ class ArmingHealth:
     min_remaining: float = 0.1
     parameters: str = ""  # which contradict each other
     min_margin: float = math.inf  # m, of the safe set
-    joint_rates: Vec2 = (0.0, 0.0)  # rad/s
-    joints: Vec2 = (0.0, 0.0)  # rad
+    joint_rates: JointVector = (0.0, 0.0)  # rad/s
+    joints: JointVector = (0.0, 0.0)  # rad
     damage: str = ""  # parts that have failed
     storage: str = ""  # why the flight log is not written
 

@@ -28,6 +28,7 @@ from fsw.autopilot.signals import (
     GoTo,
     Home,
     InjectFailure,
+    JointVector,
     LookAt,
     Mode,
     MotionSetpoint,
@@ -41,7 +42,6 @@ from fsw.autopilot.signals import (
     StartMission,
     SwitchMode,
     TakeOff,
-    Vec2,
     Vec3,
 )
 from fsw.frozen import replace
@@ -74,7 +74,7 @@ class Decision:
     stop: bool = False  # holding already, but perhaps on the way to a place
     climb: float | None = None  # m, of a takeoff; None: the usual one
     goal: PositionGoal | None = None
-    joints: Vec2 | None = None  # rad
+    joints: JointVector | None = None  # rad
     home: Home | None = None
     mission_step: int | None = None  # to fly next
     look_at: NewHeading | None = None

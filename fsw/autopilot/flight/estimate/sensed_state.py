@@ -37,11 +37,11 @@ from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import JointSample, Sample
 from fsw.autopilot.signals import (
     EstimatorReport,
+    JointVector,
     Severity,
     StateEstimate,
     StatusText,
     TickInputs,
-    Vec2,
 )
 from fsw.frozen import replace
 
@@ -315,7 +315,7 @@ def _without_stuck(
 
 
 def _watched(
-    watch: EncoderWatch, memory: FusionMemory, angles: Vec2, state: FlightState
+    watch: EncoderWatch, memory: FusionMemory, angles: JointVector, state: FlightState
 ) -> EncoderWatch:
     """Encoders are stuck when they say the same while torques should have moved the joints.
 

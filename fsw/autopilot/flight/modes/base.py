@@ -21,6 +21,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     EndEffectorTarget,
     Home,
+    JointVector,
     MissionProgress,
     Mode,
     SafeSet,
@@ -62,7 +63,7 @@ class CommandContext:
     setpoint_problem: str  # why those of the last 0.5 s are refused; empty: none was
     position: Vec3  # m, of the body
     yaw: float  # rad
-    joints: Vec2  # rad, asked for last or as they are
+    joints: JointVector  # rad, asked for last or as they are
     home: Home | None
     safe_set: SafeSet
     body: Body

@@ -7,6 +7,7 @@ commanded again.
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from fsw.autopilot.control.actuator_watch import watch
@@ -15,11 +16,20 @@ from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.rotors import rotor_decay
-from fsw.autopilot.signals import ActuatorReport, Vec2, Vec4
+from fsw.autopilot.signals import ActuatorReport, JointVector
 from fsw.autopilot.tick_record import NO_ROTOR, Tick, Watched
 from fsw.compiled import machine_code, packed
 
-ROTORS: Final = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")
+_SIDES: Final = (
+    "front",
+    "front right",
+    "right",
+    "rear right",
+    "rear",
+    "rear left",
+    "left",
+    "front left",
+)
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
 _WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
 _MIN_GIVEN: Final = 0.1  # N, of a rotor that does not obey
@@ -32,8 +42,8 @@ class DamageWatch:
     def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
         """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
         self._law = packed(airframe)
-        self._top = airframe.rotor_thrust_max
-        self._hover = 0.25 * airframe.mass * GRAVITY
+        self._top, self._names = airframe.rotor_thrust_max, rotor_names(airframe)
+        self._hover = airframe.mass * GRAVITY / airframe.rotors
         self._tick = tick
         self._decay = rotor_decay(airframe, tick)
         self._reallocates = reallocates
@@ -64,7 +74,7 @@ class DamageWatch:
             s, now_us = after.watch, after.estimate.t_us
             back = before.watch.failed != NO_ROTOR and s.failed == NO_ROTOR
             damage = self._of_rotors(damage, s, now_us, back=back)
-            damage = _of_joints(damage, s, now_us, angles_repeat)
+            damage = _of_joints(damage, s, after.joint_count, now_us, angles_repeat)
         return damage
 
     def finds(self, before: Tick, after: Tick) -> bool:
@@ -92,33 +102,33 @@ class DamageWatch:
             since_us = before.rotor_us
             if found.rotor != known.rotor:
                 since_us = now_us - round(1e6 * s.suspected)
-            after = before._replace(rotor=_sentence(s, found), rotor_us=since_us)
+            after = before._replace(rotor=_sentence(s, found, self._names[k]), rotor_us=since_us)
         if self._reallocates:
             health = self._health(s, k, found, before.health.joints)
         return after._replace(report=found, health=health)
 
-    def _health(self, s: Watched, k: int, found: ActuatorReport, joints: Vec2) -> ActuatorHealth:
+    def _health(
+        self, s: Watched, k: int, found: ActuatorReport, joints: JointVector
+    ) -> ActuatorHealth:
         """What loops reckon with for rotor ``k`` (from 0)."""
         if not found.disobeys:
-            return ActuatorHealth(_with(HEALTHY.effectiveness, k, found.effect), joints=joints)
+            return ActuatorHealth((1.0,) * k + (found.effect,), joints=joints)
         # It is commanded what it gives in hover, and reckoned with as what it really gives.
         gives = min(max(s.gives, _MIN_GIVEN), self._top)
         return ActuatorHealth(
-            _with(HEALTHY.effectiveness, k, gives / self._hover),
-            _with(HEALTHY.least, k, gives),
-            _with(HEALTHY.most, k, gives),
+            (1.0,) * k + (gives / self._hover,),
+            (0.0,) * k + (gives,),
+            (math.inf,) * k + (gives,),
             joints,
         )
 
 
-def _of_joints(before: Damage, s: Watched, now_us: int, angles_repeat: bool) -> Damage:
-    kinds = (
-        float(s.joint[0]) or before.report.joints[0],
-        float(s.joint[1]) or before.report.joints[1],
-    )
-    if kinds == before.report.joints:
+def _of_joints(before: Damage, s: Watched, joints: int, now_us: int, angles_repeat: bool) -> Damage:
+    known = before.report.joints or (SOUND,) * joints
+    kinds = tuple([float(s.joint[k]) or known[k] for k in range(joints)])
+    if kinds == known:
         return before
-    failed = [k for k in range(2) if kinds[k] != SOUND]
+    failed = [k for k in range(joints) if kinds[k] != SOUND]
     undecided = angles_repeat and LIMP in kinds and not before.joint
     if undecided and max(s.joint_for[k] for k in failed) < _UNDECIDED:
         return before  # a joint that hangs loose would move: encoders that are stuck show soon
@@ -132,15 +142,21 @@ def _of_joints(before: Damage, s: Watched, now_us: int, angles_repeat: bool) -> 
     return before._replace(joint=text, joint_us=since_us, report=report, health=health)
 
 
-def _with(values: Vec4, k: int, value: float) -> Vec4:
-    a, b, c, d = (value if i == k else one for i, one in enumerate(values))
-    return a, b, c, d
+def rotor_names(airframe: Airframe) -> list[str]:
+    """What to call each rotor: its number, and its side where no other rotor is on that."""
+    w, sides = airframe.wrench, []
+    for at in range(0, 6 * airframe.rotors, 6):
+        # A thrust along -z turns the vehicle by where it acts: x forward, y to the right.
+        sides.append(_SIDES[round(math.atan2(-w[at + 3], w[at + 4]) / (0.25 * math.pi)) % 8])
+    return [
+        f"rotor {k} ({side})" if sides.count(side) == 1 else f"rotor {k}"
+        for k, side in enumerate(sides, start=1)
+    ]
 
 
-def _sentence(s: Watched, found: ActuatorReport) -> str:
+def _sentence(s: Watched, found: ActuatorReport, name: str) -> str:
     """What is wrong with a rotor."""
     k = found.rotor - 1
-    name = f"rotor {ROTORS[k]}"
     if found.lost:
         return f"{name} gives nothing"
     if found.disobeys:

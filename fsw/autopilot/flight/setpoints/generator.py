@@ -26,11 +26,11 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, SetpointLimits
 from fsw.autopilot.signals import (
     EndEffectorTarget,
     Facing,
+    JointVector,
     MotionSetpoint,
     Orbit,
     SafeSet,
     StateEstimate,
-    Vec2,
     Vec3,
 )
 from fsw.frozen import replace
@@ -50,7 +50,7 @@ class ReferenceState:
     v: Vec3  # m/s
     yaw: float  # rad
     yaw_rate: float = 0.0  # rad/s
-    q_arm: Vec2 | None = None  # rad, joints to hold; None leaves them to the planner
+    q_arm: JointVector | None = None  # rad, joints to hold; None leaves them to the planner
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class PositionGoal:
     """The goal of the point."""
 
     motion: MotionSetpoint
-    joints: Vec2 | None = None  # rad
+    joints: JointVector | None = None  # rad
     speed: float | None = None  # m/s, towards a place; None: as usual
     orbit: Orbit | None = None  # in place of the motion
     look_at: Vec3 | None = None  # m, where the nose points in place of the motion's heading
@@ -134,7 +134,7 @@ class SetpointGenerator:
         estimate: StateEstimate,
         safe_set: SafeSet,
         t_us: int,
-    ) -> tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]:
+    ) -> tuple[tuple[EndEffectorTarget, ...], tuple[JointVector, ...]]:
         """Targets and joints at the nodes, the first at ``t_us``; joints only if some are asked."""
         config, targets, joint_targets = self._config, [], []
         for node in range(config.planner.horizon + 1):
@@ -178,7 +178,7 @@ class SetpointGenerator:
         )
         return replace(reference, p=p, v=v)
 
-    def _hanging(self, q_arm: Vec2, yaw: float) -> Vec3:
+    def _hanging(self, q_arm: JointVector, yaw: float) -> Vec3:
         """From the body to the end-effector while level [m]."""
         return end_effector_when_level(self._config.airframe.link_length, q_arm, yaw)
 

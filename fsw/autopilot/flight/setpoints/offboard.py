@@ -10,7 +10,7 @@ from fsw.autopilot.flight.commands.bounds import motion_refusal as motion_refusa
 from fsw.autopilot.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.signals import AttitudeSetpoint, MotionSetpoint, Vec2, Vec3
+from fsw.autopilot.signals import AttitudeSetpoint, JointVector, MotionSetpoint, Vec3
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ def attitude_refusal(setpoint: AttitudeSetpoint) -> str | None:
     return None
 
 
-def joints_refusal(q_arm: Vec2, airframe: Airframe) -> str | None:
+def joints_refusal(q_arm: JointVector, airframe: Airframe) -> str | None:
     """Why the arm cannot have the angles ``q_arm`` [rad]."""
     both = q_arm[0] + q_arm[1]
     if not abs(q_arm[0]) <= airframe.joint1_limit + 1e-6:

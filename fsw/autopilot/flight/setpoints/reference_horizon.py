@@ -15,10 +15,10 @@ from fsw.autopilot.mpc.reference import sample, still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     EndEffectorTarget,
+    JointVector,
     MotionSetpoint,
     SafeSet,
     StateEstimate,
-    Vec2,
     Vec3,
 )
 from fsw.frozen import replace
@@ -27,7 +27,7 @@ _LEAD = 0.4  # m that a reference may be ahead of a vehicle at rest, as of one f
 _NEAR = 0.1  # m, of a vehicle at the largest speed
 _OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
 
-Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[Vec2, ...]]
+Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[JointVector, ...]]
 """Targets at the nodes; joints at the nodes, or none where the arm is the planner's choice."""
 
 

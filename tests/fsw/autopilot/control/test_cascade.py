@@ -13,11 +13,11 @@ from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
 from fsw.autopilot.control.cascade import Cascade, Inner, at_rest, in_hover
 from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.pid import PidGains
+from fsw.autopilot.control.safety_gate import stopped
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import motion_state
 from fsw.autopilot.signals import (
-    STOPPED,
     ActuatorCommand,
     PlanInput,
     PredictionState,
@@ -168,7 +168,7 @@ def test_a_vehicle_taken_over_carries_its_weight_and_one_at_rest_nothing() -> No
     each = hovering.rotors.item(0)
     assert hovering.commanded == ActuatorCommand((each,) * 4, (0.0, 0.0))
     assert hovering.rotors.tolist() == [*(each,) * 4, *(0.0,) * 4]
-    assert standing.commanded == STOPPED
+    assert standing.commanded == stopped(AIRFRAME)
     assert not standing.rotors.any()
     for memory in (hovering, standing):
         assert memory.mass == AIRFRAME.mass

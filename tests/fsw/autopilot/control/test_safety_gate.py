@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.control.safety_gate import gate
+from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.signals import STOPPED, ActuatorCommand
+from fsw.autopilot.signals import ActuatorCommand
 
 anything = st.floats(allow_nan=True, allow_infinity=True)
 commands = st.builds(
@@ -38,7 +38,7 @@ def test_what_is_sent_is_finite_and_within_limits(
 @pytest.mark.requirement("REQ-ACT-7")
 @given(commands, allowed)
 def test_disarmed_everything_stands_still(wanted: ActuatorCommand, last: ActuatorCommand) -> None:
-    assert gate(AIRFRAME, wanted, last, armed=False) == (STOPPED, False)
+    assert gate(AIRFRAME, wanted, last, armed=False) == (stopped(AIRFRAME), False)
 
 
 @given(allowed, allowed)

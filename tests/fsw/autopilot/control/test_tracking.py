@@ -312,4 +312,4 @@ def test_what_was_observed_is_remembered_at_once_and_forgotten_slowly() -> None:
 
 
 def test_a_disturbance_that_was_never_observed_counts_as_a_large_one() -> None:
-    assert new_tick(AIRFRAME.mass).observed.recent >= 0.8
+    assert new_tick(AIRFRAME.mass, 4, 2).observed.recent >= 0.8

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.estimation.estimator import INERTIAL, JOINTS, POSE, estimate_state, read_frame
 from fsw.autopilot.signals import SensorFrame, Vec4
-from fsw.autopilot.tick_record import Tick
+from fsw.autopilot.tick_record import new_tick
 from tests.fsw.random_states import mat3
 
 GOOD = SensorFrame(
@@ -69,7 +69,7 @@ PARTS = {"p_WB": POSE, "v_WB": POSE, "q_WB": POSE, "gyro_B": INERTIAL, "q_arm": 
 @pytest.mark.parametrize("name", PARTS)
 def test_a_part_that_is_no_number_is_named_and_the_others_stay(name: str) -> None:
     nothing: Any = (math.nan,) * len(getattr(GOOD, name))
-    r = Tick()
+    r = new_tick(3.5, 4, 2)
     assert read_frame(replace(GOOD, **{name: nothing}), r) == PARTS[name]
     state = r.known
     assert state is not None

@@ -13,7 +13,7 @@ from fsw.autopilot.estimation.estimator import estimate_state, read_frame
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.frame_dropout import Dropout, filled
 from fsw.autopilot.signals import SensorFrame, StateEstimate, Vec3
-from fsw.autopilot.tick_record import Tick
+from fsw.autopilot.tick_record import new_tick
 
 TICK = 0.002
 NAN = math.nan
@@ -47,7 +47,7 @@ def flown(
     dropout, said = Dropout(), []
     for k in range(1, ticks):
         s = spoil(k, frame(k))
-        r = Tick()
+        r = new_tick(3.5, 4, 2)
         missing, read = read_frame(s, r), r.known
         assert read is not None
         dropout, sentences = dropout.after(missing, s.t_us)

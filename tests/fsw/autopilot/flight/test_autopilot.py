@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from fsw.autopilot.control.safety_gate import stopped
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.flight.autopilot import Autopilot
@@ -19,9 +20,9 @@ from fsw.autopilot.flight.safety.safe_set import joined
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import FlightState, MissionMemory
 from fsw.autopilot.measurements import ImuSample, JointSample, Sample
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
-    STOPPED,
     BatteryState,
     CommandResult,
     EndEffectorTarget,
@@ -75,7 +76,7 @@ def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> N
     blind = frame(5000, p_WB=(math.nan, 0.0, 0.0))
     asked = (command(ARM, 1.0),)
     state, outputs = tick(FlightState(), 5000, sensors=blind, commands=asked)
-    assert outputs.actuators == outputs.snapshot.actuators == STOPPED
+    assert outputs.actuators == outputs.snapshot.actuators == stopped(AIRFRAME)
     assert [ack.result for ack in outputs.acks] == [CommandResult.TEMPORARILY_REJECTED]
     assert outputs.texts[-1].text == "not armed: the state estimate is invalid"
     snapshot, level = outputs.snapshot, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)

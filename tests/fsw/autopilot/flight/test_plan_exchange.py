@@ -37,7 +37,7 @@ from fsw.autopilot.signals import (
     SolverStatus,
     Vec3,
 )
-from fsw.autopilot.tick_record import Tick
+from fsw.autopilot.tick_record import new_tick
 from tests.fsw.random_states import as_state, estimate_of, prediction_vector, random_estimate
 from tests.fsw.records import measured_motion
 
@@ -95,7 +95,7 @@ def test_a_plan_on_time_starts_where_it_says() -> None:
     assert (memory.running, memory.since_us, memory.awaited_id) == (new, START_US, -1)
     assert (memory.counters.plans, memory.counters.missed_deadlines) == (1, 0)
     exchange = PlanExchange(flight_config(body="points"))
-    r = with_nominal(Tick(), moving())
+    r = with_nominal(new_tick(3.5, 4, 2), moving())
     exchange.follow(WAITING, r, plan(), START_US, 1)
     assert r.nominal == new.start
 
@@ -109,7 +109,7 @@ def test_a_late_plan_is_missed_once_and_starts_where_it_would_be_by_now() -> Non
         assert memory.counters.missed_deadlines == 1
     now_us = START_US + 3 * TICK_US
     new = plan()
-    r = with_nominal(Tick(), moving())
+    r = with_nominal(new_tick(3.5, 4, 2), moving())
     memory = PlanExchange(flight_config(body="points")).follow(memory, r, new, now_us, 1)
     assert (memory.counters.missed_deadlines, memory.counters.plans) == (1, 1)
     assert r.nominal == MODEL.advance(new.start, new.inputs[0], 3)

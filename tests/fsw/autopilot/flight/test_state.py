@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from fsw.autopilot.control.safety_gate import stopped
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.state import (
     Aiding,
@@ -13,7 +14,8 @@ from fsw.autopilot.flight.state import (
     VehicleMemory,
     is_young,
 )
-from fsw.autopilot.signals import STOPPED, Mode, PlannerCounters, SafeSet, SolverStatus
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.signals import Mode, PlannerCounters, SafeSet, SolverStatus
 
 
 @pytest.mark.parametrize("mode", Mode)
@@ -79,7 +81,7 @@ def test_a_vehicle_that_was_switched_on_stands_disarmed_and_has_heard_and_done_n
     )
     assert vehicle.gcs_heard_us < 0
     assert (state.index, state.invalid_ticks, state.output_replaced) == (-1, 0, False)
-    assert (state.cascade.commanded, state.mission.safe_set) == (STOPPED, SafeSet())
+    assert (state.cascade.commanded, state.mission.safe_set) == (stopped(AIRFRAME), SafeSet())
     assert (plan.next_id, plan.status, plan.refused) == (0, SolverStatus.UNKNOWN, False)
     assert plan.awaited_id < 0
     assert plan.counters == PlannerCounters(plans=0, missed_deadlines=0, fallbacks=0)

@@ -163,12 +163,12 @@ def test_a_rotor_that_is_known_to_be_bad_stays_so_while_sensors_are_doubted(
 def test_while_nothing_has_failed_the_watch_starts_anew_after_a_doubt() -> None:
     motion = Motion(lambda _t, _i: 1.0)
     assert motion.run(0.2) == Damage()
-    sound = new_tick(3.5).watch
+    sound = new_tick(3.5, 4, 2).watch
     sound.running, sound.torque[:] = 5.0, 1.0
     limp = sound.copy()
     limp.joint[1] = LIMP
     pause(sound)
-    assert sound == new_tick(3.5).watch
+    assert sound == new_tick(3.5, 4, 2).watch
     pause(limp)
     assert limp.joint[:2].tolist() == [SOUND, LIMP]
     assert limp.running == 0.0
