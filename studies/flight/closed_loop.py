@@ -161,7 +161,7 @@ def controls(airframe: Airframe, command: tuple[Vec4, Vec2], *, armed: bool) -> 
     """The shares of full thrust and torque that a ``command`` [N, N m] is."""
     # Written out: each generator would take longer than all of this.
     (f1, f2, f3, f4), (t1, t2) = command
-    force, torque = airframe.rotor_thrust_max, airframe.joint_torque_max
+    force, torque = airframe.rotor_thrust_max, airframe.joint_torque_max[0]
     thrust = (f1 / force, f2 / force, f3 / force, f4 / force)
     return Controls(thrust, (t1 / torque, t2 / torque), armed)
 

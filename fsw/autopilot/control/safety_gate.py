@@ -16,7 +16,7 @@ def gate(
     if not armed:
         return STOPPED, False
     (f1, f2, f3, f4), (t1, t2) = command
-    top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
+    top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max[0]
     # What is within limits is finite as well: no comparison with NaN is true.
     if (
         (0.0 <= f1 <= top and 0.0 <= f2 <= top and 0.0 <= f3 <= top and 0.0 <= f4 <= top)
