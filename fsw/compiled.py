@@ -127,8 +127,8 @@ def packed(numbers: Any) -> NDArray[Any]:
 
     A kernel reads ``packed(tuning)[0].kp`` as a law reads ``tuning.kp``; handing it over costs
     as much as one float, however many numbers are in it. Tuples become arrays: laws pick their
-    entries by index. Whole numbers and truth values become floats. Kernels that run as the Python
-    they are read the dataclass itself.
+    entries by index. Whole numbers and truth values become floats. Tuples of dataclasses are for
+    Python alone. Kernels that run as the Python they are read the dataclass itself.
     """
     if IN_PYTHON:
         return [numbers]  # type: ignore[return-value]
@@ -139,13 +139,21 @@ def packed(numbers: Any) -> NDArray[Any]:
 
 def _layout(value: Any) -> np.dtype[Any]:
     if dataclasses.is_dataclass(value):
-        fields = [field.name for field in dataclasses.fields(value)]
-        return np.dtype([(name, _layout(getattr(value, name))) for name in fields], align=True)
+        inner = [(name, _layout(one)) for name, one in _fields(value)]
+        return np.dtype(inner, align=True)
     return np.dtype((np.float64, np.shape(value)))
 
 
 def _values(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
-        fields = dataclasses.fields(value)
-        return tuple(_values(getattr(value, field.name)) for field in fields)
+        return tuple(_values(one) for _, one in _fields(value))
     return value
+
+
+def _fields(value: Any) -> list[tuple[str, Any]]:
+    named = [(field.name, getattr(value, field.name)) for field in dataclasses.fields(value)]
+    return [
+        (name, one)
+        for name, one in named
+        if not (isinstance(one, tuple) and any(map(dataclasses.is_dataclass, one)))
+    ]

@@ -27,6 +27,7 @@ from fsw.compiled import IN_PYTHON
 
 JOINTS: Final = 6  # of an arm, at most
 ROTORS: Final = 8  # at most
+ANGLE_LIMITS: Final = 2 * JOINTS  # of joints and of sums of them, at most
 
 Floats = NDArray[np.float64]
 Two = Annotated[Floats, 2]

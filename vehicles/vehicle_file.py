@@ -19,7 +19,7 @@ from vehicles.description import JOINTS_MAX, ROTORS_MAX, V3, V6, Rotor, Vehicle
 
 PACKAGED: Final = Path(__file__).parent
 _MOST_BYTES: Final = 256 * 1024
-_MOST_PARTS: Final = 64  # of points, parts, feet and coupled limits each
+_MOST_PARTS: Final = 64  # of points, parts and feet each
 _ROTORS_MIN: Final = 4
 _ROUNDED: Final = 0.05  # [1] by which an axis may be off a unit vector; it is scaled
 _UNIT: Final = 1e-6  # [1] by which its length is off 1 without any rounding
@@ -138,7 +138,7 @@ def _counts(vehicle: Vehicle) -> Iterator[tuple[str, int, int, int]]:
     yield "feet.positions", len(vehicle.feet.positions), 3, _MOST_PARTS
     yield "critical_points", len(vehicle.critical_points), 1, _MOST_PARTS
     yield "parts", len(vehicle.parts), 0, _MOST_PARTS
-    yield "coupled_limits", len(vehicle.coupled_limits), 0, _MOST_PARTS
+    yield "coupled_limits", len(vehicle.coupled_limits), 0, JOINTS_MAX
 
 
 def _unit(axis: V3, path: str) -> V3:

@@ -173,7 +173,7 @@ def _inputs(now: Scene, airframe: Airframe) -> str:
     for name, thrust in zip(ROTORS, now.thrust or (), strict=False):
         rows.append(_limited(f"rotor {name}", thrust, airframe.rotor_thrust_max, "N"))
     for k, torque in enumerate(now.torque or (), start=1):
-        rows.append(_limited(f"joint {k} torque", torque, airframe.joint_torque_max, "N m"))
+        rows.append(_limited(f"joint {k} torque", torque, airframe.joint_torque_max[k - 1], "N m"))
     if now.estimate is not None:
         th1, th2 = now.estimate.q_arm
         deg = math.degrees

@@ -99,7 +99,7 @@ def _filled(value: Any, name: str, known: Mapping[str, Any]) -> Any:
         return replace(value, **{k: _filled(v, f"{name}.{k}", known) for k, v in parts.items()})
     if isinstance(value, tuple):
         return tuple(_filled(one, f"{name}.{k}", known) for k, one in enumerate(value))
-    return type(value)(known.get(name, value))
+    return value if value is None else type(value)(known.get(name, value))
 
 
 def _vec3(row: NDArray[np.float64]) -> Vec3:

@@ -81,7 +81,7 @@ def vehicle_facts(config: FlightConfig) -> VehicleFacts:
     """The constants of a configuration that links and logs need."""
     return VehicleFacts(
         rotor_thrust_max=config.airframe.rotor_thrust_max,
-        joint_torque_max=config.airframe.joint_torque_max,
+        joint_torque_max=config.airframe.joint_torque_max[0],
         link_length=config.airframe.link_length,
         tick_period_us=config.tick_period_us,
         mpc_period_us=config.mpc_period_us,

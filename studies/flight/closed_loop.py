@@ -159,9 +159,10 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
 
 def controls(airframe: Airframe, command: ActuatorCommand, *, armed: bool) -> Controls:
     """The shares of full thrust and torque that a ``command`` [N, N m] is."""
-    force, torque = airframe.rotor_thrust_max, airframe.joint_torque_max
+    force, torques = airframe.rotor_thrust_max, airframe.joint_torque_max
     thrust = tuple([f / force for f in command.rotor_thrust])
-    return Controls(thrust, tuple([t / torque for t in command.joint_torque]), armed)
+    torque = tuple([t / most for t, most in zip(command.joint_torque, torques, strict=False)])
+    return Controls(thrust, torque, armed)
 
 
 class CalmStretch:

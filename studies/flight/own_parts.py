@@ -421,7 +421,7 @@ class WatchedController:
         airframe = self._airframe
         for name, values, most, unit in (
             ("thrust", thrust, airframe.rotor_thrust_max, "N"),
-            ("joint torque", torque, airframe.joint_torque_max, "N m"),
+            ("joint torque", torque, airframe.joint_torque_max[0], "N m"),
         ):
             if not np.abs(values).max() <= _MAX_SHARE * most:
                 raise OwnPartError(

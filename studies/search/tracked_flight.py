@@ -142,7 +142,7 @@ def _track(
     reading = np.zeros(READINGS)
     reading[6], reading[15] = 1.0, -GRAVITY
     r: Tick = ticks[0]
-    top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
+    top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max[0]
     thrust, torque = np.zeros(ROTORS_MAX), np.zeros(JOINTS_MAX)
     for k in range(kept.shape[0]):
         planned, ahead = rows[k], rows[k + 1]

@@ -147,12 +147,12 @@ def test_both_sides_have_the_same_limits() -> None:
         {
             "joint_1_angle": AIRFRAME.joint1_limit,
             "link_2_angle": AIRFRAME.joint12_limit,
-            "joint_1_rate": AIRFRAME.joint_rate_max,
-            "joint_2_rate": AIRFRAME.joint_rate_max,
+            "joint_1_rate": AIRFRAME.joint_rate_max[0],
+            "joint_2_rate": AIRFRAME.joint_rate_max[0],
             "tilt": AIRFRAME.tilt_max,
             "roll_pitch_rate": AIRFRAME.body_rate_max[0],
             "yaw_rate": AIRFRAME.body_rate_max[1],
-            "joint_torque": AIRFRAME.joint_torque_max,
+            "joint_torque": AIRFRAME.joint_torque_max[0],
             "rotor_thrust": AIRFRAME.rotor_thrust_max,
         }
     )

@@ -266,7 +266,7 @@ def motion(flights: Sequence[Reported]) -> Chart | None:
     else:
         return None
     first, both = (_DEG * flight.number(f"airframe.joint{n}_limit") for n in ("1", "12"))
-    fastest = flight.number("airframe.joint_rate_max")
+    fastest = flight.number("airframe.joint_rate_max.0")
     tilt_max = _DEG * flight.number("airframe.tilt_max")
     summed = angles[:, 0] + angles[:, 1]
     return over_time(

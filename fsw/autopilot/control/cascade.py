@@ -339,13 +339,14 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
 def send(r: Tick, airframe: Airframe) -> None:
     """The new command for what is wanted. Reads health; writes sent, flags."""
     wanted = r.wanted
-    top, most = airframe.rotor_thrust_max, airframe.joint_torque_max
+    top = airframe.rotor_thrust_max
     for i in range(int(airframe.rotors)):
         r.sent.rotor_thrust[i] = wanted.rotor_thrust[i] / r.health.effectiveness[i]
         if not 0.0 <= r.sent.rotor_thrust[i] <= top:
             r.flags |= GATE_NEEDED
     for j in range(int(airframe.bodies.joints)):
         r.sent.joint_torque[j] = wanted.joint_torque[j]
+        most = airframe.joint_torque_max[j]
         if not -most <= wanted.joint_torque[j] <= most:
             r.flags |= GATE_NEEDED
 

@@ -102,12 +102,11 @@ def joint_torques(
         )
         qdd[i] = wanted + r.flown_u.qdd_arm[i]
     limit_acceleration(airframe, q, qd, qdd)
-    bound = airframe.joint_torque_max
     for i in range(n):
         torque = joint_load(m, i, field, turning) - k.disturbance[i]
         for j in range(n):
             torque += m.qq[JOINTS * i + j] * qdd[j]
-        r.wanted.joint_torque[i] = clamp_magnitude(torque, bound)
+        r.wanted.joint_torque[i] = clamp_magnitude(torque, airframe.joint_torque_max[i])
 
 
 @compilable
@@ -119,11 +118,10 @@ def torques_of_failed(r: Tick, airframe: Airframe, field: Vec3, turning: Vec3) -
     A limp drive is asked for nothing. What keeps a stuck joint in its place acts on the base as
     well, so that is what it is asked for. Reads health, bodies; writes wanted.
     """
-    bound = airframe.joint_torque_max
     for i in range(int(airframe.bodies.joints)):
         if r.health.joints[i] == STUCK:
             held = joint_load(r.bodies, i, field, turning)
-            r.wanted.joint_torque[i] = clamp_magnitude(held, bound)
+            r.wanted.joint_torque[i] = clamp_magnitude(held, airframe.joint_torque_max[i])
         elif r.health.joints[i] != SOUND:
             r.wanted.joint_torque[i] = 0.0
 
@@ -138,7 +136,7 @@ def limit_acceleration(
     airframe: Airframe, q: Vec2 | Floats, qd: Vec2 | Floats, qdd: Floats
 ) -> None:
     """``qdd`` (j,) [rad/s^2] of joints at ``q`` [rad] and ``qd`` [rad/s], as far as allowed."""
-    most = airframe.joint_rate_max
+    most = airframe.joint_rate_max[0]
     first = clamp(qdd[0], _POLE * (-most - qd[0]), _POLE * (most - qd[0]))
     second = clamp(qdd[1], _POLE * (-most - qd[1]), _POLE * (most - qd[1]))
     # Angles last: a rate can wait, an end stop cannot.

@@ -23,7 +23,8 @@ import numpy as np
 from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
 from fsw.autopilot.control.tube import RARE, WIND_COVERED, impulse_responses, random_steps
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.body import ON_BASE, Body, Part
+from fsw.autopilot.model.body import Body
+from fsw.autopilot.model.parts import ON_BASE, Part
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import Vec2, Vec3
 
@@ -85,7 +86,7 @@ def _ways(body: Body, level: float, vertical: float) -> list[tuple[str, Vec2]]:
     """How far each part moves with the base's deviation and acceleration."""
     return [
         (
-            _spoken(part),
+            part.name,
             (level, -(level * part.begin[2] + sign * vertical * _aside(part)) / GRAVITY),
         )
         for part in body.parts
@@ -96,10 +97,6 @@ def _ways(body: Body, level: float, vertical: float) -> list[tuple[str, Vec2]]:
 
 def _aside(part: Part) -> float:
     return math.hypot(part.begin[0], part.begin[1]) + part.rim
-
-
-def _spoken(part: Part) -> str:
-    return part.name.rstrip("0123456789")
 
 
 def _worst(loop: LoopOfParts, push: Array, wind: Array) -> float:

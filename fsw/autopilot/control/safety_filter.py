@@ -43,8 +43,9 @@ from fsw.autopilot.barriers.safe_approach import (
     safe_approach_speed,
 )
 from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
-from fsw.autopilot.model.body import CAPSULE, FORM, ON, ON_BASE, RADIUS, TURN, Body
+from fsw.autopilot.model.body import CAPSULE, FORM, ON, RADIUS, TURN, Body
 from fsw.autopilot.model.linearisation import FRAME, put_arm, put_pose
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.shapes.zones import (
     ADDED,
     FLAT,

@@ -20,15 +20,16 @@ def gate(
     """What may be sent, and whether the last command replaces one that was not finite."""
     if not armed:
         return stopped(airframe), False
-    top, bound = airframe.rotor_thrust_max, airframe.joint_torque_max
+    top, bounds = airframe.rotor_thrust_max, airframe.joint_torque_max
     # What is within limits is finite as well: no comparison with NaN is true.
     thrusts, torques = command
     allowed = all(0.0 <= f <= top for f in thrusts)
-    if allowed and all(-bound <= t <= bound for t in torques):
+    # A vehicle has fewer joints than there are bounds.
+    if allowed and all(-most <= t <= most for t, most in zip(torques, bounds, strict=False)):
         return command, False
     if not math.isfinite(sum(thrusts) + sum(torques)):
         return last, True
     return ActuatorCommand(
         tuple([clamp(f, 0.0, top) for f in thrusts]),
-        tuple([clamp_magnitude(t, bound) for t in torques]),
+        tuple([clamp_magnitude(t, most) for t, most in zip(torques, bounds, strict=False)]),
     ), False

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
+from fsw.autopilot.model.parts import Part, parts_of, points_of
 from fsw.autopilot.signals import Vec2
-from fsw.record import ROTORS
+from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS
 from vehicles.description import Rotor, Vehicle
 from vehicles.vehicle_file import VehicleError, load_vehicle
 
@@ -41,6 +43,16 @@ class BodySize:
 
 
 @dataclass(frozen=True, slots=True)
+class AngleLimits:
+    """Limits of the joints' angles, ``low <= row · q <= high``: of one joint, or of a sum."""
+
+    rows: int
+    row: Several  # (JOINTS,) [1] each
+    low: Several  # (ANGLE_LIMITS,) rad
+    high: Several  # (ANGLE_LIMITS,) rad
+
+
+@dataclass(frozen=True, slots=True)
 class Airframe:
     """What the controllers know of a vehicle.
 
@@ -58,15 +70,20 @@ class Airframe:
     yaw_per_thrust: float  # m, b
     rotor_thrust_max: float  # N, of the weakest
     rotor_lag: float  # s, of the slowest
+    joint_torque_max: Several  # (JOINTS,) N m
+    joint_rate_max: Several  # (JOINTS,) rad/s
+    angle_limits: AngleLimits
+    home_posture: Several  # (JOINTS,) rad, to fly in
+    points: tuple[Part, ...]  # the critical points
+    parts: tuple[Part, ...]  # what takes up space
+    # Of an arm like that of paper, for what knows no other one yet.
     link_length: Vec2  # m
-    joint_torque_max: float  # N m
     joint1_limit: float  # rad, |th1|
     joint12_limit: float  # rad, |th1 + th2|
-    joint_rate_max: float  # rad/s, each joint
+    size: BodySize
     tilt_max: float  # rad, of the body's z axis against the vertical
     body_rate_max: Vec2  # rad/s, of roll and pitch together, and of yaw
     leg_length: float  # m, body origin above ground when standing
-    size: BodySize
     # kg m^2 of each joint's motor, times the square of its gear's ratio; beside the vehicle's own.
     joint_armature: float = 0.0
     attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
@@ -89,22 +106,49 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         mass=vehicle.mass,
         bodies=bodies,
         rotors=len(rotors),
-        wrench=(*wrench, *[0.0] * (6 * ROTORS - len(wrench))),
-        share=(*share, *[0.0] * (4 * ROTORS - len(share))),
+        wrench=_padded(wrench, 6 * ROTORS),
+        share=_padded(share, 4 * ROTORS),
         rotor_lever=math.sqrt(sum(row[3] ** 2 + row[4] ** 2 for row in rows) / len(rows)),
         rotor_arm=math.hypot(*first.position),
         yaw_per_thrust=first.torque_per_thrust,
         rotor_thrust_max=min(rotor.thrust_max for rotor in rotors),
         rotor_lag=max(rotor.lag for rotor in rotors),
+        joint_torque_max=_padded([joint.torque_max for joint in vehicle.joints], JOINTS),
+        joint_rate_max=_padded([joint.rate_max for joint in vehicle.joints], JOINTS),
+        angle_limits=_angle_limits(vehicle),
+        home_posture=_padded(vehicle.home_posture, JOINTS),
+        points=points_of(vehicle),
+        parts=parts_of(vehicle),
         link_length=(vehicle.joints[1].xyz[2], vehicle.end_effector.position[2]),
-        joint_torque_max=joint.torque_max,
         joint1_limit=joint.position_max,
         joint12_limit=limit.maximum,
-        joint_rate_max=joint.rate_max,
+        size=_size(vehicle),
         tilt_max=vehicle.limits.tilt,
         body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
         leg_length=max(z for _, _, z in vehicle.feet.positions),
-        size=_size(vehicle),
+    )
+
+
+def _padded(numbers: Sequence[float], size: int) -> Several:
+    return (*numbers, *[0.0] * (size - len(numbers)))
+
+
+def _angle_limits(vehicle: Vehicle) -> AngleLimits:
+    """The joints' own limits, then the coupled ones; a joint without any has no row."""
+    limits = [
+        (tuple(float(k == i) for k in range(JOINTS)), joint.position_min, joint.position_max)
+        for i, joint in enumerate(vehicle.joints)
+        if math.isfinite(joint.position_min) or math.isfinite(joint.position_max)
+    ]
+    limits += [
+        (_padded(limit.row, JOINTS), limit.minimum, limit.maximum)
+        for limit in vehicle.coupled_limits
+    ]
+    return AngleLimits(
+        rows=len(limits),
+        row=_padded([number for row, _, _ in limits for number in row], ANGLE_LIMITS * JOINTS),
+        low=_padded([low for _, low, _ in limits], ANGLE_LIMITS),
+        high=_padded([high for _, _, high in limits], ANGLE_LIMITS),
     )
 
 

@@ -1,9 +1,8 @@
 """The vehicle as something with a size: what of it must keep clear.
 
-Two bodies: ``points`` are the paper's three critical points, without a size; ``full`` has spheres
-and capsules on hull, legs, links and tool and a disc around the rotors. Each part is rigid on the
-base or on a link and is kept from a surface by probes: points of it, one row of the planner's
-program each.
+Two bodies: ``points`` are the critical points, without a size; ``full`` has the spheres and
+capsules of the vehicle's file and a disc around the rotors. Each part is rigid on the base or on a
+link and is kept from a surface by probes: points of it, one row of the planner's program each.
 
 =======  ==========================================================================
 part     probes
@@ -25,29 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.parts import ON_BASE, Part
 from fsw.autopilot.signals import Vec3
 
 BodyName = Literal["points", "full"]
 BODIES: Final[tuple[BodyName, ...]] = ("points", "full")
 
-ON_BASE, ON_LINK1, ON_LINK2 = 0, 1, 2
+ON_LINK1, ON_LINK2 = 1, 2
 SPHERE, CAPSULE, DISC = 0, 1, 2
 _RIM_PLACES = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """One rigid part; ``begin`` and ``end`` are in the axes of what it is on.
-
-    On the base these are the body's (FRD). On a link they are (0, 0, distance from its joint).
-    """
-
-    name: str
-    on: int  # ON_BASE, ON_LINK1 or ON_LINK2
-    begin: Vec3  # m; centre of a sphere or disc
-    radius: float  # m, of a sphere or capsule; half the thickness of a disc
-    end: Vec3 | None = None  # m; a capsule's other end
-    rim: float = 0.0  # m, radius of a disc in the body's x-y plane
 
 
 # Columns of a probe's row, for kernels.
@@ -93,40 +78,7 @@ def _extent(parts: Iterable[Part]) -> float:
 
 def body_of(name: BodyName, airframe: Airframe) -> Body:
     """The body of a name."""
-    l1, l2 = airframe.link_length
-    if name == "points":
-        return Body(
-            name,
-            (
-                Part("base", ON_BASE, (0.0, 0.0, 0.0), 0.0),
-                Part("joint2", ON_LINK1, (0.0, 0.0, l1), 0.0),
-                Part("end_effector", ON_LINK2, (0.0, 0.0, l2), 0.0),
-            ),
-        )
-    size = airframe.size
-    rotors = airframe.rotor_arm + size.blade
-    feet = [
-        (north * size.feet_spread, east * size.feet_spread, airframe.leg_length - size.leg)
-        for north in (1.0, -1.0)
-        for east in (1.0, -1.0)
-    ]
-    legs = [Part(f"foot{k}", ON_BASE, foot, size.leg) for k, foot in enumerate(feet, start=1)]
-    legs += [
-        Part(f"leg{k}", ON_BASE, (0.0, 0.0, 0.0), size.leg, end=foot)
-        for k, foot in enumerate(feet, start=1)
-    ]
-    return Body(
-        name,
-        (
-            Part("base", ON_BASE, (0.0, 0.0, 0.0), size.hull),
-            Part("joint2", ON_LINK1, (0.0, 0.0, l1), size.link),
-            Part("end_effector", ON_LINK2, (0.0, 0.0, l2), size.tool),
-            Part("rotors", ON_BASE, (0.0, 0.0, 0.0), size.disc, rim=rotors),
-            Part("link1", ON_LINK1, (0.0, 0.0, 0.0), size.link, end=(0.0, 0.0, l1)),
-            Part("link2", ON_LINK2, (0.0, 0.0, 0.0), size.link, end=(0.0, 0.0, l2)),
-            *legs,
-        ),
-    )
+    return Body(name, airframe.points if name == "points" else airframe.parts)
 
 
 def hull_reach(body: Body, normal: Vec3) -> float:

@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsw.autopilot.model.body import ON_BASE, ON_LINK1, ON_LINK2
+from fsw.autopilot.model.body import ON_LINK1, ON_LINK2
 from fsw.autopilot.model.kinematics import body_axes, links
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.model.prediction import (
     INPUTS,
     Q_ARM,

@@ -28,8 +28,9 @@ from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.autopilot.geometry.rotation import rotate
-from fsw.autopilot.model.body import ON_BASE, ON_LINK1, Body
+from fsw.autopilot.model.body import ON_LINK1, Body
 from fsw.autopilot.model.kinematics import links
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.kind import ShapeKind

@@ -14,8 +14,9 @@ from fsw.autopilot.barriers.margins import Margins
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.zone_rows import ZoneRows, layout
 from fsw.autopilot.model.airframe import AIRFRAME, airframe_of
-from fsw.autopilot.model.body import DISC, FORM, ON, RADIUS, SPHERE, Body, Part, body_of
+from fsw.autopilot.model.body import DISC, FORM, ON, RADIUS, SPHERE, Body, body_of
 from fsw.autopilot.model.linearisation import Linearisation, position, velocity
+from fsw.autopilot.model.parts import Part
 from fsw.autopilot.model.prediction import INPUTS, Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig

@@ -186,7 +186,7 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
     # A step of the added acceleration leaves a rate of 1 / (e pole); twice that is its sum.
     pole = 0.5 * LoopGains().joint.kd
     rate = FOLLOWING * LIMITS.rate + 2.0 / (math.e * pole) * planned.joint_acc
-    assert rate < AIRFRAME.joint_rate_max
+    assert rate < AIRFRAME.joint_rate_max[0]
     field = GRAVITY + planned.vertical
     first, both = bounds(AIRFRAME, LIMITS)
     inertia = AIRFRAME.bodies.base_inertia[1]
@@ -208,7 +208,7 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
                     torques = torques_for(m, (0.0, 0.0, falls * field), turn, a)
                     for i, torque in enumerate(torques):
                         most[i] = max(most[i], abs(torque))
-    friction = 0.01 + 0.005 * AIRFRAME.joint_rate_max
-    assert most[0] + friction < AIRFRAME.joint_torque_max
-    assert most[0] + friction > 0.9 * AIRFRAME.joint_torque_max  # it is not far from it either
+    friction = 0.01 + 0.005 * AIRFRAME.joint_rate_max[0]
+    assert most[0] + friction < AIRFRAME.joint_torque_max[0]
+    assert most[0] + friction > 0.9 * AIRFRAME.joint_torque_max[0]  # it is not far from it either
     assert most[1] < most[0]

@@ -24,6 +24,7 @@ from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
 from fsw.autopilot.tick_record import Joints, Tick
+from fsw.record import JOINTS
 from tests.fsw.random_states import estimate_of
 from tests.fsw.records import changed, placed
 
@@ -103,7 +104,7 @@ def test_pitching_the_base_up_is_followed_by_the_first_joint() -> None:
 
 def test_torques_keep_the_servos_limit() -> None:
     torque, _ = hold((0.0, 0.0), (3.0, 3.0), thrust=200.0)
-    assert max(map(abs, torque)) <= AIRFRAME.joint_torque_max
+    assert max(map(abs, torque)) <= AIRFRAME.joint_torque_max[0]
 
 
 def followed(
@@ -178,7 +179,7 @@ def test_no_reference_takes_the_arm_past_a_limit_of_an_angle_or_a_rate(
     assert (links.max(axis=0) > [0.95 * LIMIT1, 0.95 * LIMIT12]).any(), "or it was no test"
     assert links[:, 0].max() < LIMIT1 + math.radians(0.5)
     assert links[:, 1].max() < LIMIT12 + math.radians(0.5)
-    assert np.abs(rates).max() < AIRFRAME.joint_rate_max + 0.1
+    assert np.abs(rates).max() < AIRFRAME.joint_rate_max[0] + 0.1
 
 
 def test_far_from_limits_accelerations_are_as_wanted_and_near_them_point_back() -> None:
@@ -204,8 +205,8 @@ def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() ->
             mass=(0.3, 0.15, *(0.0,) * 4),
             com=(0.0, 0.0, 0.06, 0.0, 0.0, 0.09, *(0.0,) * 12),
         ),
-        joint_torque_max=1e3,
-        joint_rate_max=1e3,
+        joint_torque_max=(1e3,) * JOINTS,
+        joint_rate_max=(1e3,) * JOINTS,
         joint1_limit=1e3,
         joint12_limit=1e3,
     )
@@ -236,7 +237,11 @@ def test_motors_behind_gears_are_moved_along_and_known_to_the_momentum() -> None
     """With what each motor adds, I times how its joint turns, the same PID errors come out."""
     inertia = 0.0025
     alone = replace(
-        AIRFRAME, joint_torque_max=1e3, joint_rate_max=1e3, joint1_limit=1e3, joint12_limit=1e3
+        AIRFRAME,
+        joint_torque_max=(1e3,) * JOINTS,
+        joint_rate_max=(1e3,) * JOINTS,
+        joint1_limit=1e3,
+        joint12_limit=1e3,
     )
     motors = replace(alone, joint_armature=inertia)
     model, random = planar_arm(motors), np.random.default_rng(8)
@@ -266,7 +271,7 @@ def pair(values: Any) -> Vec2:
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_torque_beyond_the_servos_limit_becomes_the_limit(sign: float) -> None:
-    weak = replace(AIRFRAME, joint_torque_max=0.1)
+    weak = replace(AIRFRAME, joint_torque_max=(0.1,) * JOINTS)
     still = estimate_of(Rotation.identity())
     r = resting(weak, still, reference=(3.0 * sign, 3.0 * sign))
     assert asked(r, weak, GAINS, (0.0, 0.0, 0.0)) == (0.1 * sign, 0.1 * sign)

@@ -14,8 +14,9 @@ from fsw.autopilot.control.gains import TrackingTuning, tracking_gains
 from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
 from fsw.autopilot.control.tube import WIND_COVERED, impulse_responses, tube
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
-from fsw.autopilot.model.body import ON_BASE, Body, Part, body_of
+from fsw.autopilot.model.body import Body, body_of
 from fsw.autopilot.model.kinematics import body_axes
+from fsw.autopilot.model.parts import ON_BASE, Part
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import Vec3
 
@@ -101,6 +102,6 @@ def test_feet_and_rotors_move_further_than_the_base() -> None:
     reaches = part_reaches(LOOP, FULL)
     base = alone((0.0, 0.0, 0.0))
     assert all(one.worst > other.worst for one, other in zip(reaches, base, strict=True))
-    assert {reach.name for reach in reaches} == {"foot", "rotors"}
+    assert {reach.name for reach in reaches} == {"leg4_end", "rotors"}
     tilt = (PUSH * tube(AIRFRAME, TUNING, GAINS, 0.225, HOLD, DT).acceleration) / GRAVITY
     assert reaches[-1].worst == pytest.approx(0.465 * tilt, rel=0.1), "upwards the rim's own way"

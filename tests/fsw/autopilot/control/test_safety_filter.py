@@ -23,7 +23,8 @@ from fsw.autopilot.control.safety_filter import (
 )
 from fsw.autopilot.geometry.vectors import dot
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.body import Part, body_of
+from fsw.autopilot.model.body import body_of
+from fsw.autopilot.model.parts import Part
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes import KINDS
 from fsw.autopilot.shapes.ball import ball

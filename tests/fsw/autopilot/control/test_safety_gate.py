@@ -32,7 +32,7 @@ def test_what_is_sent_is_finite_and_within_limits(
 ) -> None:
     sent, _ = gate(AIRFRAME, wanted, last, armed)
     assert all(0.0 <= f <= AIRFRAME.rotor_thrust_max for f in sent.rotor_thrust)
-    assert all(abs(t) <= AIRFRAME.joint_torque_max for t in sent.joint_torque)
+    assert all(abs(t) <= AIRFRAME.joint_torque_max[0] for t in sent.joint_torque)
 
 
 @pytest.mark.requirement("REQ-ACT-7")

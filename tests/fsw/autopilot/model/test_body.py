@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.body import ON_BASE, ON_LINK1, Body, Part, body_of, hull_reach
+from fsw.autopilot.model.body import ON_LINK1, Body, body_of, hull_reach
 from fsw.autopilot.model.kinematics import arm_points
 from fsw.autopilot.model.linearisation import (
     FRAME,
@@ -22,6 +22,7 @@ from fsw.autopilot.model.linearisation import (
     position,
     velocity,
 )
+from fsw.autopilot.model.parts import ON_BASE, Part
 from fsw.autopilot.model.prediction import INPUTS, STATES, Array, condense
 from fsw.autopilot.signals import Vec3
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude, moved_on
@@ -151,7 +152,7 @@ def test_the_rotors_reach_as_far_as_their_blades_and_the_feet_as_far_as_the_legs
     parts = {part.name: part for part in FULL.parts}
     assert parts["rotors"].rim == AIRFRAME.rotor_arm + AIRFRAME.size.blade
     for k in range(1, 5):
-        foot = parts[f"foot{k}"]
+        foot = parts[f"leg{k}_end"]
         assert foot.begin[2] + foot.radius == AIRFRAME.leg_length
         assert parts[f"leg{k}"].end == foot.begin
 

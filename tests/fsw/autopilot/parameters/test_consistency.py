@@ -144,7 +144,7 @@ def test_the_full_body_is_told_of_its_feet_and_rotors_with_values_that_do() -> N
         _findings(config, SafeSet((wall(normal, -1.0, 0.1),)))["part tube"].statement
         for normal in ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     )
-    assert "can move the foot 122 mm" in beside
+    assert "can move the leg4_end 122 mm" in beside
     assert "can move the rotors 94 mm" in above
     assert beside.endswith("lambda >= 0.488 m/s with alpha <= 1.67 m/s^2 would be proof")
     for lambda_, holds in ((0.488, True), (0.48, False)):

@@ -22,8 +22,9 @@ from fsw.autopilot.flight.safety.uncertain_clearance import (
 )
 from fsw.autopilot.geometry.rotation import yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.body import ON_BASE, ON_LINK1, body_of
+from fsw.autopilot.model.body import ON_LINK1, body_of
 from fsw.autopilot.model.kinematics import links
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.box import box
