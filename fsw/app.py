@@ -290,7 +290,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         numbers=program.numbers,
         parameters=program.parameters.values,
         thrust_max=airframe.rotor_thrust_max,
-        link_length=airframe.link_length,
+        bodies=airframe.bodies,
         profile=round(program.parameters.values["LOG_PROFILE"]),
     )
 

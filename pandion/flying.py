@@ -183,7 +183,7 @@ class _Recording:
             flat(config),
             values,
             AIRFRAME.rotor_thrust_max,
-            AIRFRAME.link_length,
+            AIRFRAME.bodies,
             config.log_profile,
         )
         self._flight = FlightLog(folder / "flight.ulg", subject)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.periods import PLANNING_US, TICK_US
 from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest, Vec2
 
@@ -60,7 +61,7 @@ class VehicleFacts:
 
     rotor_thrust_max: float  # N, one rotor
     joint_torque_max: float  # N m
-    link_length: Vec2  # m
+    bodies: Bodies  # of the vehicle
     tick_period_us: int
     mpc_period_us: int
     mpc_delay_us: int  # from a request to the first use of its plan

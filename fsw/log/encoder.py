@@ -25,7 +25,8 @@ from fsw.autopilot.flight.modes import NAV_STATES
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import ImuSample
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import (
@@ -39,7 +40,6 @@ from fsw.autopilot.signals import (
     TestRatios,
     TickInputs,
     TickOutputs,
-    Vec2,
 )
 from fsw.log import samples, topics
 from fsw.log.json_codec import JsonCodec
@@ -114,13 +114,13 @@ class LogEncoder:
         *,
         measured: bool,
         thrust_max: float,
-        link_length: Vec2,
+        bodies: Bodies,
         profile: int = FULL,
         origin: Origin = DEFAULT_ORIGIN,
     ) -> None:
         """Start a log; without times ``measured`` by the wall clock it repeats to the byte.
 
-        A rotor gives ``thrust_max`` [N]; the arm's links have ``link_length`` [m]; THIN or FULL.
+        A rotor gives ``thrust_max`` [N]; the vehicle consists of ``bodies``; THIN or FULL.
         The local frame begins at ``origin``.
         """
         self._detail_us, self._fast_us = DETAIL_US[profile], FAST_US[profile]
@@ -133,7 +133,7 @@ class LogEncoder:
         self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
         self._measured = measured
         self._per_newton = 1.0 / thrust_max
-        self._link_length = link_length
+        self._bodies = bodies
         self._changing = tuple(name for name in self.inputs.names if name not in (TYPED, SAMPLES))
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
@@ -258,7 +258,7 @@ class LogEncoder:
         margins, barrier, smallest = report.shown(topics.MARGINS)
         least = min(report.margins, default=math.nan)
         argmin = 0xFF if smallest is None else smallest
-        p, v = point_in_flight(snapshot.estimate, self._link_length)
+        p, v = end_effector(self._bodies, snapshot.estimate)
         wanted = (
             (*_NOWHERE, *_NOWHERE, math.nan)
             if target is None

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.parameters.facts import FACTS
 from fsw.autopilot.ports import GroupTiming
-from fsw.autopilot.signals import StatusText, TickInputs, TickOutputs, Vec2
+from fsw.autopilot.signals import StatusText, TickInputs, TickOutputs
 from fsw.log.encoder import FULL, LogEncoder, loop_timing
 from fsw.log.px4_records import cpu_load, origin_of
 from fsw.log.topics import TOPICS
@@ -44,7 +45,7 @@ class LogSubject:
     numbers: Mapping[str, Number]  # of the whole configuration, by dotted name
     parameters: Mapping[str, float]  # those that a ground station may change, by their names there
     thrust_max: float  # N, one rotor
-    link_length: Vec2  # m
+    bodies: Bodies
     profile: int = FULL  # what is written how often, LOG_PROFILE
 
 
@@ -77,7 +78,7 @@ class FlightLog:
         self._encoder = LogEncoder(
             measured=self._measured,
             thrust_max=subject.thrust_max,
-            link_length=subject.link_length,
+            bodies=subject.bodies,
             profile=subject.profile,
             origin=origin_of(subject.numbers),
         )

@@ -82,7 +82,7 @@ def vehicle_facts(config: FlightConfig) -> VehicleFacts:
     return VehicleFacts(
         rotor_thrust_max=config.airframe.rotor_thrust_max,
         joint_torque_max=config.airframe.joint_torque_max[0],
-        link_length=config.airframe.link_length,
+        bodies=config.airframe.bodies,
         tick_period_us=config.tick_period_us,
         mpc_period_us=config.mpc_period_us,
         mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,

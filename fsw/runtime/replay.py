@@ -45,7 +45,7 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
     encoder = LogEncoder(
         measured=measured,
         thrust_max=facts.rotor_thrust_max,
-        link_length=facts.link_length,
+        bodies=facts.bodies,
         profile=int(profile),
         origin=origin_of(logged_numbers(log)),
     )

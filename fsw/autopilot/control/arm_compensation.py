@@ -15,13 +15,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from fsw.autopilot.control.joint_reference import JointReferenceLimits, bounds
 from fsw.autopilot.geometry.rotation import rotate_back
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude, norm, subtract
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.kinematics import END_EFFECTOR, arm_points, links
+from fsw.autopilot.model.kinematics import links, predicted_end_effector
 from fsw.autopilot.model.prediction import to_vector
 from fsw.autopilot.signals import PredictionState, StateEstimate, Vec2, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate, PlanState
@@ -51,10 +49,7 @@ def planned_end_effector(
     airframe: Airframe, plan: PredictionState | PlanState
 ) -> tuple[Vec3, Vec3]:
     """World position and velocity of the end-effector in the plan's state."""
-    points = np.empty((2, 2, 3))
-    arm_points(to_vector(plan), airframe.link_length[0], airframe.link_length[1], points)
-    p, v = points[END_EFFECTOR, 0], points[END_EFFECTOR, 1]
-    return (float(p[0]), float(p[1]), float(p[2])), (float(v[0]), float(v[1]), float(v[2]))
+    return predicted_end_effector(airframe.bodies, to_vector(plan, int(airframe.bodies.joints)))
 
 
 @compilable

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind
@@ -32,7 +32,7 @@ _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHe
 def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """ARM_JOINT_STATE; the torque is the one commanded, the arm has no torque sensor."""
     estimate = snapshot.estimate
-    p_WE, v_WE = point_in_flight(estimate, context.facts.link_length)
+    p_WE, v_WE = end_effector(context.facts.bodies, estimate)
     return (
         snapshot.t_us,
         *_four(estimate.q_arm),

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import PlanTimings
 from fsw.log import json_codec
 from fsw.log.encoder import LogEncoder
@@ -53,7 +54,7 @@ def test_a_plan_is_written_by_the_fast_encoder(
     measured: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The tick that a plan comes in has the most to write."""
-    encoder = LogEncoder(measured=measured, thrust_max=16.0, link_length=(0.15, 0.15))
+    encoder = LogEncoder(measured=measured, thrust_max=16.0, bodies=AIRFRAME.bodies)
     monkeypatch.delattr(json_codec, "_ENCODER")
     text = encoder.inputs.encode("plan", PLAN)
     times = PLAN.timings if measured else PlanTimings(-1.0, -1.0, -1.0)

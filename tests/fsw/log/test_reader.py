@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.measurements import Sample
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import PlanTimings, SensorFrame, TickInputs
 from fsw.log import topics
 from fsw.log.encoder import SAMPLES, TYPED, LogEncoder
@@ -125,6 +126,6 @@ def test_a_number_too_large_for_a_float_is_infinite_and_no_error() -> None:
     snapshot = reported.snapshot
     far = snapshot.estimate._replace(p_WB=(1e300, -1e300, 0.0))
     reported = dataclasses.replace(reported, shown=dataclasses.replace(snapshot, estimate=far))
-    encoder, out = LogEncoder(measured=True, thrust_max=16.0, link_length=(0.15, 0.15)), bytearray()
+    encoder, out = LogEncoder(measured=True, thrust_max=16.0, bodies=AIRFRAME.bodies), bytearray()
     encoder.add(inputs(1_000_000, random.Random(4)), reported, out)
     assert out

@@ -19,10 +19,11 @@ from fsw.autopilot.control.joint_reference import JointReferenceLimits, bounds
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import PredictionState, StateEstimate, Vec2
+from tests.fsw import paper_arm
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude, tips
 from tests.fsw.random_states import estimate_of, vec3
 
-LENGTHS = np.array(AIRFRAME.link_length)
+LENGTHS = np.array(paper_arm.LENGTHS)
 LIMITS = CompensationLimits()
 JOINTS = JointReferenceLimits()
 UNBOUNDED = replace(LIMITS, whole=0.3, most=0.4)
