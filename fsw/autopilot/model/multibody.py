@@ -171,15 +171,25 @@ def _about(axis: Vec3, angle: float) -> Mat3:
 
 
 @compilable
+def next_axes(b: Bodies, k: int, R: Mat3, angle: float) -> tuple[Vec3, Mat3]:
+    """The axis of joint ``k`` and the axes of its link, turned by an ``angle`` [rad].
+
+    ``R`` are the axes of the link before, or of the base, in whatever frame.
+    """
+    at_zero = _product(R, _nine(b.turned, k))
+    axis = _get(b.axis, k)
+    return rotate(at_zero, axis), _product(at_zero, _about(axis, angle))
+
+
+@compilable
 def place_links(m: Multibody, b: Bodies, q: Several | Floats) -> None:
     """Where joints and links are at the angles ``q`` (j,) [rad]. Writes rotation, origin, axis."""
     R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     o: Vec3 = (0.0, 0.0, 0.0)
     for k in range(int(b.joints)):
         o = add(o, rotate(R, _get(b.offset, k)))
-        at_zero = _product(R, _nine(b.turned, k))
-        _put(m.axis, k, rotate(at_zero, _get(b.axis, k)))
-        R = _product(at_zero, _about(_get(b.axis, k), q[k]))
+        axis, R = next_axes(b, k, R, q[k])
+        _put(m.axis, k, axis)
         _put(m.origin, k, o)
         for i in range(9):
             m.rotation[9 * k + i] = R[i]
