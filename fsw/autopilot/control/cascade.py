@@ -59,7 +59,7 @@ from fsw.autopilot.model.rotors import (
     rotor_decay,
 )
 from fsw.autopilot.shapes.zones import NO_ZONES
-from fsw.autopilot.signals import Mat3, StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import (
     BREACH,
     FILTER_ACTED,
@@ -171,11 +171,12 @@ class Cascade:
         now.known = estimate
         return self._motion(self.packed, now.array)
 
-    def expected(self, r: Tick) -> tuple[Vec2, Model]:
-        """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
-        return self._expected(self.packed, r.array)
+    def expected(self, r: Tick) -> tuple[JointVector, Model]:
+        """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle."""
+        model = self._expected(self.packed, r.array)
+        return tuple(r.bodies.work[: r.joint_count].tolist()), model
 
-    def joint_acceleration(self, r: Tick) -> Vec2:
+    def joint_acceleration(self, r: Tick) -> JointVector:
         """The joints' part of ``expected`` [rad/s^2]."""
         return self.expected(r)[0]
 
@@ -387,7 +388,7 @@ def _close_loops(
 
 
 @kernel
-def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
+def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> Model:
     airframe, r = laws[0].airframe, ticks[0]
     for i in range(int(airframe.rotors)):
         settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
@@ -397,8 +398,8 @@ def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
     # The accelerometer knows of gusts, and of the ground.
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)
-    turning, qdd = motion.turning, r.bodies.work
-    return (qdd[0], qdd[1]), (turning[0], turning[1], turning[2], motion.thrust / r.mass)
+    turning = motion.turning
+    return turning[0], turning[1], turning[2], motion.thrust / r.mass
 
 
 @kernel
