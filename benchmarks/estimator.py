@@ -75,7 +75,7 @@ class _Flight:
 
 def estimator_us(samples: list[tuple[Sample, ...]]) -> list[float]:
     """Microseconds of each tick of the estimator alone, fed with a flight's ``samples``."""
-    fusion, memory = SensorFusion(flight_config().estimator), at_start()
+    fusion, memory = SensorFusion(flight_config().estimator, 2), at_start(2)
     fusion.warm_up()
     out = []
     for k, arrived in enumerate(samples):

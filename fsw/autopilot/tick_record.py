@@ -200,6 +200,29 @@ class Multibody(Record):
     work: PerJoint
 
 
+class ArmTask(Record):
+    """What the arm is to do, and what it takes to find that out; made anew in each tick.
+
+    Coordinates are those of ``model/arm_coordinates.py``.
+    """
+
+    q: PerJoint  # rad, wanted of the joints
+    qd: PerJoint  # rad/s, the same
+    c: PerJoint  # rad, coordinates
+    rate: PerJoint  # rad/s, the same
+    goal: PerJoint  # rad
+    origin: _Vectors  # m, B, of each joint
+    axis: _Vectors  # unit, B
+    jacobian: _Vectors  # (3,) m a coordinate: what moves the end-effector in B
+    tip: Three  # m, B, end-effector
+    gram: _Matrix
+    factor: _Matrix
+    slope: PerJoint
+    low: PerJoint
+    high: PerJoint
+    step: PerJoint
+
+
 class Mixer(Record):
     """What allocation and the watch reckon with; made anew wherever it is needed."""
 
@@ -241,6 +264,7 @@ class Tick(Record):
     wanted: Sent  # what the loops ask for, until it is sent
     bodies: Multibody  # of the estimate
     mixer: Mixer
+    arm: ArmTask
 
     @property
     def commanded(self) -> ActuatorCommand:

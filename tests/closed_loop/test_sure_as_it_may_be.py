@@ -55,7 +55,7 @@ def nees(suite: str, seed: int, seconds: float) -> list[float]:
     assert estimate is not None
     assert memory is not None
     tuning = flight.config.estimator
-    M = SensorFusion(tuning).covariance(memory, memory.now)
+    M = SensorFusion(tuning, 2).covariance(memory, memory.now)
     at = [P, P + 1, P + 2, TH, TH + 1, TH + 2]
     M[at, at] += correlated_error(memory, tuning)
     turn = multiply(conjugate(quaternion_from_matrix(estimate.R_WB)), truth.q_WB)

@@ -10,14 +10,25 @@ import numpy as np
 
 from fsw.autopilot.control import tracking
 from fsw.autopilot.control.allocation import allocate
+from fsw.autopilot.control.arm_compensation import CompensationLimits, compensate
 from fsw.autopilot.control.gains import TrackingTuning
+from fsw.autopilot.control.joint_reference import JointReferenceLimits, refer
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, note_health
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.multibody import joint_load, move_bodies
 from fsw.autopilot.model.rotors import MotionState, motion_state
-from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3, Vec4
-from fsw.autopilot.tick_record import Multibody, Observed, Tick, new_tick
+from fsw.autopilot.signals import (
+    JointVector,
+    PlanInput,
+    PredictionState,
+    StateEstimate,
+    Vec2,
+    Vec3,
+    Vec4,
+)
+from fsw.autopilot.tick_record import ArmTask, Joints, Multibody, Observed, Tick, new_tick
 from fsw.record import JOINTS, Record
 
 Kind = TypeVar("Kind", bound=Record)
@@ -95,3 +106,43 @@ def observe(before: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
     after = before.copy()
     tracking.observe(after, v, a, tuning, dt)
     return after
+
+
+def boundless(airframe: Airframe, most: float = 3.0) -> Airframe:
+    """A vehicle with wide limits of its joints' angles [rad]."""
+    limits = airframe.angle_limits
+    wide = replace(limits, low=(-most,) * len(limits.low), high=(most,) * len(limits.high))
+    return replace(airframe, angle_limits=wide)
+
+
+Motion = tuple[JointVector, JointVector]
+"""Angles [rad] and rates [rad/s] of joints."""
+
+
+def compensated_joints(
+    airframe: Airframe,
+    limits: CompensationLimits,
+    joint_limits: JointReferenceLimits,
+    off_plan: float,
+    estimate: StateEstimate,
+    plan: PredictionState,
+) -> Motion:
+    """What the arm is asked for where the base is off its plan."""
+    a, arm = ArmTask(), arm_coordinates(airframe)
+    compensate(a, airframe.bodies, arm, limits, joint_limits, off_plan, estimate, plan)
+    return _of_joints(a.q, arm.joints), _of_joints(a.qd, arm.joints)
+
+
+def joint_reference(
+    airframe: Airframe, limits: JointReferenceLimits, last: Motion, wanted: Motion, dt: float
+) -> Motion:
+    """The reference ``dt`` [s] after the last one."""
+    a, arm = ArmTask(), arm_coordinates(airframe)
+    k = changed(Joints(), reference=last[0], reference_rate=last[1])
+    a.q[: arm.joints], a.qd[: arm.joints] = wanted
+    refer(k, a, airframe, arm, limits, dt)
+    return _of_joints(k.reference, arm.joints), _of_joints(k.reference_rate, arm.joints)
+
+
+def _of_joints(values: Any, joints: int) -> JointVector:
+    return tuple(values[:joints].tolist())

@@ -3,35 +3,51 @@ r"""The arm holds the end-effector where the plan wants it while the base is pus
 The base cannot be held better than its tilting allows: under the disturbance it wanders by
 centimetres, and every correction swings whatever hangs below. The arm is ten times as
 quick. Each tick it is asked for the joint angles that put the end-effector, seen from where
-the base really is, on its planned path, as far as the arm's plane allows; across the plane it
-can do nothing. Where a limit of the joints is in the way it is the pose within them that comes
-nearest, and the rates are those at which this pose moves.
+the base really is, on its planned path, as far as its joints can: of an arm in a plane, not across
+it. With e what is left and J the end-effector's Jacobian in the arm's coordinates c, a few steps of
 
-Source: docs/equations.md T3.
+.. math:: \min_{\delta c} |J \delta c - e|^2 + (\epsilon^2 + |e|^2) |\delta c|^2
+          + \sum_k \max(-e^T \partial_k J_k, 0) \delta c_k^2
+
+within the bounds of c from the plan's pose find them, on its side of every singularity. The rates
+are those at which this pose moves, from the same problem.
+
+Source: docs/equations.md T3; J. Nocedal, S. Wright, Numerical Optimization, 2006, ch. 10 (damping
+by the residual) and 16.7 (bounds).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
-from fsw.autopilot.control.joint_reference import JointReferenceLimits, bounds
-from fsw.autopilot.geometry.rotation import rotate_back
-from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude, norm, subtract
-from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.kinematics import links, predicted_end_effector
-from fsw.autopilot.model.prediction import to_vector
-from fsw.autopilot.signals import PredictionState, StateEstimate, Vec2, Vec3, Vec4
-from fsw.autopilot.tick_record import Estimate, PlanState
+import numpy as np
+
+from fsw.autopilot.control.joint_reference import JointReferenceLimits
+from fsw.autopilot.geometry.rotation import rotate, rotate_back
+from fsw.autopilot.geometry.vectors import add, add_scaled, clamp, cross, dot, norm, subtract
+from fsw.autopilot.model.arm_coordinates import ArmCoordinates, to_coordinates, to_joints
+from fsw.autopilot.model.kinematics import body_axes
+from fsw.autopilot.model.multibody import Bodies, factorise, next_axes, solve
+from fsw.autopilot.model.prediction import YAW, YAW_RATE, A, J
+from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec3
+from fsw.autopilot.tick_record import ArmTask, Estimate, PlanState
 from fsw.compiled import compilable
+from fsw.record import JOINTS, Floats
+
+_STEPS: Final = 3  # 20 mm that the base is off are then corrected to a micrometre
+_LONGEST: Final = 0.3  # rad a step; the Jacobian is that of no other pose
+_DAMPING: Final = 0.003  # m a rad, of a motion that the arm can make; it bounds rates near straight
+_ALIGNED: Final = 0.001  # m a rad, with which a joint still moves the end-effector some way
+_ROUNDING: Final = 1e-9  # rad
+_SWEEPS: Final = 20  # of coordinates at bounds
 
 
 @dataclass(frozen=True, slots=True)
 class CompensationLimits:
     """How far the arm may leave its planned pose to compensate."""
 
-    reach: float = 0.985  # of the straight arm; beyond it the elbow loses its side
-    fold: float = 0.25  # of the straight arm; closer to the base it folds through itself
     # How far the end-effector is moved against its planned place in the base's frame. Every
     # correction pushes off the base, and an arm that follows the worst disturbance in full needs
     # the pitch torque with which the base rejects it.
@@ -42,14 +58,6 @@ class CompensationLimits:
     near: float = 0.035  # m
     far: float = 0.055  # m
     memory: float = 2.0  # s, in which a deviation is forgotten
-
-
-@compilable
-def planned_end_effector(
-    airframe: Airframe, plan: PredictionState | PlanState
-) -> tuple[Vec3, Vec3]:
-    """World position and velocity of the end-effector in the plan's state."""
-    return predicted_end_effector(airframe.bodies, to_vector(plan, int(airframe.bodies.joints)))
 
 
 @compilable
@@ -69,61 +77,193 @@ def lately_off_plan(
 
 
 @compilable
-def compensated_joints(
-    airframe: Airframe,
+def compensate(
+    a: ArmTask,
+    bodies: Bodies,
+    arm: ArmCoordinates,
     limits: CompensationLimits,
     joint_limits: JointReferenceLimits,
     off_plan: float,
     estimate: StateEstimate | Estimate,
     plan: PredictionState | PlanState,
-) -> tuple[Vec2, Vec2]:
-    """Joint angles [rad] and rates [rad/s] that keep the end-effector on its planned path.
+) -> None:
+    """Joint angles and rates that keep the end-effector on its planned path. Writes a.q, a.qd.
 
-    The elbow of the plan, where bent, decides on which side ours is. ``off_plan`` [m] is how far
-    the base was off its plan lately.
+    ``off_plan`` [m] is how far the base was off its plan lately.
     """
-    l1, l2 = airframe.link_length[0], airframe.link_length[1]
-    p_WE, v_WE = planned_end_effector(airframe, plan)
-    x, z, vx, vz = _seen_from_base(estimate, p_WE, v_WE)
-    x, z, vx, vz = _within_correction(airframe, limits, off_plan, plan, (x, z, vx, vz))
-    length = math.hypot(x, z)
-    if length < 1e-3:
-        return (plan.q_arm[0], plan.q_arm[1]), (plan.qd_arm[0], plan.qd_arm[1])
-    # A plan that is nearly straight has no side; the arm then stays on the one it is on.
-    side = plan.q_arm[1] if abs(plan.q_arm[1]) >= _LEAST_BEND else estimate.q_arm[1]
-    straight = l1 + l2
-    scale = clamp(length, limits.fold * straight, limits.reach * straight) / length
-    if scale != 1.0:  # the arm cannot follow in or out, only round
-        outwards = (vx * x + vz * z) / (length * length)
-        vx, vz = scale * (vx - outwards * x), scale * (vz - outwards * z)
-    x, z = x * scale, z * scale
-    cos2 = (x * x + z * z - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
-    th2 = math.copysign(math.acos(clamp_magnitude(cos2, 1.0)), side)
-    th1 = math.atan2(x, z) - math.atan2(l2 * math.sin(th2), l1 + l2 * math.cos(th2))
-    first, both = bounds(airframe, joint_limits)
-    if abs(th1) <= first and abs(th1 + th2) <= both:
-        return (th1, th2), _rates(airframe, th1, th1 + th2, vx, vz)
-    return _nearest_pose(airframe, (first, both), (th1, th1 + th2), (x, z), (vx, vz))
+    n = int(arm.joints)
+    for i in range(n):
+        a.q[i], a.qd[i] = plan.q_arm[i], plan.qd_arm[i]
+    to_coordinates(arm, a.q, a.c)
+    to_coordinates(arm, a.qd, a.rate)
+    _reach(a, bodies, arm)
+    planned, moving = (a.tip[0], a.tip[1], a.tip[2]), _moved(a, a.rate, n)
+    off, drifting = _seen_from_base(estimate, plan, planned, moving)
+    off, drifting = _reachable(a, n, off), _reachable(a, n, drifting)
+    off, drifting = _within_correction(limits, off_plan, off, drifting)
+    goal, wanted = add(planned, off), add(moving, drifting)
+    for step in range(_STEPS):
+        if step > 0:
+            _reach(a, bodies, arm)
+        left = subtract(goal, (a.tip[0], a.tip[1], a.tip[2]))
+        for i in range(n):
+            low, high = arm.low[i] + joint_limits.margin, arm.high[i] - joint_limits.margin
+            a.low[i] = clamp(low - a.c[i], -_LONGEST, _LONGEST)
+            a.high[i] = clamp(high - a.c[i], -_LONGEST, _LONGEST)
+        _solve_within(a, n, left, left)
+        for i in range(n):
+            a.c[i] += a.step[i]
+        to_joints(arm, a.c, a.q)
+    _reach(a, bodies, arm)
+    for i in range(n):
+        low, high = arm.low[i] + joint_limits.margin, arm.high[i] - joint_limits.margin
+        held = a.c[i] <= low + _ROUNDING or a.c[i] >= high - _ROUNDING
+        a.low[i] = -a.rate[i] if held else -math.inf
+        a.high[i] = -a.rate[i] if held else math.inf
+    left = subtract(goal, (a.tip[0], a.tip[1], a.tip[2]))
+    _solve_within(a, n, subtract(wanted, _moved(a, a.rate, n)), left)
+    for i in range(n):
+        a.rate[i] += a.step[i]
+    to_joints(arm, a.rate, a.qd)
 
 
-_LEAST_BEND = 0.2  # rad; a straighter plan has no side
+@compilable
+def planned_axes(plan: PredictionState | PlanState) -> tuple[Mat3, Vec3]:
+    """The base's attitude R_WB in the plan's state, and its rate [rad/s, B]."""
+    x, axes = np.empty(YAW_RATE + 1), np.empty((4, 3))
+    for i in range(3):
+        x[A + i] = plan.a[i]
+    for i in range(2):
+        x[J + i] = plan.j[i]
+    x[YAW], x[YAW_RATE] = plan.yaw, plan.yaw_rate
+    body_axes(x, axes)
+    b1 = (float(axes[0, 0]), float(axes[0, 1]), float(axes[0, 2]))
+    b3 = (float(axes[1, 0]), float(axes[1, 1]), float(axes[1, 2]))
+    d1, d3 = (axes[2, 0], axes[2, 1], axes[2, 2]), (axes[3, 0], axes[3, 1], axes[3, 2])
+    b2 = cross(b3, b1)
+    R = (b1[0], b2[0], b3[0], b1[1], b2[1], b3[1], b1[2], b2[2], b3[2])
+    # The rate w of axes b with rates w x b.
+    return R, (-float(dot(d3, b2)), float(dot(d3, b1)), float(dot(d1, b2)))
+
+
+@compilable
+def _seen_from_base(
+    estimate: StateEstimate | Estimate,
+    plan: PredictionState | PlanState,
+    planned: Vec3,
+    moving: Vec3,
+) -> tuple[Vec3, Vec3]:
+    """By how much the end-effector's place and motion in B differ from those ``planned`` in B.
+
+    Seen from where the base really is, and turning as it really does.
+    """
+    R, w = planned_axes(plan)
+    p = add(rotate(R, planned), subtract(plan.p, estimate.p_WB))
+    v = add(rotate(R, add(moving, cross(w, planned))), subtract(plan.v, estimate.v_WB))
+    seen, rate = rotate_back(estimate.R_WB, p), estimate.w_WB_B
+    turned = cross((rate[0], rate[1], rate[2]), seen)
+    return subtract(seen, planned), subtract(
+        subtract(rotate_back(estimate.R_WB, v), turned), moving
+    )
+
+
+@compilable
+def _reach(a: ArmTask, b: Bodies, arm: ArmCoordinates) -> None:
+    """Where the end-effector is at a.q, and its Jacobian. Writes origin, axis, tip, jacobian."""
+    n = int(b.joints)
+    R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    o: Vec3 = (0.0, 0.0, 0.0)
+    for k in range(n):
+        at = 3 * k
+        o = add(o, rotate(R, (b.offset[at], b.offset[at + 1], b.offset[at + 2])))
+        axis, R = next_axes(b, k, R, a.q[k])
+        for i in range(3):
+            a.origin[at + i], a.axis[at + i] = o[i], axis[i]
+    tip = add(o, rotate(R, (b.tip[0], b.tip[1], b.tip[2])))
+    for i in range(3):
+        a.tip[i] = tip[i]
+    # Of joints, and from the last on of coordinates.
+    for k in range(n - 1, -1, -1):
+        moved = cross(_at(a.axis, k), subtract(tip, _at(a.origin, k)))
+        for i in range(k + 1, n):
+            moved = add_scaled(moved, _at(a.jacobian, i), -arm.row[JOINTS * i + k])
+        for i in range(3):
+            a.jacobian[3 * k + i] = moved[i] / arm.row[JOINTS * k + k]
+
+
+@compilable
+def _at(vectors: Floats, k: int) -> Vec3:
+    return vectors[3 * k], vectors[3 * k + 1], vectors[3 * k + 2]
+
+
+@compilable
+def _moved(a: ArmTask, change: Floats, n: int) -> Vec3:
+    """What a change of the coordinates (j,) [rad] does to the end-effector [m, B], or a rate."""
+    total: Vec3 = (0.0, 0.0, 0.0)
+    for k in range(n):
+        total = add_scaled(total, _at(a.jacobian, k), change[k])
+    return total
+
+
+@compilable
+def _reachable(a: ArmTask, n: int, off: Vec3) -> Vec3:
+    """The part of a displacement of the end-effector, or of its rate, that joints can make."""
+    _set_up(a, n, off)
+    for i in range(n):
+        a.gram[JOINTS * i + i] += _ALIGNED * _ALIGNED
+    factorise(a.factor, a.gram, n)
+    for i in range(n):
+        a.step[i] = a.slope[i]
+    solve(a.factor, a.step, n)
+    return _moved(a, a.step, n)
+
+
+@compilable
+def _set_up(a: ArmTask, n: int, off: Vec3) -> None:
+    """The least-squares problem of a displacement. Writes gram, slope."""
+    for i in range(n):
+        one = _at(a.jacobian, i)
+        a.slope[i] = dot(one, off)
+        for k in range(i + 1):
+            a.gram[JOINTS * i + k] = a.gram[JOINTS * k + i] = dot(one, _at(a.jacobian, k))
+
+
+@compilable
+def _solve_within(a: ArmTask, n: int, off: Vec3, left: Vec3) -> None:
+    """Changes of the coordinates, within bounds, that move the end-effector by ``off``.
+
+    What is ``left`` [m, B] to its place damps them, most where a turn bends the way from it.
+    Reads axis, jacobian, low, high; writes step.
+    """
+    _set_up(a, n, off)
+    for i in range(n):
+        bend = -dot(left, cross(_at(a.axis, i), _at(a.jacobian, i)))
+        a.gram[JOINTS * i + i] += _DAMPING * _DAMPING + dot(left, left) + max(bend, 0.0)
+    factorise(a.factor, a.gram, n)
+    for i in range(n):
+        a.step[i] = a.slope[i]
+    solve(a.factor, a.step, n)
+    outside = False
+    for i in range(n):
+        inside = clamp(a.step[i], a.low[i], a.high[i])
+        outside = outside or inside != a.step[i]
+        a.step[i] = inside
+    if not outside:
+        return
+    for _ in range(_SWEEPS):
+        for i in range(n):
+            left = a.slope[i]
+            for k in range(n):
+                left -= a.gram[JOINTS * i + k] * a.step[k]
+            a.step[i] = clamp(a.step[i] + left / a.gram[JOINTS * i + i], a.low[i], a.high[i])
 
 
 @compilable
 def _within_correction(
-    airframe: Airframe,
-    limits: CompensationLimits,
-    off_plan: float,
-    plan: PredictionState | PlanState,
-    seen: Vec4,
-) -> Vec4:
-    """The point, and how it moves, no further from the planned one than the correction reaches."""
-    th1, w1 = plan.q_arm[0], plan.qd_arm[0]
-    th12, w12 = th1 + plan.q_arm[1], w1 + plan.qd_arm[1]
-    (x1, z1), (x2, z2) = links(airframe.link_length, th1, th12)
-    x, z, vx, vz = x1 + x2, z1 + z2, z1 * w1 + z2 * w12, -x1 * w1 - x2 * w12
-    dx, dz, dvx, dvz = seen[0] - x, seen[1] - z, seen[2] - vx, seen[3] - vz
-    far = math.hypot(dx, dz)
+    limits: CompensationLimits, off_plan: float, off: Vec3, drifting: Vec3
+) -> tuple[Vec3, Vec3]:
+    """What of a displacement, and of how it changes, the correction makes up for."""
+    far = norm(off)
     calm = clamp((limits.far - off_plan) / max(limits.far - limits.near, 1e-6), 0.0, 1.0)
     share, slope = calm, calm
     if far > limits.whole:
@@ -132,71 +272,6 @@ def _within_correction(
         share = calm * (limits.whole + span * bend) / far
         slope = calm * (1.0 - bend * bend)
     # Outwards the point slows down by the slope, along the circle by the share.
-    outwards = (slope - share) * (dx * dvx + dz * dvz) / max(far * far, 1e-12)
-    return (
-        x + share * dx,
-        z + share * dz,
-        vx + share * dvx + outwards * dx,
-        vz + share * dvz + outwards * dz,
-    )
-
-
-@compilable
-def _seen_from_base(
-    estimate: StateEstimate | Estimate, p_WE: Vec3, v_WE: Vec3
-) -> tuple[float, float, float, float]:
-    """Where the point is in the arm's plane of the real body, and how it moves there."""
-    R = estimate.R_WB
-    x, y, z = rotate_back(R, subtract(p_WE, estimate.p_WB))
-    ux, _, uz = rotate_back(R, subtract(v_WE, estimate.v_WB))
-    wx, wy, wz = estimate.w_WB_B[0], estimate.w_WB_B[1], estimate.w_WB_B[2]
-    vx = ux - (wy * z - wz * y)
-    vz = uz - (wx * y - wy * x)
-    return x, z, vx, vz
-
-
-@compilable
-def _nearest_pose(
-    airframe: Airframe, most: Vec2, links_wanted: Vec2, p: Vec2, v: Vec2
-) -> tuple[Vec2, Vec2]:
-    """Joint angles and rates of the pose within ``most`` that brings the end-effector nearest.
-
-    One link stands at its limit and the other points from there, or from the base, at the place.
-    """
-    l1, l2 = airframe.link_length[0], airframe.link_length[1]
-    held1, held12 = (
-        clamp_magnitude(links_wanted[0], most[0]),
-        clamp_magnitude(links_wanted[1], most[1]),
-    )
-    th12, w12, miss12 = _pointed(l1, held1, l2, most[1], p, v)
-    th1, w1, miss1 = _pointed(l2, held12, l1, most[0], p, v)
-    if miss12 <= miss1:
-        return (held1, th12 - held1), (0.0, w12)
-    return (th1, held12 - th1), (w1, -w1)
-
-
-@compilable
-def _pointed(
-    held_length: float, held: float, length: float, bound: float, p: Vec2, v: Vec2
-) -> tuple[float, float, float]:
-    """Angle and rate of a link that points at a place beside one that is held, and the miss."""
-    x, z = p[0] - held_length * math.sin(held), p[1] - held_length * math.cos(held)
-    distance = max(math.hypot(x, z), 1e-3)
-    free = math.atan2(x, z)
-    angle = clamp_magnitude(free, bound)
-    rate = (z * v[0] - x * v[1]) / (distance * distance) if angle == free else 0.0
-    return angle, rate, math.hypot(x - length * math.sin(angle), z - length * math.cos(angle))
-
-
-@compilable
-def _rates(airframe: Airframe, th1: float, th12: float, vx: float, vz: float) -> Vec2:
-    """Joint rates for a velocity of the end-effector in the body's x-z plane."""
-    l1, l2 = airframe.link_length[0], airframe.link_length[1]
-    (x1, z1), (x2, z2) = links(airframe.link_length, th1, th12)
-    # [vx, vz] = [[z1, z2], [-x1, -x2]] [w1, w12]
-    determinant = z2 * x1 - z1 * x2
-    if abs(determinant) < 0.1 * l1 * l2:
-        return 0.0, 0.0
-    w1 = (-x2 * vx - z2 * vz) / determinant
-    w12 = (x1 * vx + z1 * vz) / determinant
-    return w1, w12 - w1
+    outwards = (slope - share) * dot(off, drifting) / max(far * far, 1e-12)
+    kept = (share * drifting[0], share * drifting[1], share * drifting[2])
+    return (share * off[0], share * off[1], share * off[2]), add_scaled(kept, off, outwards)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.control.allocation import allocate
-from fsw.autopilot.control.arm_compensation import compensated_joints, lately_off_plan
+from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
 from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
 from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.height import height_pid
-from fsw.autopilot.control.joint_reference import joint_reference
+from fsw.autopilot.control.joint_reference import refer
 from fsw.autopilot.control.joints import (
     accelerate_joints,
     joint_torques,
@@ -48,6 +48,7 @@ from fsw.autopilot.model.actuator_health import (
     note_health,
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.arm_coordinates import ArmCoordinates, arm_coordinates
 from fsw.autopilot.model.body import Body, body_of
 from fsw.autopilot.model.multibody import load_on_base, move_bodies, torque_to_turn
 from fsw.autopilot.model.rotors import (
@@ -58,7 +59,7 @@ from fsw.autopilot.model.rotors import (
     rotor_decay,
 )
 from fsw.autopilot.shapes.zones import NO_ZONES
-from fsw.autopilot.signals import Mat3, StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import (
     BREACH,
     FILTER_ACTED,
@@ -113,6 +114,7 @@ class CascadeLaw:
     """Everything the loops need that does not change in flight."""
 
     airframe: Airframe
+    arm: ArmCoordinates
     tuning: LoopGains
     tracking: TrackingLaw
     follows_plan: bool  # or only the plan's acceleration
@@ -140,6 +142,7 @@ class Cascade:
         gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
         self.law = CascadeLaw(
             airframe,
+            arm_coordinates(airframe),
             tuning,
             TrackingLaw(airframe.attitude_lag, tuning.tracking, gains),
             inner == "tracking",
@@ -167,11 +170,12 @@ class Cascade:
         now.known = estimate
         return self._motion(self.packed, now.array)
 
-    def expected(self, r: Tick) -> tuple[Vec2, Model]:
-        """What the commands sent last make of the joints [rad/s^2] and of the vehicle."""
-        return self._expected(self.packed, r.array)
+    def expected(self, r: Tick) -> tuple[JointVector, Model]:
+        """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle."""
+        model = self._expected(self.packed, r.array)
+        return tuple(r.bodies.work[: r.joint_count].tolist()), model
 
-    def joint_acceleration(self, r: Tick) -> Vec2:
+    def joint_acceleration(self, r: Tick) -> JointVector:
         """The joints' part of ``expected`` [rad/s^2]."""
         return self.expected(r)[0]
 
@@ -307,17 +311,17 @@ def turn_by_pid(r: Tick, law: CascadeLaw) -> tuple[Vec3, float]:
 @compilable
 def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
     """What the joints are to do, ``seconds`` [s] later. Writes off_plan, joints.reference."""
-    airframe, tuning, k, plan = law.airframe, law.tuning, r.joints, r.flown
-    wanted = (plan.q_arm[0], plan.q_arm[1]), (plan.qd_arm[0], plan.qd_arm[1])
-    if law.follows_plan and tuning.compensate and _joints_are_sound(r):
+    airframe, tuning, plan = law.airframe, law.tuning, r.flown
+    if law.follows_plan and tuning.compensate and _joints_are_sound(r, airframe):
         r.off_plan = lately_off_plan(tuning.compensation, r.off_plan, r.estimate, plan, seconds)
-        wanted = compensated_joints(
-            airframe, tuning.compensation, tuning.joint_limits, r.off_plan, r.estimate, plan
+        compensate(
+            *(r.arm, airframe.bodies, law.arm, tuning.compensation, tuning.joint_limits),
+            *(r.off_plan, r.estimate, plan),
         )
-    last = (k.reference[0], k.reference[1]), (k.reference_rate[0], k.reference_rate[1])
-    q, qd = joint_reference(airframe, tuning.joint_limits, last, wanted, seconds)
-    for i in range(len(q)):
-        k.reference[i], k.reference_rate[i] = q[i], qd[i]
+    else:
+        for i in range(int(airframe.bodies.joints)):
+            r.arm.q[i], r.arm.qd[i] = plan.q_arm[i], plan.qd_arm[i]
+    refer(r.joints, r.arm, airframe, law.arm, tuning.joint_limits, seconds)
 
 
 @compilable
@@ -329,10 +333,10 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
     field = -pushed[0], -pushed[1], motion.thrust / r.mass - pushed[2]
     for _ in range(ticks):
         torque = r.sent.joint_torque
-        observe_disturbance(r.joints, r.bodies, airframe.bodies, torque, field, law.dt)
+        observe_disturbance(r.joints, r.bodies, airframe, torque, field, law.dt)
     # Not what is commanded: the rotors take 40 ms to give it.
-    joint_torques(r, airframe, law.tuning.joint, field, motion.turning, law.dt)
-    if not _joints_are_sound(r):
+    joint_torques(r, airframe, law.arm, law.tuning.joint, field, motion.turning, law.dt)
+    if not _joints_are_sound(r, airframe):
         torques_of_failed(r, airframe, field, motion.turning)
 
 
@@ -364,8 +368,11 @@ def compare_with_plan(r: Tick, tube: TubeAround) -> None:
 
 
 @compilable
-def _joints_are_sound(r: Tick) -> bool:
-    return bool(r.health.joints[0] == SOUND and r.health.joints[1] == SOUND)
+def _joints_are_sound(r: Tick, airframe: Airframe) -> bool:
+    sound = True
+    for i in range(int(airframe.bodies.joints)):
+        sound = sound and r.health.joints[i] == SOUND
+    return sound
 
 
 @compiled
@@ -382,7 +389,7 @@ def _close_loops(
 
 
 @kernel
-def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
+def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> Model:
     airframe, r = laws[0].airframe, ticks[0]
     for i in range(int(airframe.rotors)):
         settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
@@ -392,8 +399,8 @@ def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Vec2, Model]:
     # The accelerometer knows of gusts, and of the ground.
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)
-    turning, qdd = motion.turning, r.bodies.work
-    return (qdd[0], qdd[1]), (turning[0], turning[1], turning[2], motion.thrust / r.mass)
+    turning = motion.turning
+    return turning[0], turning[1], turning[2], motion.thrust / r.mass
 
 
 @kernel

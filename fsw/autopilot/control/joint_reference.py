@@ -2,13 +2,16 @@ r"""What the joints are asked for, brought within their limits: angle, rate and 
 
 The limits hold for what is sent to the joint loop, the sum of plan and compensation. The reference
 is a state of its own that follows what is wanted as far as the limits allow. Its angles are bounded
-link by link, in :math:`\theta_1` and :math:`\theta_1 + \theta_2`, its rates joint by joint:
+in the arm's coordinates (``model/arm_coordinates.py``), of the paper's arm :math:`\theta_1` and
+:math:`\theta_1 + \theta_2`, its rates joint by joint:
 
-- A link is never faster towards its bound than it can brake before it. A rate that keeps this is
-  therefore in reach in the next tick as well, for either link whatever the other does.
-- The acceleration is cut link by link. The rate of the second joint is the difference of those of
-  the links, and cutting both changes to the same size leaves it between the last rate and the
-  wanted one, both of which are allowed.
+- A coordinate is never faster towards its bound than it can brake before it. A rate that keeps this
+  is therefore in reach in the next tick as well, for each coordinate whatever the others do.
+- The acceleration is cut coordinate by coordinate. The rate of the paper's second joint is the
+  difference of those of its coordinates, and cutting both changes to the same size leaves it
+  between the last rate and the wanted one, both of which are allowed.
+- Rates of joints that are too much, and rates towards a limit beside the coordinates, are cut for
+  all joints by one factor.
 
 Source: docs/equations.md T3a; docs/decisions/0027-limits-that-hold.md.
 """
@@ -20,7 +23,13 @@ from dataclasses import dataclass
 
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import Vec2
+from fsw.autopilot.model.arm_coordinates import (
+    ArmCoordinates,
+    along_other,
+    to_coordinates,
+    to_joints,
+)
+from fsw.autopilot.tick_record import ArmTask, Joints
 from fsw.compiled import compilable
 
 
@@ -30,95 +39,99 @@ class JointReferenceLimits:
 
     margin: float = 0.03  # rad, to the limits of the angles
     rate: float = 3.5  # rad/s; three tenths of ``joint_rate_max`` is for the loop that follows
-    # rad/s^2, of either link. Whatever a reference does within it and a plan besides, in the worst
-    # pose and with the rotors at their limit, the first joint needs no more than its 2 N m.
+    # rad/s^2, of each coordinate. Whatever a reference does within it and a plan besides, in the
+    # worst pose and with the rotors at their limit, the first joint of the paper's arm needs no
+    # more than its 2 N m.
     acceleration: float = 50.0
 
 
-# s, damping over stiffness of the joint loop. A link that is asked for no more than its distance
+# s, damping over stiffness of the joint loop. A joint that is asked for no more than its distance
 # from its bound in this time is pulled to no place beyond it, and comes to rest there.
 APPROACH = 0.08
 # s. What is wanted may jump, with every correction of an estimate. The reference makes up for it in
 # this time, a quarter of that of the joint loop; what moves on steadily it follows without lag.
 CATCH_UP = 0.01
+_SHARE_OF_RATE = 0.7  # of ``joint_rate_max``, that a reference may have
 
 
 @compilable
-def bounds(airframe: Airframe, limits: JointReferenceLimits) -> Vec2:
-    """The largest angle of either link [rad] that a reference may have."""
-    return airframe.joint1_limit - limits.margin, airframe.joint12_limit - limits.margin
-
-
-@compilable
-def within_limits(airframe: Airframe, limits: JointReferenceLimits, q: Vec2) -> Vec2:
-    """The joint angles nearest to ``q`` [rad], link by link, that a reference may have."""
-    first, both = bounds(airframe, limits)
-    th1, th12 = clamp_magnitude(q[0], first), clamp_magnitude(q[0] + q[1], both)
-    return th1, th12 - th1
-
-
-@compilable
-def joint_reference(
+def refer(
+    k: Joints,
+    a: ArmTask,
     airframe: Airframe,
+    arm: ArmCoordinates,
     limits: JointReferenceLimits,
-    last: tuple[Vec2, Vec2],
-    wanted: tuple[Vec2, Vec2],
     dt: float,
-) -> tuple[Vec2, Vec2]:
-    """Angles [rad] and rates [rad/s] for the joint loop, ``dt`` [s] after the ``last`` ones.
+) -> None:
+    """Angles and rates for the joint loop, ``dt`` [s] after the last ones. Writes k's reference.
 
-    Of ``wanted`` angles [rad] and rates [rad/s] what the limits allow. The rates are those at which
-    the angles went there from the last ones.
+    Of the wanted ``a.q`` and ``a.qd`` what the limits allow. The rates are those at which the
+    angles went there from the last ones.
     """
-    (q1, q2), (before1, before2) = last
-    before12 = before1 + before2
-    most = limits.acceleration
-    w1, w12 = _towards(limits, (q1, q1 + q2), _links(airframe, limits, wanted), dt)
-    first, both = bounds(airframe, limits)
-    w1 = _within(w1, q1, first, most, dt)
-    w12 = _within(w12, q1 + q2, both, most, dt)
-    fastest = max(abs(w1), abs(w12 - w1))
-    if fastest > limits.rate:
-        # Both by the same factor: neither link then approaches its limit faster than before.
-        w1, w12 = w1 * limits.rate / fastest, w12 * limits.rate / fastest
-    w1 = before1 + clamp_magnitude(w1 - before1, most * dt)
-    w12 = before12 + clamp_magnitude(w12 - before12, most * dt)
-    return (q1 + w1 * dt, q2 + (w12 - w1) * dt), (w1, w12 - w1)
-
-
-@compilable
-def _links(
-    airframe: Airframe, limits: JointReferenceLimits, wanted: tuple[Vec2, Vec2]
-) -> tuple[Vec2, Vec2]:
-    """Angles and rates of the links for those ``wanted`` of the joints, the angles allowed ones."""
-    th1, th2 = within_limits(airframe, limits, wanted[0])
-    return (th1, th1 + th2), (wanted[1][0], wanted[1][0] + wanted[1][1])
+    n, most = int(arm.joints), limits.acceleration
+    _towards(k, a, arm, limits, dt)
+    for i in range(n):
+        low = braking_rate(arm.low[i] + limits.margin - a.c[i], most, APPROACH, dt)
+        high = braking_rate(arm.high[i] - limits.margin - a.c[i], most, APPROACH, dt)
+        a.rate[i] = clamp(a.rate[i], low, high)
+    to_joints(arm, a.rate, a.qd)
+    # All by the same factor: none then approaches its limit faster than before.
+    share = _share_of_rates(k, a, airframe, arm, limits, dt)
+    to_coordinates(arm, k.reference_rate, a.step)
+    for i in range(n):
+        change = share * a.rate[i] - a.step[i]
+        a.rate[i] = a.step[i] + clamp_magnitude(change, most * dt)
+    to_joints(arm, a.rate, k.reference_rate)
+    for i in range(n):
+        k.reference[i] += k.reference_rate[i] * dt
 
 
 @compilable
 def _towards(
-    limits: JointReferenceLimits, links: Vec2, wanted: tuple[Vec2, Vec2], dt: float
-) -> Vec2:
-    """Rates of the links that follow ``wanted`` and bring both there at once."""
-    (goal1, goal12), (w1, w12) = wanted
-    off1, off12 = goal1 - links[0] - w1 * dt, goal12 - links[1] - w12 * dt
-    longest = max(abs(off1), abs(off12))
-    if longest == 0.0:
-        return w1, w12
-    share = braking_rate(longest, limits.acceleration, CATCH_UP, dt) / longest
-    return w1 + share * off1, w12 + share * off12
+    k: Joints, a: ArmTask, arm: ArmCoordinates, limits: JointReferenceLimits, dt: float
+) -> None:
+    """Rates that follow what is wanted and bring all coordinates there at once. Writes c, rate."""
+    n, longest = int(arm.joints), 0.0
+    to_coordinates(arm, a.q, a.goal)
+    to_coordinates(arm, a.qd, a.rate)
+    to_coordinates(arm, k.reference, a.c)
+    for i in range(n):
+        low, high = arm.low[i] + limits.margin, arm.high[i] - limits.margin
+        a.goal[i] = clamp(a.goal[i], low, high) - a.c[i] - a.rate[i] * dt
+        longest = max(longest, abs(a.goal[i]))
+    if longest > 0.0:
+        share = braking_rate(longest, limits.acceleration, CATCH_UP, dt) / longest
+        for i in range(n):
+            a.rate[i] += share * a.goal[i]
 
 
 @compilable
-def _within(rate: float, angle: float, bound: float, most: float, dt: float) -> float:
-    """``rate`` [rad/s], no faster towards either bound than the link can brake before it."""
-    low = -braking_rate(bound + angle, most, APPROACH, dt)
-    return clamp(rate, low, braking_rate(bound - angle, most, APPROACH, dt))
+def _share_of_rates(
+    k: Joints,
+    a: ArmTask,
+    airframe: Airframe,
+    arm: ArmCoordinates,
+    limits: JointReferenceLimits,
+    dt: float,
+) -> float:
+    """The largest share [1] of the joints' rates that every joint and every other limit allows."""
+    share = 1.0
+    for i in range(int(arm.joints)):
+        most = min(limits.rate, _SHARE_OF_RATE * airframe.joint_rate_max[i])
+        if abs(a.qd[i]) > most:
+            share = min(share, most / abs(a.qd[i]))
+    for i in range(int(arm.others)):
+        angle, rate = along_other(arm, i, k.reference), along_other(arm, i, a.qd)
+        room = arm.other_high[i] - angle if rate > 0.0 else angle - arm.other_low[i]
+        most = max(braking_rate(room - limits.margin, limits.acceleration, APPROACH, dt), 0.0)
+        if abs(rate) > most:
+            share = min(share, most / abs(rate))
+    return share
 
 
 @compilable
 def braking_rate(distance: float, most: float, time: float, dt: float) -> float:
-    """Largest rate [rad/s] for a tick of ``dt`` [s] from which a link stops in ``distance`` [rad].
+    """Largest rate [rad/s] for a tick of ``dt`` [s] from which a joint stops in ``distance`` [rad].
 
     It brakes with ``most`` [rad/s^2] at most, and near the end in proportion to what is left, with
     a time constant ``time`` [s].

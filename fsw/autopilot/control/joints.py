@@ -7,11 +7,12 @@ which needs no acceleration:
 .. math:: \dot{\hat p} = \tau - b + \hat\tau + 2\beta(p - \hat p), \quad
           \dot{\hat\tau} = \beta^2(p - \hat p),
 
-and taken off the torque. A link near its limit may be accelerated towards it by no more than
+and taken off the torque. A coordinate of the arm (``model/arm_coordinates.py``) near its limit
+may be accelerated towards it by no more than
 
 .. math:: c^2(\theta_{max} - \theta) - 2c\,\dot\theta,
 
-with which a critically damped link comes to rest at it. This holds for what is measured, so that
+with which, critically damped, it comes to rest at it. This holds for what is measured, so that
 neither a disturbed arm nor an integral passes the limit. The rate of each joint has the same of one
 order less.
 
@@ -29,6 +30,12 @@ from fsw.autopilot.control.pid import PidGains, pid_step
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.arm_coordinates import (
+    ArmCoordinates,
+    along_other,
+    to_coordinates,
+    to_joints,
+)
 from fsw.autopilot.model.multibody import (
     Bodies,
     factorise,
@@ -37,13 +44,14 @@ from fsw.autopilot.model.multibody import (
     move_bodies,
     solve,
 )
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Joints, Multibody, Tick
+from fsw.autopilot.signals import StateEstimate, Vec3
+from fsw.autopilot.tick_record import ArmTask, Joints, Multibody, Tick
 from fsw.compiled import compilable, kernel, machine_code, packed
 from fsw.record import JOINTS, Floats
 
 _OBSERVER = 100.0  # rad/s
-_DISTURBANCE = 0.3  # N m; more than friction and gusts make, and less than the servo has
+# Of the largest torque; more than friction and gusts make, and less than the servo has.
+_DISTURBANCE = 0.15
 
 
 def rest_joints(k: Joints, airframe: Airframe, estimate: StateEstimate) -> None:
@@ -69,24 +77,30 @@ def _place(airframes: NDArray[Any], ticks: NDArray[Any]) -> None:
 
 @compilable
 def observe_disturbance(
-    k: Joints, m: Multibody, bodies: Bodies, torque: Vec2 | Floats, field: Vec3, dt: float
+    k: Joints, m: Multibody, airframe: Airframe, torque: Floats, field: Vec3, dt: float
 ) -> None:
     """Momentum and disturbance ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile.
 
     The ``field`` [m/s^2, B] is gravity less the base's acceleration, which is what thrust and
     disturbance make of it, whatever the attitude.
     """
-    for i in range(int(bodies.joints)):
+    for i in range(int(airframe.bodies.joints)):
         predicted = k.momentum[i] + dt * (torque[i] + joint_drift(m, i, field) + k.disturbance[i])
         surprise = m.momentum[i] - predicted
         k.momentum[i] = predicted + 2.0 * _OBSERVER * dt * surprise
         believed = k.disturbance[i] + _OBSERVER * _OBSERVER * dt * surprise
-        k.disturbance[i] = clamp_magnitude(believed, _DISTURBANCE)
+        k.disturbance[i] = clamp_magnitude(believed, _DISTURBANCE * airframe.joint_torque_max[i])
 
 
 @compilable
 def joint_torques(
-    r: Tick, airframe: Airframe, gains: PidGains, field: Vec3, turning: Vec3, dt: float
+    r: Tick,
+    airframe: Airframe,
+    arm: ArmCoordinates,
+    gains: PidGains,
+    field: Vec3,
+    turning: Vec3,
+    dt: float,
 ) -> None:
     """Torques within the servos' limit (computed torque). Writes wanted, the integrals in joints.
 
@@ -101,7 +115,7 @@ def joint_torques(
             gains, k.integral[i], k.reference[i] - q[i], k.reference_rate[i] - qd[i], dt
         )
         qdd[i] = wanted + r.flown_u.qdd_arm[i]
-    limit_acceleration(airframe, q, qd, qdd)
+    limit_acceleration(airframe, arm, r.arm, q, qd, qdd)
     for i in range(n):
         torque = joint_load(m, i, field, turning) - k.disturbance[i]
         for j in range(n):
@@ -133,25 +147,42 @@ _POLE = 30.0
 
 @compilable
 def limit_acceleration(
-    airframe: Airframe, q: Vec2 | Floats, qd: Vec2 | Floats, qdd: Floats
+    airframe: Airframe, arm: ArmCoordinates, a: ArmTask, q: Floats, qd: Floats, qdd: Floats
 ) -> None:
-    """``qdd`` (j,) [rad/s^2] of joints at ``q`` [rad] and ``qd`` [rad/s], as far as allowed."""
-    most = airframe.joint_rate_max[0]
-    first = clamp(qdd[0], _POLE * (-most - qd[0]), _POLE * (most - qd[0]))
-    second = clamp(qdd[1], _POLE * (-most - qd[1]), _POLE * (most - qd[1]))
+    """``qdd`` (j,) [rad/s^2] of joints at ``q`` [rad] and ``qd`` [rad/s], as far as allowed.
+
+    Writes c, rate, goal of the task ``a``.
+    """
+    n = int(arm.joints)
+    for i in range(n):
+        most = airframe.joint_rate_max[i]
+        qdd[i] = clamp(qdd[i], _POLE * (-most - qd[i]), _POLE * (most - qd[i]))
     # Angles last: a rate can wait, an end stop cannot.
-    both = _towards(q[0] + q[1], qd[0] + qd[1], first + second, airframe.joint12_limit)
-    first = _towards(q[0], qd[0], first, airframe.joint1_limit)
-    qdd[0], qdd[1] = first, both - first
+    to_coordinates(arm, q, a.c)
+    to_coordinates(arm, qd, a.rate)
+    to_coordinates(arm, qdd, a.goal)
+    for i in range(n):
+        a.goal[i] = _towards(a.c[i], a.rate[i], a.goal[i], arm.low[i], arm.high[i])
+    to_joints(arm, a.goal, qdd)
+    for i in range(int(arm.others)):
+        wanted = along_other(arm, i, qdd)
+        allowed = _towards(
+            *(along_other(arm, i, q), along_other(arm, i, qd), wanted),
+            *(arm.other_low[i], arm.other_high[i]),
+        )
+        row, size = JOINTS * i, 0.0
+        for k in range(n):
+            size += arm.other_row[row + k] * arm.other_row[row + k]
+        for k in range(n):
+            qdd[k] += (allowed - wanted) * arm.other_row[row + k] / size
 
 
 @compilable
-def _towards(angle: float, rate: float, acceleration: float, limit: float) -> float:
-    """Acceleration [rad/s^2] of a link, as far as both limits of its angle allow."""
+def _towards(angle: float, rate: float, acceleration: float, low: float, high: float) -> float:
+    """Acceleration [rad/s^2] of an angle, as far as both of its limits allow."""
     damping = 2.0 * _POLE * rate
-    low = _POLE * _POLE * (-limit - angle) - damping
-    high = _POLE * _POLE * (limit - angle) - damping
-    return clamp(acceleration, low, high)
+    least = _POLE * _POLE * (low - angle) - damping
+    return clamp(acceleration, least, _POLE * _POLE * (high - angle) - damping)
 
 
 @compilable

@@ -20,14 +20,13 @@ def moved_on(x: StateEstimate, seconds: float, felt: Vec3 | None = None) -> Stat
         a = (-x.specific_force * R[2], -x.specific_force * R[5], GRAVITY - x.specific_force * R[8])
     else:
         a = add_scaled(rotate(R, felt), (0.0, 0.0, 1.0), GRAVITY)
-    (q1, q2), (qd1, qd2) = x.q_arm, x.qd_arm
     turned = _turned(R, (t * x.w_WB_B[0], t * x.w_WB_B[1], t * x.w_WB_B[2]))
     return x._replace(
         p_WB=add_scaled(x.p_WB, add_scaled(x.v_WB, a, 0.5 * t), t),
         v_WB=add_scaled(x.v_WB, a, t),
         R_WB=turned,
         yaw=yaw_of(turned),
-        q_arm=(q1 + t * qd1, q2 + t * qd2),
+        q_arm=tuple([q + t * qd for q, qd in zip(x.q_arm, x.qd_arm, strict=True)]),
     )
 
 

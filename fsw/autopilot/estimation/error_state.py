@@ -29,6 +29,7 @@ from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable
+from fsw.record import JOINTS
 
 Array = NDArray[np.float64]
 # Entries of the error.
@@ -87,23 +88,29 @@ FILTER: Final = np.dtype(
         ("innovated_last", float, (4, ROWS)),
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
-        ("joints", float, (2, 3)),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
-        ("joint_variance", float, (3, 3)),  # [SI], of either
+        ("joint_count", np.int64),  # of the vehicle
+        (
+            "joints",
+            float,
+            (JOINTS, 3),
+        ),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
+        ("joint_variance", float, (3, 3)),  # [SI], of each
         ("joint_time", float),  # s
-        ("pushes", float, (PUSHES, 3)),  # ring: up to a time [s], accelerations [rad/s^2]
+        ("pushes", float, (PUSHES, 1 + JOINTS)),  # ring: up to a time [s], accelerations [rad/s^2]
         ("pushed", np.int64),  # the first of them after the joints' time, counted from the start
         ("pushes_end", np.int64),  # behind the last one
         # Encoders: the newest reading [rad] and its time [s], and as above.
-        ("encoders", float, (3,)),
+        ("encoders", float, (JOINTS,)),
+        ("encoders_read", float),
         ("encoder_steady", np.int64),
         ("encoder_calm", np.int64),
         ("encoder_doubted", np.int64),
-        ("encoder_zero", float, (2,)),  # rad, by which readings have leapt so far
+        ("encoder_zero", float, (JOINTS,)),  # rad, by which readings have leapt so far
         # Of what is doubted: how far readings have leapt [rad], and in which time [s].
-        ("encoder_leap", float, (2,)),
+        ("encoder_leap", float, (JOINTS,)),
         ("encoder_leapt", float),
         ("encoder_scale", float),  # by how much their variance is larger than stated
-        ("encoder_surprise", float, (2,)),  # rad, of the last one that was believed
+        ("encoder_surprise", float, (JOINTS,)),  # rad, of the last one that was believed
         # What is known of the biases while the readings are of no use.
         ("kept_bias", float, (6,)),
         ("kept_variance", float, (6,)),

@@ -17,13 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
-from fsw.autopilot.signals import Mat3, SensorFrame, StateEstimate, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import Mat3, SensorFrame, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate, Tick
 from fsw.compiled import compilable, kernel, machine_code
-from fsw.record import Floats
+from fsw.record import JOINTS as CAPACITY
+from fsw.record import Floats, padded
 
-READINGS: Final = 20
-"""Numbers of a frame: position, velocity, quaternion, gyro, accelerometer, joints, their rates."""
+_ANGLES_AT: Final = 16
+_RATES_AT: Final = _ANGLES_AT + CAPACITY
+READINGS: Final = _RATES_AT + CAPACITY
+"""Numbers of a frame: position, velocity, quaternion, gyro, accelerometer, joints, their rates.
+
+It has room for the joints of any vehicle; those that one does not have are zero.
+"""
 _FRAME: Final = struct.Struct(f"<{READINGS}d")
 POSE, INERTIAL, JOINTS = 1, 2, 4  # parts of a frame
 # Farther or faster is no vehicle of this kind.
@@ -49,7 +55,8 @@ def read_frame(sensors: SensorFrame, r: Tick) -> int:
 def reading_of(sensors: SensorFrame) -> Floats:
     """The numbers of a frame (READINGS,) [SI]."""
     s = sensors
-    parts = *s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *s.q_arm, *s.qd_arm
+    parts = *s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *padded(s.q_arm, CAPACITY)
+    parts = *parts, *padded(s.qd_arm, CAPACITY)
     return np.frombuffer(_FRAME.pack(*parts))
 
 
@@ -66,23 +73,23 @@ def read_into(x: Estimate, reading: Floats, now_us: int) -> int:
     """The estimate of a ``reading`` (READINGS,) [SI]; which parts of that cannot be."""
     s = reading
     p, v, w = (s[0], s[1], s[2]), (s[3], s[4], s[5]), (s[10], s[11], s[12])
-    q_arm, qd_arm = (s[16], s[17]), (s[18], s[19])
-    missing, R, x.yaw = attitude(
-        p, v, (s[6], s[7], s[8], s[9]), w, (s[13], s[14], s[15]), q_arm, qd_arm
-    )
+    missing, R, x.yaw = attitude(p, v, (s[6], s[7], s[8], s[9]), w, (s[13], s[14], s[15]))
     for i in range(3):
         x.p_WB[i], x.v_WB[i], x.w_WB_B[i] = p[i], v[i], w[i]
     for i in range(9):
         x.R_WB[i] = R[i]
-    for i in range(len(q_arm)):
-        x.q_arm[i], x.qd_arm[i] = q_arm[i], qd_arm[i]
+    for i in range(x.q_arm.size):
+        x.q_arm[i], x.qd_arm[i] = s[_ANGLES_AT + i], s[_RATES_AT + i]
+        # Of what is no number every comparison is false.
+        if not (abs(x.q_arm[i]) < _ANGLE_LIMIT and abs(x.qd_arm[i]) < _RATE_LIMIT):
+            missing |= JOINTS
     x.t_us, x.specific_force = now_us, -s[15]
     return missing
 
 
 @compilable
 def attitude(
-    p_WB: Vec3, v_WB: Vec3, q_WB: Vec4, gyro_B: Vec3, accel_B: Vec3, q_arm: Vec2, qd_arm: Vec2
+    p_WB: Vec3, v_WB: Vec3, q_WB: Vec4, gyro_B: Vec3, accel_B: Vec3
 ) -> tuple[int, Mat3, float]:
     """Parts that are no numbers, out of range or no attitude; the rotation R_WB and its yaw [rad].
 
@@ -92,8 +99,6 @@ def attitude(
         q_WB: Attitude, [w, x, y, z] [1].
         gyro_B: Body rates [rad/s].
         accel_B: Specific force [m/s^2].
-        q_arm: Joint angles [rad].
-        qd_arm: Joint rates [rad/s].
     """
     missing = 0
     norm2 = q_WB[0] * q_WB[0] + q_WB[1] * q_WB[1] + q_WB[2] * q_WB[2] + q_WB[3] * q_WB[3]
@@ -102,14 +107,12 @@ def attitude(
         missing |= POSE
     if not (_within(gyro_B, _RATE_LIMIT) and abs(accel_B[2]) < FORCE_LIMIT):
         missing |= INERTIAL
-    if not (_within(q_arm, _ANGLE_LIMIT) and _within(qd_arm, _RATE_LIMIT)):
-        missing |= JOINTS
     R = matrix_from_quaternion(q_WB)
     return missing, R, yaw_of(R)
 
 
 @compilable
-def _within(values: Vec3 | Vec2, limit: float) -> bool:
+def _within(values: Vec3, limit: float) -> bool:
     """Whether each of ``values`` [the unit of ``limit``] is nearer to zero than ``limit`` [SI]."""
     within = True
     for one in values:

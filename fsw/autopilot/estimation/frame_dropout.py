@@ -97,8 +97,8 @@ def filled(
         found = found._replace(p_WB=read.p_WB, v_WB=read.v_WB, R_WB=read.R_WB, yaw=read.yaw)
     if not missing & JOINTS:
         return found._replace(q_arm=read.q_arm, qd_arm=read.qd_arm)
-    (r1, r2), (a1, a2) = x.qd_arm, arm_acceleration()
-    return found._replace(qd_arm=(r1 + dt * a1, r2 + dt * a2))
+    pairs = zip(x.qd_arm, arm_acceleration(), strict=True)
+    return found._replace(qd_arm=tuple([rate + dt * a for rate, a in pairs]))
 
 
 def _from_poses(new: StateEstimate, x: StateEstimate, dt: float) -> tuple[Vec3, float]:

@@ -44,8 +44,8 @@ class Reset(NamedTuple):
 class EncoderWatch(NamedTuple):
     """Whether the joints' encoders still follow the joints."""
 
-    angles: JointVector = (math.nan, math.nan)  # rad, the last reading
-    asked: JointVector = (0.0, 0.0)  # rad, of the joints when it came first
+    angles: JointVector = ()  # rad, the last reading
+    asked: JointVector = ()  # rad, of the joints when it came first
     repeats: int = 0  # readings in a row that were the same
     stuck: bool = False
 
@@ -185,8 +185,9 @@ def copied(x: Filter) -> Filter:
     return np.ndarray(1, FILTER, bytearray(memory if type(memory) is bytearray else x.tobytes()))
 
 
-def at_start() -> FusionMemory:
-    """Memory before the first sample."""
+def at_start(joints: int) -> FusionMemory:
+    """Memory before the first sample, of a vehicle of so many ``joints``."""
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
+    x["joint_count"] = joints
     x["model_walk"] = MIN_WALKS
     return FusionMemory(x)

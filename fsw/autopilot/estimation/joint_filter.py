@@ -5,7 +5,7 @@ by 0.7 rad/s. For each joint a Kalman filter of angle, rate and a disturbing acc
 
 .. math:: \ddot\theta = u + d, \quad \dot d = w,
 
-whose input u is the acceleration that the model of the arm gives for the torques. Both joints have
+whose input u is the acceleration that the model of the arm gives for the torques. All joints have
 the same covariance, because they are read together.
 
 A reading tells of the past. The state stays at the time of the newest one, and a ring keeps what
@@ -26,6 +26,7 @@ from fsw.autopilot.estimation.measurement_noise import followed
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.signals import JointVector
 from fsw.compiled import compilable
+from fsw.record import Floats
 
 ENCODERS_TOO_OLD: Final = 0.05  # s; what torques made of the joints since is too uncertain
 _RATE_AT_START: Final = 1.0  # rad/s, standard deviation
@@ -66,43 +67,39 @@ def predicted(joint: JointState, u: float, dt: float) -> JointState:
 
 
 @compilable
-def push(x: Any, law: Any, now: float, dt: float, u: JointVector) -> None:
-    """Joints of ``x`` were accelerated by ``u`` [rad/s^2] for ``dt`` [s], until ``now`` [s]."""
+def push(x: Any, law: Any, now: float, dt: float, u: Floats) -> None:
+    """Joints of ``x`` were accelerated by ``u`` (j,) [rad/s^2] for ``dt`` [s] until ``now`` [s]."""
     last = x.pushes[(x.pushes_end - 1) % PUSHES, 0] if x.pushes_end > 0 else x.joint_time
     # What was missed is as if it had not been.
     x.joint_time += max(now - last - dt, 0.0)
     if x.pushes_end - x.pushed >= PUSHES - 1:
         _advance(x, law, x.pushes[x.pushed % PUSHES, 0])
     row = x.pushes[x.pushes_end % PUSHES]
-    row[0], row[1], row[2] = now, u[0], u[1]
+    row[0] = now
+    for i in range(x.joint_count):
+        row[1 + i] = u[i]
     x.pushes_end += 1
 
 
 @compilable
-def read(x: Any, law: Any, now: float, angles: JointVector, age: float) -> int:
-    """Take in ``angles`` [rad] that are ``age`` [s] old ``now`` [s]; returns what is wrong."""
-    time, before = now - age, x.encoders[2]
+def read(x: Any, law: Any, now: float, angles: Floats, age: float) -> int:
+    """Take in ``angles`` (j,) [rad], ``age`` [s] old at ``now`` [s]; returns what is wrong.
+
+    The ``angles`` are written: they become those against the zero that is believed.
+    """
+    time, before = now - age, x.encoders_read
     if not time > before:
         return _REPEATED
-    apart = min(time - before, 1.0)
-    steps = angles[0] - x.encoders[0], angles[1] - x.encoders[1]
-    x.encoders[0], x.encoders[1], x.encoders[2] = angles[0], angles[1], time
-    if max(abs(steps[0]), abs(steps[1])) <= _NEAR + _FASTEST * apart:
-        x.encoder_steady += 1
-    else:
-        x.encoder_steady, x.encoder_leapt = 0, x.encoder_leapt + apart
-        for i in range(2):
-            x.encoder_leap[i] += steps[i]
+    _note_reading(x, angles, min(time - before, 1.0))
+    x.encoders_read = time
     if time < x.joint_time:  # older than what the ring reaches back to
         return _TOO_OLD
     _advance(x, law, time)
-    said = _less_zero(x, angles)
-    far, before_it = _is_far(x, said), x.encoder_doubted
+    _take_off_zero(x, angles)
+    far, before_it = _is_far(x, angles), x.encoder_doubted
     if far and not x.encoder_leapt > 0.0:
         # No reading has leapt since one was believed: the joint moves as torques do not make it.
-        rates = x.joints[0, 1], x.joints[1, 1]
-        begin(x, law, time, said)
-        x.joints[0, 1], x.joints[1, 1] = rates
+        begin(x, law, time, angles, at_rest=False)
         far = False
     x.encoder_doubted, x.encoder_calm = doubt(
         x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
@@ -111,25 +108,45 @@ def read(x: Any, law: Any, now: float, angles: JointVector, age: float) -> int:
         return _JUMP
     if before_it > 0 and far:
         _move_zero(x)
-        said = _less_zero(x, angles)
-    x.encoder_leap[0], x.encoder_leap[1], x.encoder_leapt = 0.0, 0.0, 0.0
-    if before_it > 0 and _is_far(x, said):
-        begin(x, law, time, said)
+        _take_off_zero(x, angles)
+    x.encoder_leapt = 0.0
+    for i in range(x.joint_count):
+        x.encoder_leap[i] = 0.0
+    if before_it > 0 and _is_far(x, angles):
+        begin(x, law, time, angles)
     else:
-        _correct(x, law, said)
+        _correct(x, law, angles)
     return _NONE
 
 
 @compilable
-def _less_zero(x: Any, angles: JointVector) -> JointVector:
-    return angles[0] - x.encoder_zero[0], angles[1] - x.encoder_zero[1]
+def _note_reading(x: Any, angles: Floats, apart: float) -> None:
+    """Whether ``angles`` have leapt since the last reading, ``apart`` [s] before."""
+    longest = 0.0
+    for i in range(x.joint_count):
+        longest = max(longest, abs(angles[i] - x.encoders[i]))
+    if longest <= _NEAR + _FASTEST * apart:
+        x.encoder_steady += 1
+    else:
+        x.encoder_steady, x.encoder_leapt = 0, x.encoder_leapt + apart
+        for i in range(x.joint_count):
+            x.encoder_leap[i] += angles[i] - x.encoders[i]
+    for i in range(x.joint_count):
+        x.encoders[i] = angles[i]
 
 
 @compilable
-def _is_far(x: Any, angles: JointVector) -> bool:
+def _take_off_zero(x: Any, angles: Floats) -> None:
+    """The newest reading against the zero that is believed. Writes angles."""
+    for i in range(x.joint_count):
+        angles[i] = x.encoders[i] - x.encoder_zero[i]
+
+
+@compilable
+def _is_far(x: Any, angles: Floats) -> bool:
     """Whether a reading is farther from what is expected than the filter may be wrong."""
     sigma, stray = min(math.sqrt(x.joint_variance[0, 0]), _MAX_SIGMA), 0.0
-    for i in range(2):
+    for i in range(x.joint_count):
         stray = max(stray, abs(angles[i] - x.joints[i, 0]))
     return stray > _FAR + _SIGMAS * sigma
 
@@ -140,14 +157,19 @@ def _move_zero(x: Any) -> None:
 
     What garbage has leapt adds up to how the joint has moved meanwhile.
     """
-    for i in range(2):
+    for i in range(x.joint_count):
         if abs(x.encoder_leap[i]) > _NEAR + _FASTEST * x.encoder_leapt:
             x.encoder_zero[i] += x.encoder_leap[i]
 
 
 @compilable
-def begin(x: Any, law: Any, time: float, angles: JointVector) -> None:
-    """Start at ``time`` [s] from an arm at ``angles`` [rad] that hardly moves."""
+def begin(
+    x: Any, law: Any, time: float, angles: JointVector | Floats, at_rest: bool = True
+) -> None:
+    """Start at ``time`` [s] from an arm at ``angles`` (j,) [rad].
+
+    It hardly moves if it is ``at_rest``; else its rates are kept.
+    """
     x.joint_time = time
     while x.pushed < x.pushes_end and x.pushes[x.pushed % PUSHES, 0] <= time:
         x.pushed += 1
@@ -158,22 +180,23 @@ def begin(x: Any, law: Any, time: float, angles: JointVector) -> None:
     C[0, 0] = law.encoder_noise * law.encoder_noise
     C[1, 1] = _RATE_AT_START * _RATE_AT_START
     C[2, 2] = _DISTURBANCE_AT_START * _DISTURBANCE_AT_START
-    for i in range(2):
-        x.joints[i, 0], x.joints[i, 1], x.joints[i, 2] = angles[i], 0.0, 0.0
+    for i in range(x.joint_count):
+        x.joints[i, 0], x.joints[i, 2] = angles[i], 0.0
+        if at_rest:
+            x.joints[i, 1] = 0.0
 
 
 @compilable
-def present_joints(x: Any, now: float) -> tuple[JointVector, JointVector]:
-    """Angles [rad] and rates [rad/s] of the joints at ``now`` [s]."""
-    a = JointState(x.joints[0, 0], x.joints[0, 1], x.joints[0, 2])
-    b = JointState(x.joints[1, 0], x.joints[1, 1], x.joints[1, 2])
-    t = x.joint_time
-    for k in range(x.pushed, x.pushes_end):
-        row = x.pushes[k % PUSHES]
-        dt = row[0] - t
-        if dt > 0.0:
-            a, b, t = predicted(a, row[1], dt), predicted(b, row[2], dt), row[0]
-    return (a.angle, b.angle), (a.rate, b.rate)
+def present_joints(x: Any, now: float, angles: Floats, rates: Floats) -> None:
+    """Write ``angles`` (j,) [rad] and ``rates`` (j,) [rad/s] of the joints at ``now`` [s]."""
+    for i in range(x.joint_count):
+        joint, t = JointState(x.joints[i, 0], x.joints[i, 1], x.joints[i, 2]), x.joint_time
+        for k in range(x.pushed, x.pushes_end):
+            row = x.pushes[k % PUSHES]
+            dt = row[0] - t
+            if dt > 0.0:
+                joint, t = predicted(joint, row[1 + i], dt), row[0]
+        angles[i], rates[i] = joint.angle, joint.rate
 
 
 @compilable
@@ -181,20 +204,19 @@ def _advance(x: Any, law: Any, until: float) -> None:
     """Move the joints' state on, not beyond the last push."""
     while x.pushed < x.pushes_end:
         row = x.pushes[x.pushed % PUSHES]
-        _move(x, law, row[1], row[2], min(row[0], until) - x.joint_time)
+        _move(x, law, row, min(row[0], until) - x.joint_time)
         if row[0] > until:
             return
         x.pushed += 1
 
 
 @compilable
-def _move(x: Any, law: Any, u1: float, u2: float, dt: float) -> None:
+def _move(x: Any, law: Any, push: Floats, dt: float) -> None:
     if not dt > 0.0:
         return
-    for i in range(2):
-        u = u1 if i == 0 else u2
+    for i in range(x.joint_count):
         joint = JointState(x.joints[i, 0], x.joints[i, 1], x.joints[i, 2])
-        after = predicted(joint, u, dt)
+        after = predicted(joint, push[1 + i], dt)
         x.joints[i, 0], x.joints[i, 1] = after.angle, after.rate
     x.joint_time += dt
     C, h, q = x.joint_variance, 0.5 * dt * dt, law.joint_disturbance_walk
@@ -218,13 +240,13 @@ def _move(x: Any, law: Any, u1: float, u2: float, dt: float) -> None:
 
 
 @compilable
-def _correct(x: Any, law: Any, angles: JointVector) -> None:
+def _correct(x: Any, law: Any, angles: Floats) -> None:
     C = x.joint_variance
     total = C[0, 0] + max(x.encoder_scale, 1.0) * law.encoder_noise * law.encoder_noise
     most = _SIGMAS * math.sqrt(total)  # of a reading that is just believed, and may be garbage
     g0, g1, g2 = C[0, 0] / total, C[1, 0] / total, C[2, 0] / total
     squared = 0.0
-    for i in range(2):
+    for i in range(x.joint_count):
         surprise = angles[i] - x.joints[i, 0]
         more = surprise - x.encoder_surprise[i]
         squared, x.encoder_surprise[i] = max(squared, more * more / total), surprise

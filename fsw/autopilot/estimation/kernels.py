@@ -45,7 +45,8 @@ from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate
 from fsw.compiled import compilable, kernel, machine_code
-from fsw.record import Four, Record, Three, Two
+from fsw.record import JOINTS as JOINT_CAPACITY
+from fsw.record import Four, PerJoint, Record, Three, padded
 
 # What ``tick`` does, in this order.
 PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
@@ -58,9 +59,10 @@ class Asked(Record):
 
     t_us: int  # now
     dt: float  # s, length of the tick
-    u: Two  # rad/s^2, what torques made of the joints
+    u: PerJoint  # rad/s^2, what torques made of the joints
     model: Four  # SI, FRD: what rotors make of the vehicle, see ``imu.add_imu``
-    encoders: Three  # rad, rad, s: two angles and their age
+    encoders: PerJoint  # rad
+    encoders_age: float  # s
     time: float  # s, of a reading of the IMU
     force: Three  # m/s^2, FRD
     rate: Three  # rad/s, FRD
@@ -73,19 +75,19 @@ class Asked(Record):
 
         Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle.
         """
-        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *u, *model)
+        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *padded(u, JOINT_CAPACITY), *model)
 
     def read_joints(self, angles: JointVector, age: float) -> None:
         """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
-        _ENCODERS.pack_into(self.memory, _ENCODERS_AT, *angles, age)
+        _ENCODERS.pack_into(self.memory, _ENCODERS_AT, *padded(angles, JOINT_CAPACITY), age)
 
     def read(self, time: float, force: Vec3, rate: Vec3) -> None:
         """What the IMU says: ``time`` [s], ``force`` [m/s^2, FRD] and ``rate`` [rad/s, FRD]."""
         _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
 
 
-_TICK = struct.Struct("<q7d")
-_ENCODERS = struct.Struct("<3d")
+_TICK = struct.Struct(f"<q{5 + JOINT_CAPACITY}d")
+_ENCODERS = struct.Struct(f"<{JOINT_CAPACITY + 1}d")
 _ENCODERS_AT = Asked.place("encoders")
 _READING = struct.Struct("<7d")
 _READING_AT = Asked.place("time")
@@ -110,11 +112,10 @@ def tick(
     x, t, a = filters[0], law[0].tuning, requests[0]
     model = a.model[0], a.model[1], a.model[2], a.model[3]
     if parts & PUSH:
-        joint_filter.push(x, t, now, a.dt, (a.u[0], a.u[1]))
+        joint_filter.push(x, t, now, a.dt, a.u)
     a.of_imu, a.of_encoders = 0, 0
     if parts & JOINTS:
-        angles = (a.encoders[0], a.encoders[1])
-        a.of_encoders = joint_filter.read(x, t, now, angles, a.encoders[2])
+        a.of_encoders = joint_filter.read(x, t, now, a.encoders, a.encoders_age)
     if parts & READING:
         f, w = (a.force[0], a.force[1], a.force[2]), (a.rate[0], a.rate[1], a.rate[2])
         a.of_imu = imu.add_imu(x, t, now, a.time, f, w, model)
@@ -135,16 +136,16 @@ def tick(
 def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
     """Write the present; whether it has numbers and variances, and its rotation."""
     p, v, q, rate, force = present(x, now)
-    angles, rates = joint_filter.present_joints(x, now)
+    joint_filter.present_joints(x, now, known.q_arm, known.qd_arm)
     R = matrix_from_quaternion(q)
     total = p[0] + p[1] + p[2] + v[0] + v[1] + v[2] + R[0] + rate[0] + rate[1] + rate[2] + force[2]
-    finite = math.isfinite(total + angles[0] + angles[1] + rates[0] + rates[1])
+    for i in range(x.joint_count):
+        total += known.q_arm[i] + known.qd_arm[i]
+    finite = math.isfinite(total)
     for i in range(3):
         known.p_WB[i], known.v_WB[i], known.w_WB_B[i] = p[i], v[i], rate[i]
     for i in range(9):
         known.R_WB[i] = R[i]
-    for i in range(2):
-        known.q_arm[i], known.qd_arm[i] = angles[i], rates[i]
     known.yaw, known.specific_force = yaw_of(R), -force[2]
     return finite and varies(x), R
 
@@ -152,7 +153,10 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
 @machine_code
 @kernel
 def set_joints(x: Filter, law: Law, time: float, angles: JointVector) -> None:
-    """Start from an arm that stands still at ``angles`` [rad] at a ``time`` [s]."""
+    """Start from an arm that stands still at a ``time`` [s].
+
+    Its ``angles`` [rad] are as many as a record has room for.
+    """
     joint_filter.begin(x[0], law[0].tuning, time, angles)
 
 

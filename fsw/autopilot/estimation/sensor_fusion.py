@@ -79,6 +79,8 @@ from fsw.autopilot.measurements import (
 from fsw.autopilot.signals import JointVector, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import estimate_in
 from fsw.compiled import machine_code, packed
+from fsw.record import JOINTS as JOINT_CAPACITY
+from fsw.record import padded
 
 _FARTHEST_BEHIND: Final = 0.1  # s, that the filter stays behind while there is nothing to fuse
 LATE: Final = 0.01  # s behind the filter, where a measurement is still fused as it stands
@@ -106,26 +108,27 @@ _OF_EVERY_TICK: Final = (ImuSample, JointSample)
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
 
-    def __init__(self, tuning: EstimatorTuning) -> None:
-        self.tuning = tuning
+    def __init__(self, tuning: EstimatorTuning, joints: int) -> None:
+        """Estimate a vehicle of so many ``joints`` [1]."""
+        self.tuning, self._joints = tuning, joints
         self.law = packed(EstimatorLaw(tuning, tuning.gates))
         self._stated = MeasurementNoise(tuning)
         self._confirmation = Confirmation(tuning, self._stated)
         self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
         self._update = MeasurementUpdate(tuning, self.law, self._stated)
         self._arbitration = Arbitration(tuning, self._stated, self._update, self._again)
-        self._asked, x = Asked(), at_start().numbers  # written anew in each call
+        self._asked, x = Asked(), at_start(joints).numbers  # written anew in each call
         self._requests = self._asked.array
         self._tick = machine_code(kernels.tick, x, self.law, self._requests, 0, 0.0, 0.0)
 
     def warm_up(self) -> StateEstimate:
         """Compile every kernel: stand for a while with every sensor, then take jumps."""
-        memory, estimate, t = at_start(), None, 0.0
+        memory, estimate, t = at_start(self._joints), None, 0.0
         for k in range(60):
             t = 1.0 + 0.01 * k
-            memory, estimate = self.step(memory, _at_rest(t), t)
+            memory, estimate = self.step(memory, _at_rest(t, self._joints), t)
         assert estimate is not None
-        for sample in _at_rest(t):
+        for sample in _at_rest(t, self._joints):
             if isinstance(sample, PoseSample | GnssSample | PressureSample):
                 self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
         fusion.doubt(memory.numbers, 0.0, 0.0, True)
@@ -138,7 +141,7 @@ class SensorFusion:
         memory: FusionMemory,
         samples: Sequence[Sample],
         now: float,
-        joint_acceleration: JointVector = (0.0, 0.0),
+        joint_acceleration: JointVector = (),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -154,7 +157,7 @@ class SensorFusion:
         memory: FusionMemory,
         samples: Sequence[Sample],
         now: float,
-        joint_acceleration: JointVector = (0.0, 0.0),
+        joint_acceleration: JointVector = (),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
@@ -195,7 +198,7 @@ class SensorFusion:
             trail=trail,
         )
         if found & FINITE:
-            return memory, estimate_in(asked, PRESENT_AT, 2)
+            return memory, estimate_in(asked, PRESENT_AT, self._joints)
         return (_anew(memory) if ready else memory), None
 
     def _take_each(
@@ -226,7 +229,8 @@ class SensorFusion:
                 if joints_came < 0.0 or parts & JOINTS:
                     memory, parts = self._done(memory, x, parts, now), 0
                 if joints_came < 0.0:
-                    kernels.set_joints(x, self.law, sample.time, sample.angles)
+                    angles = padded(sample.angles, JOINT_CAPACITY)
+                    kernels.set_joints(x, self.law, sample.time, angles)
                 else:
                     asked.read_joints(sample.angles, now - sample.time)
                     parts |= JOINTS
@@ -279,7 +283,7 @@ class SensorFusion:
             return memory, estimate
         x = copied(memory.numbers)
         memory = memory._replace(numbers=x)
-        self._asked.begin(now, 0.0, (0.0, 0.0), UNKNOWN)
+        self._asked.begin(now, 0.0, (), UNKNOWN)
         if not memory.started:
             memory = self._start(memory)
         if not (memory.started and memory.joints_came >= 0.0):
@@ -289,7 +293,7 @@ class SensorFusion:
             self._tick(x, self.law, self._requests, ADVANCE, now, memory.waiting[0].time)
             memory = self._fuse_first(memory, now)
         if self._tick(x, self.law, self._requests, ADVANCE | END, now, until) & FINITE:
-            return memory, estimate_in(self._asked, PRESENT_AT, 2)
+            return memory, estimate_in(self._asked, PRESENT_AT, self._joints)
         return _anew(memory), None
 
     def _done(self, memory: FusionMemory, x: Filter, parts: int, now: float) -> FusionMemory:
@@ -493,7 +497,7 @@ def _rests(memory: FusionMemory, now: float) -> bool:
 def _anew(memory: FusionMemory) -> FusionMemory:
     """The memory with a filter that starts from the next samples, because it is no number."""
     return memory._replace(
-        numbers=at_start().numbers,
+        numbers=at_start(int(memory.numbers[0]["joint_count"])).numbers,
         joints_came=-1.0,
         imu_came=-1.0,
         started=False,
@@ -575,13 +579,13 @@ def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
     return (px, py, pz), (vx, vy, vz), multiply(attitude(after), conjugate(attitude(before)))
 
 
-def _at_rest(t: float) -> tuple[Sample, ...]:
-    """A reading of every sensor, of a vehicle that stands."""
+def _at_rest(t: float, joints: int) -> tuple[Sample, ...]:
+    """A reading of every sensor, of a vehicle of so many ``joints`` that stands."""
     none, fine, small = (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-4), 1e-3 * t
     return (
         ImuSample(t - 1e-3, (0.0, 0.0, -9.81), none),
         ImuSample(t, (0.0, 0.0, -9.81 + small), none),
-        JointSample(t, (0.0, 0.0)),
+        JointSample(t, (0.0,) * joints),
         PoseSample(t, (small, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), fine, fine),
         GnssSample(t, (0.0, small, 0.0), none, fine, fine),
         PressureSample(t, 0.0, 1.0),

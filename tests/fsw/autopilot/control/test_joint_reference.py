@@ -14,35 +14,39 @@ from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.joint_reference import (
     APPROACH,
     JointReferenceLimits,
-    bounds,
     braking_rate,
-    joint_reference,
-    within_limits,
 )
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
 from fsw.autopilot.mpc.qp_data import InputLimits
-from fsw.autopilot.signals import StateEstimate, Vec2
-from tests.fsw.records import placed, torques_for
+from fsw.autopilot.signals import JointVector, StateEstimate
+from tests.fsw.records import joint_reference, placed, torques_for
 
 LIMITS = JointReferenceLimits()
+ARM = arm_coordinates(AIRFRAME)
 DT = 0.002
-REST: Vec2 = (0.0, 0.0)
+REST: JointVector = (0.0, 0.0)
 ANGLES = st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0))
 RATES = st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
 # Where a wish is, how it moves, and for how many ticks it does.
 WISHES = st.lists(st.tuples(ANGLES, st.just(REST) | RATES, st.integers(1, 120)), max_size=6)
 ROUNDING = 1e-9
 
-Reference = tuple[Vec2, Vec2]
+Reference = tuple[JointVector, JointVector]
 
 
-def links(joints: Vec2) -> Vec2:
+def bounds(limits: JointReferenceLimits) -> tuple[float, float]:
+    """The largest angle of either link [rad] that a reference may have."""
+    return ARM.high[0] - limits.margin, ARM.high[1] - limits.margin
+
+
+def links(joints: JointVector) -> JointVector:
     return joints[0], joints[0] + joints[1]
 
 
 def assert_within(last: Reference, now: Reference, limits: JointReferenceLimits, dt: float) -> None:
     """``now`` keeps every limit, and its rates are how it came there from ``last``."""
-    (q, qd), first_and_both = now, bounds(AIRFRAME, limits)
+    (q, qd), first_and_both = now, bounds(limits)
     for angle, rate, before, bound in zip(
         links(q), links(qd), links(last[1]), first_and_both, strict=True
     ):
@@ -61,14 +65,14 @@ def assert_within(last: Reference, now: Reference, limits: JointReferenceLimits,
 @given(ANGLES, WISHES, st.floats(20.0, 200.0), st.floats(0.5, 5.0), st.sampled_from((1, 1, 1, 5)))
 @settings(max_examples=60)
 def test_no_wish_leads_out_of_the_limits_in_angle_rate_or_acceleration(
-    start: Vec2,
-    wishes: list[tuple[Vec2, Vec2, int]],
+    start: JointVector,
+    wishes: list[tuple[JointVector, JointVector, int]],
     acceleration: float,
     rate: float,
     ticks: int,
 ) -> None:
     limits = replace(LIMITS, acceleration=acceleration, rate=rate)
-    now = (within_limits(AIRFRAME, limits, start), REST)
+    now = (within_limits(ARM, start, limits.margin), REST)
     for q, qd, times in wishes:
         for k in range(times):
             moved = (q[0] + k * DT * qd[0], q[1] + k * DT * qd[1])
@@ -116,7 +120,7 @@ def test_a_far_wish_is_reached_on_a_nearly_straight_way_and_at_the_most_allowed_
 
 
 def test_at_rest_at_its_wish_it_stays_there() -> None:
-    here: Vec2 = (0.3, -0.4)
+    here: JointVector = (0.3, -0.4)
     assert joint_reference(AIRFRAME, LIMITS, (here, REST), (here, REST), DT) == (here, REST)
 
 
@@ -127,14 +131,14 @@ def test_outside_of_the_bounds_it_comes_back_without_a_jump() -> None:
         last, now = now, joint_reference(AIRFRAME, LIMITS, now, ((2.0, 0.0), REST), DT)
         assert max(map(abs, np.subtract(now[0], last[0]))) <= LIMITS.rate * DT
         assert abs(now[1][0] - last[1][0]) <= LIMITS.acceleration * DT + ROUNDING
-    assert now[0] == pytest.approx(within_limits(AIRFRAME, LIMITS, (2.0, 0.0)), abs=1e-3)
+    assert now[0] == pytest.approx(within_limits(ARM, (2.0, 0.0), LIMITS.margin), abs=1e-3)
 
 
 def test_a_wider_margin_keeps_farther_off() -> None:
     wide = replace(LIMITS, margin=0.2)
-    q = within_limits(AIRFRAME, wide, (2.0, 2.0))
-    assert q[0] == pytest.approx(AIRFRAME.joint1_limit - 0.2)
-    assert sum(q) == pytest.approx(AIRFRAME.joint12_limit - 0.2)
+    q = within_limits(ARM, (2.0, 2.0), wide.margin)
+    assert q[0] == pytest.approx(ARM.high[0] - 0.2)
+    assert sum(q) == pytest.approx(ARM.high[1] - 0.2)
 
 
 @pytest.mark.parametrize("distance", [-0.3, -0.004, 0.0, 0.001, 0.0649, 0.0651, 0.5, 3.0])
@@ -168,7 +172,7 @@ def test_near_a_bound_the_joint_loop_is_pulled_to_no_place_beyond_it() -> None:
     """Angle and rate together are one set point of a loop that does not overshoot."""
     gains = LoopGains().joint
     assert gains.kd / gains.kp == pytest.approx(APPROACH)
-    bound, dt = bounds(AIRFRAME, LIMITS)[0], DT
+    bound, dt = bounds(LIMITS)[0], DT
     now, q, qd, most = ((-0.9, 0.0), REST), -0.9, 0.0, 0.0
     for _ in range(1000):
         now = joint_reference(AIRFRAME, LIMITS, now, ((2.0, -2.0), (9.0, -9.0)), dt)
@@ -188,7 +192,7 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
     rate = FOLLOWING * LIMITS.rate + 2.0 / (math.e * pole) * planned.joint_acc
     assert rate < AIRFRAME.joint_rate_max[0]
     field = GRAVITY + planned.vertical
-    first, both = bounds(AIRFRAME, LIMITS)
+    first, both = bounds(LIMITS)
     inertia = AIRFRAME.bodies.base_inertia[1]
     turning = 2.0 * AIRFRAME.rotor_arm * 0.5 * AIRFRAME.rotor_thrust_max / inertia
     link1 = FOLLOWING * LIMITS.acceleration + ADDED * planned.joint_acc

@@ -21,13 +21,15 @@ from fsw.autopilot.control.joints import (
 )
 from fsw.autopilot.control.pid import PidGains
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Joints, Tick
+from fsw.autopilot.tick_record import ArmTask, Joints, Tick
 from fsw.record import JOINTS
 from tests.fsw.random_states import estimate_of
-from tests.fsw.records import changed, placed
+from tests.fsw.records import boundless, changed, placed
 
+ARM = arm_coordinates(AIRFRAME)
 GAINS = LoopGains().joint
 WITH_INTEGRAL = replace(GAINS, ki=400.0)
 FIELD = (0.0, 9.81)
@@ -74,7 +76,7 @@ def hold(q: Vec2, q_ref: Vec2, thrust: float = 9.81, pitch: float = 0.0) -> tupl
 
 def asked(r: Tick, airframe: Airframe, gains: PidGains, field: Vec3, pitch: float = 0.0) -> Vec2:
     """Torques of the joints in a field, the base having an angular acceleration in pitch."""
-    joint_torques(r, airframe, gains, field, (0.0, pitch, 0.0), DT)
+    joint_torques(r, airframe, arm_coordinates(airframe), gains, field, (0.0, pitch, 0.0), DT)
     return pair(r.wanted.joint_torque)
 
 
@@ -126,7 +128,7 @@ def followed(
     for tick in range(round(seconds / DT)):
         estimate = estimate_of(Rotation.identity(), q_arm=pair(q), qd_arm=pair(qd))
         r = placed(AIRFRAME, estimate)
-        observe_disturbance(k, r.bodies, AIRFRAME.bodies, torque, DOWN, DT)
+        observe_disturbance(k, r.bodies, AIRFRAME, torque, DOWN, DT)
         k.reference[:2], k.reference_rate[:2] = references(tick * DT)
         r.joints = k
         torque = asked(r, AIRFRAME, GAINS, DOWN)
@@ -192,14 +194,14 @@ def test_far_from_limits_accelerations_are_as_wanted_and_near_them_point_back() 
 
 def limited(q: Vec2, qd: Vec2, qdd: Vec2) -> list[float]:
     found = np.array(qdd)
-    limit_acceleration(AIRFRAME, q, qd, found)
+    limit_acceleration(AIRFRAME, ARM, ArmTask(), np.array(q), np.array(qd), found)
     return [float(value) for value in found]
 
 
 def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() -> None:
     """Computed torque, seen through Pinocchio's forward dynamics of an arm of two unlike links."""
     unlike = replace(
-        AIRFRAME,
+        boundless(AIRFRAME, 1e3),
         bodies=replace(
             AIRFRAME.bodies,
             mass=(0.3, 0.15, *(0.0,) * 4),
@@ -207,8 +209,6 @@ def test_the_errors_of_both_joints_obey_their_own_pid_whatever_the_arm_does() ->
         ),
         joint_torque_max=(1e3,) * JOINTS,
         joint_rate_max=(1e3,) * JOINTS,
-        joint1_limit=1e3,
-        joint12_limit=1e3,
     )
     model, random = planar_arm(unlike), np.random.default_rng(7)
     data, far = model.createData(), replace(WITH_INTEGRAL, limit=1e9)
@@ -237,11 +237,9 @@ def test_motors_behind_gears_are_moved_along_and_known_to_the_momentum() -> None
     """With what each motor adds, I times how its joint turns, the same PID errors come out."""
     inertia = 0.0025
     alone = replace(
-        AIRFRAME,
+        boundless(AIRFRAME, 1e3),
         joint_torque_max=(1e3,) * JOINTS,
         joint_rate_max=(1e3,) * JOINTS,
-        joint1_limit=1e3,
-        joint12_limit=1e3,
     )
     motors = replace(alone, joint_armature=inertia)
     model, random = planar_arm(motors), np.random.default_rng(8)

@@ -95,7 +95,7 @@ def smoothed(flown: Run) -> tuple[float, Array, Array, Array, Array]:
 def test_the_filter_ends_where_a_batch_smoother_ends(seed: int) -> None:
     flown = run(replace(VIO, pose=SENSOR), seed, DURATION)
     time, p, v, R, sigma = smoothed(flown)
-    fusion, memory = SensorFusion(flown.suite.tuning), at_start()
+    fusion, memory = SensorFusion(flown.suite.tuning, 2), at_start(2)
     estimate = None
     # The filter's own time is that of the newest pose, once that has come.
     for now, samples in flown:

@@ -105,7 +105,7 @@ def test_other_measurements_carry_the_offsets_share_of_the_error() -> None:
 def heading_sigma(suite_offset: float) -> float:
     """Deviation of the heading [rad] after 6 s with satellites and a magnetometer."""
     tuning = replace(RTK.tuning, mag_offset=suite_offset)
-    fusion_, memory = SensorFusion(tuning), at_start()
+    fusion_, memory = SensorFusion(tuning, 2), at_start(2)
     flown, now = run(replace(RTK, tuning=tuning), 4, 6.0), 0.0
     for now, samples in flown:
         memory, _ = fusion_.step(memory, samples, now)
@@ -125,7 +125,7 @@ def test_a_heading_that_is_off_for_good_is_off_by_what_is_told() -> None:
     shift = np.array([0.0, 0.0099, 0.0])
     chi = []
     for seed in range(6):
-        fusion_, memory, now = SensorFusion(tuning), at_start(), 0.0
+        fusion_, memory, now = SensorFusion(tuning, 2), at_start(2), 0.0
         flown = run(replace(RTK, tuning=replace(tuning, mag_offset=0.0)), 40 + seed, 3.0)
         estimate = None
         for now, samples in flown:
@@ -154,7 +154,7 @@ def _shifted(sample: Sample, by: Array) -> Sample:
 @pytest.mark.parametrize("seed", range(4))
 def test_garbage_that_is_within_the_gate_now_and_then_turns_nothing(seed: int) -> None:
     """A magnetometer is believed again where it has not been refused for half a second."""
-    random, fusion_, memory = np.random.default_rng(seed), SensorFusion(RTK.tuning), at_start()
+    random, fusion_, memory = np.random.default_rng(seed), SensorFusion(RTK.tuning, 2), at_start(2)
     begins, ends, last = START + 1.0, START + 4.0, START + 4.7
     fused: list[float] = []
     for now, samples in run(RTK, seed, last - START):

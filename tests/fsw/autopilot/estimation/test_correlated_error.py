@@ -27,7 +27,7 @@ TURN = (0.01**2, 0.02**2, 0.03**2)
 
 def memory(*, drifts: bool = False) -> FusionMemory:
     pose = PoseSample(1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), FINE, TURN, 0, drifts)
-    return at_start()._replace(pose=pose)
+    return at_start(2)._replace(pose=pose)
 
 
 def deviations(found: Vec6) -> list[float]:
@@ -64,7 +64,7 @@ def test_the_position_that_was_used_last_counts(
 
 def test_without_a_pose_satellites_count_and_without_both_nothing() -> None:
     fix = GnssSample(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1e-5, 1e-5, 0.05**2), FINE)
-    found = correlated_error(at_start()._replace(gnss=fix), TUNING)
+    found = correlated_error(at_start(2)._replace(gnss=fix), TUNING)
     least = TUNING.gnss_position_floor
     assert deviations(found) == pytest.approx([least, least, 0.05, 0.0, 0.0, 0.0])
-    assert not any(correlated_error(at_start(), TUNING))
+    assert not any(correlated_error(at_start(2), TUNING))

@@ -15,13 +15,25 @@ from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.joint_filter import begin, present_joints, push, read
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.signals import Vec2
-from fsw.compiled import packed
 
 TUNING = EstimatorTuning()
-LAW = packed(TUNING).view(np.recarray)[0]
+LAW = TUNING
 TICK = 0.002
 STEP = 1.534e-3  # rad, of an encoder
 Spoil = Callable[[float, Vec2], Vec2 | None]
+
+
+def empty_filter(joints: int = 2) -> Any:
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    x.joint_count = joints
+    return x
+
+
+def present(x: Any, now: float) -> tuple[list[float], list[float]]:
+    """Angles and rates of the joints."""
+    angles, rates = np.zeros(x.joint_count), np.zeros(x.joint_count)
+    present_joints(x, now, angles, rates)
+    return angles.tolist(), rates.tolist()
 
 
 def angle(t: float) -> float:
@@ -41,21 +53,21 @@ class Arm:
     """Two joints that swing, one against the other."""
 
     def __init__(self, age: float = 0.0, every: int = 1, spoil: Spoil = lambda _, a: a) -> None:
-        self.x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+        self.x = empty_filter()
         begin(self.x, LAW, 0.0, (0.0, 0.0))
         self.faults: set[SensorFault] = set()
         self.error, self.off = 0.0, 0.0
         for k in range(1, 1000):
             now = TICK * k
             u = believed(now - 0.5 * TICK)
-            push(self.x, LAW, now, TICK, (u, -u))
+            push(self.x, LAW, now, TICK, np.array((u, -u)))
             seen = round(angle(now - age) / STEP) * STEP
             said = spoil(now, (seen, -seen))
             if now > age and k % every == 0 and said is not None:
-                fault = SensorFault(read(self.x, LAW, now, said, age))
+                fault = SensorFault(read(self.x, LAW, now, np.array(said), age))
                 if fault:
                     self.faults.add(fault)
-            (q1, q2), (w1, w2) = present_joints(self.x, now)
+            (q1, q2), (w1, w2) = present(self.x, now)
             if now > 1.0:
                 self.error = max(self.error, abs(q1 - angle(now)), abs(q2 + angle(now)))
                 self.off = max(self.off, abs(w1 - rate(now)), abs(w2 + rate(now)))
@@ -118,7 +130,7 @@ def test_a_zero_that_has_moved_is_named_and_the_joint_is_followed_on(
     arm = Arm(spoil=spoil)
     assert arm.faults == {SensorFault.JUMP}
     assert arm.error < 0.03
-    np.testing.assert_allclose(arm.x.encoder_zero, by if until > 2.0 else (0.0, 0.0), atol=0.02)
+    np.testing.assert_allclose(arm.x.encoder_zero[:2], by if until > 2.0 else (0.0, 0.0), atol=0.02)
 
 
 @pytest.mark.parametrize("sigma", [0.05, 0.1, 0.3, 1.3])
@@ -142,15 +154,15 @@ def test_after_garbage_the_zero_is_where_it_was() -> None:
         return (a, b) if 1.3 < now < 1.6 else said
 
     arm = Arm(spoil=spoil)
-    assert tuple(arm.x.encoder_zero) == (0.0, 0.0)
-    (q1, q2), _ = present_joints(arm.x, TICK * 999)
+    assert not np.any(arm.x.encoder_zero)
+    (q1, q2), _ = present(arm.x, TICK * 999)
     assert abs(q1 - angle(TICK * 999)) + abs(q2 + angle(TICK * 999)) < 0.01
 
 
 def test_a_reading_again_and_one_older_than_the_state_are_named() -> None:
     arm = Arm()
     now = TICK * 1000
-    assert SensorFault(read(arm.x, LAW, now, (0.0, 0.0), TICK)) is SensorFault.REPEATED
+    assert SensorFault(read(arm.x, LAW, now, np.zeros(2), TICK)) is SensorFault.REPEATED
     assert all(np.isfinite(np.ravel(arm.x.joints)))
 
 
@@ -158,17 +170,17 @@ def test_a_reading_again_and_one_older_than_the_state_are_named() -> None:
 @pytest.mark.parametrize("falls", [150.0, 400.0])
 def test_a_joint_that_falls_as_no_torque_makes_it_is_followed_and_is_no_jump(falls: float) -> None:
     """Encoders were blamed for a limp joint, and joints are not judged without encoders."""
-    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    x = empty_filter()
     begin(x, LAW, 0.0, (0.0, 0.0))
     q, w, worst = 0.0, 0.0, 0.0
     for k in range(1, 650):
         now = TICK * k
         a = falls if now > 1.0 and w < 8.0 else 0.0
         q, w = q + TICK * (w + 0.5 * TICK * a), w + TICK * a
-        push(x, LAW, now, TICK, (0.0, 0.0))
+        push(x, LAW, now, TICK, np.zeros(2))
         seen = round(q / STEP) * STEP
-        assert read(x, LAW, now, (seen, -0.5 * seen), 0.0) == SensorFault.NONE
-        (first, _), _ = present_joints(x, now)
+        assert read(x, LAW, now, np.array((seen, -0.5 * seen)), 0.0) == SensorFault.NONE
+        (first, _), _ = present(x, now)
         worst = max(worst, abs(first - q))
     assert worst < 0.12
 
@@ -188,3 +200,18 @@ def test_noise_of_an_encoder_is_no_motion_and_it_is_known_how_large_it_is(sigma:
     scale = float(arm.x.encoder_scale)
     assert 0.2 * sigma < math.sqrt(scale) * TUNING.encoder_noise < 3.0 * sigma
     assert Arm().x.encoder_scale == 1.0
+
+
+@pytest.mark.parametrize("joints", [1, 4, 6])
+def test_each_of_any_number_of_joints_is_followed(joints: int) -> None:
+    x, worst = empty_filter(joints), 0.0
+    begin(x, LAW, 0.0, (0.0,) * joints)
+    share = np.linspace(-1.0, 0.5, joints)
+    for k in range(1, 1000):
+        now = TICK * k
+        push(x, LAW, now, TICK, believed(now - 0.5 * TICK) * share)
+        assert read(x, LAW, now, angle(now) * share, 0.0) == SensorFault.NONE
+        if now > 1.0:
+            worst = max(worst, float(np.abs(present(x, now)[0] - angle(now) * share).max()))
+    assert worst < 2e-3
+    assert not np.any(x.joints[joints:])

@@ -62,9 +62,9 @@ class Flown:
     """A run through the estimator; ``change`` alters or removes (None) samples."""
 
     def __init__(self, flown: Run, change: Change | None = None) -> None:
-        self.fusion = SensorFusion(flown.suite.tuning)
+        self.fusion = SensorFusion(flown.suite.tuning, 2)
         self.run = flown
-        self.memory: FusionMemory = at_start()
+        self.memory: FusionMemory = at_start(2)
         self.found: set[tuple[Sensor, SensorFault]] = set()
         self.worst = 0.0  # of the position's error against its standard deviation, on one axis
         self.estimate: StateEstimate | None = None
@@ -145,7 +145,7 @@ def test_a_few_runs_are_as_sure_as_they_may_be(suite: Suite) -> None:
 def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
     """Sum of the chi-square of all innovations after the first second, and their dimension."""
     flown = run(suite, seed, duration)
-    fusion, memory = SensorFusion(suite.tuning), at_start()
+    fusion, memory = SensorFusion(suite.tuning, 2), at_start(2)
     total, dimension = 0.0, 0
     size = {Sensor.POSE: 3, Sensor.GNSS: 3, Sensor.BAROMETER: 1, Sensor.MAGNETOMETER: 1}
     gate = {n: chi_square(5.0, n) for n in (1, 3)}
@@ -203,7 +203,7 @@ def test_a_filter_that_starts_from_poses_older_than_its_imu_makes_up_no_velocity
     def reading(time: float, shake: float) -> ImuSample:
         return ImuSample(time, (0.0, shake, -9.81), (0.0, 0.0, 0.0))
 
-    fusion, memory = SensorFusion(MOCAP.tuning), at_start()
+    fusion, memory = SensorFusion(MOCAP.tuning, 2), at_start(2)
     level, place, noise = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0), ((1e-6,) * 3, (1e-5,) * 3)
     poses = [
         PoseSample(0.784, (3e-4, 0.0, -1.0), level, *noise),
@@ -231,7 +231,7 @@ def test_a_filter_that_starts_from_poses_older_than_its_imu_makes_up_no_velocity
 def test_a_fix_from_before_the_filter_began_is_no_fault(
     measured: float, comes: float, fault: SensorFault
 ) -> None:
-    fusion, memory, still = SensorFusion(MOCAP.tuning), at_start(), (0.0, 0.0, 0.0)
+    fusion, memory, still = SensorFusion(MOCAP.tuning, 2), at_start(2), (0.0, 0.0, 0.0)
     level, place, fine = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0), (1e-4,) * 3
     poses = [PoseSample(0.784 + x, (x, 0.0, -1.0), level, fine, fine) for x in (0.0, 0.008)]
     first = [ImuSample(0.956 + TICK * k, (0.0, 0.0, -9.81 + 1e-4 * k), still) for k in range(21)]
@@ -520,7 +520,7 @@ def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
 @pytest.mark.requirement("REQ-EST-1")
 def test_what_has_been_refused_for_long_is_not_used_for_one_pose_within_a_wide_gate() -> None:
     """At the end of a climb one pose of garbage tilted the estimate by 46 deg; a run is used."""
-    flown, fusion, memory = run(MOCAP, 8, 3.5), SensorFusion(MOCAP.tuning), at_start()
+    flown, fusion, memory = run(MOCAP, 8, 3.5), SensorFusion(MOCAP.tuning, 2), at_start(2)
     jumped, estimate = 0.0, None
     for now, samples in flown:
         since, tried = now - START, 1.8 < now - START < 1.82
@@ -578,7 +578,7 @@ def test_an_axis_that_repeats_itself_is_stuck_while_the_others_go_on(
 
 def test_a_tick_leaves_the_memory_it_was_given_as_it_was() -> None:
     flown = run(MOCAP, 9, 0.3)
-    fusion, memory = SensorFusion(MOCAP.tuning), at_start()
+    fusion, memory = SensorFusion(MOCAP.tuning, 2), at_start(2)
     for now, samples in flown:
         memory, _ = fusion.step(memory, samples, now)
     now, samples = now + TICK, [ImuSample(now + TICK, (0.0, 0.0, -9.0), (0.1, 0.0, 0.0))]
@@ -589,7 +589,7 @@ def test_a_tick_leaves_the_memory_it_was_given_as_it_was() -> None:
 
 def test_without_a_pose_there_is_no_estimate() -> None:
     flown = run(MOCAP, 9, 0.1)
-    fusion, memory = SensorFusion(MOCAP.tuning), at_start()
+    fusion, memory = SensorFusion(MOCAP.tuning, 2), at_start(2)
     for now, samples in flown:
         readings = [one for one in samples if not isinstance(one, PoseSample)]
         memory, estimate = fusion.step(memory, readings, now)
@@ -621,9 +621,9 @@ def test_the_delay_of_the_pose_can_be_set_and_estimated_from_one_tick_to_the_nex
     assert MOCAP.pose is not None
     suite = replace(MOCAP, pose=replace(MOCAP.pose, hidden_delay=0.012))
     flown = run(suite, 0, 4.0)
-    before = SensorFusion(MOCAP.tuning)
+    before = SensorFusion(MOCAP.tuning, 2)
     tuning = replace(MOCAP.tuning, pose_delay=known, pose_delay_sigma=estimated)
-    after, memory, estimate = SensorFusion(tuning), at_start(), None
+    after, memory, estimate = SensorFusion(tuning, 2), at_start(2), None
     for now, samples in flown:
         fusion = before if now < START + 1.0 else after
         memory, estimate = fusion.step(memory, samples, now)
@@ -780,7 +780,7 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
 @pytest.mark.parametrize("lost", [ImuSample, PoseSample])
 def test_a_covariance_stays_one_after_a_sensor_was_lost_and_back_for_long(lost: type) -> None:
     """Rounding makes halves that differ, which grew until a variance was negative."""
-    fusion, memory = SensorFusion(MOCAP.tuning), at_start()
+    fusion, memory = SensorFusion(MOCAP.tuning, 2), at_start(2)
     for now, samples in run(MOCAP, 8, 20.0):
         if 1.0 < now - START < 3.0:
             samples = [one for one in samples if not isinstance(one, lost)]
@@ -799,7 +799,7 @@ def test_a_covariance_stays_one_after_a_sensor_was_lost_and_back_for_long(lost: 
 )
 def test_a_filter_without_numbers_starts_anew(name: str, at: tuple[int, int], value: float) -> None:
     flown = run(MOCAP, 8, 2.0)
-    fusion, memory, estimates = SensorFusion(MOCAP.tuning), at_start(), []
+    fusion, memory, estimates = SensorFusion(MOCAP.tuning, 2), at_start(2), []
     for tick, (now, samples) in enumerate(flown):
         if tick == 700:
             numbers = memory.numbers.copy()

@@ -19,7 +19,7 @@ from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
 from fsw.autopilot.signals import Vec3, Vec4
 
-FUSION = SensorFusion(EstimatorTuning())
+FUSION = SensorFusion(EstimatorTuning(), 2)
 HOVERS: Vec4 = (0.0, 0.0, 0.0, 9.81)  # what rotors make of it
 STANDS: Vec4 = (0.0, 0.0, 0.0, 0.0)  # it does not fly
 TICK = 0.002
@@ -46,7 +46,7 @@ def hovering(
     be ``turned_by`` an angle [rad, FRD] at each time [s] of that second, and ``moved_by`` so much
     [m].
     """
-    memory, random = at_start(), np.random.default_rng(3)
+    memory, random = at_start(2), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
         t, now = TICK * tick, 1.0 + TICK * tick
         wrong = t > WRONG_FROM
@@ -105,7 +105,7 @@ def test_a_bias_is_as_unknown_as_residuals_are_large(turns: float) -> None:
 
     What is known of it from before is kept, and taken up when the trial is over.
     """
-    before, all_memories = at_start(), hovering(turns=turns)
+    before, all_memories = at_start(2), hovering(turns=turns)
     for memory in all_memories:
         if memory.verdict.suspects & Source.GYRO:
             break
@@ -201,7 +201,7 @@ def test_of_a_pose_whose_attitude_is_wrong_the_place_is_used(rate: Vec3) -> None
 
 @pytest.mark.requirement("REQ-EST-13")
 def test_of_a_pose_whose_attitude_repeats_itself_the_place_is_used() -> None:
-    memory, random, said = at_start(), np.random.default_rng(5), LEVEL
+    memory, random, said = at_start(2), np.random.default_rng(5), LEVEL
     for tick in range(round(2.0 / TICK)):
         now = 1.0 + TICK * tick
         a, b, c = (1e-3 * random.standard_normal(3)).tolist()

@@ -1,0 +1,106 @@
+r"""Coordinates of the arm in which the limits of its angles do not depend on each other.
+
+Limits hold for joints and for sums of joints. With one coordinate a joint,
+
+.. math:: c_k = \sum_{i \le k} L_{ki} q_i,
+
+the coupled limit that ends at joint k where there is one and the joint's own angle elsewhere, most
+arms have nothing but bounds on c. Limits that are left over, the ``others``, are few.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+from fsw.autopilot.geometry.vectors import clamp
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.multibody import Several
+from fsw.autopilot.signals import JointVector
+from fsw.compiled import compilable
+from fsw.record import ANGLE_LIMITS, JOINTS, Floats, padded
+
+
+@dataclass(frozen=True, slots=True)
+class ArmCoordinates:
+    """The coordinates of an arm, with room for ``JOINTS`` joints."""
+
+    joints: int
+    row: Several  # (JOINTS,) [1] a coordinate: L
+    low: Several  # (JOINTS,) rad, minus infinity where there is no limit
+    high: Several  # (JOINTS,) rad
+    others: int  # limits beside those
+    other_row: Several  # (JOINTS,) [1] each
+    other_low: Several  # (ANGLE_LIMITS,) rad
+    other_high: Several  # (ANGLE_LIMITS,) rad
+
+
+@lru_cache(maxsize=8)
+def arm_coordinates(airframe: Airframe) -> ArmCoordinates:
+    """The coordinates of a vehicle's arm."""
+    n, limits = airframe.bodies.joints, airframe.angle_limits
+    rows = [limits.row[JOINTS * i : JOINTS * (i + 1)] for i in range(limits.rows)]
+    chosen: dict[int, int] = {}
+    for i, row in enumerate(rows):
+        # Of those that end at the same joint the last: a joint's own limits come first.
+        chosen[max(k for k in range(n) if row[k] != 0.0)] = i
+    own = [tuple(float(i == k) for i in range(JOINTS)) for k in range(n)]
+    left = [i for i in range(limits.rows) if i not in chosen.values()]
+    low = [limits.low[chosen[k]] if k in chosen else -math.inf for k in range(n)]
+    high = [limits.high[chosen[k]] if k in chosen else math.inf for k in range(n)]
+    return ArmCoordinates(
+        joints=n,
+        row=_joined([rows[chosen[k]] if k in chosen else own[k] for k in range(n)], JOINTS),
+        low=padded(tuple(low), JOINTS),
+        high=padded(tuple(high), JOINTS),
+        others=len(left),
+        other_row=_joined([rows[i] for i in left], ANGLE_LIMITS),
+        other_low=padded(tuple([limits.low[i] for i in left]), ANGLE_LIMITS),
+        other_high=padded(tuple([limits.high[i] for i in left]), ANGLE_LIMITS),
+    )
+
+
+def _joined(rows: list[Several], most: int) -> Several:
+    return padded(tuple([number for row in rows for number in row]), most * JOINTS)
+
+
+@compilable
+def to_coordinates(arm: ArmCoordinates, q: Several | Floats, out: Floats) -> None:
+    """What joints at ``q`` (j,) [rad] are in coordinates, into ``out`` (j,) [rad]; of rates too."""
+    for k in range(int(arm.joints)):
+        total = 0.0
+        for i in range(k + 1):
+            total += arm.row[JOINTS * k + i] * q[i]
+        out[k] = total
+
+
+@compilable
+def to_joints(arm: ArmCoordinates, c: Several | Floats, out: Floats) -> None:
+    """The joints (j,) [rad] of coordinates ``c`` (j,) [rad] into ``out``; of rates too."""
+    for k in range(int(arm.joints)):
+        rest = c[k]
+        for i in range(k):
+            rest -= arm.row[JOINTS * k + i] * out[i]
+        out[k] = rest / arm.row[JOINTS * k + k]
+
+
+@compilable
+def along_other(arm: ArmCoordinates, other: int, q: Several | Floats) -> float:
+    """The sum of joints (j,) [rad] that one of the ``others`` limits; of rates too."""
+    total = 0.0
+    for i in range(int(arm.joints)):
+        total += arm.other_row[JOINTS * other + i] * q[i]
+    return total
+
+
+def within_limits(arm: ArmCoordinates, q: JointVector, margin: float) -> JointVector:
+    """The angles (j,) [rad] next to ``q`` [rad] that are a ``margin`` [rad] within limits."""
+    found: list[float] = []
+    for k in range(arm.joints):
+        row = arm.row[JOINTS * k : JOINTS * k + k + 1]
+        c = sum(a * b for a, b in zip(row, q, strict=False))
+        c = clamp(c, arm.low[k] + margin, arm.high[k] - margin)
+        rest = c - sum(a * b for a, b in zip(row, found, strict=False))
+        found.append(rest / row[k])
+    return tuple(found)
