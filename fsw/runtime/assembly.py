@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, cast
 
 from fsw.autopilot.control.cascade import Inner
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.mpc.planner import Planner
@@ -49,7 +49,7 @@ def flight_software(
     )
     return FlightProgram(
         facts=vehicle_facts(config),
-        first_state=FlightState(),
+        first_state=first_state(config.airframe),
         control=flight.control,
         conclude=flight.conclude,
         planner=planner,

@@ -196,7 +196,7 @@ def _set_actuator(request: CommandRequest, _: Locate) -> CommandAction:
         raise _InvalidError("no such actuator: only the joints, 1 and 2, can be set")
     if any(math.isinf(value) or abs(value) > 1.0 for value in (first, second)):
         raise _InvalidError("joints not moved: an actuator's range is -1 to 1")
-    return MoveJoints(_or_none(first), _or_none(second))
+    return MoveJoints((_or_none(first), _or_none(second)))
 
 
 def _set_home(request: CommandRequest, locate: Locate) -> CommandAction:
