@@ -80,9 +80,7 @@ def configured(choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN) -> Flight
 def vehicle_facts(config: FlightConfig) -> VehicleFacts:
     """The constants of a configuration that links and logs need."""
     return VehicleFacts(
-        rotor_thrust_max=config.airframe.rotor_thrust_max,
-        joint_torque_max=config.airframe.joint_torque_max[0],
-        link_length=config.airframe.link_length,
+        airframe=config.airframe,
         tick_period_us=config.tick_period_us,
         mpc_period_us=config.mpc_period_us,
         mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,

@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import field
 from pathlib import Path
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.ports import GroupTiming
@@ -44,9 +45,7 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
     facts: dict[str, str | int] = CHOICE.facts()
-    log = FlightLog(
-        path, LogSubject(facts, flat(flight_config(body="points")), {}, 17.1675, (0.15, 0.15))
-    )
+    log = FlightLog(path, LogSubject(facts, flat(flight_config(body="points")), {}, AIRFRAME))
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:
         log.add(inputs, outputs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.ports import GroupTiming, LoopHealth, VehicleFacts
 from fsw.autopilot.signals import (
     ActuatorCommand,
@@ -35,10 +36,9 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.telemetry_context import TelemetryContext
 
+VEHICLE = replace(AIRFRAME, rotor_thrust_max=16.0)
 FACTS = VehicleFacts(
-    rotor_thrust_max=16.0,
-    joint_torque_max=2.0,
-    link_length=(0.15, 0.15),
+    VEHICLE,
     tick_period_us=2_000,
     mpc_period_us=100_000,
     mpc_delay_us=10_000,
