@@ -284,13 +284,11 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
     }
     if options.seed is not None:
         facts["seed"] = options.seed
-    airframe = program.facts
     return LogSubject(
         facts=facts,
         numbers=program.numbers,
         parameters=program.parameters.values,
-        thrust_max=airframe.rotor_thrust_max,
-        bodies=airframe.bodies,
+        airframe=program.facts.airframe,
         profile=round(program.parameters.values["LOG_PROFILE"]),
     )
 

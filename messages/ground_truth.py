@@ -6,7 +6,6 @@ they say. The flight log declares them, so that both can be joined after the fli
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 from messages.ulog import Field, Topic, doubles
@@ -20,18 +19,16 @@ SIM_GROUND_TRUTH: Final = Topic(
         doubles("v_WB", 3, "m/s, NED"),
         doubles("q_WB", 4, "[w, x, y, z], body to NED"),
         doubles("w_WB_B", 3, "rad/s, body"),
-        doubles("thrust", 4, "N: rear, left, front, right"),
-        doubles("q_arm", 2, "rad"),
-        doubles("qd_arm", 2, "rad/s"),
+        Field("thrust", "double", 4, "N, of each rotor", "rotor"),
+        Field("q_arm", "double", 2, "rad", "joint"),
+        Field("qd_arm", "double", 2, "rad/s", "joint"),
     ),
 )
 
 
 def state_topic(rotors: int, joints: int) -> Topic:
     """The same of a vehicle with so many rotors and joints; the state vector is the record."""
-    sizes = {"thrust": rotors, "q_arm": joints, "qd_arm": joints}
-    fields = [replace(one, count=sizes.get(one.name, one.count)) for one in SIM_GROUND_TRUTH.fields]
-    return replace(SIM_GROUND_TRUTH, fields=tuple(fields))
+    return SIM_GROUND_TRUTH.sized(rotor=rotors, joint=joints)
 
 
 SIM_TRACKING: Final = Topic(

@@ -10,7 +10,7 @@ Source: ULog file format, https://docs.px4.io/main/en/dev_log/ulog_file_format.h
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from struct import Struct, calcsize, pack
 from typing import Final
 
@@ -43,6 +43,7 @@ class Field:
     type: str  # C type as the format names it
     count: int = 0  # elements of an array, 0 for a single value; characters of a text
     note: str = ""  # unit, frame, meaning; for the documentation only
+    per: str = ""  # "rotor" or "joint": the array is as long as the vehicle has of these
 
     @property
     def declared(self) -> str:
@@ -99,6 +100,11 @@ class Topic:
     about: str
     when: str  # how often it is written; for the documentation only
     fields: tuple[Field, ...]  # behind the time stamp
+
+    def sized(self, **counts: int) -> Topic:
+        """The topic of a vehicle that has so many of each thing that fields are ``per``."""
+        fields = [replace(one, count=counts.get(one.per, one.count)) for one in self.fields]
+        return replace(self, fields=tuple(fields))
 
     @property
     def all_fields(self) -> tuple[Field, ...]:

@@ -15,7 +15,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
@@ -182,8 +181,7 @@ class _Recording:
             facts,
             flat(config),
             values,
-            AIRFRAME.rotor_thrust_max,
-            AIRFRAME.bodies,
+            config.airframe,
             config.log_profile,
         )
         self._flight = FlightLog(folder / "flight.ulg", subject)

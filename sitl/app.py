@@ -53,10 +53,9 @@ def _run(options: SitlOptions, events: Events) -> int:
         # NumPy and numba take a second to load; the flight software can start meanwhile.
         from sitl.flight import Flight
         from sitl.link.server import wait_for_vehicle
-        from sitl.vehicle_session import VehicleSession, check_joints
+        from sitl.vehicle_session import VehicleSession
 
         flight = Flight(options, scenario, events)
-        check_joints(scenario)
         session = VehicleSession(options, endpoint)
         stop = _stop_request(events, "the flight software")
         if wait_for_vehicle(endpoint, options.wait_s, stop):

@@ -7,30 +7,13 @@ from sitl.arguments import SitlOptions
 from sitl.faults.keys import LINKS
 from sitl.flight import FlownSession, Watch
 from sitl.link.encode import StepEncoder
-from sitl.link.encode_sensors import JOINTS_MAX
 from sitl.link.exchange import Exchange, Lockstep, RealTime
 from sitl.link.faulty_endpoint import Endpoint, FaultyEndpoint
 from sitl.link.pilot import flight_plan
 from sitl.link.server import serve, shut_down
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
-from sitl.scenario import Scenario, vehicle_of
-from sitl.scenario_file import ScenarioError
 from sitl.simulation import START_US, STEP_US, Simulation
-
-
-def check_joints(scenario: Scenario) -> None:
-    """Refuse a vehicle with more joints than the messages of the link have room for.
-
-    Raises:
-        ScenarioError: With what flies it none the less.
-    """
-    joints = len(vehicle_of(scenario).joints)
-    if joints > JOINTS_MAX:
-        raise ScenarioError(
-            f"vehicle {scenario.vehicle} has {joints} joints: the link to the flight software "
-            f"carries {JOINTS_MAX}; PX4 flies it (pandion sitl --for px4)"
-        )
 
 
 class VehicleSession:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from fsw.autopilot.model.multibody import Bodies
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.periods import PLANNING_US, TICK_US
-from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest, Vec2
+from fsw.autopilot.signals import ActuatorCommand, Plan, PlanFailure, PlanRequest, Vec2
 
 Clock = Callable[[], int]
 """Monotonic wall time [us]. Measures the loop; no law ever sees it."""
@@ -59,14 +59,16 @@ class GroupTiming:
 class VehicleFacts:
     """What does not change in flight."""
 
-    rotor_thrust_max: float  # N, one rotor
-    joint_torque_max: float  # N m
-    bodies: Bodies  # of the vehicle
+    airframe: Airframe
     tick_period_us: int
     mpc_period_us: int
     mpc_delay_us: int  # from a request to the first use of its plan
     horizon: int  # steps
     sqp_iterations: int
+
+    def thrust_share(self, command: ActuatorCommand) -> float:
+        """What rotors are asked for, of all that they can give [1]."""
+        return sum(command.rotor_thrust) / (self.airframe.rotors * self.airframe.rotor_thrust_max)
 
 
 @dataclass(frozen=True, slots=True)

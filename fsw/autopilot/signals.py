@@ -351,10 +351,11 @@ class ChangeSpeed:
 
 @dataclass(frozen=True, slots=True)
 class MoveJoints:
-    """Move the arm; None leaves a joint as it is."""
+    """Move the arm."""
 
-    joint1: float | None  # -1 to 1, of the joint's limit
-    joint2: float | None  # -1 to 1, of the limit of both joints together
+    # Of each joint -1 to 1, of the limit of its angle, or of the sum of joints that ends with it;
+    # None leaves it as it is, and so do joints that are not there.
+    shares: tuple[float | None, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,6 +50,7 @@ from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
 from messages import status_text
 from messages.frames import Frame, FrameWriter, split
+from messages.joint_arrays import BASE, ENCODERS_AT, STATE_AT
 from messages.lockstep_codec import LockstepFrame, LockstepReader
 from messages.udp import PeerSocket
 
@@ -65,18 +66,6 @@ _PX4: Final = 12  # MAV_AUTOPILOT
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG
 _ARMED: Final = 128
 _STANDBY, _ACTIVE = 3, 4  # MAV_STATE
-# An ordinary step; with the number of first values that are of use.
-_STEP: Final = LockstepReader(
-    (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, 7), (message_ids.HIL_SENSOR, 7)
-)
-# The same of a vehicle with sensors, if its HIL_SENSOR is the inertial unit's: then the flags are
-# the last byte before the checksum, because zeros at the end are not sent.
-_MEASURED_STEP: Final = LockstepReader((message_ids.JOINT_ENCODERS, 3), (message_ids.HIL_SENSOR, 7))
-_STEP_WITH_POSE: Final = LockstepReader(
-    (message_ids.ODOMETRY, ODOMETRY_VALUES),
-    (message_ids.JOINT_ENCODERS, 3),
-    (message_ids.HIL_SENSOR, 7),
-)
 _FLAGS_AT: Final = -3
 _INERTIAL: Final = 0x3F
 _NUMBER_AT: Final = 4  # in a datagram, of its first frame
@@ -84,7 +73,6 @@ _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
-_NO_JOINTS: Final = (math.nan, math.nan)
 _NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
 
 
@@ -100,18 +88,34 @@ class SimLink:
         self.routed_acks: list[CommandAck] = []  # of the simulator to what was routed; the same
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
-        self._decoder = SampleDecoder(inbox.locate)
+        airframe = facts.airframe
+        joints = self._joints = airframe.bodies.joints
+        self._decoder = SampleDecoder(inbox.locate, joints)
+        # An ordinary step; with the number of first values that are of use.
+        arm, encoders = _up_to(STATE_AT[1], joints), _up_to(ENCODERS_AT, joints)
+        inertial = message_ids.HIL_SENSOR, 7
+        self._step = LockstepReader(
+            (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, arm), inertial
+        )
+        # The same of a vehicle with sensors, if its HIL_SENSOR is the inertial unit's: then the
+        # flags are the last byte before the checksum, because zeros at the end are not sent.
+        self._measured_step = LockstepReader((message_ids.JOINT_ENCODERS, encoders), inertial)
+        self._step_with_pose = LockstepReader(
+            (message_ids.ODOMETRY, ODOMETRY_VALUES),
+            (message_ids.JOINT_ENCODERS, encoders),
+            inertial,
+        )
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
         self._controls_frames = {
             armed: LockstepFrame(
                 self._writer,
                 message_ids.HIL_ACTUATOR_CONTROLS,
-                *encode_replies.end_of_controls(armed=armed),
+                *encode_replies.end_of_controls(airframe.rotors + joints, armed=armed),
             )
             for armed in (False, True)
         }
-        self._thrust_scale = 1.0 / facts.rotor_thrust_max
-        self._torque_scale = 1.0 / facts.joint_torque_max
+        self._thrust_scale = 1.0 / airframe.rotor_thrust_max
+        self._torque_scales = tuple([1.0 / most for most in airframe.joint_torque_max[:joints]])
         self._steps = SensorClock(
             facts.tick_period_us, clock, self._note_what_is_odd, inbox.accept_clock_jump
         )
@@ -201,14 +205,17 @@ class SimLink:
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""
         if not self.measured:
-            step = _STEP.read(datagram)
+            step = self._step.read(datagram)
             if step is not None:
                 return self._new(datagram[_NUMBER_AT], *step)
         else:
-            measured = _MEASURED_STEP.read(datagram) or _STEP_WITH_POSE.read(datagram)
+            measured = self._measured_step.read(datagram) or self._step_with_pose.read(datagram)
             if measured is not None and datagram[_FLAGS_AT] == _INERTIAL:
                 *pose, joints, inertial = measured
-                samples: list[Sample] = [joint_sample(joints), inertial_sample(inertial)]
+                samples: list[Sample] = [
+                    joint_sample(joints, self._joints),
+                    inertial_sample(inertial),
+                ]
                 if pose and (seen := pose_sample(pose[0])) is not None:
                     samples.insert(0, seen)
                 return self._new_measured(int(inertial[0]), samples, datagram[_NUMBER_AT])
@@ -280,7 +287,7 @@ class SimLink:
         t_us = int(barrier[0])
         if odometry is None or arm is None or not self._is_next(t_us, number):
             return None
-        frame = decode.sensor_frame(odometry, arm, barrier)
+        frame = decode.sensor_frame(odometry, arm, barrier, self._joints)
         ahead_us = self._steps.ahead_us
         return frame if not ahead_us else replace(frame, t_us=t_us - ahead_us)
 
@@ -297,9 +304,8 @@ class SimLink:
         rate, force = _NO_VECTOR, _NO_VECTOR
         if type(newest) is ImuSample:
             rate, force = newest.rate, newest.acceleration
-        return SensorFrame(
-            t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, _NO_JOINTS, _NO_JOINTS
-        )
+        arm = (math.nan,) * self._joints
+        return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, arm, arm)
 
     def _is_next(self, t_us: int, number: int) -> bool:
         """Whether a step is a new one, which it is only once; a known one is answered again."""
@@ -348,7 +354,7 @@ class SimLink:
     def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
         values = encode_replies.hil_actuator_controls(
-            stamp_us, outputs.actuators, self._thrust_scale, self._torque_scale
+            stamp_us, outputs.actuators, self._thrust_scale, self._torque_scales
         )
         return self._controls_frames[outputs.armed](*values)
 
@@ -367,3 +373,8 @@ class SimLink:
 def _source(frame: Frame) -> MessageSource:
     """The simulator is the only peer of its link, whichever port it has."""
     return MessageSource(frame.system_id, frame.component_id, "simulator")
+
+
+def _up_to(at: tuple[int, int], joints: int) -> int:
+    """How many first values a message has up to the last joint of an array."""
+    return at[0] + joints if joints <= BASE else at[1] + joints - BASE

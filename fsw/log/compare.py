@@ -22,8 +22,13 @@ class Difference:
     replayed: int | float | str
 
 
-def first_difference(logged: LoggedTick, encoded: bytes) -> Difference | None:
-    """Compare a logged tick with what the encoder made of the same tick now."""
+def first_difference(
+    logged: LoggedTick, encoded: bytes, rotors: int, joints: int
+) -> Difference | None:
+    """Compare a logged tick with what the encoder made of the same tick now.
+
+    Of a vehicle with so many ``rotors`` and ``joints``.
+    """
     replayed = list(split(encoded))
     if replayed == logged.records:
         return None
@@ -35,7 +40,7 @@ def first_difference(logged: LoggedTick, encoded: bytes) -> Difference | None:
             return Difference(*where, "record", _name(one), _name(other))
         if one.kind == ulog.TEXT:
             return Difference(*where, "text", _text(one), _text(other))
-        topic = TOPICS[one.number]
+        topic = TOPICS[one.number].sized(rotor=rotors, joint=joints)
         values = (map(_readable, unpacker(topic).unpack(record.body)) for record in (one, other))
         for name, was, now in zip(columns(topic), *values, strict=True):
             if repr(was) != repr(now):  # by their digits: NaN is NaN, and -0.0 is not 0.0

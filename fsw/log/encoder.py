@@ -25,8 +25,8 @@ from fsw.autopilot.flight.modes import NAV_STATES
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import ImuSample
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.kinematics import end_effector
-from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import (
@@ -41,11 +41,12 @@ from fsw.autopilot.signals import (
     TickInputs,
     TickOutputs,
 )
-from fsw.log import samples, topics
+from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
 from fsw.log.packed import Packed, Records
 from fsw.log.px4_records import Px4Records, validity
-from messages.ulog import logged_text
+from fsw.log.samples import Samples
+from messages.ulog import Topic, logged_text
 
 TYPED: Final = "sensors"  # the inputs that have topics of their own
 SAMPLES: Final = "samples"
@@ -69,34 +70,13 @@ _INNOVATION_BITS: Final = (0, 1, 2, 6, 9)
 _ROTARY_WING: Final = 1  # VEHICLE_TYPE of PX4
 
 
-# What a replay needs and what it is compared by: every tick in every profile.
-(_SENSORS,), (_TICK,) = Packed(topics.SENSOR_FRAME).heads, Packed(topics.TICK).heads
-(_COMMAND,) = Packed(topics.ACTUATOR_COMMAND).heads
-_FRAME: Final = samples.FRAME
-_AS_SENT: Final = "5s" + topics.ACTUATOR_COMMAND.codes
-_SHORT_TICK: Final = Records(f"<5sQ{_AS_SENT}")
-_WHOLE_TICK: Final = Records(f"<5sQ{_FRAME.size}s{_AS_SENT}")
-# What follows from that, for reading.
-_DETAIL: Final = Packed(
-    topics.VEHICLE_ATTITUDE,
-    topics.VEHICLE_LOCAL_POSITION,
-    topics.ACTUATOR_MOTORS,
-    topics.ARM_JOINT_STATE,
-)
-_ATTITUDE, _POSITION, _MOTORS, _ARM = _DETAIL.heads
+# Ticks are written by parts that are as long as the vehicle has joints and rotors.
+(_TICK,) = Packed(topics.TICK).heads
 # What tools look at the spectrum of.
 _RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
-_IN_FLIGHT: Final = Packed(
-    topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
-)
-_POSITION_SETPOINT, _ARM_SETPOINT, _PLAN_INPUT = _IN_FLIGHT.heads
 _PLANNING: Final = Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
 _BARRIER, _END_EFFECTOR = _PLANNING.heads
 _MPC: Final = Packed(topics.MPC_STATUS)
-_REQUEST: Final = Packed(topics.MPC_REQUEST)
-_STATUS: Final = Packed(
-    topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED, topics.FAILURE_DETECTOR_STATUS
-)
 _ASKED: Final = Packed(topics.VEHICLE_COMMAND)
 _ANSWERED: Final = Packed(topics.VEHICLE_COMMAND_ACK)
 _INPUT: Final = Packed(topics.TICK_INPUT)
@@ -106,6 +86,36 @@ _ESTIMATOR: Final = Packed(
 )
 
 
+class _Layout:
+    """Records that are as long as a vehicle has joints and rotors."""
+
+    def __init__(self, rotors: int, joints: int) -> None:
+        def packed(*members: Topic) -> Packed:
+            return Packed(*(topic.sized(rotor=rotors, joint=joints) for topic in members))
+
+        self.samples = Samples(joints)
+        # What a replay needs and what it is compared by: every tick in every profile.
+        sent = packed(topics.ACTUATOR_COMMAND)
+        as_sent = sent.struct.format.removeprefix("<")
+        (self.sensors,), (self.command,) = packed(topics.SENSOR_FRAME).heads, sent.heads
+        self.short_tick = Records(f"<5sQ{as_sent}")
+        self.whole_tick = Records(f"<5sQ{self.samples.frame.size}s{as_sent}")
+        # What follows from that, for reading.
+        self.detail = packed(
+            topics.VEHICLE_ATTITUDE,
+            topics.VEHICLE_LOCAL_POSITION,
+            topics.ACTUATOR_MOTORS,
+            topics.ARM_JOINT_STATE,
+        )
+        self.in_flight = packed(
+            topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
+        )
+        self.request = packed(topics.MPC_REQUEST)
+        self.status = packed(
+            topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED, topics.FAILURE_DETECTOR_STATUS
+        )
+
+
 class LogEncoder:
     """Turns ticks into bytes; remembers what it has written, to write changes only."""
 
@@ -113,27 +123,27 @@ class LogEncoder:
         self,
         *,
         measured: bool,
-        thrust_max: float,
-        bodies: Bodies,
+        airframe: Airframe,
         profile: int = FULL,
         origin: Origin = DEFAULT_ORIGIN,
     ) -> None:
         """Start a log; without times ``measured`` by the wall clock it repeats to the byte.
 
-        A rotor gives ``thrust_max`` [N]; the vehicle consists of ``bodies``; THIN or FULL.
-        The local frame begins at ``origin``.
+        Of a vehicle with this ``airframe``, THIN or FULL. The local frame begins at ``origin``.
         """
         self._detail_us, self._fast_us = DETAIL_US[profile], FAST_US[profile]
         self._plan_us = PLAN_US[profile]
         # Numbers of the intervals that were written last.
         self._detailed = self._fast = self._planned = -1
-        self._px4 = Px4Records(1.0 / thrust_max, origin)
+        self._px4 = Px4Records(airframe, origin)
+        self._of = _Layout(airframe.rotors, airframe.bodies.joints)
+        self._joints = airframe.bodies.joints
         self._imu: ImuSample | None = None  # the last one
         self._took_over = False  # the pilot, from a failsafe whose condition still holds
         self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
         self._measured = measured
-        self._per_newton = 1.0 / thrust_max
-        self._bodies = bodies
+        self._per_newton = 1.0 / airframe.rotor_thrust_max
+        self._bodies = airframe.bodies
         self._changing = tuple(name for name in self.inputs.names if name not in (TYPED, SAMPLES))
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
@@ -145,7 +155,7 @@ class LogEncoder:
         snapshot = outputs.snapshot
         out += self._every_tick(inputs, snapshot)
         for sample in inputs.samples:
-            out += samples.record(inputs.sensors.t_us, sample)
+            out += self._of.samples.record(inputs.sensors.t_us, sample)
         self._timed(snapshot, out)
         self._px4.add(snapshot, out)
         self._add_inputs(inputs, out)
@@ -155,7 +165,7 @@ class LogEncoder:
         if last is None or _plan_changed(snapshot, last):
             out += self._mpc(snapshot)
         if outputs.plan_request is not None:
-            out += _request(snapshot.t_us, outputs.plan_request)
+            out += _request(self._of.request, snapshot.t_us, outputs.plan_request)
         self._add_status(snapshot, last, out)
         for ack in outputs.acks:
             addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
@@ -189,7 +199,7 @@ class LogEncoder:
                 self._took_over = False
             elif last is not None and last.failsafe_from is not None:
                 self._took_over = True
-            out += _status(snapshot, self._took_over)
+            out += self._status(snapshot)
 
     def _every_tick(self, inputs: TickInputs, snapshot: FlightSnapshot) -> bytes:
         one, sent = inputs.sensors, snapshot.actuators
@@ -200,26 +210,27 @@ class LogEncoder:
                 self._px4.feel(sample.acceleration, sample.rate)
         if not inputs.samples:
             self._px4.feel(one.accel_B, one.gyro_B)
-        numbers = _FRAME.pack(
+        of = self._of
+        numbers = of.samples.frame.pack(
             *one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *one.q_arm, *one.qd_arm
         )
-        command = (_COMMAND, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
+        command = (of.command, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        if self._imu is not None and numbers == samples.frame_of(self._imu):
-            return _SHORT_TICK.pack((_TICK, t_us, *command))
-        return _WHOLE_TICK.pack((_SENSORS, t_us, numbers, *command))
+        if self._imu is not None and numbers == of.samples.frame_of(self._imu):
+            return of.short_tick.pack((_TICK, t_us, *command))
+        return of.whole_tick.pack((of.sensors, t_us, numbers, *command))
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
         estimate, sent = snapshot.estimate, snapshot.actuators
         t_us, k = snapshot.t_us, self._per_newton
-        f1, f2, f3, f4 = sent.rotor_thrust
-        return _DETAIL.pack(
+        attitude, position, motors, arm = self._of.detail.heads
+        return self._of.detail.pack(
             (
-                _ATTITUDE, t_us, *quaternion_from_matrix(estimate.R_WB),
-                _POSITION, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
+                attitude, t_us, *quaternion_from_matrix(estimate.R_WB),
+                position, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
                 *validity(snapshot), -estimate.p_WB[2], _sees_ground(snapshot),
-                _MOTORS, t_us, k * f1, k * f2, k * f3, k * f4,
-                _ARM, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
+                motors, t_us, *[k * f for f in sent.rotor_thrust],
+                arm, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
             )
         )  # fmt: skip
 
@@ -227,13 +238,14 @@ class LogEncoder:
         t_us, x, u = snapshot.t_us, snapshot.plan_state, snapshot.plan_input
         assert x is not None
         a, yaw_acc, qdd = (
-            ((0.0,) * 3, 0.0, (0.0, 0.0)) if u is None else (u.a, u.yaw_acc, u.qdd_arm)
+            ((0.0,) * 3, 0.0, (0.0,) * len(x.q_arm)) if u is None else (u.a, u.yaw_acc, u.qdd_arm)
         )
-        return _IN_FLIGHT.pack(
+        position, arm, plan = self._of.in_flight.heads
+        return self._of.in_flight.pack(
             (
-                *(_POSITION_SETPOINT, t_us, *x.p, *x.v, *x.a, x.yaw, x.yaw_rate),
-                *(_ARM_SETPOINT, t_us, *x.q_arm, *x.qd_arm, *qdd),
-                *(_PLAN_INPUT, t_us, *a, yaw_acc),
+                *(position, t_us, *x.p, *x.v, *x.a, x.yaw, x.yaw_rate),
+                *(arm, t_us, *x.q_arm, *x.qd_arm, *qdd),
+                *(plan, t_us, *a, yaw_acc),
             )
         )
 
@@ -251,6 +263,26 @@ class LogEncoder:
             if name == "commands":
                 for command in inputs.commands:
                     out += _command(t_us, command.request)
+
+    def _status(self, snapshot: FlightSnapshot) -> bytes:
+        mode: Mode = snapshot.mode
+        head, landing, found = self._of.status.heads
+        known = snapshot.actuators_found
+        rotors = 1 << known.rotor >> 1  # from 1; 0: none
+        return self._of.status.pack(
+            (
+                *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES[mode]),
+                *(
+                    bool(snapshot.failures),
+                    mode.value.encode(),
+                    ",".join(snapshot.failures).encode(),
+                ),
+                *(self._took_over, _ROTARY_WING, False),
+                *(landing, snapshot.t_us, snapshot.landed),
+                *(found, snapshot.t_us, rotors != 0, rotors, known.effect, known.lost),
+                *(known.disobeys, *(round(kind) for kind in known.joints or (0.0,) * self._joints)),
+            )
+        )
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
         t_us, report, target = snapshot.t_us, snapshot.constraints, snapshot.reference
@@ -326,23 +358,6 @@ def _status_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
     )
 
 
-def _status(snapshot: FlightSnapshot, took_over: bool) -> bytes:
-    mode: Mode = snapshot.mode
-    head, landing, found = _STATUS.heads
-    known = snapshot.actuators_found
-    rotors = 1 << known.rotor >> 1  # from 1; 0: none
-    return _STATUS.pack(
-        (
-            *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES[mode]),
-            *(bool(snapshot.failures), mode.value.encode(), ",".join(snapshot.failures).encode()),
-            *(took_over, _ROTARY_WING, False),
-            *(landing, snapshot.t_us, snapshot.landed),
-            *(found, snapshot.t_us, rotors != 0, rotors, known.effect, known.lost),
-            *(known.disobeys, *(round(kind) for kind in known.joints)),
-        )
-    )
-
-
 def _estimator(t_us: int, known: EstimatorReport) -> bytes:
     status, innovations, bias = _ESTIMATOR.heads
     ratios, variance, motion = known.ratios, known.pose_covariance, known.velocity_covariance
@@ -392,12 +407,12 @@ def _refused(ratios: TestRatios) -> int:
     return sum(1 << bit for bit, ratio in tested if ratio > 1.0)
 
 
-def _request(t_us: int, request: PlanRequest) -> bytes:
+def _request(packed: Packed, t_us: int, request: PlanRequest) -> bytes:
     x = request.start
     first = request.targets[0].p_WE if request.targets else _NOWHERE
-    return _REQUEST.pack(
+    return packed.pack(
         (
-            *(*_REQUEST.heads, t_us, request.plan_id & _U32, request.t_apply_us),
+            *(*packed.heads, t_us, request.plan_id & _U32, request.t_apply_us),
             *(*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm),
             *(*first, request.from_nominal),
         )

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from fsw.autopilot.model.multibody import Bodies
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.parameters.facts import FACTS
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import StatusText, TickInputs, TickOutputs
@@ -44,8 +44,7 @@ class LogSubject:
     facts: Mapping[str, str | int]  # revision, scenario, seed, controller, …
     numbers: Mapping[str, Number]  # of the whole configuration, by dotted name
     parameters: Mapping[str, float]  # those that a ground station may change, by their names there
-    thrust_max: float  # N, one rotor
-    bodies: Bodies
+    airframe: Airframe
     profile: int = FULL  # what is written how often, LOG_PROFILE
 
 
@@ -77,8 +76,7 @@ class FlightLog:
         subject, self._measured = self._subject, not lockstep
         self._encoder = LogEncoder(
             measured=self._measured,
-            thrust_max=subject.thrust_max,
-            bodies=subject.bodies,
+            airframe=subject.airframe,
             profile=subject.profile,
             origin=origin_of(subject.numbers),
         )
@@ -155,7 +153,11 @@ def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> byt
     }
     parts = [ulog.opening(t_us)]
     parts += [ulog.information(key, value) for key, value in facts.items()]
-    parts += [ulog.format_of(topic) for topic in (*TOPICS, *TRUTH_TOPICS)]
+    counts = {"rotor": subject.airframe.rotors, "joint": subject.airframe.bodies.joints}
+    ours = [topic.sized(**counts) for topic in TOPICS]
+    parts += [
+        ulog.format_of(one) for one in (*ours, *(one.sized(**counts) for one in TRUTH_TOPICS))
+    ]
     parts += [ulog.parameter(name, value) for name, value in named.items()]
-    parts += [ulog.subscription(number, topic) for number, topic in enumerate(TOPICS)]
+    parts += [ulog.subscription(number, topic) for number, topic in enumerate(ours)]
     return b"".join(parts)

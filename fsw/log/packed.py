@@ -33,7 +33,7 @@ class Packed(Records):
 
     def __init__(self, *members: Topic) -> None:
         super().__init__("<" + "".join("5s" + topic.codes for topic in members))
-        self.heads = tuple(data_head(topics.TOPICS.index(topic), topic) for topic in members)
+        self.heads = tuple(data_head(topics.NUMBERS[topic.name], topic) for topic in members)
 
 
 def _within_float(value: Any) -> Any:

@@ -19,8 +19,16 @@ from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_global
 from fsw.autopilot.geometry.rotation import quaternion_from_euler
 from fsw.autopilot.geometry.vectors import dot
-from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.signals import FlightSnapshot, Origin, PlanInput, PredictionState, Vec3, Vec4
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.signals import (
+    FlightSnapshot,
+    Origin,
+    PlanInput,
+    PredictionState,
+    RotorVector,
+    Vec3,
+    Vec4,
+)
 from fsw.log import px4_topics as topics
 from fsw.log.packed import Packed
 
@@ -50,9 +58,13 @@ _LOAD: Final = Packed(topics.CPULOAD)
 class Px4Records:
     """Remembers when each was written last, and what the inertial unit measured."""
 
-    def __init__(self, per_newton: float, origin: Origin) -> None:
-        """Start a log; a rotor's thrust times ``per_newton`` [1/N] is its share of the largest."""
-        self._per_newton = per_newton
+    def __init__(self, airframe: Airframe, origin: Origin) -> None:
+        """Start a log of a vehicle."""
+        # Of each rotor's thrust [1/N], the share of the largest torque about x, y and z, and of
+        # the largest thrust.
+        rows = [airframe.wrench[6 * i : 6 * i + 6] for i in range(airframe.rotors)]
+        self._of_torque = [_shares([row[3 + axis] for row in rows], airframe) for axis in range(3)]
+        self._of_thrust = _shares([-row[2] for row in rows], airframe)
         self._origin = origin
         # Numbers of the intervals that were written last.
         self._torque = self._setpoints = self._place = self._second = -1
@@ -98,14 +110,13 @@ class Px4Records:
         self._accel, self._gyro = accel, gyro
 
     def _torques(self, snapshot: FlightSnapshot) -> bytes:
-        k, (rear, left, front, right) = self._per_newton, snapshot.actuators.rotor_thrust
-        yaw = 0.5 * k * (rear + front - left - right)
-        torque = (k * (left - right), k * (front - rear), yaw)
+        thrust = snapshot.actuators.rotor_thrust
+        torque = [_sum(shares, thrust) for shares in self._of_torque]
         return _TORQUE.pack((*_TORQUE.heads, snapshot.t_us, *torque))
 
     def _setpoint_records(self, snapshot: FlightSnapshot) -> bytes:
         t_us = snapshot.t_us
-        thrust = (0.0, 0.0, -0.25 * self._per_newton * sum(snapshot.actuators.rotor_thrust))
+        thrust = (0.0, 0.0, -_sum(self._of_thrust, snapshot.actuators.rotor_thrust))
         found = _THRUST.pack((*_THRUST.heads, t_us, *thrust))
         plan = snapshot.plan_state
         if plan is None:
@@ -173,6 +184,16 @@ def planned_rates(plan: PredictionState) -> Vec3:
     turning = (-plan.j[0] / force, -plan.j[1] / force, 0.0)
     p, q = -dot(turning, y), dot(turning, x)
     return p, q, (plan.yaw_rate * cp - q * sr) / cr
+
+
+def _shares(effects: list[float], airframe: Airframe) -> list[float]:
+    """Effects of each rotor's thrust over the largest that all of them have together [1/N]."""
+    most = airframe.rotor_thrust_max * sum(max(one, 0.0) for one in effects)
+    return [one / most if most > 0.0 else 0.0 for one in effects]
+
+
+def _sum(shares: list[float], thrust: RotorVector) -> float:
+    return sum([share * f for share, f in zip(shares, thrust, strict=True)])
 
 
 def _attitude(plan: PredictionState, u: PlanInput | None) -> Vec4:

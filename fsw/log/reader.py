@@ -9,9 +9,10 @@ from typing import Any, Final
 
 from fsw.autopilot.measurements import ImuSample, Sample
 from fsw.autopilot.signals import SensorFrame, TickInputs
-from fsw.log import px4_topics, samples, topics
+from fsw.log import px4_topics, topics
 from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
+from fsw.log.samples import TOPIC_NUMBERS, Samples
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
 
@@ -59,9 +60,21 @@ def open_flight(path: Path) -> UlogFile:
 
 def _has_our_topics(log: UlogFile) -> bool:
     try:
-        return all(log.formats[topic.name].codes == topic.codes for topic in topics.TOPICS)
+        rotors, joints = counts(log)
+        ours = [topic.sized(rotor=rotors, joint=joints) for topic in topics.TOPICS]
+        return all(log.formats[topic.name].codes == topic.codes for topic in ours)
     except (KeyError, ValueError):  # a topic is missing, or has an unknown type
         return False
+
+
+def counts(log: UlogFile) -> tuple[int, int]:
+    """How many rotors and joints the vehicle of a log has.
+
+    Raises:
+        KeyError: The log does not say.
+    """
+    sizes = {one.name: one.count for one in log.formats[topics.ACTUATOR_COMMAND.name].fields}
+    return sizes["rotor_thrust"], sizes["joint_torque"]
 
 
 def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
@@ -112,7 +125,9 @@ class _Inputs:
         self._values: dict[str, Any] = {}
         self._pieces = b""
         self._imu: ImuSample | None = None  # the last one
-        self._sensors = unpacker(topics.SENSOR_FRAME)
+        joints = counts(log)[1]
+        self._samples, self._joints = Samples(joints), joints
+        self._sensors = unpacker(topics.SENSOR_FRAME.sized(joint=joints))
         self._input = unpacker(topics.TICK_INPUT)
 
     def tick(self, index: int, records: list[Record]) -> LoggedTick:
@@ -124,10 +139,12 @@ class _Inputs:
             for record in records:
                 if record.kind != ulog.DATA:
                     continue
-                if record.number in samples.TOPIC_NUMBERS:
-                    measured.append(samples.sample_of(record.number, record.body))
+                if record.number in TOPIC_NUMBERS:
+                    measured.append(self._samples.sample_of(record.number, record.body))
                 elif record.number == _SENSORS:
-                    self._values[TYPED] = _sensor_frame(self._sensors.unpack(record.body))
+                    self._values[TYPED] = _sensor_frame(
+                        self._sensors.unpack(record.body), self._joints
+                    )
                 elif record.number == _TICK:
                     short_us = int.from_bytes(record.body, "little")
                 elif record.number == _INPUT:
@@ -146,7 +163,8 @@ class _Inputs:
         """The frame of a tick that says nothing but what the inertial unit measured last."""
         if self._imu is None:
             raise ValueError("it repeats what an inertial unit says, and none was heard")
-        return _sensor_frame((t_us, *samples.FRAME.unpack(samples.frame_of(self._imu))))
+        numbers = self._samples.frame.unpack(self._samples.frame_of(self._imu))
+        return _sensor_frame((t_us, *numbers), self._joints)
 
     def _check_numbers(self) -> None:
         for number, topic in enumerate(topics.TOPICS):
@@ -163,7 +181,7 @@ class _Inputs:
         self._values[name] = self._codec.decode(name, self._pieces.rstrip(b"\0"))
 
 
-def _sensor_frame(values: tuple[Any, ...]) -> SensorFrame:
+def _sensor_frame(values: tuple[Any, ...], joints: int) -> SensorFrame:
     return SensorFrame(
         t_us=values[0],
         p_WB=values[1:4],
@@ -171,6 +189,6 @@ def _sensor_frame(values: tuple[Any, ...]) -> SensorFrame:
         q_WB=values[7:11],
         gyro_B=values[11:14],
         accel_B=values[14:17],
-        q_arm=values[17:19],
-        qd_arm=values[19:21],
+        q_arm=values[17 : 17 + joints],
+        qd_arm=values[17 + joints :],
     )

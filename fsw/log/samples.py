@@ -14,10 +14,8 @@ from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 
 Values = tuple[Any, ...]
-FRAME: Final = Struct("<" + "".join(field.code for field in topics.SENSOR_FRAME.fields))
 _SIX: Final = Struct("<6d")
 _UNKNOWN_POSE: Final = pack("<10d", *(math.nan,) * 10)  # position, velocity and attitude
-_UNKNOWN_ARM: Final = pack("<4d", *(math.nan,) * 4)  # angles and rates
 _LATEST: Final = 1e12  # s; what is later fits no field
 
 
@@ -51,7 +49,7 @@ class _Codec:
     """Records of one kind of sample."""
 
     def __init__(self, kind: type[Sample], topic: Topic) -> None:
-        self.number = topics.TOPICS.index(topic)
+        self.number = topics.NUMBERS[topic.name]
         self._kind = kind
         self._names = tuple(field.name for field in dataclasses.fields(kind))
         own = [field for field in topic.fields if field.name != topics.SAMPLED]
@@ -82,22 +80,31 @@ class _Codec:
             at += max(size, 1)
 
 
-def frame_of(imu: ImuSample) -> bytes:
-    """The numbers of a frame of sensors of which the inertial unit alone is known."""
-    return _UNKNOWN_POSE + _SIX.pack(*imu.rate, *imu.acceleration) + _UNKNOWN_ARM
+TOPIC_NUMBERS: Final = frozenset(topics.NUMBERS[one.name] for one in topics.OF_SAMPLES.values())
 
 
-_CODECS: Final = {kind: _Codec(kind, topic) for kind, topic in topics.OF_SAMPLES.items()}
-_BY_NUMBER: Final = {codec.number: codec for codec in _CODECS.values()}
-TOPIC_NUMBERS: Final = frozenset(_BY_NUMBER)
+class Samples:
+    """Records of a vehicle with so many joints."""
 
+    def __init__(self, joints: int) -> None:
+        frame = topics.SENSOR_FRAME.sized(joint=joints)
+        self.frame = Struct("<" + "".join(field.code for field in frame.fields))
+        self._unknown_arm = pack(f"<{2 * joints}d", *(math.nan,) * (2 * joints))
+        self._codecs = {
+            kind: _Codec(kind, topic.sized(joint=joints))
+            for kind, topic in topics.OF_SAMPLES.items()
+        }
+        self._by_number = {codec.number: codec for codec in self._codecs.values()}
 
-def record(t_us: int, sample: Sample) -> bytes:
-    """The record of a sample that arrived for the tick of ``t_us``."""
-    codec = _CODECS[type(sample)]
-    return codec.pack(codec.head, t_us, *codec.values(sample))
+    def frame_of(self, imu: ImuSample) -> bytes:
+        """The numbers of a frame of sensors of which the inertial unit alone is known."""
+        return _UNKNOWN_POSE + _SIX.pack(*imu.rate, *imu.acceleration) + self._unknown_arm
 
+    def record(self, t_us: int, sample: Sample) -> bytes:
+        """The record of a sample that arrived for the tick of ``t_us``."""
+        codec = self._codecs[type(sample)]
+        return codec.pack(codec.head, t_us, *codec.values(sample))
 
-def sample_of(number: int, body: bytes) -> Sample:
-    """The sample in the body of a record of topic ``number``, one of ``TOPIC_NUMBERS``."""
-    return _BY_NUMBER[number].read(body)
+    def sample_of(self, number: int, body: bytes) -> Sample:
+        """The sample in the body of a record of topic ``number``, one of ``TOPIC_NUMBERS``."""
+        return self._by_number[number].read(body)

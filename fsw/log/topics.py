@@ -37,6 +37,14 @@ def _vector(name: str, size: int, note: str) -> Field:
     return Field(name, "float", size, note)
 
 
+def _of_joints(name: str, kind: str, note: str) -> Field:
+    return Field(name, kind, 2, note, "joint")
+
+
+def _of_rotors(name: str, kind: str, note: str) -> Field:
+    return Field(name, kind, 4, note, "rotor")
+
+
 SENSOR_FRAME: Final = Topic(
     "sensor_frame",
     "Sensor readings; input of the tick",
@@ -47,8 +55,8 @@ SENSOR_FRAME: Final = Topic(
         doubles("q_WB", 4, "[w, x, y, z]"),
         doubles("gyro_B", 3, "rad/s, body"),
         doubles("accel_B", 3, "m/s^2, body"),
-        doubles("q_arm", 2, "rad"),
-        doubles("qd_arm", 2, "rad/s"),
+        _of_joints("q_arm", "double", "rad"),
+        _of_joints("qd_arm", "double", "rad/s"),
     ),
 )
 TICK: Final = Topic(
@@ -81,8 +89,8 @@ ACTUATOR_COMMAND: Final = Topic(
     "Actuator command, exactly as sent",
     EVERY_TICK,
     (
-        doubles("rotor_thrust", 4, "N: rear, left, front, right"),
-        doubles("joint_torque", 2, "N m"),
+        _of_rotors("rotor_thrust", "double", "N"),
+        _of_joints("joint_torque", "double", "N m"),
         Field("armed", "bool"),
     ),
 )
@@ -90,16 +98,16 @@ ACTUATOR_MOTORS: Final = Topic(
     "actuator_motors",
     "Rotor commands in PX4's form",
     DETAIL,
-    (_vector("control", 4, "0 to 1, share of full thrust"),),
+    (_of_rotors("control", "float", "0 to 1, share of full thrust"),),
 )
 ARM_JOINT_STATE: Final = Topic(
     "arm_joint_state",
     "Estimate, and commanded torque",
     DETAIL,
     (
-        _vector("q", 2, "rad"),
-        _vector("qd", 2, "rad/s"),
-        _vector("tau", 2, "N m"),
+        _of_joints("q", "float", "rad"),
+        _of_joints("qd", "float", "rad/s"),
+        _of_joints("tau", "float", "N m"),
     ),
 )
 VEHICLE_LOCAL_POSITION_SETPOINT: Final = Topic(
@@ -118,7 +126,11 @@ ARM_JOINT_SETPOINT: Final = Topic(
     "arm_joint_setpoint",
     "State of the running plan: joints",
     DETAIL_IN_FLIGHT,
-    (_vector("q", 2, "rad"), _vector("qd", 2, "rad/s"), _vector("qdd", 2, "rad/s^2")),
+    (
+        _of_joints("q", "float", "rad"),
+        _of_joints("qd", "float", "rad/s"),
+        _of_joints("qdd", "float", "rad/s^2"),
+    ),
 )
 PLAN_INPUT: Final = Topic(
     "plan_input",
@@ -180,8 +192,8 @@ MPC_REQUEST: Final = Topic(
         doubles("s", 2, "m/s^4, horizontal"),
         doubles("yaw", 0, "rad"),
         doubles("yaw_rate", 0, "rad/s"),
-        doubles("q_arm", 2, "rad"),
-        doubles("qd_arm", 2, "rad/s"),
+        _of_joints("q_arm", "double", "rad"),
+        _of_joints("qd_arm", "double", "rad/s"),
         doubles("p_WE", 3, "m, NED; first point of the reference"),
         Field("from_nominal", "bool", note="start taken from the running plan, not measured"),
     ),
@@ -225,11 +237,11 @@ FAILURE_DETECTOR_STATUS: Final = Topic(
     "on change of a fault and every second",
     (
         Field("fd_motor", "bool", note="a rotor has failed"),
-        Field("motor_failure_mask", "uint16_t", note="bit 0: rear, left, front, right"),
+        Field("motor_failure_mask", "uint16_t", note="bit 0: the first"),
         *floats("motor_effectiveness", note="thrust over command of that rotor, as allocated"),
         Field("motor_lost", "bool", note="it gives nothing"),
         Field("motor_disobeys", "bool", note="it gives something else than is commanded"),
-        Field("joint_state", "uint8_t", 2, "0 sound, 1 stuck, 2 limp"),
+        _of_joints("joint_state", "uint8_t", "0 sound, 1 stuck, 2 limp"),
     ),
 )
 VEHICLE_LAND_DETECTED: Final = Topic(
@@ -354,7 +366,7 @@ JOINT_ENCODERS: Final = Topic(
     "joint_encoders",
     "Encoders of the arm; input of the tick",
     _MEASURED,
-    (_MEASURED_AT, doubles("angle", 2, "rad")),
+    (_MEASURED_AT, _of_joints("angle", "double", "rad")),
 )
 # Each kind of sample and its topic, whose fields are the sample's, in their order, and SAMPLED.
 OF_SAMPLES: Final[dict[type[Sample], Topic]] = {
@@ -451,4 +463,9 @@ TOPICS: Final = (
     TICK,
     *px4_topics.PX4_TOPICS,
 )
-"""Everything the flight software writes; a topic's place is its number in the file."""
+"""Everything the flight software writes; a topic's place is its number in the file.
+
+Arrays of joints and rotors are as long here as those of the paper's vehicle; ``Topic.sized`` has
+those of another one.
+"""
+NUMBERS: Final = {topic.name: number for number, topic in enumerate(TOPICS)}

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, cast
 
 from fsw.autopilot.control.cascade import Inner
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.mpc.planner import Planner
@@ -49,7 +49,7 @@ def flight_software(
     )
     return FlightProgram(
         facts=vehicle_facts(config),
-        first_state=FlightState(),
+        first_state=first_state(config.airframe),
         control=flight.control,
         conclude=flight.conclude,
         planner=planner,
@@ -80,9 +80,7 @@ def configured(choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN) -> Flight
 def vehicle_facts(config: FlightConfig) -> VehicleFacts:
     """The constants of a configuration that links and logs need."""
     return VehicleFacts(
-        rotor_thrust_max=config.airframe.rotor_thrust_max,
-        joint_torque_max=config.airframe.joint_torque_max[0],
-        bodies=config.airframe.bodies,
+        airframe=config.airframe,
         tick_period_us=config.tick_period_us,
         mpc_period_us=config.mpc_period_us,
         mpc_delay_us=config.plan_delay_ticks * config.tick_period_us,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from command_line.bounded_json import JsonError, json_numbers
+from fsw.autopilot.model.airframe import Airframe
 from fsw.log.compare import Difference, first_difference
 from fsw.log.encoder import FULL, THIN, LogEncoder
 from fsw.log.px4_records import origin_of
@@ -44,8 +45,7 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
     facts = program.facts
     encoder = LogEncoder(
         measured=measured,
-        thrust_max=facts.rotor_thrust_max,
-        bodies=facts.bodies,
+        airframe=facts.airframe,
         profile=int(profile),
         origin=origin_of(logged_numbers(log)),
     )
@@ -54,7 +54,7 @@ def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Re
     for logged in ticks(log):
         if isinstance(logged, Gap):
             return Replayed(compared, None, logged.duration_ms)
-        difference = _difference(logged, tick, encoder)
+        difference = _difference(logged, tick, encoder, facts.airframe)
         if difference is not None:
             return Replayed(compared, difference, 0)
         compared += 1
@@ -88,7 +88,7 @@ def logged_numbers(log: UlogFile) -> dict[str, float]:
 
 
 def _difference(
-    logged: LoggedTick, tick: TickRunner[Any], encoder: LogEncoder
+    logged: LoggedTick, tick: TickRunner[Any], encoder: LogEncoder, airframe: Airframe
 ) -> Difference | None:
     out = bytearray()
     try:
@@ -99,7 +99,7 @@ def _difference(
         return Difference(
             tick=logged.index, t_us=t_us, field="the tick", logged="flown", replayed=raised
         )
-    return first_difference(logged, bytes(out))
+    return first_difference(logged, bytes(out), airframe.rotors, airframe.bodies.joints)
 
 
 def other_numbers(log: UlogFile, program: FlightProgram[Any]) -> tuple[str, ...]:

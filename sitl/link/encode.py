@@ -7,10 +7,11 @@ from typing import Final
 
 from messages import status_text
 from messages.frames import FrameWriter
+from messages.joint_arrays import BASE, base, more
 from messages.lockstep_codec import LockstepFrame
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.link import message_ids
-from sitl.link.encode_sensors import JOINTS_MAX, SensorEncoder
+from sitl.link.encode_sensors import SensorEncoder
 from sitl.link.failures import Answer, Injection
 from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
@@ -62,21 +63,31 @@ class StepEncoder:
         self._odometry = LockstepFrame(self._sensors, message_ids.ODOMETRY, *_ODOMETRY_TAIL)
         self._hil_sensor = LockstepFrame(self._sensors, message_ids.HIL_SENSOR, *_HIL_TAIL)
         self._arms = {
-            joints: LockstepFrame(self._sensors, message_ids.ARM_JOINT_STATE, *_ARM_TAIL, joints)
-            for joints in range(1, JOINTS_MAX + 1)
+            joints: LockstepFrame(
+                self._sensors, message_ids.ARM_JOINT_STATE, *_ARM_TAIL, joints, *more(()) * 3
+            )
+            for joints in range(1, BASE + 1)
         }
 
     def datagram(self, readings: SensorReadings, messages: tuple[PilotMessage, ...]) -> bytes:
         """Pilot's messages, pose, arm, and HIL_SENSOR last, as the barrier."""
         t_us, p, v, q, w, gyro, accel, angles, rates, torques = readings
-        arm = self._arms[len(angles)]
-        rest = (0.0,) * (JOINTS_MAX - len(angles))
         step = (
             self._odometry(t_us, *p, *q, *v, *w)
-            + arm(t_us, *angles, *rest, *rates, *rest, *torques, *rest)
+            + self._arm(t_us, angles, rates, torques)
             + self._hil_sensor(t_us, *accel, *gyro)
         )
         return self._spoken(messages) + step if messages else step
+
+    def _arm(self, t_us: int, *arrays: tuple[float, ...]) -> bytes:
+        """ARM_JOINT_STATE; without joints in the extension its length is always the same."""
+        count = len(arrays[0])
+        first = [value for one in arrays for value in base(one)]
+        if count in self._arms:
+            return self._arms[count](t_us, *first)
+        rest = [value for one in arrays for value in more(one)]
+        values = (*first, *_ARM_TAIL, count, *rest)
+        return self._sensors.frame(message_ids.ARM_JOINT_STATE, t_us, *values)
 
     def measured_datagrams(
         self,

@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from messages.frames import FrameWriter
+from messages.joint_arrays import BASE, base, more
 from messages.lockstep_codec import LockstepFrame
 from sitl.earth import Place, place_of
 from sitl.link import message_ids
@@ -37,7 +38,7 @@ _ALL_WELL: Final = 100  # quality
 _UNKNOWN: Final = (math.nan, *(0.0,) * 20)  # a covariance
 _NO_RATES: Final = (math.nan,) * 6
 _LASER, _DOWNWARD = 0, 25  # MAV_DISTANCE_SENSOR, MAV_SENSOR_ORIENTATION
-JOINTS_MAX: Final = 4  # that JOINT_ENCODERS and ARM_JOINT_STATE have room for
+_NO_MORE: Final = more(())
 _U8, _U16, _I16 = 0xFF, 0xFFFF, 0x7FFF
 _WARM_C: Final = 15.0
 
@@ -55,9 +56,9 @@ class SensorEncoder:
         self._pose: LockstepFrame | None = None
         self._joints = {
             count: LockstepFrame(
-                writer, message_ids.JOINT_ENCODERS, *(0.0,) * (JOINTS_MAX - count), count
+                writer, message_ids.JOINT_ENCODERS, *(0.0,) * (BASE - count), count, *_NO_MORE
             )
-            for count in range(1, JOINTS_MAX + 1)
+            for count in range(1, BASE + 1)
         }
 
     def frames(self, t_us: int, measurements: tuple[Measurement, ...]) -> list[bytes]:
@@ -68,7 +69,7 @@ class SensorEncoder:
             if isinstance(one, ImuMeasurement) and one.t_us == t_us:
                 clock = one
             elif isinstance(one, JointMeasurement):
-                out.append(self._joints[len(one.angles)](max(one.t_us, 0), *one.angles))
+                out.append(self._encoders(max(one.t_us, 0), one.angles))
             else:
                 out.append(self._frame(one))
         if clock is not None:
@@ -76,6 +77,13 @@ class SensorEncoder:
         else:
             out.append(self._hil_sensor(t_us, (0.0,) * 13, 0, 0))
         return out
+
+    def _encoders(self, t_us: int, angles: tuple[float, ...]) -> bytes:
+        """JOINT_ENCODERS; without joints in the extension its length is always the same."""
+        if len(angles) in self._joints:
+            return self._joints[len(angles)](t_us, *angles)
+        values = (*base(angles), len(angles), *more(angles))
+        return self._writer.frame(message_ids.JOINT_ENCODERS, t_us, *values)
 
     def _frame(self, one: Measurement) -> bytes:
         # A clock that is wrong by more than the flight is long cannot be sent.

@@ -17,7 +17,7 @@ import numpy as np
 from fsw.autopilot.estimation.estimator import READINGS
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.calm_tick import CalmTick
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -255,7 +255,13 @@ class ScenarioFlight:
         self.autopilot = Autopilot(config)
         law = parts.law(self.autopilot, simulation.clock, self.recorder)
         tick = self.autopilot.tick if law is None else law.tick
-        self.loop = ClosedLoop(simulation, tick, FlightState(), self.planner, config.airframe)
+        self.loop = ClosedLoop(
+            simulation,
+            tick,
+            first_state(config.airframe),
+            self.planner,
+            config.airframe,
+        )
         # Somebody looks at each tick, or has a part in it; a fault of a sensor may be in each.
         self.may_be_calm = law is None and seen is None and fault is None and not traced
         self._steps_per_plan = config.mpc_period_us // config.tick_period_us

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Mode, PredictionState, TickInputs, TickOutputs
@@ -55,7 +55,11 @@ class WholeFlight:
         self._planner = InlinePlanner(planner_of(config))
         tick = Autopilot(config).tick
         self._loop = ClosedLoop(
-            self._simulation, tick, FlightState(), self._planner, config.airframe
+            self._simulation,
+            tick,
+            first_state(config.airframe),
+            self._planner,
+            config.airframe,
         )
 
     def go_to(self, step: int, report: Callable[[float, float], None]) -> None:

@@ -204,7 +204,7 @@ def test_an_estimate_that_is_not_to_be_relied_upon_says_nothing_of_rest(
     state = FlightState(vehicle=VehicleMemory(mode=Mode.FAULT, mode_begin_us=begun_us), **known)
     for after_us in range(0, 12_000_000, 200_000):
         expected = after_us >= from_us
-        assert rests(state, nowhere(begun_us + after_us), 400_000) is expected, after_us
+        assert rests(state, nowhere(begun_us + after_us, 2), 400_000) is expected, after_us
 
 
 @pytest.mark.requirement("REQ-MODE-12")

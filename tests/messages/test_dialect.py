@@ -9,8 +9,8 @@ from messages.generate import DEFINITION
 # name: (id, payload length, CRC_EXTRA). A peer built with other numbers drops the frames silently,
 # so none of these may change; a new message gets a new line.
 PINNED = {
-    "ARM_JOINT_STATE": (60200, 81, 222),
-    "ARM_JOINT_SETPOINT": (60201, 59, 59),
+    "ARM_JOINT_STATE": (60200, 129, 222),
+    "ARM_JOINT_SETPOINT": (60201, 107, 59),
     "END_EFFECTOR_TARGET": (60202, 57, 239),
     "BARRIER_MARGIN": (60203, 223, 183),
     "MPC_STATUS": (60204, 53, 216),
@@ -21,7 +21,8 @@ PINNED = {
     "SETPOINT_STATUS": (60209, 25, 131),
     "OBSTACLE_POINT": (60210, 20, 254),
     "OBSTACLE_SHAPE": (60211, 94, 185),
-    "JOINT_ENCODERS": (60212, 25, 156),
+    "JOINT_ENCODERS": (60212, 41, 156),
+    "MPC_HORIZON_ARM": (60213, 222, 38),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have

@@ -34,7 +34,7 @@ def step(t_us: int = 5, sequence: int = 0) -> bytes:
         writer.next_origin()
     return (
         writer.frame(ODOMETRY, t_us, *[0.5] * 13, *ODOMETRY_TAIL)
-        + writer.frame(ARM, t_us, *[0.25] * 12, *[0.0] * 6, 2)
+        + writer.frame(ARM, t_us, *[0.25] * 12, *[0.0] * 6, 2, *[0.0] * 12)
         + writer.frame(HIL_SENSOR, t_us, *[0.125] * 6, *[0.0] * 7, 0x3F, 0)
     )
 

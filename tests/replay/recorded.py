@@ -45,9 +45,7 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
     facts: dict[str, str | int] = CHOICE.facts()
-    log = FlightLog(
-        path, LogSubject(facts, flat(flight_config(body="points")), {}, 17.1675, AIRFRAME.bodies)
-    )
+    log = FlightLog(path, LogSubject(facts, flat(flight_config(body="points")), {}, AIRFRAME))
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:
         log.add(inputs, outputs)

@@ -12,6 +12,7 @@ import pytest
 
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
@@ -219,7 +220,7 @@ def test_behind_a_gap_nothing_is_compared(
 
 
 def test_a_log_of_other_fields_is_refused_with_its_revision(tmp_path: Path) -> None:
-    subject = LogSubject({"ver_sw": "0123abc"}, {}, {}, 1.0, (1.0, 1.0))
+    subject = LogSubject({"ver_sw": "0123abc"}, {}, {}, AIRFRAME)
     path = tmp_path / "flight.ulg"
     path.write_bytes(definitions(0, subject, "lockstep", '{"sensors":"other"}'))
     with pytest.raises(UlogError, match="has other fields than this build reads; it is of 0123abc"):

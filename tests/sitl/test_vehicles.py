@@ -35,7 +35,6 @@ from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
 from sitl.simulation import Controls, Simulation
 from sitl.truth_log import TruthLog
-from sitl.vehicle_session import check_joints
 from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
 from tests.sitl.vehicles import PAPER, inputs, random_vehicle
@@ -281,15 +280,6 @@ def test_a_critical_point_anywhere_on_a_link_is_judged() -> None:
     assert simulation.ended is not None
     assert simulation.ended.kind is EndKind.COLLISION
     assert "the probe hit the ground" in simulation.ended.sentence
-
-
-def test_more_joints_than_the_link_carries_are_refused_with_who_flies_them() -> None:
-    check_joints(scenario("octo-4r"))
-    with (
-        patched(random_vehicle(5, 6, np.random.default_rng(0))),
-        pytest.raises(ScenarioError, match=r"has 5 joints: the link .* carries 4; PX4 flies it"),
-    ):
-        check_joints(scenario("random"))
 
 
 def test_what_our_flight_software_does_not_fly_is_refused_before_a_flight() -> None:

@@ -21,6 +21,7 @@ Source: docs/equations.md T3b.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any
 
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 from fsw.autopilot.control.pid import PidGains, pid_step
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
-from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import (
     ArmCoordinates,
     along_other,
@@ -42,9 +43,10 @@ from fsw.autopilot.model.multibody import (
     joint_drift,
     joint_load,
     move_bodies,
+    posture,
     solve,
 )
-from fsw.autopilot.signals import StateEstimate, Vec3
+from fsw.autopilot.signals import JointVector, StateEstimate, Vec3
 from fsw.autopilot.tick_record import ArmTask, Joints, Multibody, Tick
 from fsw.compiled import compilable, kernel, machine_code, packed
 from fsw.record import JOINTS, Floats
@@ -61,6 +63,16 @@ def rest_joints(k: Joints, airframe: Airframe, estimate: StateEstimate) -> None:
     still.known = estimate
     _place(_packed(airframe), still.array)
     k.reference[:], k.momentum[:] = still.estimate.q_arm, still.bodies.momentum
+
+
+def arm_damping(airframe: Airframe) -> JointVector:
+    """About critical for the hanging arm (j,) [N m s/rad]: it is let down beside walls as well."""
+    b = airframe.bodies
+    m, found = posture(b, (0.0,) * b.joints), []
+    for k in range(b.joints):
+        stiffness = GRAVITY * math.hypot(*m.vq[3 * k : 3 * k + 3].tolist())
+        found.append(2.0 * math.sqrt(stiffness * float(m.qq[JOINTS * k + k])))
+    return tuple(found)
 
 
 @lru_cache(maxsize=8)

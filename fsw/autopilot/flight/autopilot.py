@@ -12,6 +12,7 @@ import numpy as np
 
 from fsw.autopilot.control.actuator_watch import pause
 from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
+from fsw.autopilot.control.joints import arm_damping
 from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
@@ -90,11 +91,9 @@ _STILL = SensorFrame(
     q_WB=(1.0, 0.0, 0.0, 0.0),
     gyro_B=(0.0, 0.0, 0.0),
     accel_B=(0.0, 0.0, -9.81),
-    q_arm=(0.0, 0.0),
-    qd_arm=(0.0, 0.0),
+    q_arm=(),
+    qd_arm=(),
 )
-# N m s/rad, about critical for the hanging arm: it is let down beside walls as well.
-_ARM_DAMPING: Vec2 = (0.15, 0.04)
 _DESCEND = Mode.DESCEND  # ten times as fast as Mode.X
 
 
@@ -157,12 +156,14 @@ class Autopilot:
         )
         self._room = ZoneRoom(config)
         self._tick_us = config.tick_period_us
+        self._damping = arm_damping(config.airframe)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
         self._max_us = config.catch_up_ticks * config.tick_period_us
 
     def warm_up(self) -> None:
         """Compile every kernel of the tick, before anything flies."""
-        estimate = estimate_state(_STILL)
+        rest = (0.0,) * self.config.airframe.bodies.joints
+        estimate = estimate_state(replace(_STILL, q_arm=rest, qd_arm=rest))
         assert estimate is not None
         r = with_nominal(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
         self._plans.model.move(r, 1)
@@ -341,7 +342,7 @@ class Autopilot:
     ) -> Controlled:
         """Before the first estimate: actuators off, and no command that needs one."""
         state, acks = self._commander.handle_commands(
-            state, nowhere(inputs.sensors.t_us), inputs.commands, texts, known=False
+            state, nowhere(inputs.sensors.t_us, r.joint_count), inputs.commands, texts, known=False
         )
         texts += told(state, self._tick_us)
         still = stopped(self.config.airframe)
@@ -634,7 +635,7 @@ class Autopilot:
                 return wanted, r, False
         elif armed:
             idle = self.config.limits.idle_thrust
-            wanted = ActuatorCommand((idle, idle, idle, idle), _let_down(estimate))
+            wanted = ActuatorCommand((idle,) * airframe.rotors, self._let_down(estimate))
             r = at_rest(airframe, estimate, r)
         else:
             wanted = stopped(airframe)
@@ -646,6 +647,10 @@ class Autopilot:
             r.flags, r.margin = found.flags, found.margin
         r.commanded = sent
         return sent, r, replaced
+
+    def _let_down(self, estimate: StateEstimate) -> JointVector:
+        """Joint torques (j,) [N m] that let a folded arm hang without swinging through."""
+        return tuple([-c * rate for c, rate in zip(self._damping, estimate.qd_arm, strict=True)])
 
     def _see_damage(self, state: FlightState, r: Tick, controlled: Controlled) -> Damage:
         """What is known of the actuators. Reads estimate, joints; writes watch.
@@ -700,12 +705,6 @@ def keep_clear(config: FlightConfig) -> KeepClear:
         replace(config.safety_filter, enabled=int(enabled)),
         config.steering.speed,
     )
-
-
-def _let_down(estimate: StateEstimate) -> Vec2:
-    """Joint torques that let a folded arm hang without swinging through."""
-    (rate1, rate2), (damping1, damping2) = estimate.qd_arm, _ARM_DAMPING
-    return -damping1 * rate1, -damping2 * rate2
 
 
 def freeze_arm(r: Tick, estimate: StateEstimate, kinds: JointVector) -> None:

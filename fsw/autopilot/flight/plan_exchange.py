@@ -11,6 +11,7 @@ from fsw.autopilot.flight.state import FlightState, PlanMemory
 from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
 from fsw.autopilot.model.nominal import NominalModel
 from fsw.autopilot.model.rotors import MotionState
 from fsw.autopilot.mpc.qp_data import InputLimits
@@ -38,7 +39,7 @@ def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
         yaw=estimate.yaw,
         yaw_rate=0.0,
         q_arm=estimate.q_arm,
-        qd_arm=(0.0, 0.0),
+        qd_arm=(0.0,) * len(estimate.q_arm),
     )
 
 
@@ -69,12 +70,9 @@ def with_arm_in_bounds(
     A hard push slings the arm about. A plan that began with it so would need seconds to catch it,
     and the arm would follow the plan round and round.
     """
-    margin, rate = limits.joint_margin, limits.joint_rate
-    th1 = clamp_magnitude(x.q_arm[0], airframe.joint1_limit - margin)
-    th12 = clamp_magnitude(x.q_arm[0] + x.q_arm[1], airframe.joint12_limit - margin)
-    first, second = x.qd_arm
-    rates = (clamp_magnitude(first, rate), clamp_magnitude(second, rate))
-    return x._replace(q_arm=(th1, th12 - th1), qd_arm=rates)
+    q_arm = within_limits(arm_coordinates(airframe), x.q_arm, limits.joint_margin)
+    rates = tuple([clamp_magnitude(rate, limits.joint_rate) for rate in x.qd_arm])
+    return x._replace(q_arm=q_arm, qd_arm=rates)
 
 
 def coast(x: PredictionState, seconds: float) -> PredictionState:
@@ -89,7 +87,7 @@ def coast(x: PredictionState, seconds: float) -> PredictionState:
         v=_each(lambda k: x.v[k] + t * (x.a[k] + t * j[k] / 2.0)),
         a=_each(lambda k: x.a[k] + t * j[k]),
         yaw=x.yaw + t * x.yaw_rate,
-        q_arm=(x.q_arm[0] + t * x.qd_arm[0], x.q_arm[1] + t * x.qd_arm[1]),
+        q_arm=tuple([q + t * qd for q, qd in zip(x.q_arm, x.qd_arm, strict=True)]),
     )
 
 

@@ -21,6 +21,7 @@ from fsw.autopilot.flight.state import (
     VehicleMemory,
 )
 from fsw.autopilot.signals import StateEstimate
+from fsw.autopilot.tick_record import new_tick
 
 RESTARTED: Final = "flight software restarted"
 _REST_US: Final = 1_000_000  # without thrust, for which what falls is fast or has come down
@@ -46,7 +47,9 @@ def rests(state: FlightState, estimate: StateEstimate, unaided_us: int) -> bool:
 def restarted(state: FlightState) -> FlightState:
     """The state from which the next tick begins anew."""
     vehicle, plan, offboard = state.vehicle, state.plan, state.offboard
+    r = state.cascade
     return FlightState(
+        cascade=new_tick(r.mass, r.rotor_count, r.joint_count),
         # What was answered stays as well: the same command, sent again, is no second restart.
         vehicle=VehicleMemory(gcs_heard_us=vehicle.gcs_heard_us, answered=vehicle.answered),
         mission=state.mission,

@@ -17,7 +17,7 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceStat
 from fsw.autopilot.flight.setpoints.offboard import Tilt
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.signals import (
     ActuatorReport,
     ArmingReport,
@@ -300,3 +300,8 @@ class FlightState:
     def nominal(self) -> PredictionState | None:
         """Where the running plan wants the vehicle now, made anew each time."""
         return self.cascade.nominal
+
+
+def first_state(airframe: Airframe) -> FlightState:
+    """What the first tick of a vehicle starts from."""
+    return FlightState(cascade=new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints))

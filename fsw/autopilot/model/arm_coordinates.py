@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from fsw.autopilot.geometry.vectors import clamp
-from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.airframe import Airframe, AngleLimits
 from fsw.autopilot.model.multibody import Several
 from fsw.autopilot.signals import JointVector
 from fsw.compiled import compilable
@@ -104,3 +104,21 @@ def within_limits(arm: ArmCoordinates, q: JointVector, margin: float) -> JointVe
         rest = c - sum(a * b for a, b in zip(row, found, strict=False))
         found.append(rest / row[k])
     return tuple(found)
+
+
+def first_beyond(limits: AngleLimits, q: JointVector, room: float) -> str | None:
+    """The first joint, or sum of joints, that is more than ``room`` [rad] beyond its limits.
+
+    As a sentence without its last word, "limit": of joints at ``q`` (j,) [rad].
+    """
+    for i in range(limits.rows):
+        row = limits.row[JOINTS * i : JOINTS * i + len(q)]
+        angle = sum(a * b for a, b in zip(row, q, strict=True))
+        if limits.low[i] - room <= angle <= limits.high[i] + room:
+            continue
+        names = [str(k) for k, share in enumerate(row, start=1) if share]
+        at = f"at {math.degrees(angle):.0f} deg"
+        if len(names) == 1:
+            return f"joint {names[0]} {at} is beyond its"
+        return f"joints {', '.join(names[:-1])} and {names[-1]} together {at} are beyond their"
+    return None

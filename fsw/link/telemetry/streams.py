@@ -103,6 +103,7 @@ STREAMS: Final = (
     # Behind the others, whose places decide when each is sent.
     Stream(message_ids.GPS_RAW_INT, 1, 5, AUTOPILOT, encode_place.gps_raw),
     Stream(message_ids.MPC_HORIZON, 0, 0, PANDION, encode_dialect.mpc_horizon),
+    Stream(message_ids.MPC_HORIZON_ARM, 0, 0, PANDION, encode_dialect.mpc_horizon_arm),
 )
 
 # These leave at once when mode, arming, landing or health change.

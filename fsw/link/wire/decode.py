@@ -28,6 +28,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from messages.frames import Frame, wire_fields
+from messages.joint_arrays import STATE_AT, joined
 
 Numbers = tuple[float, ...]  # a payload without text, in wire order
 
@@ -72,11 +73,14 @@ def _target_at(message_id: int) -> tuple[int | None, int | None]:
     return at.get("target_system"), at.get("target_component")
 
 
-def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> SensorFrame:
-    """Sensor readings of one step: ODOMETRY in local NED, ARM_JOINT_STATE and HIL_SENSOR."""
+def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers, joints: int) -> SensorFrame:
+    """Sensor readings of one step: ODOMETRY in local NED, ARM_JOINT_STATE and HIL_SENSOR.
+
+    Of a vehicle with so many ``joints``.
+    """
     _, px, py, pz, qw, qx, qy, qz, vx, vy, vz = odometry[:11]
     t_us, ax, ay, az, wx, wy, wz = hil_sensor[:7]
-    _, q1, q2, _, _, qd1, qd2 = arm[:7]
+    position, velocity, _ = STATE_AT
     return SensorFrame(
         cast(int, t_us),
         p_WB=(px, py, pz),
@@ -84,8 +88,8 @@ def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers) -> Sensor
         q_WB=(qw, qx, qy, qz),
         gyro_B=(wx, wy, wz),
         accel_B=(ax, ay, az),
-        q_arm=(q1, q2),
-        qd_arm=(qd1, qd2),
+        q_arm=joined(arm, *position, joints),
+        qd_arm=joined(arm, *velocity, joints),
     )
 
 

@@ -188,15 +188,13 @@ def _change_speed(request: CommandRequest, _: Locate) -> CommandAction:
 
 
 def _set_actuator(request: CommandRequest, _: Locate) -> CommandAction:
-    """1 and 2 of index 0 are the joints."""
-    first, second, *others, index = request.params
+    """The actuators of index 0 are the joints."""
+    *shares, index = request.params
     if math.isfinite(index) and index != 0.0:
-        raise _InvalidError("no such actuators: the joints are 1 and 2 of index 0")
-    if any(math.isfinite(value) for value in others):
-        raise _InvalidError("no such actuator: only the joints, 1 and 2, can be set")
-    if any(math.isinf(value) or abs(value) > 1.0 for value in (first, second)):
+        raise _InvalidError("no such actuators: the joints are those of index 0")
+    if any(math.isinf(value) or abs(value) > 1.0 for value in shares):
         raise _InvalidError("joints not moved: an actuator's range is -1 to 1")
-    return MoveJoints(_or_none(first), _or_none(second))
+    return MoveJoints(tuple([_or_none(value) for value in shares]))
 
 
 def _set_home(request: CommandRequest, locate: Locate) -> CommandAction:

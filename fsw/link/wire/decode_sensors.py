@@ -25,6 +25,7 @@ from fsw.autopilot.signals import BatteryReading
 from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers
 from messages.frames import Frame
+from messages.joint_arrays import ENCODERS_AT, ENCODERS_COUNT_AT, joined
 
 Locate = Callable[[float, float, float], Vec3]
 """North, east, down [m] of a latitude [deg], a longitude [deg] and an altitude [m]."""
@@ -53,14 +54,15 @@ _EXPONENT: Final = 0.190263  # of the troposphere
 class SampleDecoder:
     """Reads what a vehicle with one origin measures."""
 
-    def __init__(self, locate: Locate) -> None:
-        self._locate = locate
+    def __init__(self, locate: Locate, joints: int) -> None:
+        """Of a vehicle with so many ``joints``."""
+        self._locate, self._count = locate, joints
         self._origin_altitude = locate(0.0, 0.0, 0.0)[2]  # m: the sea is so far below
         self._readers: dict[int, Callable[[Numbers], Sample | None]] = {
             message_ids.ODOMETRY: pose_sample,
             message_ids.HIL_GPS: self._gnss,
             message_ids.DISTANCE_SENSOR: range_sample,
-            message_ids.JOINT_ENCODERS: joint_sample,
+            message_ids.JOINT_ENCODERS: self._joints,
         }
 
     def samples(self, frame: Frame) -> list[Sample]:
@@ -71,6 +73,11 @@ class SampleDecoder:
         reader = self._readers.get(frame.message_id)
         found = None if reader is None else reader(values)
         return [] if found is None else [found]
+
+    def _joints(self, values: Numbers) -> JointSample | None:
+        """Encoders of this arm; those of an arm of more or fewer joints say nothing of it."""
+        ours = values[ENCODERS_COUNT_AT] == self._count
+        return joint_sample(values, self._count) if ours else None
 
     def _hil_sensor(self, values: Numbers) -> list[Sample]:
         """Those of the sensors in a HIL_SENSOR that have something new."""
@@ -116,9 +123,9 @@ def inertial_sample(values: Numbers) -> ImuSample:
     return ImuSample(1e-6 * values[0], (ax, ay, az), (wx, wy, wz))
 
 
-def joint_sample(values: Numbers) -> JointSample:
-    """JOINT_ENCODERS."""
-    return JointSample(1e-6 * values[0], (values[1], values[2]))
+def joint_sample(values: Numbers, joints: int) -> JointSample:
+    """JOINT_ENCODERS of a vehicle with so many ``joints``."""
+    return JointSample(1e-6 * values[0], joined(values, *ENCODERS_AT, joints))
 
 
 def pose_sample(values: Numbers) -> PoseSample | None:

@@ -16,12 +16,12 @@ from fsw.autopilot.signals import (
     JointSetpoint,
     MotionSetpoint,
     PositionFrom,
-    Vec2,
     Vec3,
     Vec4,
 )
 from fsw.link.wire.decode import Numbers, RefusedError
 from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, Locate
+from messages.joint_arrays import JOINTS_MAX, SETPOINT_AT, SETPOINT_COUNT_AT, joined
 
 # MAV_FRAME, with what a position counts from there; the others have no meaning for a setpoint.
 _LOCAL_NED: Final = 1
@@ -40,7 +40,6 @@ _YAW_RATE: Final = 0x800
 _RATES: Final = 0x07
 _THRUST: Final = 0x40
 _ATTITUDE: Final = 0x80
-_JOINTS: Final = 2
 
 
 def body_setpoint(values: Numbers) -> MotionSetpoint:
@@ -122,11 +121,12 @@ def joint_setpoint(values: Numbers) -> JointSetpoint:
     """Read an ARM_JOINT_SETPOINT.
 
     Raises:
-        RefusedError: It is not for two joints, or an angle is not finite.
+        RefusedError: It is for more joints than it has room for, or an angle is not finite.
     """
-    if values[15] != _JOINTS:
-        raise RefusedError(f"it is for {values[15]:g} joints; this arm has {_JOINTS}")
-    q_arm = cast(Vec2, values[1:3])
+    count = int(values[SETPOINT_COUNT_AT])
+    if not 0 < count <= JOINTS_MAX:
+        raise RefusedError(f"it is for {count} joints; must be 1 to {JOINTS_MAX}")
+    q_arm = joined(values, *SETPOINT_AT, count)
     if not all(map(math.isfinite, q_arm)):
         raise RefusedError("a joint angle is not finite")
     return JointSetpoint(q_arm)

@@ -18,13 +18,14 @@ from fsw.link.wire import message_ids
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.record import padded
+from fsw.record import JOINTS, padded
+from messages.joint_arrays import JOINTS_MAX, base, more
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _MAX_CONSTRAINTS: Final = 16
 _U16: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
-_HORIZON_STEPS: Final = 6  # of an MPC_HORIZON
+_HORIZON_STEPS, _HORIZON_JOINTS = 6, 2  # of an MPC_HORIZON
 _SHAPE_NUMBERS: Final = 16  # of an OBSTACLE_SHAPE
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
@@ -32,34 +33,21 @@ _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHe
 def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """ARM_JOINT_STATE; the torque is the one commanded, the arm has no torque sensor."""
     estimate = snapshot.estimate
-    p_WE, v_WE = end_effector(context.facts.bodies, estimate)
-    return (
-        snapshot.t_us,
-        *_four(estimate.q_arm),
-        *_four(estimate.qd_arm),
-        *_four(snapshot.actuators.joint_torque),
-        *p_WE,
-        *v_WE,
-        2,
-    )
+    p_WE, v_WE = end_effector(context.facts.airframe.bodies, estimate)
+    arrays = estimate.q_arm, estimate.qd_arm, snapshot.actuators.joint_torque
+    return (snapshot.t_us, *_bases(arrays), *p_WE, *v_WE, len(arrays[0]), *_rests(arrays))
 
 
 def arm_joint_setpoint(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
     """ARM_JOINT_SETPOINT in use: the one that is flown offboard, or the running plan's joints."""
-    offboard = snapshot.offboard
+    offboard, plan, inputs = snapshot.offboard, snapshot.plan_state, snapshot.plan_input
     if offboard.kind is not SetpointKind.NONE and offboard.joints is not None:
-        still = (*_four((0.0, 0.0)), *_four((0.0, 0.0)))
-        return (snapshot.t_us, *_four(offboard.joints.q_arm), *still, 0, 0, 2)
-    plan, inputs = snapshot.plan_state, snapshot.plan_input
-    if plan is None or inputs is None:
+        arrays: tuple[JointVector, ...] = (offboard.joints.q_arm, (), ())
+    elif plan is None or inputs is None:
         return None
-    return (
-        snapshot.t_us,
-        *_four(plan.q_arm),
-        *_four(plan.qd_arm),
-        *_four(inputs.qdd_arm),
-        *(0, 0, 2),
-    )
+    else:
+        arrays = plan.q_arm, plan.qd_arm, inputs.qdd_arm
+    return (snapshot.t_us, *_bases(arrays), 0, 0, len(arrays[0]), *_rests(arrays))
 
 
 def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
@@ -138,10 +126,23 @@ def mpc_horizon(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | N
     if plan is None or snapshot.plan_state is None:
         return None
     x, steps = plan.start, plan.inputs[:_HORIZON_STEPS]
-    start = (*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm)
-    inputs = tuple(value for u in steps for value in (*u.a, u.yaw_acc, *u.qdd_arm))
+    start = (*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *_two(x.q_arm), *_two(x.qd_arm))
+    inputs = tuple([value for u in steps for value in (*u.a, u.yaw_acc, *_two(u.qdd_arm))])
     filled = padded(inputs, 6 * _HORIZON_STEPS)
     return (plan.t_us, *start, *filled, plan.plan_id & _U32, plan.period_us, len(steps))
+
+
+def mpc_horizon_arm(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """MPC_HORIZON_ARM of the plan in use: all joints, of which MPC_HORIZON has the first two."""
+    plan = snapshot.plan
+    if plan is None or snapshot.plan_state is None:
+        return None
+    x, steps = plan.start, plan.inputs[:_HORIZON_STEPS]
+    accelerations = padded(
+        tuple([qdd for u in steps for qdd in u.qdd_arm]), JOINTS * _HORIZON_STEPS
+    )
+    arm = (*padded(x.q_arm, JOINTS_MAX), *padded(x.qd_arm, JOINTS_MAX), *accelerations)
+    return (plan.t_us, *arm, plan.plan_id & _U32, len(steps), len(x.q_arm))
 
 
 def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext) -> list[Outgoing]:
@@ -194,5 +195,13 @@ def _microseconds(value: float) -> int:
     return min(round(value), _U32) if 0.0 <= value < math.inf else _U32
 
 
-def _four(values: JointVector) -> JointVector:
-    return padded(values, 4)
+def _bases(arrays: tuple[JointVector, ...]) -> tuple[float, ...]:
+    return tuple([value for one in arrays for value in base(one)])
+
+
+def _rests(arrays: tuple[JointVector, ...]) -> tuple[float, ...]:
+    return tuple([value for one in arrays for value in more(one)])
+
+
+def _two(joints: JointVector) -> JointVector:
+    return padded(joints[:_HORIZON_JOINTS], _HORIZON_JOINTS)

@@ -76,7 +76,7 @@ def vfr_hud(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     estimate = snapshot.estimate
     vx, vy, vz = estimate.v_WB
     speed = math.hypot(vx, vy)
-    thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
+    thrust = context.facts.thrust_share(snapshot.actuators)
     heading = round(_degrees(estimate.yaw)) % 360
     mean_sea = context.origin.altitude - estimate.p_WB[2]
     return (speed, speed, mean_sea, -vz, heading, round(100.0 * thrust))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.autopilot.signals import ActuatorCommand, CommandAck
+from fsw.autopilot.signals import ActuatorCommand, CommandAck, JointVector
 from fsw.link.wire.outgoing import WireValues
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1
 _LOCKSTEP: Final = 1  # HIL_ACTUATOR_CONTROLS_FLAGS
-_UNUSED_CONTROLS: Final = 10  # of 16
+_CONTROLS: Final = 16
 
 
 def command_ack(ack: CommandAck) -> WireValues:
@@ -19,26 +19,22 @@ def command_ack(ack: CommandAck) -> WireValues:
 
 
 def hil_actuator_controls(
-    t_us: int, actuators: ActuatorCommand, thrust_scale: float, torque_scale: float
+    t_us: int, actuators: ActuatorCommand, thrust_scale: float, torque_scales: JointVector
 ) -> tuple[float, ...]:
     """HIL_ACTUATOR_CONTROLS up to the last control in use, the answer to a HIL_SENSOR of ``t_us``.
 
-    ``thrust_scale`` [1/N] and ``torque_scale`` [1/(N m)] are the inverses of the largest values.
+    Rotors come first, then joints. ``thrust_scale`` [1/N] and ``torque_scales`` (j,) [1/(N m)] are
+    the inverses of the largest values.
     """
-    f1, f2, f3, f4 = actuators.rotor_thrust
-    tau1, tau2 = actuators.joint_torque
+    pairs = zip(actuators.joint_torque, torque_scales, strict=True)
     return (
         t_us,
         _LOCKSTEP,
-        f1 * thrust_scale,
-        f2 * thrust_scale,
-        f3 * thrust_scale,
-        f4 * thrust_scale,
-        tau1 * torque_scale,
-        tau2 * torque_scale,
+        *[f * thrust_scale for f in actuators.rotor_thrust],
+        *[torque * scale for torque, scale in pairs],
     )
 
 
-def end_of_controls(*, armed: bool) -> tuple[float, ...]:
-    """The rest of HIL_ACTUATOR_CONTROLS: controls that are not used, and the mode."""
-    return (*(0.0,) * _UNUSED_CONTROLS, _CUSTOM_MODE | (_ARMED if armed else 0))
+def end_of_controls(used: int, *, armed: bool) -> tuple[float, ...]:
+    """The rest of HIL_ACTUATOR_CONTROLS after the ``used`` controls, and the mode."""
+    return (*(0.0,) * (_CONTROLS - used), _CUSTOM_MODE | (_ARMED if armed else 0))

@@ -116,7 +116,7 @@ def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
         mask = _RATES_IGNORED if asked.w_WB_B is None else _ATTITUDE_IGNORED
         rates, attitude = asked.w_WB_B or _ZERO, asked.q_WB or (1.0, 0.0, 0.0, 0.0)
         return (boot_ms(snapshot.t_us), *attitude, *rates, asked.thrust, mask)
-    thrust = sum(snapshot.actuators.rotor_thrust) / (4.0 * context.facts.rotor_thrust_max)
+    thrust = context.facts.thrust_share(snapshot.actuators)
     plan, u = snapshot.plan_state, snapshot.plan_input
     yaw = snapshot.estimate.yaw if plan is None else plan.yaw
     quaternion = quaternion_from_euler(
@@ -126,18 +126,19 @@ def attitude_target(snapshot: FlightSnapshot, context: TelemetryContext) -> Wire
 
 
 def servo_outputs(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-    """SERVO_OUTPUT_RAW: rotors 1 to 4 and joints 5 and 6, as pulse lengths 1000 to 2000 us.
+    """SERVO_OUTPUT_RAW: rotors, then joints, as pulse lengths 1000 to 2000 us.
 
     A rotor's is its share of full thrust, a joint's its torque about 1500.
     """
-    facts, actuators = context.facts, snapshot.actuators
-    pulses = [0, 0, 0, 0, 0, 0]
+    airframe, (thrusts, torques) = context.facts.airframe, snapshot.actuators
+    pulses = [0] * (len(thrusts) + len(torques))
     if snapshot.armed:
-        pulses = [
-            *(1000 + round(1000.0 * f / facts.rotor_thrust_max) for f in actuators.rotor_thrust),
-            *(1500 + round(500.0 * t / facts.joint_torque_max) for t in actuators.joint_torque),
-        ]
-    return (snapshot.t_us & _U32, *pulses, 0, 0, 0, *(0,) * 8)
+        pulses = [1000 + round(1000.0 * f / airframe.rotor_thrust_max) for f in thrusts]
+        pairs = zip(torques, airframe.joint_torque_max, strict=False)
+        pulses += [1500 + round(500.0 * t / most) for t, most in pairs]
+    first, second = pulses[:8], pulses[8:]
+    rest = (*first, *(0,) * (8 - len(first))), (*second, *(0,) * (8 - len(second)))
+    return (snapshot.t_us & _U32, *rest[0], 0, *rest[1])
 
 
 def highres_imu(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:

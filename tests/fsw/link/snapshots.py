@@ -36,10 +36,9 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.telemetry_context import TelemetryContext
 
+VEHICLE = replace(AIRFRAME, rotor_thrust_max=16.0)
 FACTS = VehicleFacts(
-    rotor_thrust_max=16.0,
-    joint_torque_max=2.0,
-    bodies=AIRFRAME.bodies,
+    VEHICLE,
     tick_period_us=2_000,
     mpc_period_us=100_000,
     mpc_delay_us=10_000,

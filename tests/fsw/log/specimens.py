@@ -12,6 +12,8 @@ from typing import Any
 
 from fsw.autopilot.signals import TickInputs
 
+OF_JOINTS = ("q_arm", "qd_arm", "qdd_arm", "angles")  # as many numbers as the vehicle has joints
+
 
 def specimen(hint: Any, dice: random.Random, nothing: float = 0.2) -> Any:
     """A value of an annotated type: floats of any size, NaN among them, texts beyond ASCII.
@@ -39,7 +41,14 @@ def specimen(hint: Any, dice: random.Random, nothing: float = 0.2) -> Any:
     if issubclass(hint, enum.Enum):
         return dice.choice(list(hint))
     hints = typing.get_type_hints(hint)
-    return hint(**{name: specimen(part, dice) for name, part in hints.items()})
+    return hint(
+        **{
+            name: tuple(specimen(float, dice) for _ in range(2))
+            if name in OF_JOINTS
+            else specimen(part, dice)
+            for name, part in hints.items()
+        }
+    )
 
 
 def inputs(t_us: int, dice: random.Random) -> TickInputs:

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import PlanTimings
 from fsw.log import json_codec
 from fsw.log.encoder import LogEncoder
 from fsw.log.json_codec import JsonCodec
-from tests.fsw.link.snapshots import PLAN
+from tests.fsw.link.snapshots import PLAN, VEHICLE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +53,7 @@ def test_a_plan_is_written_by_the_fast_encoder(
     measured: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The tick that a plan comes in has the most to write."""
-    encoder = LogEncoder(measured=measured, thrust_max=16.0, bodies=AIRFRAME.bodies)
+    encoder = LogEncoder(measured=measured, airframe=VEHICLE)
     monkeypatch.delattr(json_codec, "_ENCODER")
     text = encoder.inputs.encode("plan", PLAN)
     times = PLAN.timings if measured else PlanTimings(-1.0, -1.0, -1.0)

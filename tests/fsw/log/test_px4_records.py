@@ -33,7 +33,7 @@ from fsw.log.encoder import FULL, THIN
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.px4_records import planned_rates
 from fsw.log.reader import LoggedTick, open_flight, ticks
-from tests.fsw.link.snapshots import SNAPSHOT, outputs_at
+from tests.fsw.link.snapshots import SNAPSHOT, VEHICLE, outputs_at
 
 ORIGIN = Origin(47.0, 8.0, 400.0)
 NUMBERS = {"origin.latitude": 47.0, "origin.longitude": 8.0, "origin.altitude": 400.0}
@@ -45,7 +45,7 @@ FRAME = SensorFrame(0, NONE, NONE, (1.0, *NONE), NONE, (0.0, 0.0, -9.81), NONE[:
 def logged(
     path: Path, snapshots: Iterator[FlightSnapshot], profile: int = THIN, sampled: bool = False
 ) -> ULog:
-    log = FlightLog(path, LogSubject({}, NUMBERS, {}, 16.0, (0.15, 0.15), profile))
+    log = FlightLog(path, LogSubject({}, NUMBERS, {}, VEHICLE, profile))
     for k, snapshot in enumerate(snapshots):
         t_us = 1_000_000 + 2_000 * k
         if k == 0:
@@ -183,7 +183,7 @@ def test_vibration_is_px4_s_measure_of_what_the_inertial_unit_feels(tmp_path: Pa
 
 def test_a_frame_of_which_the_samples_say_everything_takes_a_few_bytes(tmp_path: Path) -> None:
     path, unknown = tmp_path / "flight.ulg", (NAN, NAN, NAN)
-    log = FlightLog(path, LogSubject({}, NUMBERS, {}, 16.0, (0.15, 0.15)))
+    log = FlightLog(path, LogSubject({}, NUMBERS, {}, VEHICLE))
     log.begin(1_000_000, lockstep=True)
     given = []
     for k in range(40):
@@ -225,7 +225,7 @@ def test_the_load_is_written_where_it_is_measured(tmp_path: Path) -> None:
     timing = GroupTiming(2_000, 500, 0, 0, 500.0, 800.0, 900.0, 1.0, 2.0, 3.0, 0.1)
     for lockstep in (True, False):
         path = tmp_path / f"{lockstep}.ulg"
-        log = FlightLog(path, LogSubject({}, {}, {}, 16.0, (0.15, 0.15)))
+        log = FlightLog(path, LogSubject({}, {}, {}, VEHICLE))
         log.begin(1_000_000, lockstep)
         log.add(TickInputs(replace(FRAME, t_us=1_000_000)), outputs_at(1_000_000))
         log.add_timing(1_000_000, 0, timing)

@@ -12,19 +12,16 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.measurements import Sample
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import PlanTimings, SensorFrame, TickInputs
 from fsw.log import topics
 from fsw.log.encoder import SAMPLES, TYPED, LogEncoder
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.json_codec import JsonCodec
 from fsw.log.reader import LoggedTick, open_flight, ticks
-from tests.fsw.link.snapshots import outputs_at
+from tests.fsw.link.snapshots import VEHICLE, outputs_at
 from tests.fsw.log.specimens import inputs
 
-SUBJECT = LogSubject(
-    {"ver_sw": "a test"}, {"airframe.mass": 3.5}, {"PD_ROLL_P": 50.0}, 16.0, (0.15, 0.15)
-)
+SUBJECT = LogSubject({"ver_sw": "a test"}, {"airframe.mass": 3.5}, {"PD_ROLL_P": 50.0}, VEHICLE)
 
 
 def digits(value: Any) -> str:
@@ -126,6 +123,6 @@ def test_a_number_too_large_for_a_float_is_infinite_and_no_error() -> None:
     snapshot = reported.snapshot
     far = snapshot.estimate._replace(p_WB=(1e300, -1e300, 0.0))
     reported = dataclasses.replace(reported, shown=dataclasses.replace(snapshot, estimate=far))
-    encoder, out = LogEncoder(measured=True, thrust_max=16.0, bodies=AIRFRAME.bodies), bytearray()
+    encoder, out = LogEncoder(measured=True, airframe=VEHICLE), bytearray()
     encoder.add(inputs(1_000_000, random.Random(4)), reported, out)
     assert out

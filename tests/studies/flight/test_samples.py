@@ -28,7 +28,7 @@ def numbers(one: Sample) -> list[float]:
 def test_the_link_and_the_studies_make_the_same_samples(suite: str) -> None:
     simulation = Simulation(load_scenario("walls", suite), 1)
     encoder = StepEncoder(lockstep=True, measured=True)
-    decoder = SampleDecoder(Inbox().locate)
+    decoder = SampleDecoder(Inbox().locate, 2)
     kinds = set()
     for _ in range(150):
         said = simulation.measurements()

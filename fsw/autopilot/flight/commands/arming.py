@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Final
 
 from fsw.autopilot.flight.modes.base import CommandContext
+from fsw.autopilot.model.arm_coordinates import first_beyond
 from fsw.autopilot.signals import Mode
 
 _INVALID: Final = "the state estimate is invalid"
@@ -81,14 +82,11 @@ def _outside(context: CommandContext) -> str:
 
 
 def _joints(context: CommandContext) -> str:
-    (q1, q2), rates = context.health.joints, context.health.joint_rates
-    airframe = context.airframe
-    if not max(abs(rates[0]), abs(rates[1])) <= _SWINGING:
+    joints, rates = context.health.joints, context.health.joint_rates
+    if not all(abs(rate) <= _SWINGING for rate in rates):
         return "the arm swings; wait until it hangs still"
-    first, both = airframe.joint1_limit + _BEYOND, airframe.joint12_limit + _BEYOND
-    if abs(q1) <= first and abs(q1 + q2) <= both:
-        return ""
-    return f"the joints are beyond their limits, at {q1:.2f} and {q2:.2f} rad"
+    beyond = first_beyond(context.airframe.angle_limits, joints, _BEYOND)
+    return "" if beyond is None else f"{beyond} limit"
 
 
 def _storage(context: CommandContext) -> str:

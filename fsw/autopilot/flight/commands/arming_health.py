@@ -27,8 +27,8 @@ class ArmingHealth:
     min_remaining: float = 0.1
     parameters: str = ""  # which contradict each other
     min_margin: float = math.inf  # m, of the safe set
-    joint_rates: JointVector = (0.0, 0.0)  # rad/s
-    joints: JointVector = (0.0, 0.0)  # rad
+    joint_rates: JointVector = ()  # rad/s
+    joints: JointVector = ()  # rad
     damage: str = ""  # parts that have failed
     storage: str = ""  # why the flight log is not written
 

@@ -15,6 +15,7 @@ from fsw.autopilot.flight.restart import RESTARTED
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.setpoints.offboard import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
+from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.body import hull_reach
 from fsw.autopilot.shapes.zones import surface, surfaces
 from fsw.autopilot.signals import (
@@ -260,21 +261,25 @@ def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) ->
 
 
 def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> Decision:
-    """Joint 1 as a share of its limit, joint 2 of the limit of both together."""
+    """Each joint as a share of the limit of its coordinate, such as of joints 1 and 2 together."""
     refusal = _hovering_refusal(context)
     if refusal is None and context.mode is not Mode.HOLD:
         refusal = f"the arm is not free while {context.mode.value}; hold first"
     if refusal is not None:
         return Decision(LATER, f"joints not moved: {refusal}")
-    airframe, (q1, q2) = context.airframe, context.joints
-    if action.joint1 is not None:
-        q1 = action.joint1 * airframe.joint1_limit
-    if action.joint2 is not None:
-        q2 = action.joint2 * airframe.joint12_limit
-    refusal = joints_refusal((q1, q2), airframe)
+    arm, q_arm = arm_coordinates(context.airframe), list(context.joints)
+    for k, share in enumerate(action.shares):
+        if share is None:
+            continue
+        if k >= arm.joints:
+            refusal = f"there is no joint {k + 1}, the arm has {arm.joints}"
+            return Decision(DENIED, f"joints not moved: {refusal}")
+        limit = arm.high[k] if share > 0.0 else -arm.low[k]
+        q_arm[k] = share * min(limit, math.pi)
+    refusal = joints_refusal(tuple(q_arm), context.airframe)
     if refusal is not None:
         return Decision(DENIED, f"joints not moved: {refusal}")
-    return Decision(ACCEPTED, joints=(q1, q2))
+    return Decision(ACCEPTED, joints=tuple(q_arm))
 
 
 def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decision:

@@ -60,8 +60,11 @@ def _reason(memory: FusionMemory | None) -> str:
     return "; ".join(faults) or "readings come, and none is good enough to begin with"
 
 
-def nowhere(t_us: int) -> StateEstimate:
-    """The estimate that telemetry shows and commands are looked at with, which says nothing."""
+def nowhere(t_us: int, joints: int) -> StateEstimate:
+    """The estimate that telemetry shows and commands are looked at with, which says nothing.
+
+    Of a vehicle of so many ``joints``.
+    """
     zero = (0.0, 0.0, 0.0)
     level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     return StateEstimate(
@@ -71,8 +74,8 @@ def nowhere(t_us: int) -> StateEstimate:
         R_WB=level,
         w_WB_B=zero,
         yaw=0.0,
-        q_arm=(0.0, 0.0),
-        qd_arm=(0.0, 0.0),
+        q_arm=(0.0,) * joints,
+        qd_arm=(0.0,) * joints,
     )
 
 
@@ -88,7 +91,7 @@ def nothing_known(
         t_us=t_us,
         mode=so_far.mode,
         armed=so_far.armed,
-        estimate=nowhere(t_us),
+        estimate=nowhere(t_us, state.cascade.joint_count),
         reference=None,
         plan_state=None,
         plan_input=None,

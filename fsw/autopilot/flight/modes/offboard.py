@@ -123,7 +123,8 @@ class Offboard(FlightMode):
             last = ahead if state.setpoint.reference is None else memory.tilt
             tilt_limit = config.planner.limits.tilt
             tilt = tilted(memory.attitude, last, tilt_limit, config.planner.period)
-            thrust = 4.0 * config.airframe.rotor_thrust_max * memory.attitude.thrust
+            airframe = config.airframe
+            thrust = airframe.rotors * airframe.rotor_thrust_max * memory.attitude.thrust
             return as_motion(tilt, thrust / state.cascade.mass), tilt
         assert memory.motion is not None, "one of the two is young"
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead

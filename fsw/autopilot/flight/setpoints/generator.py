@@ -77,10 +77,8 @@ def step(
     q_arm = reference.q_arm
     if q_arm is not None and goal.joints is not None:
         most = limits.joint_speed * dt
-        q_arm = (
-            q_arm[0] + clamp_magnitude(goal.joints[0] - q_arm[0], most),
-            q_arm[1] + clamp_magnitude(goal.joints[1] - q_arm[1], most),
-        )
+        pairs = zip(q_arm, goal.joints, strict=True)
+        q_arm = tuple([now + clamp_magnitude(wanted - now, most) for now, wanted in pairs])
     return replace(reference, p=p, v=v, yaw=yaw, yaw_rate=yaw_rate, q_arm=q_arm)
 
 

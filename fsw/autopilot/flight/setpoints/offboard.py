@@ -10,7 +10,10 @@ from fsw.autopilot.flight.commands.bounds import motion_refusal as motion_refusa
 from fsw.autopilot.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.arm_coordinates import first_beyond
 from fsw.autopilot.signals import AttitudeSetpoint, JointVector, MotionSetpoint, Vec3
+
+_ROUNDING = 1e-6  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,13 +37,11 @@ def attitude_refusal(setpoint: AttitudeSetpoint) -> str | None:
 
 
 def joints_refusal(q_arm: JointVector, airframe: Airframe) -> str | None:
-    """Why the arm cannot have the angles ``q_arm`` [rad]."""
-    both = q_arm[0] + q_arm[1]
-    if not abs(q_arm[0]) <= airframe.joint1_limit + 1e-6:
-        return f"joint 1 at {math.degrees(q_arm[0]):.0f} deg is beyond its limit"
-    if not abs(both) <= airframe.joint12_limit + 1e-6:
-        return f"joints 1 and 2 together at {math.degrees(both):.0f} deg are beyond their limit"
-    return None
+    """Why the arm cannot have the angles ``q_arm`` (j,) [rad]."""
+    if len(q_arm) != airframe.bodies.joints:
+        return f"{len(q_arm)} joints are set, and the arm has {airframe.bodies.joints}"
+    beyond = first_beyond(airframe.angle_limits, q_arm, _ROUNDING)
+    return None if beyond is None else f"{beyond} limit"
 
 
 def tilted(setpoint: AttitudeSetpoint, last: Tilt, most: float, dt: float) -> Tilt:

@@ -358,7 +358,7 @@ def test_a_place_is_flown_to_from_the_setpoint_that_is_under_way_with_the_joints
 def test_after_a_setpoint_of_the_end_effector_one_of_the_body_begins_anew() -> None:
     arm = replace(UNDER_WAY, of_end_effector=True)
     state = replace(steered(), setpoint=SetpointMemory(arm, steered().setpoint.goal))
-    for action in (GoTo(Place((4.0, 4.0), 3.0)), MoveJoints(0.5, -0.5)):
+    for action in (GoTo(Place((4.0, 4.0), 3.0)), MoveJoints((0.5, -0.5))):
         reference = after(state, action).setpoint.reference
         assert reference is not None
         assert (reference.of_end_effector, reference.p) == (False, HERE)
@@ -378,12 +378,12 @@ def test_an_orbit_begins_with_the_heading_of_its_beginning() -> None:
 
 def test_joints_are_moved_on_the_way_or_where_the_vehicle_stays() -> None:
     limit = CONFIG.airframe.joint1_limit
-    on_the_way = after(steered(), MoveJoints(0.5, None)).setpoint
+    on_the_way = after(steered(), MoveJoints((0.5, None))).setpoint
     assert on_the_way.reference == UNDER_WAY
     assert on_the_way.goal == PositionGoal(
         MotionSetpoint(False, (5.0, 2.0, -3.0)), (0.5 * limit, 0.1)
     )
-    staying = after(flying(), MoveJoints(0.5, None)).setpoint
+    staying = after(flying(), MoveJoints((0.5, None))).setpoint
     assert staying.goal == PositionGoal(MotionSetpoint(False, HERE), (0.5 * limit, -0.1))
 
 

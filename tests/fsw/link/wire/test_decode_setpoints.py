@@ -220,7 +220,8 @@ def test_joints_and_the_end_effector_of_our_own_dialect() -> None:
     assert taken(setpoint) == Received(joints=JointSetpoint((0.5, -0.25)))
     wrong: tuple[tuple[dict[str, float], str], ...] = (
         ({"position[1]": NAN}, "a joint angle is not finite"),
-        ({"joint_count": 3}, "it is for 3 joints"),
+        ({"joint_count": 9}, "it is for 9 joints; must be 1 to 8"),
+        ({"joint_count": 0}, "it is for 0 joints"),
         ({"target_component": 7}, ""),
     )
     for bad, why in wrong:

@@ -132,6 +132,10 @@ TELLING: dict[int, dict[str, Any]] = {
         "time_usec": 3_000_000, "start": [0.0, 0.0, -1.0, *[0.0] * 16], "inputs": [0.0] * 36,
         "plan_id": 7, "period_us": 100_000, "steps": 0,
     },
+    ids.MPC_HORIZON_ARM: {
+        "time_usec": 3_000_000, "position": [0.0] * 8, "velocity": [0.0] * 8,
+        "acceleration": [0.0] * 36, "plan_id": 7, "steps": 0, "joint_count": 2,
+    },
     ids.LOOP_TIMING: {"ticks": 5000, "late_ticks": 3, "skipped_ticks": 1, "lateness_p99_us": 90.0},
 }  # fmt: skip
 
@@ -348,13 +352,14 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
         ids.END_EFFECTOR_TARGET,
         ids.MPC_STATUS,
         ids.MPC_HORIZON,
+        ids.MPC_HORIZON_ARM,
     ):
         assert stream_of(message_id).encode(idle, CONTEXT) is None
 
 
 def test_actuators_are_fractions_of_their_limits() -> None:
-    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, 1 / 16.0, 1 / 2.0)
-    end = encode_replies.end_of_controls(armed=True)
+    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, 1 / 16.0, (1 / 2.0,) * 2)
+    end = encode_replies.end_of_controls(6, armed=True)
     message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values, *end))
     assert message.time_usec == 3_004_000
     assert message.controls[:6] == pytest.approx([0.5, 0.25, 0.75, 1.0, 0.5, -0.25])

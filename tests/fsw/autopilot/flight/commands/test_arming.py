@@ -61,7 +61,7 @@ def unwell(**changes: Any) -> arming.CommandContext:
         (INCONSISTENT, Subject.SAFE_SET, "the sphere is too small"),
         (unwell(min_margin=-0.02), Subject.SAFE_SET, "outside its safe set by 20 mm"),
         (unwell(joint_rates=(0.0, -2.1)), Subject.JOINTS, "swings"),
-        (unwell(joints=(3.0, 0.0)), Subject.JOINTS, "beyond their limits"),
+        (unwell(joints=(3.0, 0.0)), Subject.JOINTS, "joint 1 at 172 deg is beyond its limit"),
         (unwell(damage="rotor 2 gives nothing"), Subject.ACTUATORS, "rotor 2"),
         (unwell(storage="flight.ulg ends early"), Subject.STORAGE, "flight.ulg ends early"),
     ],

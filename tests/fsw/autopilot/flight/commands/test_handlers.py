@@ -552,10 +552,10 @@ def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
 
 @pytest.mark.parametrize("mode", [Mode.LAND, Mode.MISSION])
 def test_joints_are_moved_in_hold_alone(mode: Mode) -> None:
-    decision = decided(MoveJoints(0.1, 0.1), replace(HIGH, mode=mode))
+    decision = decided(MoveJoints((0.1, 0.1)), replace(HIGH, mode=mode))
     assert (decision.result, decision.joints) == (TEMPORARILY_REJECTED, None)
     assert "hold first" in decision.reason
-    kept = decided(MoveJoints(None, None), replace(HIGH, joints=(0.2, -0.3)))
+    kept = decided(MoveJoints((None, None)), replace(HIGH, joints=(0.2, -0.3)))
     assert kept.joints == (0.2, -0.3)
 
 
