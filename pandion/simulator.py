@@ -81,7 +81,7 @@ class Simulator:
         frame, samples = readings(self.simulation)
         estimate = None if samples else estimate_state(frame)
         aim = target(self.simulation.clock, self.simulation.t_us)
-        seen = observed(estimate or _UNKNOWN, aim, AIRFRAME.link_length)
+        seen = observed(estimate or _UNKNOWN, aim, AIRFRAME.bodies)
         return replace(seen, samples=samples) if samples else seen
 
     def step(self, thrust: Floats, torque: Floats, armed: bool = True) -> Observation:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from fsw.autopilot.control.tube import limits_used
-from fsw.autopilot.model.airframe import GRAVITY, airframe_of, wrench_of
+from fsw.autopilot.model.airframe import GRAVITY, airframe_of, check_arm, wrench_of
 from fsw.autopilot.model.multibody import Bodies, bodies_of, posture
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -67,6 +67,7 @@ def figures(vehicle: Vehicle) -> Figures:
 def start_up(vehicle: Vehicle) -> str:
     """What the flight software's analysis says at start with its default loops, in a sentence."""
     try:
+        check_arm(vehicle)
         airframe = airframe_of(vehicle)
     except VehicleError as error:
         return str(error)

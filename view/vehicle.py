@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from command_line.bounded_json import json_numbers
 from fsw.autopilot.geometry.rotation import euler_zyx, matrix_from_quaternion
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
-from fsw.autopilot.model.kinematics import arm_points, point_in_flight
+from fsw.autopilot.model.kinematics import (
+    frame_of,
+    position,
+    predicted_end_effector,
+)
 from fsw.autopilot.model.prediction import P, condense, to_vector
 from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec3
 from view.scene import Horizon, Posture
@@ -36,10 +40,8 @@ def places(posture: Posture, airframe: Airframe = AIRFRAME) -> Places:
     estimate = StateEstimate(
         0, posture.p, _STILL, R, _STILL, euler_zyx(R)[2], posture.q_arm, (0.0, 0.0)
     )
-    l1, l2 = airframe.link_length
-    joint2, _ = point_in_flight(estimate, (l1, 0.0))
-    tip, _ = point_in_flight(estimate, (l1, l2))
-    return Places(posture.p, joint2, tip)
+    frame = frame_of(airframe.bodies, estimate)
+    return Places(*(position(frame, point.on, point.begin) for point in airframe.points))
 
 
 def rotor_hubs(airframe: Airframe = AIRFRAME) -> tuple[Vec3, ...]:
@@ -66,15 +68,9 @@ def horizon(
     """
     model = condense_once(airframe, len(inputs), period)
     u = np.array([(*one.a, one.yaw_acc, *one.qdd_arm) for one in inputs]).ravel()
-    nodes = model.phi @ to_vector(start) + model.gamma @ u
-    l1, l2 = airframe.link_length
-    points = np.empty((2, 2, 3))
-    base, tip = [], []
-    for node in nodes:
-        arm_points(node, l1, l2, points)
-        base.append(_vec3(node[P : P + 3]))
-        tip.append(_vec3(points[1, 0]))
-    return Horizon(tuple(base), tuple(tip))
+    nodes = model.phi @ to_vector(start, airframe.bodies.joints) + model.gamma @ u
+    base = tuple(_vec3(node[P : P + 3]) for node in nodes)
+    return Horizon(base, tuple(predicted_end_effector(airframe.bodies, node)[0] for node in nodes))
 
 
 @lru_cache(maxsize=4)

@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.ocp import INPUTS, STATES
 from benchmarks.optimiser.solved import Solved, timed
 from fsw.autopilot.barriers.cbf_row import cbf_lower_bound
 from fsw.autopilot.barriers.safe_approach import safe_approach_speed
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.model.linearisation import Linearisation, position, velocity
-from fsw.autopilot.model.prediction import INPUTS, STATES, YAW, Array, P, V, condense, to_vector
+from fsw.autopilot.model.kinematics import position, velocity
+from fsw.autopilot.model.linearisation import Linearisation
+from fsw.autopilot.model.prediction import YAW, Array, P, V, condense, to_vector
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.shapes.frame import outward_axis
 from fsw.autopilot.signals import PlanRequest, SafeSet
@@ -101,7 +103,7 @@ class CasadiMethod:
 
     def _unknowns(self, request: PlanRequest, inputs: Array) -> Array:
         """States that follow from the inputs, stage by stage, and no slack."""
-        states = self._model.phi @ to_vector(request.start) + self._model.gamma @ inputs
+        states = self._model.phi @ to_vector(request.start, 2) + self._model.gamma @ inputs
         parts: list[Array] = [states[0]]
         for i, controls in enumerate(self._controls):
             u = inputs[INPUTS * i : INPUTS * (i + 1)]
@@ -120,7 +122,7 @@ class CasadiMethod:
 
     def _parameters(self, request: PlanRequest, optimum: Array) -> Array:
         """Start, targets, directions at the optimum and the h that eq 25 requires."""
-        start = to_vector(request.start)
+        start = to_vector(request.start, 2)
         self._horizon.refill(start, optimum)
         yaws = self._horizon.states[:, YAW]
         parts: list[Any] = [start]

@@ -11,10 +11,11 @@ import numpy as np
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, given, installed
 from benchmarks.optimiser.converged import target_points
 from benchmarks.optimiser.instances import Instance
+from benchmarks.optimiser.ocp import INPUTS
 from benchmarks.optimiser.slopes import slopes_of
 from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.mpc.planner_config import PlannerConfig
@@ -86,7 +87,7 @@ class SlsqpMethod:
 
     def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
-        start, targets = to_vector(instance.request.start), target_points(instance.request)
+        start, targets = to_vector(instance.request.start, 2), target_points(instance.request)
 
         def search() -> Solution:
             problem = NonlinearProgram(self._ocp, start, targets)

@@ -19,21 +19,23 @@ from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.model.kinematics import body_axes
 from fsw.autopilot.model.prediction import (
-    INPUTS,
     Q_ARM,
     QD_ARM,
-    STATES,
     YAW,
     YAW_RATE,
     P,
     V,
     discretise,
+    inputs_of,
+    states_of,
 )
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.signals import TARGET_SPHERE, SafeSet, Zone
 
 # A node's parameters: target position, velocity, yaw; directions as rows; required h of each row.
 TARGET, DIRECTIONS = 7, 9
+# Written for the arm of paper alone, sharing no formula with the planner.
+STATES, INPUTS = states_of(2), inputs_of(2)
 
 
 @dataclass
@@ -150,7 +152,7 @@ def _node(
     program.cost += joint * slack[0]
     for k in range(1, slack.numel()):
         program.cost += barrier * slack[k]
-    th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
+    th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]
     for angle, limit in (
         (th1, AIRFRAME.joint1_limit),
         (th12, AIRFRAME.joint12_limit),
@@ -170,7 +172,7 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
     points = [(p, v)]
     angle, rate = 0.0, 0.0
     for joint, length in enumerate(AIRFRAME.link_length):
-        angle, rate = angle + x[Q_ARM + joint], rate + x[QD_ARM + joint]
+        angle, rate = angle + x[Q_ARM + 2 * joint], rate + x[QD_ARM + 2 * joint]
         ahead, down = length * ca.sin(angle), length * ca.cos(angle)
         p = p + ahead * b1 + down * b3
         v = v + ahead * d1 + down * d3 + rate * (down * b1 - ahead * b3)
@@ -189,7 +191,7 @@ def _add_cost(
     w, airframe = config.weights, AIRFRAME
     target_v = node[3:6] if w.relative_velocity else 0.0
     m1, m2 = airframe.bodies.mass[:2]
-    th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
+    th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]
     moment1 = m1 * airframe.bodies.com[2] + m2 * airframe.link_length[0]
     cog = (moment1 * ca.sin(th1) + m2 * airframe.bodies.com[5] * ca.sin(th12)) / (m1 + m2)
     program.cost += (w.tracking_terminal if last else w.tracking) * ca.sumsqr(tip[0] - node[:3])

@@ -26,7 +26,7 @@ from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import ImuSample
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import (
@@ -143,7 +143,7 @@ class LogEncoder:
         self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
         self._measured = measured
         self._per_newton = 1.0 / airframe.rotor_thrust_max
-        self._link_length = airframe.link_length
+        self._bodies = airframe.bodies
         self._changing = tuple(name for name in self.inputs.names if name not in (TYPED, SAMPLES))
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
@@ -290,7 +290,7 @@ class LogEncoder:
         margins, barrier, smallest = report.shown(topics.MARGINS)
         least = min(report.margins, default=math.nan)
         argmin = 0xFF if smallest is None else smallest
-        p, v = point_in_flight(snapshot.estimate, self._link_length)
+        p, v = end_effector(self._bodies, snapshot.estimate)
         wanted = (
             (*_NOWHERE, *_NOWHERE, math.nan)
             if target is None

@@ -15,10 +15,10 @@ import numpy as np
 
 from fsw.autopilot.control.braking import Brake
 from fsw.autopilot.flight.plan_exchange import plan_input
-from fsw.autopilot.geometry.vectors import add_scaled, subtract
+from fsw.autopilot.geometry.vectors import add, subtract
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.kinematics import end_effector_when_level
-from fsw.autopilot.model.nominal import REST_STATE
+from fsw.autopilot.model.kinematics import level_frame, position
+from fsw.autopilot.model.nominal import rest_state
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Plan, PlanInput, PlanRequest, PredictionState
 from sitl.disturbances.items import push
@@ -71,12 +71,11 @@ Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
 
 def points(state: PredictionState) -> Points:
     """Base, joint 2 and end-effector of the level body [m, NED]."""
-    l1, l2 = AIRFRAME.link_length
-    joint2, end_effector = (
-        end_effector_when_level(lengths, state.q_arm, state.yaw)
-        for lengths in ((l1, 0.0), (l1, l2))
+    frame = level_frame(AIRFRAME.bodies, state.q_arm, state.yaw)
+    base, joint2, end_effector = (
+        add(state.p, position(frame, point.on, point.begin)) for point in AIRFRAME.points
     )
-    return state.p, add_scaled(state.p, joint2, 1.0), add_scaled(state.p, end_effector, 1.0)
+    return base, joint2, end_effector
 
 
 class DoubleIntegrator:
@@ -180,7 +179,7 @@ def simulate(
 
 def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:
     th1, th2 = start_angles(scenario)
-    at_origin = REST_STATE._replace(yaw=math.radians(scenario.start.yaw_deg), q_arm=(th1, th2))
+    at_origin = rest_state(2)._replace(yaw=math.radians(scenario.start.yaw_deg), q_arm=(th1, th2))
     return at_origin._replace(p=subtract(p_target, points(at_origin)[2]))
 
 

@@ -43,5 +43,6 @@ def _passes(
     f = thrust / r.mass
     wanted = -f * R[2], -f * R[5], GRAVITY - f * R[8]
     a = add_scaled(motion.a, r.observed.d, 1.0)
-    _, changed, _ = filtered(law.filter, probes, zones, estimate, r.observed.v, a, wanted)
+    bodies, v = law.airframe.bodies, r.observed.v
+    _, changed, _ = filtered(law.filter, bodies, probes, zones, estimate, v, a, wanted)
     return not changed

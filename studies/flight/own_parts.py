@@ -34,7 +34,8 @@ from fsw.autopilot.flight.autopilot import Autopilot, keep_clear
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.ports import PlanningCycle
@@ -392,7 +393,7 @@ class WatchedController:
         if outputs.mode is not Mode.TRAJECTORY or estimate is None or not state.vehicle.flies:
             return state, outputs
         t_us = inputs.sensors.t_us
-        seen = observed(estimate, target(self._clock, t_us), self._airframe.link_length)
+        seen = observed(estimate, target(self._clock, t_us), self._airframe.bodies)
         command = self._checked(self._pace.call(self._law, seen, seen.t), seen.t)
         command, _ = gate(self._airframe, command, self._last, armed=True)
         zones = self._autopilot.zones_now(state)
@@ -439,10 +440,8 @@ class WatchedController:
         return ActuatorCommand((f1, f2, f3, f4), (t1, t2))
 
 
-def observed(
-    estimate: StateEstimate, aim: EndEffectorTarget, links: tuple[float, float]
-) -> Observation:
-    """What is known in a tick, of a vehicle whose arm has ``links`` [m]."""
+def observed(estimate: StateEstimate, aim: EndEffectorTarget, bodies: Bodies) -> Observation:
+    """What is known in a tick, of a vehicle of ``bodies``."""
     return Observation(
         1e-6 * (aim.t_us - START_US),
         np.array(estimate.p_WB),
@@ -451,7 +450,7 @@ def observed(
         np.array(estimate.w_WB_B),
         np.array(estimate.q_arm),
         np.array(estimate.qd_arm),
-        np.array(point_in_flight(estimate, links)[0]),
+        np.array(end_effector(bodies, estimate)[0]),
         np.array(aim.p_WE),
         np.array(aim.v_WE),
         np.array(aim.a_WE),

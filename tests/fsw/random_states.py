@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.model.prediction import (
     Q_ARM,
     QD_ARM,
-    STATES,
     YAW,
     YAW_RATE,
     A,
@@ -19,13 +18,14 @@ from fsw.autopilot.model.prediction import (
     P,
     S,
     V,
+    states_of,
 )
 from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec2, Vec3
 
 
-def prediction_vector(random: np.random.Generator) -> Array:
-    """A state of the prediction model (19,): tilts up to 50 degrees, yaw often at plus-minus pi."""
-    x = np.zeros(STATES)
+def prediction_vector(random: np.random.Generator, joints: int = 2) -> Array:
+    """A state of the prediction model: tilts up to 50 degrees, yaw often at plus-minus pi."""
+    x = np.zeros(states_of(joints))
     x[P : P + 3] = random.uniform(-2.0, 2.0, 3)
     x[V : V + 3] = random.uniform(-1.5, 1.5, 3)
     x[A : A + 2] = random.uniform(-6.0, 6.0, 2)
@@ -34,8 +34,8 @@ def prediction_vector(random: np.random.Generator) -> Array:
     x[S : S + 2] = random.uniform(-100.0, 100.0, 2)
     x[YAW] = random.choice([-math.pi, math.pi, random.uniform(-math.pi, math.pi)])
     x[YAW_RATE] = random.uniform(-1.0, 1.0)
-    x[Q_ARM : Q_ARM + 2] = random.uniform(-1.4, 1.4, 2)
-    x[QD_ARM : QD_ARM + 2] = random.uniform(-3.0, 3.0, 2)
+    x[Q_ARM::2] = random.uniform(-1.4, 1.4, joints)
+    x[QD_ARM::2] = random.uniform(-3.0, 3.0, joints)
     return x
 
 
@@ -50,8 +50,8 @@ def as_state(x: Array) -> PredictionState:
         s=(v[11], v[12]),
         yaw=v[13],
         yaw_rate=v[14],
-        q_arm=(v[15], v[16]),
-        qd_arm=(v[17], v[18]),
+        q_arm=(v[15], v[17]),
+        qd_arm=(v[16], v[18]),
     )
 
 
@@ -94,3 +94,10 @@ def random_estimate(random: np.random.Generator, tilt: float = 1.0) -> StateEsti
         (q1, q2),
         (qd1, qd2),
     )
+
+
+def any_estimate(random: np.random.Generator, joints: int) -> StateEstimate:
+    """Any attitude, everything moving, of a vehicle with so many joints."""
+    estimate = random_estimate(random, tilt=3.0)
+    q, qd = (tuple(random.uniform(-3.0, 3.0, joints).tolist()) for _ in range(2))
+    return estimate._replace(q_arm=q, qd_arm=qd)

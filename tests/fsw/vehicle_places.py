@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import StateEstimate
+from tests.fsw.paper_arm import LENGTHS
 
 
 def placed(estimate: StateEstimate) -> dict[int, tuple[Array, Rotation]]:
@@ -19,5 +19,5 @@ def placed(estimate: StateEstimate) -> dict[int, tuple[Array, Rotation]]:
     return {
         0: (p, R_WB),
         1: (p, first),
-        2: (p + first.apply([0.0, 0.0, AIRFRAME.link_length[0]]), second),
+        2: (p + first.apply([0.0, 0.0, LENGTHS[0]]), second),
     }

@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pandion
+from tests.fsw.paper_arm import LENGTHS
 
 MIRROR = np.diag([1.0, -1.0, -1.0])  # NED to north, west, up; FRD to forward, left, up
 
@@ -95,7 +96,7 @@ class DoMpcPlanner:
         aim, speed = (model.set_variable("_tvp", name, (3, 1)) for name in ("aim", "speed"))
         for name, rate in zip("pvaqw", (v, a, (wanted - a) / self.LAG, w, turned), strict=True):
             model.set_rhs(name, rate)
-        l1, l2 = pandion.AIRFRAME.link_length
+        l1, l2 = LENGTHS
         yaw, both = request.start.yaw, q[0] + q[1]
         ahead, below = l1 * ca.sin(q[0]) + l2 * ca.sin(both), l1 * ca.cos(q[0]) + l2 * ca.cos(both)
         tool = p + ca.vertcat(ahead * np.cos(yaw), ahead * np.sin(yaw), below)

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from fsw.autopilot.model.airframe import AIRFRAME, BodySize, airframe_of
+from fsw.autopilot.model.airframe import AIRFRAME, BodySize, check_arm
 from vehicles.vehicle_file import (
     PACKAGED,
     VehicleError,
@@ -73,7 +73,7 @@ def test_an_arm_that_the_flight_software_does_not_know_is_refused(old: str, new:
     """No arm is flown as if it were another one."""
     other = parse_vehicle(PAPER.replace(old, new, 1), "mine")
     with pytest.raises(VehicleError, match="vehicle mine: the flight software flies an arm like"):
-        airframe_of(other)
+        check_arm(other)
 
 
 def test_axes_that_are_rounded_are_scaled() -> None:

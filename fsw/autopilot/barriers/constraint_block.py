@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import SafeSet
 
 
@@ -20,7 +20,7 @@ class Rows(NamedTuple):
     start: Array  # (starts,)
     value: Array  # (rows,)
     lower_bound: Array  # (rows,)
-    gradient: Array  # (rows, 6 n)
+    gradient: Array  # (rows, inputs n)
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,12 @@ class ConstraintBlock:
 
     node: NDArray[np.intp]  # (rows,) node of each row, 1..n
     slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
-    unknowns: int  # 6 n
+    unknowns: int  # inputs n
     starts: int  # values at node 0
     start: Array = field(init=False)  # (starts,) the value of each zone and part at node 0
     value: Array = field(init=False)  # (rows,)
     lower_bound: Array = field(init=False)  # (rows,)
-    gradient: Array = field(init=False)  # (rows, 6 n)
+    gradient: Array = field(init=False)  # (rows, inputs n)
 
     def __post_init__(self) -> None:
         rows = len(self.node)
@@ -58,16 +58,19 @@ class ConstraintBlock:
 
 
 def block(
-    per_group: tuple[int, ...], first_node: int, horizon: int, starts: int = 0
+    per_group: tuple[int, ...], first_node: int, horizon: int, inputs: int, starts: int = 0
 ) -> ConstraintBlock:
-    """Rows of the nodes from a first one on; at each node groups of so many share a slack."""
+    """Rows of the nodes from a first one on; at each node groups of so many share a slack.
+
+    A node of the ``horizon`` [1] has so many ``inputs`` [1].
+    """
     nodes = np.arange(first_node, horizon + 1)
     rows, groups = sum(per_group), len(per_group)
     group = np.repeat(np.arange(groups), per_group)
     return ConstraintBlock(
         node=np.repeat(nodes, rows),
         slack=(groups * np.arange(len(nodes))[:, None] + group).ravel(),
-        unknowns=INPUTS * horizon,
+        unknowns=inputs * horizon,
         starts=starts,
     )
 
@@ -79,7 +82,7 @@ class TargetPoints:
     position: Array  # (n + 1, 3) m
     velocity: Array  # (n + 1, 3) m/s
     yaw: Array  # (n + 1,) rad
-    q_arm: Array | None = None  # (n + 1, 2) rad; None: the planner is free to choose
+    q_arm: Array | None = None  # (n + 1, j) rad; None: the planner is free to choose
     t_us: int = 0  # of node 0; what moves by itself is placed by it
     recent_disturbance: float = math.inf  # m/s^2, which lambda may follow
 

@@ -9,20 +9,18 @@ import numpy as np
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.barriers.zone_rows import fill_starts, settings
 from fsw.autopilot.model.body import Body
-from fsw.autopilot.model.linearisation import FRAME, put_arm, put_pose, put_turning
+from fsw.autopilot.model.kinematics import frame_of
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.zones import FOLLOWS, all_moving_zones, shifts, zone_arrays
 from fsw.autopilot.signals import (
     ConstraintReport,
     EndEffectorTarget,
-    JointVector,
-    Mat3,
     SafeSet,
     StateEstimate,
-    Vec2,
     Vec3,
 )
-from fsw.compiled import kernel, machine_code
+from fsw.compiled import machine_code
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
 
@@ -43,22 +41,19 @@ class Margins:
     def __init__(
         self,
         body: Body,
-        links: Vec2,
+        bodies: Bodies,
         tunings: tuple[BarrierTuning, BarrierTuning],
         period: float,
     ) -> None:
-        """Prepare for ``links`` [m] and the planner's ``period`` [s].
+        """Prepare for a vehicle of ``bodies`` and the planner's ``period`` [s].
 
         The first of ``tunings`` is for all zones but those that follow the target.
         """
         self.parts = tuple(part.name for part in body.parts)
-        self._probes, self._links = body.probes, links
+        self._probes, self._bodies = body.probes, bodies
         self._settings = settings(tunings, period)
         self._known = _known(SafeSet(), 0)
         self._fill = machine_code(fill_starts)
-        level, arm = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0)
-        vehicle = np.zeros(FRAME), links, _REST, _REST, level, _REST, arm, arm
-        self._put_vehicle = machine_code(_put_vehicle, *vehicle)
 
     def report(
         self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
@@ -76,11 +71,7 @@ class Margins:
         p, v = (_REST, _REST) if target is None else (target.p_WE, target.v_WE)
         of_target = np.array((p, v), dtype=np.float64)
         shift, speed = shifts(moving, np.array([estimate.t_us]), of_target[:1], of_target[1:])
-        vehicle = np.zeros(FRAME)
-        self._put_vehicle(
-            *(vehicle, self._links, estimate.p_WB, estimate.v_WB, estimate.R_WB),
-            *(estimate.w_WB_B, estimate.q_arm, estimate.qd_arm),
-        )
+        vehicle = frame_of(self._bodies, estimate)
         size = sum(per_zone)
         margins, values = np.empty(size), np.empty(size)
         how = (zones, shift[0], speed[0], self._probes, vehicle, self._settings)
@@ -97,20 +88,3 @@ def _known(safe_set: SafeSet, parts: int) -> _Known:
     follows = [zone[FOLLOWS] > 0.0 for zone in zones.tolist()]
     per_zone = tuple([1 if rides else parts for rides in follows])
     return _Known(safe_set, zones, all_moving_zones(safe_set), per_zone, any(follows))
-
-
-@kernel
-def _put_vehicle(
-    frame: Array,
-    links: Vec2,
-    p: Vec3,
-    v: Vec3,
-    R: Mat3,
-    w: Vec3,
-    q_arm: JointVector,
-    qd_arm: JointVector,
-) -> None:
-    """The vehicle itself as a frame of ``fsw.autopilot.model.linearisation``."""
-    put_pose(frame, p, R)
-    put_turning(frame, v, w)
-    put_arm(frame, q_arm, qd_arm, links)

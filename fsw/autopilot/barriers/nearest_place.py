@@ -10,7 +10,7 @@ import math
 
 from fsw.autopilot.geometry.vectors import add_scaled, dot
 from fsw.autopilot.model.body import BEGIN, CAPSULE, DISC, END, FORM, ON, RIM, TURN
-from fsw.autopilot.model.linearisation import in_axes, position
+from fsw.autopilot.model.kinematics import in_axes, position
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.kind import Surface
 from fsw.autopilot.shapes.zones import FLAT, KEEP_IN, surface_at

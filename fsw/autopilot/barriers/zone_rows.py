@@ -27,7 +27,8 @@ from fsw.autopilot.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
 from fsw.autopilot.geometry.vectors import dot
-from fsw.autopilot.model.body import ON, PART, RADIUS, Body
+from fsw.autopilot.model.body import ON, PART, RADIUS, Body, reaches
+from fsw.autopilot.model.kinematics import position, velocity
 from fsw.autopilot.model.linearisation import (
     TURNED,
     Horizon,
@@ -35,13 +36,11 @@ from fsw.autopilot.model.linearisation import (
     chain,
     fill_slopes,
     fill_turned,
-    position,
-    velocity,
 )
 from fsw.autopilot.model.prediction import (
-    INPUTS,
     QD_ARM,
-    STATES,
+    QDD_ARM,
+    YAW_ACC,
     YAW_RATE,
     Array,
     CondensedModel,
@@ -68,15 +67,15 @@ def settings(
     tightening: float = 0.0,
     first_node: int = 1,
     most: Vec4 = (math.inf, 0.0, 0.0, 0.0),
-    reach: float = math.inf,
+    reach: tuple[float, ...] = (),
 ) -> Array:
-    """What the kernels need to know besides geometry (20,) [SI]; arguments as of ``ZoneRows``.
+    """What the kernels need to know besides geometry (20 + j,) [SI]; arguments as of ``ZoneRows``.
 
     ``period`` [s] is the planner's, ``first_node`` [1] the first with rows; ``tightening`` [m],
-    ``most`` [m/s^2, rad/s^2]; no place of the vehicle is farther from the base than ``reach`` [m].
+    ``most`` [m/s^2, rad/s^2], ``reach`` (1 + j,) [m] as of ``model.body.reaches``.
     """
     numbers = [entry for tuning in tunings for entry in tuning.numbers(period)]
-    return np.array([distances, tightening, first_node, *most, *numbers, reach], dtype=np.float64)
+    return np.array([distances, tightening, first_node, *most, *numbers, *reach], dtype=np.float64)
 
 
 class ZoneRows:
@@ -111,7 +110,7 @@ class ZoneRows:
         per_zone = self._zones[:, PLANES] * np.where(following, 1, len(self._probes))
         skipped = tunings[0].skipped_nodes if skipped_nodes is None else skipped_nodes
         first_node = 1 + skipped
-        self._work = (np.empty((TURNED, 3)), np.zeros((2, STATES)))
+        self._work = (np.empty((TURNED, 3)), np.zeros((2, model.states)))
         self._settings = settings(
             tunings,
             model.period,
@@ -119,11 +118,12 @@ class ZoneRows:
             tightening=tightening,
             first_node=first_node,
             most=most,
-            reach=body.reach,
+            reach=reaches(body, model.airframe.bodies),
         )
         parts = len(body.parts)
         starts = sum(1 if follows else parts for follows in following)
-        self.rows = block(tuple(per_zone.astype(int).tolist()), first_node, model.horizon, starts)
+        per_group = tuple(per_zone.astype(int).tolist())
+        self.rows = block(per_group, first_node, model.horizon, model.inputs, starts)
         self._rows, self._fill = self.rows.rows, machine_code(_fill)
 
     def update(self, safe_set: SafeSet) -> None:
@@ -214,7 +214,7 @@ def _fill(
                         if distances:
                             chain(impulse, i, slopes[0], gradients[row])
                         else:
-                            for s in range(STATES):
+                            for s in range(slopes.shape[1]):
                                 slopes[1, s] += steepness * slopes[0, s]
                             chain(impulse, i, slopes[1], gradients[row])
                         values[row], least_values[row] = value, least
@@ -259,33 +259,39 @@ def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
     A bound for all inputs within their limits: horizontal, vertical, yaw, joints. A
     place swings about the base by the tilt that a change of acceleration takes, by yaw and joints.
     """
-    most, lever = settings[_MOST : _MOST + 4], settings[_REACH]
+    most, levers = settings[_MOST : _MOST + 4], settings[_REACH:]
+    joints = len(levers) - 1
     far = fast = up = up_fast = 0.0
     tilt = tilt_rate = turn = turn_rate = swing = swing_rate = 0.0
     for step in range(node):
-        g, u = horizon.impulse[node - 1 - step], horizon.inputs[INPUTS * step : INPUTS * (step + 1)]
+        g, at = horizon.impulse[node - 1 - step], (QDD_ARM + joints) * step
+        u = horizon.inputs[at : at + QDD_ARM + joints]
         level = most[0] + math.sqrt(u[0] * u[0] + u[1] * u[1])
         vertical = most[1] + abs(u[2])
         far, fast = far + abs(g[0]) * level, fast + abs(g[1]) * level
         up, up_fast = up + abs(g[4]) * vertical, up_fast + abs(g[5]) * vertical
         tilt, tilt_rate = tilt + abs(g[2]) * level, tilt_rate + abs(g[3]) * level
-        turn, turn_rate = (
-            turn + abs(g[7]) * (most[2] + abs(u[3])),
-            turn_rate + abs(g[8]) * (most[2] + abs(u[3])),
-        )
-        joint = 2.0 * most[3] + abs(u[4]) + abs(u[5])
-        swing, swing_rate = swing + abs(g[9]) * joint, swing_rate + abs(g[10]) * joint
+        yaw = most[2] + abs(u[YAW_ACC])
+        turn, turn_rate = turn + abs(g[7]) * yaw, turn_rate + abs(g[8]) * yaw
+        # Each joint moves what comes after it, no farther off than it reaches.
+        arm = 0.0
+        for joint in range(joints):
+            arm += levers[1 + joint] * (most[3] + abs(u[QDD_ARM + joint]))
+        swing, swing_rate = swing + abs(g[9]) * arm, swing_rate + abs(g[10]) * arm
     state = horizon.states[node]
     jerk = math.sqrt(state[J] * state[J] + state[J + 1] * state[J + 1])
-    rates = abs(state[QD_ARM]) + abs(state[QD_ARM + 1])
+    rates = 0.0
+    for joint in range(joints):
+        rates += abs(state[QD_ARM + 2 * joint])
     # Linearised, a place turns about the base as much as it does for a small turn.
     angle = tilt / _LEAST_THRUST + turn
     rate = tilt_rate / _LEAST_THRUST + turn_rate
-    rate += angle * (jerk / _LEAST_THRUST + abs(state[YAW_RATE]) + rates)
-    rate_of_arm = swing_rate + swing * (rates + jerk / _LEAST_THRUST + abs(state[YAW_RATE]))
+    turning = jerk / _LEAST_THRUST + abs(state[YAW_RATE]) + rates
+    rate += angle * turning
+    swing_rate += swing * turning
     return (
-        math.sqrt(far * far + up * up) + (angle + swing) * lever,
-        math.sqrt(fast * fast + up_fast * up_fast) + (rate + rate_of_arm) * lever,
+        math.sqrt(far * far + up * up) + angle * levers[0] + swing,
+        math.sqrt(fast * fast + up_fast * up_fast) + rate * levers[0] + swing_rate,
     )
 
 
@@ -302,8 +308,8 @@ def fill_starts(
 ) -> None:
     """The least value of each zone and part at one instant: h [m/s], or the distance [m].
 
-    ``zones`` (zones, 23) [SI], ``probes`` (probes, 12) [SI] and ``settings`` (19,) [SI] are numbers
-    as in ``shapes.zones``, ``model.body`` and above, ``frame`` (FRAME,) [SI] the vehicle;
+    ``zones`` (zones, 23) [SI], ``probes`` (probes, 12) [SI] and ``settings`` (20 + j,) [SI] are as
+    in ``shapes.zones``, ``model.body`` and above, ``frame`` (FRAME,) [SI] the vehicle;
     ``shift`` (zones, 3) [m, NED] and ``speed`` (zones, 3) [m/s, NED] those of the zones. Into
     ``starts`` (zones x parts,) [SI], zone by zone; a zone that follows the target has one entry.
     """

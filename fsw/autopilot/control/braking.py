@@ -26,7 +26,7 @@ from scipy.linalg import solve_continuous_are
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.prediction import A, J, S, V, continuous_model
-from fsw.autopilot.signals import PlanInput, PredictionState, Vec2
+from fsw.autopilot.signals import PlanInput, PredictionState
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +60,8 @@ class Brake:
         # The thrust points along a - g: the same tilt is less acceleration while descending.
         most = self._tilt_slope * (GRAVITY - max(vertical, 0.0))
         scale = min(1.0, most / max(math.hypot(wish_x, wish_y), 1e-9))
-        first, second = x.qd_arm
-        joints: Vec2 = (
-            clamp_magnitude(-tuning.joint_rate * first, tuning.joint),
-            clamp_magnitude(-tuning.joint_rate * second, tuning.joint),
+        joints = tuple(
+            [clamp_magnitude(-tuning.joint_rate * rate, tuning.joint) for rate in x.qd_arm]
         )
         return PlanInput(
             (scale * wish_x, scale * wish_y, vertical),

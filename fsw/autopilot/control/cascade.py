@@ -149,7 +149,6 @@ class Cascade:
             filter_law(
                 clear.tuning,
                 clear.barriers,
-                airframe.link_length,
                 gains.k[3] / gains.k[2],
                 tuning.tracking.acceleration_limit,
                 clear.speed,
@@ -269,7 +268,9 @@ def keep_off_zones(
     level = law.filter.level
     wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
     a = add_scaled(motion.a, r.observed.d, 1.0)
-    safe, changed, margin = filtered(law.filter, probes, zones, r.estimate, r.observed.v, a, wanted)
+    safe, changed, margin = filtered(
+        law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, wanted
+    )
     r.margin = margin
     if not margin >= 0.0:
         r.flags |= BREACH

@@ -44,7 +44,8 @@ from fsw.autopilot.barriers.safe_approach import (
 )
 from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
 from fsw.autopilot.model.body import CAPSULE, FORM, ON, RADIUS, TURN, Body
-from fsw.autopilot.model.linearisation import FRAME, put_arm, put_pose
+from fsw.autopilot.model.kinematics import FRAME, put_base, put_links
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.shapes.zones import (
     ADDED,
@@ -86,7 +87,6 @@ class FilterLaw:
     tuning: FilterTuning
     kept: Vec2  # alpha [m/s^2] and k_S [1/s] of zones
     following: Vec2  # of the sphere that follows the target
-    links: Vec2  # m
     lag: float  # s, tau
     level: float  # m/s^2, at most, an axis
     speed: float  # m/s, at most, along a zone's normal
@@ -95,12 +95,11 @@ class FilterLaw:
 def filter_law(
     tuning: FilterTuning,
     barriers: tuple[BarrierTuning, BarrierTuning],
-    links: Vec2,
     lag: float,
     level: float,
     speed: float = math.inf,
 ) -> FilterLaw:
-    """The law for ``links`` [m], a loop that takes ``lag`` [s] and stands ``level`` [m/s^2].
+    """The law for a loop that takes ``lag`` [s] and stands ``level`` [m/s^2].
 
     It pushes up to a ``speed`` [m/s].
     """
@@ -109,7 +108,6 @@ def filter_law(
         tuning=tuning,
         kept=(kept.alpha, kept.slope),
         following=(following.alpha, following.slope),
-        links=links,
         lag=lag,
         level=level,
         speed=speed,
@@ -126,6 +124,7 @@ def filter_probes(body: Body) -> NDArray[np.float64]:
 @compilable
 def filtered(
     law: FilterLaw,
+    bodies: Bodies,
     probes: NDArray[np.float64],
     zones: NDArray[np.float64],
     estimate: StateEstimate | Estimate,
@@ -141,8 +140,8 @@ def filtered(
     infinite where no zone is near.
     """
     frame, shift = np.empty(FRAME), np.empty((zones.shape[0], 3))
-    put_pose(frame, estimate.p_WB, estimate.R_WB)
-    put_arm(frame, estimate.q_arm, estimate.qd_arm, (law.links[0], law.links[1]))
+    put_base(frame, estimate.p_WB, estimate.v_WB, estimate.R_WB, estimate.w_WB_B)
+    put_links(frame, bodies, estimate.q_arm, estimate.qd_arm)
     for k in range(zones.shape[0]):
         moved = moved_by(zones, k, estimate.t_us)
         for axis in range(3):

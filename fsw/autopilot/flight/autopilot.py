@@ -55,7 +55,7 @@ from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.model.nominal import REST_INPUT
+from fsw.autopilot.model.nominal import rest_input
 from fsw.autopilot.mpc.reference import merge
 from fsw.autopilot.parameters.consistency import Finding
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -147,7 +147,7 @@ class Autopilot:
         self._clearance = UncertainClearance(
             config.limits.clearance_sigmas,
             body_of(config.planner.body, config.airframe),
-            config.airframe.link_length,
+            config.airframe.bodies,
             config.planner.tunings,
             # Half a period until one is asked for, what it takes then, and the loop's own lag.
             0.5 * config.planner.period
@@ -229,7 +229,7 @@ class Autopilot:
         if flown:
             plan = self._follow(state, r, estimate, inputs.plan, looped)
         else:
-            r.input = REST_INPUT
+            r.input = rest_input(r.joint_count)
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
         outputs = TickOutputs(sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts))
         return Controlled(

@@ -33,7 +33,7 @@ from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.state import AIDED, FlightState
 from fsw.autopilot.measurements import RangeSample, Sample
 from fsw.autopilot.model.actuator_health import HEALTHY
-from fsw.autopilot.model.nominal import NominalModel, next_state, put_plan
+from fsw.autopilot.model.nominal import NominalModel, move_plan
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES
 from fsw.autopilot.signals import Mode, StateEstimate, TickInputs
@@ -54,7 +54,7 @@ def _sense(
     """
     r = ticks[0]
     missing = read_into(r.estimate, reading, now_us)
-    put_plan(r.plan, next_state(models[0], r.plan, r.u))
+    move_plan(models[0], r.plan, r.u, r.joint_count)
     return bool(missing == 0 and r.estimate.R_WB[8] > upright)
 
 

@@ -31,7 +31,7 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGener
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.autopilot.parameters.contradictions import contradictions
@@ -205,7 +205,7 @@ class Commander:
         config = self._config
         room = stand_off(config.planner.walls) + self._tube_radius
         safe_set = within_room(state.kept.safe_set, estimate, self._body)
-        place = retreat_place(safe_set, estimate, self._body, config.airframe.link_length, room)
+        place = retreat_place(safe_set, estimate, self._body, config.airframe.bodies, room)
         return self._towards(state, PositionGoal(MotionSetpoint(False, place)), estimate)
 
     def check_mode_completion(
@@ -393,7 +393,7 @@ class Commander:
         before, vehicle = state.vehicle.mode, state.vehicle
         texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
         follower = self._modes.get(mode, self._no_mode)
-        p_WE = point_in_flight(estimate, self._config.airframe.link_length)[0]
+        p_WE = end_effector(self._config.airframe.bodies, estimate)[0]
         here = still_at(p_WE, estimate.t_us, estimate.yaw)
         last = here
         if vehicle.flies:

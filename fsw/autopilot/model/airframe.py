@@ -90,18 +90,13 @@ class Airframe:
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
-    """What the controllers know of a vehicle.
-
-    Raises:
-        VehicleError: Planner and compensation do not know its arm yet.
-    """
+    """What the controllers know of a vehicle."""
     rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
     rows = [wrench_of(rotor) for rotor in rotors]
     wrench = [number for row in rows for number in row]
     effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
     share = np.linalg.pinv(effect).ravel().tolist()
-    _check_arm(vehicle)
-    joint, limit = vehicle.joints[0], vehicle.coupled_limits[0]
+    second, both = vehicle.joints[1:2], vehicle.coupled_limits[:1]
     return Airframe(
         mass=vehicle.mass,
         bodies=bodies,
@@ -119,9 +114,9 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         home_posture=_padded(vehicle.home_posture, JOINTS),
         points=points_of(vehicle),
         parts=parts_of(vehicle),
-        link_length=(vehicle.joints[1].xyz[2], vehicle.end_effector.position[2]),
-        joint1_limit=joint.position_max,
-        joint12_limit=limit.maximum,
+        link_length=(sum(one.xyz[2] for one in second), vehicle.end_effector.position[2]),
+        joint1_limit=vehicle.joints[0].position_max,
+        joint12_limit=min([one.maximum for one in both], default=math.inf),
         size=_size(vehicle),
         tilt_max=vehicle.limits.tilt,
         body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
@@ -154,7 +149,7 @@ def _angle_limits(vehicle: Vehicle) -> AngleLimits:
 
 def _size(vehicle: Vehicle) -> BodySize:
     """How far the parts of a vehicle reach; where there is none they are thin."""
-    first, second = (joint.name for joint in vehicle.joints)
+    first, second = vehicle.joints[0].name, vehicle.joints[-1].name
 
     def largest(on: str, *, capsule: bool) -> float:
         radii = [
@@ -175,8 +170,8 @@ def _size(vehicle: Vehicle) -> BodySize:
     )
 
 
-def _check_arm(vehicle: Vehicle) -> None:
-    """Refuse an arm that planner and compensation do not know yet.
+def check_arm(vehicle: Vehicle) -> None:
+    """Refuse an arm that the compensation does not know yet.
 
     Raises:
         VehicleError: With what it is, and what they know.

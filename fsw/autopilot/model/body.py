@@ -16,7 +16,6 @@ disc     four places of the rim, the first of them nearest
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -24,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.parts import ON_BASE, Part
 from fsw.autopilot.signals import Vec3
 
 BodyName = Literal["points", "full"]
 BODIES: Final[tuple[BodyName, ...]] = ("points", "full")
 
-ON_LINK1, ON_LINK2 = 1, 2
 SPHERE, CAPSULE, DISC = 0, 1, 2
 _RIM_PLACES = 4
 
@@ -49,15 +48,6 @@ class Body:
     parts: tuple[Part, ...]
 
     @property
-    def reach(self) -> float:
-        """Farthest that any place of a part is from the base [m], in any posture."""
-        base, first, second = (
-            _extent(part for part in self.parts if part.on == on)
-            for on in (ON_BASE, ON_LINK1, ON_LINK2)
-        )
-        return max(base, first + second)
-
-    @property
     def probes(self) -> NDArray[np.float64]:
         """A row of numbers a probe (probes, 12) [SI], in the order of the parts."""
         rows = []
@@ -70,10 +60,29 @@ class Body:
         return np.array(rows, dtype=np.float64)
 
 
-def _extent(parts: Iterable[Part]) -> float:
+def reaches(body: Body, bodies: Bodies) -> tuple[float, ...]:
+    """How far any place of a body can be from the base, and from each joint that moves it [m].
+
+    In any posture: a tuple (1 + j,), that of the base first.
+    """
+    reach = [_extent(body, ON_BASE + bodies.joints)]
+    for on in range(bodies.joints, 0, -1):
+        offset = math.hypot(*bodies.offset[3 * on - 3 : 3 * on])
+        reach.append(max(_extent(body, on - 1), offset + reach[-1]))
+    return tuple(reversed(reach))
+
+
+def _extent(body: Body, on: int) -> float:
     """How far from the origin of what they are on the places of parts are [m], at most."""
-    places = [(place, part.rim) for part in parts for place in (part.begin, part.end or part.begin)]
-    return max((math.hypot(*place) + rim for place, rim in places), default=0.0)
+    return max(
+        (
+            math.hypot(*place) + part.rim
+            for part in body.parts
+            if part.on == on
+            for place in (part.begin, part.end or part.begin)
+        ),
+        default=0.0,
+    )
 
 
 def body_of(name: BodyName, airframe: Airframe) -> Body:

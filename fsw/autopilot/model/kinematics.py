@@ -1,80 +1,279 @@
-"""Forward kinematics of the arm: every place where angles become positions.
+"""Forward kinematics: every place where angles become positions.
 
-The arm moves in the x-z plane of the body: th1 counts from straight down (body z), th2 is relative
-to link 1. In flight the attitude is measured (``point_in_flight``). Along the horizon it follows
-from the planned acceleration: thrust points along ``g - a`` and the body's x axis keeps the planned
-yaw, so the plan includes how tilting swings the end-effector (``arm_points``).
+A place is rigid on the base or on a link. A frame holds, in the world's axes, where base and links
+are, how they are turned and how both change; from it follow position and velocity of every place.
+In flight the attitude is measured. Along the horizon it follows from the planned acceleration:
+thrust points along ``g - a`` and the body's x axis keeps the planned yaw, so the plan includes how
+tilting swings the end-effector.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.rotation import rotate
-from fsw.autopilot.geometry.vectors import add_scaled
+from fsw.autopilot.geometry.vectors import add, add_scaled, cross, subtract
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, J, P, V
-from fsw.autopilot.signals import JointVector, StateEstimate, Vec2, Vec3
-from fsw.compiled import compilable, compiled
+from fsw.autopilot.model.multibody import Bodies, next_axes
+from fsw.autopilot.model.parts import ON_BASE
+from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, Array, J, P, V
+from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec2, Vec3
+from fsw.compiled import compilable, compiled, kernel, machine_code, packed
+from fsw.record import JOINTS, Floats
 
-JOINT2, END_EFFECTOR = 0, 1  # rows of arm_points
+# What a frame holds, in this order; matrices row by row. One array, because compiled code counts
+# the references to each array it is handed. First the base: position, velocity, R_WB and its rate.
+AT_P, AT_V, AT_R, AT_TURNING = 0, 3, 6, 15
+AT_D_R, AT_D_TURNING = 24, 60  # derivatives of the last two in each of four turning states
+# Then each link: the same of its joint's origin and its own axes, the joint's axis and its rate.
+AT_LINKS, AT_AXIS, AT_AXIS_RATE = 96, 24, 27
+LINK: Final = 30
+FRAME: Final = AT_LINKS + LINK * JOINTS
+_AXES: Final = 4  # b1, b3 and their rates
+
+_REST: Final[Vec3] = (0.0, 0.0, 0.0)
+
+
+@kernel
+def three(frame: Array, at: int) -> Vec3:
+    """Three entries of a ``frame`` (FRAME,) [SI] from ``at`` [1] on."""
+    return frame[at], frame[at + 1], frame[at + 2]
+
+
+@kernel
+def _nine(frame: Array, at: int) -> Mat3:
+    return (
+        *(frame[at], frame[at + 1], frame[at + 2]),
+        *(frame[at + 3], frame[at + 4], frame[at + 5]),
+        *(frame[at + 6], frame[at + 7], frame[at + 8]),
+    )
+
+
+@kernel
+def _put(frame: Array, at: int, v: Vec3) -> None:
+    frame[at], frame[at + 1], frame[at + 2] = v
+
+
+@kernel
+def place_of(on: int) -> int:
+    """Where in a frame the numbers begin of what a part is ``on`` [1]."""
+    return 0 if on == ON_BASE else AT_LINKS + LINK * (on - 1)
 
 
 @compilable
-def _link(length: Any, sine: Any, cosine: Any, rate: Any) -> Any:
-    """One link in the arm's plane: forward, down [m] and their rates [m/s].
+def fill_frame(state: Array, b: Bodies, frame: Array) -> None:
+    """Where the vehicle is in a prediction ``state`` (states,) [SI].
 
-    The angle enters by its sine and cosine, so that the numbers may be real, complex (the
-    derivatives of the horizon) or symbolic (a study's reference).
+    Into a ``frame`` (FRAME,) [SI], whose derivatives stay as they are.
     """
-    x, z = length * sine, length * cosine
-    return x, z, z * rate, -x * rate
+    _fill_base(state, frame)
+    put_links(frame, b, state[Q_ARM::2], state[QD_ARM::2])
+
+
+@compiled
+def _fill_base(state: Array, frame: Array) -> None:
+    axes = np.empty((_AXES, 3))
+    body_axes(state, axes)
+    for k in range(3):
+        frame[AT_P + k], frame[AT_V + k] = state[P + k], state[V + k]
+    put_matrix(frame, AT_R, axes[0], axes[1])
+    put_rate(frame, AT_TURNING, axes[0], axes[1], axes[2], axes[3])
+
+
+@compiled
+def put_matrix(frame: Array, at: int, b1: Array, b3: Array) -> None:
+    """The axes b1, b2 and b3 as columns, of ``b1`` (3,) [1, NED] and ``b3`` (3,) [1, NED].
+
+    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on.
+    """
+    b2 = cross(b3, b1)
+    for row in range(3):
+        frame[at + 3 * row], frame[at + 3 * row + 1] = b1[row], b2[row]
+        frame[at + 3 * row + 2] = b3[row]
+
+
+@compiled
+def put_rate(frame: Array, at: int, b1: Array, b3: Array, d1: Array, d3: Array) -> None:
+    """The change of ``put_matrix`` by the product rule, for any change of its axes.
+
+    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on: of ``b1`` (3,) [1, NED] and ``b3`` (3,)
+    [1, NED] by ``d1`` (3,) [any, NED] and ``d3`` (3,) [any, NED].
+    """
+    a, b = cross(d3, b1), cross(b3, d1)
+    for row in range(3):
+        frame[at + 3 * row], frame[at + 3 * row + 1] = d1[row], a[row] + b[row]
+        frame[at + 3 * row + 2] = d3[row]
+
+
+@compilable
+def put_base(
+    frame: Array, p: Vec3 | Floats, v: Vec3 | Floats, R: Mat3 | Floats, w: Vec3 | Floats
+) -> None:
+    """The base of a ``frame`` (FRAME,) [SI] at ``p`` [m, NED] with the attitude ``R`` [1].
+
+    It moves with ``v`` [m/s, NED] and turns with ``w`` [rad/s, FRD].
+    """
+    for row in range(3):
+        frame[AT_P + row], frame[AT_V + row] = p[row], v[row]
+        x, y, z = R[3 * row], R[3 * row + 1], R[3 * row + 2]
+        _put(frame, AT_R + 3 * row, (x, y, z))
+        # R times the cross product with w.
+        turning = (y * w[2] - z * w[1], z * w[0] - x * w[2], x * w[1] - y * w[0])
+        _put(frame, AT_TURNING + 3 * row, turning)
+
+
+@compilable
+def put_links(frame: Array, b: Bodies, q: JointVector | Floats, qd: JointVector | Floats) -> None:
+    """The links in a ``frame`` (FRAME,) [SI] whose base is there.
+
+    Joints are at ``q`` (j,) [rad] and turn with ``qd`` (j,) [rad/s].
+    """
+    R, turning = _nine(frame, AT_R), _nine(frame, AT_TURNING)
+    p, v = three(frame, AT_P), three(frame, AT_V)
+    # The rate of the base in the world: its cross product is turning times R transposed.
+    w = (
+        turning[6] * R[3] + turning[7] * R[4] + turning[8] * R[5],
+        turning[0] * R[6] + turning[1] * R[7] + turning[2] * R[8],
+        turning[3] * R[0] + turning[4] * R[1] + turning[5] * R[2],
+    )
+    for k in range(int(b.joints)):
+        offset = (b.offset[3 * k], b.offset[3 * k + 1], b.offset[3 * k + 2])
+        p, v = add(p, rotate(R, offset)), add(v, cross(w, rotate(R, offset)))
+        axis, R = next_axes(b, k, R, q[k])
+        at = AT_LINKS + LINK * k
+        _put(frame, at + AT_P, p)
+        _put(frame, at + AT_V, v)
+        _put(frame, at + AT_AXIS, axis)
+        _put(frame, at + AT_AXIS_RATE, cross(w, axis))
+        w = add_scaled(w, axis, qd[k])
+        for column in range(3):
+            x, y, z = R[column], R[3 + column], R[6 + column]
+            frame[at + AT_R + column], frame[at + AT_R + 3 + column] = x, y
+            frame[at + AT_R + 6 + column] = z
+            dx, dy, dz = cross(w, (x, y, z))
+            frame[at + AT_TURNING + column], frame[at + AT_TURNING + 3 + column] = dx, dy
+            frame[at + AT_TURNING + 6 + column] = dz
+
+
+@kernel
+def position(frame: Array, on: int, local: Vec3) -> Vec3:
+    """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
+    at = place_of(on)
+    return add(three(frame, at), rotate(_nine(frame, at + AT_R), local))
+
+
+@kernel
+def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
+    """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
+    at = place_of(on)
+    return add(three(frame, at + AT_V), rotate(_nine(frame, at + AT_TURNING), local))
+
+
+@kernel
+def in_axes(frame: Array, n: Vec3) -> Vec3:
+    """A direction ``n`` [1, NED] in the body's axes, of a ``frame`` (FRAME,) [SI]."""
+    return (
+        n[0] * frame[6] + n[1] * frame[9] + n[2] * frame[12],
+        n[0] * frame[7] + n[1] * frame[10] + n[2] * frame[13],
+        n[0] * frame[8] + n[1] * frame[11] + n[2] * frame[14],
+    )
+
+
+@kernel
+def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
+    """Where a place of the vehicle is in the body [m, FRD], and its velocity there [m/s].
+
+    ``frame`` (FRAME,) [SI] is the vehicle, ``on`` [1] what the place is rigid on, ``local``
+    [m, part] where there (``fsw.autopilot.model.parts.Part``).
+    """
+    p, v = position(frame, on, local), velocity(frame, on, local)
+    place = in_axes(frame, subtract(p, three(frame, AT_P)))
+    carried = velocity(frame, ON_BASE, place)
+    return place, in_axes(frame, subtract(v, carried))
+
+
+def packed_bodies(bodies: Bodies) -> NDArray[Any]:
+    """The bodies for kernels (1,) [SI], made once.
+
+    Known by identity: to hash them takes longer than what is done with them.
+    """
+    for known, numbers in _PACKED:
+        if known is bodies:
+            return numbers
+    _PACKED.append((bodies, packed(bodies)))
+    del _PACKED[:-_KEPT]
+    return _PACKED[-1][1]
+
+
+_PACKED: Final[list[tuple[Bodies, NDArray[Any]]]] = []
+_KEPT: Final = 8
+
+
+def frame_of(bodies: Bodies, estimate: StateEstimate) -> Array:
+    """The vehicle of an estimate as a frame (FRAME,) [SI]."""
+    frame = np.zeros(FRAME)
+    q, qd = np.array(estimate.q_arm), np.array(estimate.qd_arm)
+    pose = estimate.p_WB, estimate.v_WB, estimate.R_WB, estimate.w_WB_B
+    _put_vehicle(frame, packed_bodies(bodies), *pose, q, qd)
+    return frame
+
+
+@machine_code
+@kernel
+def _put_vehicle(
+    frame: Array, bodies: NDArray[Any], p: Vec3, v: Vec3, R: Mat3, w: Vec3, q: Array, qd: Array
+) -> None:
+    put_base(frame, p, v, R, w)
+    put_links(frame, bodies[0], q, qd)
+
+
+def end_effector(bodies: Bodies, estimate: StateEstimate) -> tuple[Vec3, Vec3]:
+    """World position p_WE [m] and velocity v_WE [m/s] of the estimated end-effector."""
+    frame = frame_of(bodies, estimate)
+    return position(frame, bodies.joints, bodies.tip), velocity(frame, bodies.joints, bodies.tip)
+
+
+def level_frame(bodies: Bodies, q_arm: JointVector, yaw: float) -> Array:
+    """A level vehicle at rest at the origin as a frame (FRAME,) [SI].
+
+    Joints at ``q_arm`` (j,) [rad], the body at ``yaw`` [rad].
+    """
+    c, s = math.cos(yaw), math.sin(yaw)
+    R = (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+    arm = q_arm, (0.0,) * bodies.joints
+    return frame_of(bodies, StateEstimate(0, _REST, _REST, R, _REST, yaw, *arm))
+
+
+def end_effector_when_level(bodies: Bodies, q_arm: JointVector, yaw: float) -> Vec3:
+    """From the body origin to the end-effector of a level vehicle [m, NED].
+
+    Joints at ``q_arm`` (j,) [rad], the body at ``yaw`` [rad].
+    """
+    return position(level_frame(bodies, q_arm, yaw), bodies.joints, bodies.tip)
 
 
 @compilable
 def links(lengths: Vec2, th1: float, th12: float) -> tuple[Vec2, Vec2]:
-    """Both links as vectors (forward, down) in the body's x-z plane [m].
+    """Both links of an arm like that of paper as vectors (forward, down) in the body [m].
 
     Links of ``lengths`` [m], from straight down ``th1`` [rad] and ``th12`` [rad].
     """
-    x1, z1, _, _ = _link(lengths[0], math.sin(th1), math.cos(th1), 0.0)
-    x2, z2, _, _ = _link(lengths[1], math.sin(th12), math.cos(th12), 0.0)
-    return (x1, z1), (x2, z2)
+    return (
+        (lengths[0] * math.sin(th1), lengths[0] * math.cos(th1)),
+        (lengths[1] * math.sin(th12), lengths[1] * math.cos(th12)),
+    )
 
 
-def end_effector_when_level(lengths: Vec2, q_arm: JointVector, yaw: float) -> Vec3:
-    """From the body origin to the end-effector of a level vehicle [m, NED].
-
-    Links of ``lengths`` [m], joints at ``q_arm`` [rad], the body at ``yaw`` [rad].
-    """
-    (x1, z1), (x2, z2) = links(lengths, q_arm[0], q_arm[0] + q_arm[1])
-    ahead = x1 + x2
-    return ahead * math.cos(yaw), ahead * math.sin(yaw), z1 + z2
-
-
-def _tip_in_body(lengths: Vec2, q_arm: JointVector, qd_arm: JointVector) -> tuple[Vec3, Vec3]:
-    """Position [m] and velocity [m/s] of the tip of links of these lengths in the body frame."""
-    th1, th12 = q_arm[0], q_arm[0] + q_arm[1]
-    x1, z1, vx1, vz1 = _link(lengths[0], math.sin(th1), math.cos(th1), qd_arm[0])
-    w12 = qd_arm[0] + qd_arm[1]
-    x2, z2, vx2, vz2 = _link(lengths[1], math.sin(th12), math.cos(th12), w12)
-    return (x1 + x2, 0.0, z1 + z2), (vx1 + vx2, 0.0, vz1 + vz2)
-
-
-def point_in_flight(estimate: StateEstimate, lengths: Vec2) -> tuple[Vec3, Vec3]:
-    """World position p_WE [m] and velocity v_WE [m/s] of an arm point of the estimated vehicle.
-
-    Link ``lengths`` [m]: ``(l1, l2)`` gives the end-effector, ``(l1, 0)`` joint 2.
-    """
-    r, rd = _tip_in_body(lengths, estimate.q_arm, estimate.qd_arm)
-    wx, wy, wz = estimate.w_WB_B
-    turning = (rd[0] + wy * r[2] - wz * r[1], wz * r[0] - wx * r[2], rd[2] + wx * r[1] - wy * r[0])
-    offset, velocity = rotate(estimate.R_WB, r), rotate(estimate.R_WB, turning)
-    return add_scaled(estimate.p_WB, offset, 1.0), add_scaled(estimate.v_WB, velocity, 1.0)
+@compilable
+def predicted_end_effector(b: Bodies, state: Array) -> tuple[Vec3, Vec3]:
+    """Its position [m, NED] and velocity [m/s, NED] in a prediction ``state`` (states,) [SI]."""
+    frame, tip = np.zeros(FRAME), (b.tip[0], b.tip[1], b.tip[2])
+    fill_frame(state, b, frame)
+    return position(frame, int(b.joints), tip), velocity(frame, int(b.joints), tip)
 
 
 @compiled
@@ -82,7 +281,7 @@ def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
     """The body's x and z axes of a prediction state, and how fast they turn.
 
     Written without trigonometry of the tilt and without absolute values, so that it accepts a
-    complex state ``x`` (19,) [SI]: the derivative is then exact (complex step). Into
+    complex state ``x`` (states,) [SI]: the derivative is then exact (complex step). Into
     ``out`` (4, 3) [1, 1/s] go b1, b3 and their rates, in NED.
     """
     # Thrust along f = g e3 - a; its derivative needs the horizontal jerk only: a vertical
@@ -110,25 +309,3 @@ def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
     out[2, 1] = dny / n - b1y * along
     out[2, 2] = dnz / n - b1z * along
     out[3, 0], out[3, 1], out[3, 2] = d3x, d3y, d3z
-
-
-@compiled
-def arm_points(x: NDArray[np.float64], l1: float, l2: float, out: NDArray[np.float64]) -> None:
-    """World position and velocity of joint 2 and end-effector of a prediction state.
-
-    The state ``x`` is (19,) [SI], links are of ``l1`` [m] and ``l2`` [m]. Into
-    ``out`` (2, 2, 3) [m, m/s] go, in NED, [joint 2 | end-effector][position | velocity].
-    """
-    axes = np.empty((4, 3))
-    body_axes(x, axes)
-    b1, b3, d1, d3 = axes
-    th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 1]
-    w1, w12 = x[QD_ARM], x[QD_ARM] + x[QD_ARM + 1]
-    rx, rz, vx, vz = _link(l1, np.sin(th1), np.cos(th1), w1)
-    for point in range(2):
-        if point == 1:
-            tx, tz, ux, uz = _link(l2, np.sin(th12), np.cos(th12), w12)
-            rx, rz, vx, vz = rx + tx, rz + tz, vx + ux, vz + uz
-        for k in range(3):
-            out[point, 0, k] = x[P + k] + rx * b1[k] + rz * b3[k]
-            out[point, 1, k] = x[V + k] + vx * b1[k] + rx * d1[k] + vz * b3[k] + rz * d3[k]

@@ -16,19 +16,6 @@ from fsw.autopilot.signals import PlanInput, PredictionState, Vec3
 from fsw.autopilot.tick_record import Accelerations, PlanState, Tick
 from fsw.compiled import compilable, kernel, machine_code, packed
 
-REST_INPUT = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
-REST_STATE = PredictionState(
-    (0.0, 0.0, 0.0),
-    (0.0, 0.0, 0.0),
-    (0.0, 0.0, 0.0),
-    (0.0, 0.0),
-    (0.0, 0.0),
-    0.0,
-    0.0,
-    (0.0, 0.0),
-    (0.0, 0.0),
-)
-
 _Row = tuple[float, ...]
 
 
@@ -75,16 +62,15 @@ class NominalModel:
         return moved
 
 
-@compilable
-def put_plan(into: PlanState, x: PredictionState) -> None:
-    """Write a state down."""
-    for i in range(3):
-        into.p[i], into.v[i], into.a[i] = x.p[i], x.v[i], x.a[i]
-    for i in range(2):
-        into.j[i], into.s[i] = x.j[i], x.s[i]
-    for i in range(len(x.q_arm)):
-        into.q_arm[i], into.qd_arm[i] = x.q_arm[i], x.qd_arm[i]
-    into.yaw, into.yaw_rate = x.yaw, x.yaw_rate
+def rest_input(joints: int) -> PlanInput:
+    """The input of a vehicle at rest, with so many ``joints`` [1]."""
+    return PlanInput((0.0, 0.0, 0.0), 0.0, (0.0,) * joints)
+
+
+def rest_state(joints: int) -> PredictionState:
+    """A vehicle at rest at the origin, with so many ``joints`` [1] at angles of zero."""
+    no2, no3, arm = (0.0, 0.0), (0.0, 0.0, 0.0), (0.0,) * joints
+    return PredictionState(no3, no3, no3, no2, no2, 0.0, 0.0, arm, arm)
 
 
 @kernel
@@ -92,32 +78,25 @@ def _move(models: NDArray[Any], ticks: NDArray[Any], count: int) -> None:
     """Bring the plan's state ``count`` ticks on."""
     model, r = models[0], ticks[0]
     for _ in range(count):
-        put_plan(r.plan, next_state(model, r.plan, r.u))
+        move_plan(model, r.plan, r.u, r.joint_count)
 
 
 @compilable
-def next_state(
-    model: TickModel, x: PredictionState | PlanState, u: PlanInput | Accelerations
-) -> PredictionState:
-    """The state one tick later."""
+def move_plan(model: TickModel, x: PlanState, u: Accelerations, joints: int) -> None:
+    """Bring the state of a plan of so many ``joints`` [1] on by a tick."""
     rows = model.horizontal
-    px, vx, ax, jx, sx = _axis(rows, x.p[0], x.v[0], x.a[0], x.j[0], x.s[0], u.a[0])
-    py, vy, ay, jy, sy = _axis(rows, x.p[1], x.v[1], x.a[1], x.j[1], x.s[1], u.a[1])
-    pz, vz, az = _climb(model.vertical, x.p[2], x.v[2], x.a[2], u.a[2])
+    for k in range(2):
+        x.p[k], x.v[k], x.a[k], x.j[k], x.s[k] = _axis(
+            rows, x.p[k], x.v[k], x.a[k], x.j[k], x.s[k], u.a[k]
+        )
+    x.p[2], x.v[2], x.a[2] = _climb(model.vertical, x.p[2], x.v[2], x.a[2], u.a[2])
     dt = model.dt
     half = 0.5 * dt * dt
-    q, qd, qdd = x.q_arm, x.qd_arm, u.qdd_arm
-    return PredictionState(
-        (px, py, pz),
-        (vx, vy, vz),
-        (ax, ay, az),
-        (jx, jy),
-        (sx, sy),
-        x.yaw + dt * x.yaw_rate + half * u.yaw_acc,
-        x.yaw_rate + dt * u.yaw_acc,
-        (q[0] + dt * qd[0] + half * qdd[0], q[1] + dt * qd[1] + half * qdd[1]),
-        (qd[0] + dt * qdd[0], qd[1] + dt * qdd[1]),
-    )
+    x.yaw = x.yaw + dt * x.yaw_rate + half * u.yaw_acc
+    x.yaw_rate += dt * u.yaw_acc
+    for k in range(joints):
+        x.q_arm[k] = x.q_arm[k] + dt * x.qd_arm[k] + half * u.qdd_arm[k]
+        x.qd_arm[k] += dt * u.qdd_arm[k]
 
 
 @compilable

@@ -1,4 +1,4 @@
-r"""The planner's prediction model: six double integrators with the attitude's lag in between.
+r"""The planner's prediction model: double integrators with the attitude's lag in between.
 
 The paper's model (eq 16) takes the commanded acceleration as reached at once. The real
 vehicle must tilt first: a horizontal acceleration follows its command through the attitude
@@ -33,11 +33,23 @@ from fsw.compiled import compilable
 
 Array = NDArray[np.float64]
 
-# Layout of the prediction state as a vector.
+# Layout of the prediction state as a vector. Yaw and each joint are an angle and its rate: those of
+# joint i are at Q_ARM + 2 i and QD_ARM + 2 i.
 P, V, A, J, S = 0, 3, 6, 9, 11
-YAW, YAW_RATE, Q_ARM, QD_ARM = 13, 14, 15, 17
-STATES = 19
-INPUTS = 6
+YAW, YAW_RATE, Q_ARM, QD_ARM = 13, 14, 15, 16
+YAW_ACC, QDD_ARM = 3, 4  # of the inputs, after the accelerations of the base
+
+
+@compilable
+def states_of(joints: int) -> int:
+    """How many numbers a prediction state has of a vehicle with ``joints`` [1]."""
+    return Q_ARM + 2 * joints
+
+
+@compilable
+def inputs_of(joints: int) -> int:
+    """How many inputs a node has of a vehicle with ``joints`` [1]."""
+    return QDD_ARM + joints
 
 
 @dataclass(frozen=True)
@@ -47,14 +59,25 @@ class CondensedModel:
     airframe: Airframe
     horizon: int
     period: float  # s
-    phi: Array  # (n + 1, 19, 19)
-    gamma: Array  # (n + 1, 19, 6 n)
+    phi: Array  # (n + 1, states, states)
+    gamma: Array  # (n + 1, states, inputs n)
+
+    @property
+    def states(self) -> int:
+        """Numbers in a state."""
+        return states_of(self.airframe.bodies.joints)
+
+    @property
+    def inputs(self) -> int:
+        """Inputs of a node."""
+        return inputs_of(self.airframe.bodies.joints)
 
 
 def continuous_model(airframe: Airframe) -> tuple[Array, Array]:
-    """Continuous-time A (19, 19) and B (19, 6) of the module docstring."""
-    a = np.zeros((STATES, STATES))
-    b = np.zeros((STATES, INPUTS))
+    """Continuous-time A (states, states) and B (states, inputs) of the module docstring."""
+    joints = airframe.bodies.joints
+    a = np.zeros((states_of(joints), states_of(joints)))
+    b = np.zeros((states_of(joints), inputs_of(joints)))
     for axis in range(3):
         a[P + axis, V + axis] = 1.0
         if airframe.attitude_lag.at_once:
@@ -62,10 +85,10 @@ def continuous_model(airframe: Airframe) -> tuple[Array, Array]:
     if not airframe.attitude_lag.at_once:
         _add_lag(airframe, a, b)
     a[YAW, YAW_RATE] = 1.0
-    b[YAW_RATE, 3] = 1.0
-    for joint in range(2):
-        a[Q_ARM + joint, QD_ARM + joint] = 1.0
-        b[QD_ARM + joint, 4 + joint] = 1.0
+    b[YAW_RATE, YAW_ACC] = 1.0
+    for joint in range(joints):
+        a[Q_ARM + 2 * joint, QD_ARM + 2 * joint] = 1.0
+        b[QD_ARM + 2 * joint, QDD_ARM + joint] = 1.0
     return a, b
 
 
@@ -84,17 +107,18 @@ def _add_lag(airframe: Airframe, a: Array, b: Array) -> None:
 
 
 def discretise(airframe: Airframe, period: float) -> tuple[Array, Array]:
-    """Exact zero-order-hold A (19, 19) and B (19, 6) over one ``period`` [s]."""
-    exponential = _exponential(airframe, period)
-    return exponential[:STATES, :STATES].copy(), exponential[:STATES, STATES:].copy()
+    """Exact zero-order-hold A (states, states), B (states, inputs) over one ``period`` [s]."""
+    exponential, states = _exponential(airframe, period), states_of(airframe.bodies.joints)
+    return exponential[:states, :states].copy(), exponential[:states, states:].copy()
 
 
 @lru_cache(maxsize=64)
 def _exponential(airframe: Airframe, period: float) -> Array:
     a, b = continuous_model(airframe)
-    block = np.zeros((STATES + INPUTS, STATES + INPUTS))
-    block[:STATES, :STATES] = a * period
-    block[:STATES, STATES:] = b * period
+    states, inputs = b.shape
+    block = np.zeros((states + inputs, states + inputs))
+    block[:states, :states] = a * period
+    block[:states, states:] = b * period
     exponential: Array = expm(block)
     return exponential
 
@@ -102,28 +126,31 @@ def _exponential(airframe: Airframe, period: float) -> Array:
 def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
     """Stack the model of one ``period`` [s] over the horizon, inputs as the only unknowns."""
     a, b = discretise(airframe, period)
-    phi = np.zeros((horizon + 1, STATES, STATES))
-    gamma = np.zeros((horizon + 1, STATES, INPUTS * horizon))
-    phi[0] = np.eye(STATES)
+    states, inputs = b.shape
+    phi = np.zeros((horizon + 1, states, states))
+    gamma = np.zeros((horizon + 1, states, inputs * horizon))
+    phi[0] = np.eye(states)
     for i in range(horizon):
         phi[i + 1] = a @ phi[i]
         gamma[i + 1] = a @ gamma[i]
-        gamma[i + 1, :, INPUTS * i : INPUTS * (i + 1)] = b
+        gamma[i + 1, :, inputs * i : inputs * (i + 1)] = b
     return CondensedModel(airframe=airframe, horizon=horizon, period=period, phi=phi, gamma=gamma)
 
 
 @compilable
-def to_vector(state: PredictionState | PlanState) -> Array:
-    """The prediction state in the layout of this module, (19,)."""
-    return np.array(
-        (
-            *(state.p[0], state.p[1], state.p[2]),
-            *(state.v[0], state.v[1], state.v[2]),
-            *(state.a[0], state.a[1], state.a[2]),
-            *(state.j[0], state.j[1]),
-            *(state.s[0], state.s[1]),
-            *(state.yaw, state.yaw_rate),
-            *(state.q_arm[0], state.q_arm[1]),
-            *(state.qd_arm[0], state.qd_arm[1]),
-        )
-    )
+def to_vector(state: PredictionState | PlanState, joints: int) -> Array:
+    """The prediction state in the layout of this module, (states,), of a vehicle with ``joints``.
+
+    Args:
+        state: Of as many joints, or with room for more.
+        joints: How many [1].
+    """
+    x = np.empty(states_of(joints))
+    for k in range(3):
+        x[P + k], x[V + k], x[A + k] = state.p[k], state.v[k], state.a[k]
+    for k in range(2):
+        x[J + k], x[S + k] = state.j[k], state.s[k]
+    x[YAW], x[YAW_RATE] = state.yaw, state.yaw_rate
+    for k in range(joints):
+        x[Q_ARM + 2 * k], x[QD_ARM + 2 * k] = state.q_arm[k], state.qd_arm[k]
+    return x

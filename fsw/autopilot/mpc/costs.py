@@ -1,9 +1,11 @@
 r"""The paper's costs (eqs 18, 20, 21) and an input cost, as one Gauss-Newton quadratic.
 
-.. math:: \sum_i \|e_e\|^2_{W_1} + \|v_e - v_d\|^2_{W_2} + \|p_{G,x}\|^2_{W_3}
+.. math:: \sum_i \|e_e\|^2_{W_1} + \|v_e - v_d\|^2_{W_2} + \|p_{G,xy}\|^2_{W_3}
           + w_\psi(\psi - \psi_d)^2 + \|u_i\|^2_R
 
-over nodes 1..n-1, with the terminal weights at node n (node 0 is measured and constant).
+over nodes 1..n-1, with the terminal weights at node n (node 0 is measured and constant). The
+arm's centre of mass counts ahead and to the right in the body; the paper's arm has no other way
+than ahead.
 
 The paper penalises :math:`v_e` itself, which pulls a moving end-effector back; by default
 the target's velocity is subtracted (docs/equations.md E20 gives both figures).
@@ -20,8 +22,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from fsw.autopilot.barriers.constraint_block import TargetPoints
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.linearisation import Linearisation, Tracked
-from fsw.autopilot.model.prediction import INPUTS, Q_ARM, Array
+from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array
 from fsw.autopilot.signals import Vec4
 from fsw.compiled import compiled, machine_code
 
@@ -43,6 +46,10 @@ class CostWeights:
     # planner to see that what turns must be stopped as well, and the vehicle swung for ever.
     yaw_lead: float = 2.0  # s
     posture: float = 2.0  # on joint angles that a ground station asks for
+    # Ours, of an arm with more joints than two, which the costs above settle: towards the posture
+    # to fly in, with what its rate makes of it, or joints that nothing asks for drift for ever.
+    home: float = 0.05
+    home_lead: float = 1.0  # s
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
@@ -50,9 +57,9 @@ class CostWeights:
 class Quadratic(NamedTuple):
     """``1/2 U' hessian U + gradient' U``, refilled in place."""
 
-    guess: Array  # (6 n,) inputs of the linearisation
-    hessian: Array  # (6 n, 6 n), upper triangle
-    gradient: Array  # (6 n,)
+    guess: Array  # (inputs n,) of the linearisation
+    hessian: Array  # (inputs n, inputs n), upper triangle
+    gradient: Array  # (inputs n,)
 
 
 class Cost(Protocol):
@@ -105,40 +112,52 @@ class TrackingCost:
         return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
 
 
-class PostureCost:
-    """Ours: joints that are asked for. Body and end-effector can then both be given."""
+_SETTLED = 2  # joints, by what the paper's costs say
 
-    def __init__(self, weights: CostWeights) -> None:
-        self._weight = weights.posture
+
+class PostureCost:
+    """Ours: joints that are asked for. Body and end-effector can then both be given.
+
+    Where none are, an arm that has more joints than are settled is led to its home posture.
+    """
+
+    def __init__(self, weights: CostWeights, airframe: Airframe) -> None:
+        joints = airframe.bodies.joints
+        self._weights, self._home = weights, np.array([airframe.home_posture[:joints]])
+        self._redundant = joints > _SETTLED
 
     def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
-        """See ``Cost``; nothing where no joints are asked for."""
-        if targets.q_arm is None:
-            return 0.0
+        """See ``Cost``; nothing where no joints are asked for and none are redundant."""
+        weight, lead, wanted = self._weights.posture, 0.0, targets.q_arm
+        if wanted is None:
+            if not self._redundant:
+                return 0.0
+            weight, lead = self._weights.home, self._weights.home_lead
+            wanted = self._home.repeat(len(horizon.states), axis=0)
         return _add_posture(
-            self._weight,
-            horizon.states[:, Q_ARM : Q_ARM + 2],
-            horizon.model.gamma[:, Q_ARM : Q_ARM + 2],
-            targets.q_arm,
+            weight, lead, horizon.model.inputs, horizon.states, horizon.model.gamma, wanted,
             quadratic,
-        )
+        )  # fmt: skip
 
 
 @compiled
 def _add_posture(
     weight: float,
-    q_arm: Array,
-    d_q_arm: Array,
+    lead: float,
+    inputs: int,
+    states: Array,
+    gamma: Array,
     targets: Array,
     quadratic: Quadratic,
 ) -> float:
     cost = 0.0
-    for i in range(1, q_arm.shape[0]):
-        for joint in range(2):
-            value = q_arm[i, joint] - targets[i, joint]
+    for i in range(1, states.shape[0]):
+        for joint in range(targets.shape[1]):
+            q, qd = Q_ARM + 2 * joint, QD_ARM + 2 * joint
+            value = states[i, q] - targets[i, joint] + lead * states[i, qd]
             cost += weight * value * value
-            row = d_q_arm[i, joint]
-            add_square(weight, value, row, INPUTS * i, quadratic)
+            row = gamma[i, q] + lead * gamma[i, qd]
+            add_square(weight, value, row, inputs * i, quadratic)
     return cost
 
 
@@ -146,7 +165,7 @@ def _add_posture(
 def add_square(weight: float, value: float, row: Array, columns: int, quadratic: Quadratic) -> None:
     """Add ``weight`` [1 / unit of value^2] times ``(value + row (U - guess))^2``.
 
-    ``value`` [any unit] is the residual at the guess and ``row`` (6 n,) [value / input] its
+    ``value`` [any unit] is the residual at the guess and ``row`` (inputs n,) [value / input] its
     gradient, of which only the first ``columns`` count.
     """
     guess, hessian, gradient = quadratic
@@ -161,7 +180,7 @@ def add_square(weight: float, value: float, row: Array, columns: int, quadratic:
                 hessian[k, m] += scaled * row[m]
 
 
-_RESIDUALS = 8  # of a node: position and velocity of the end-effector, centre of mass, yaw
+_RESIDUALS = 8  # of a node: position and velocity of the end-effector, centre of mass
 
 
 @compiled
@@ -170,13 +189,13 @@ def _add_tracking(
 ) -> float:
     guess, hessian = quadratic.guess, quadratic.hessian
     n = tracked.position.shape[0] - 1
+    inputs = len(guess) // n
     cost = 0.0
-    for k in range(INPUTS * n):
+    for k in range(len(guess)):
         hessian[k, k] += 2.0 * weights.inputs
         cost += weights.inputs * guess[k] * guess[k]
-    rows = np.zeros((_RESIDUALS, INPUTS * n))
+    rows, of_yaw = np.zeros((_RESIDUALS, len(guess))), np.zeros(len(guess))
     values, weight = np.zeros(_RESIDUALS), np.zeros(_RESIDUALS)
-    weight[7] = weights.yaw
     for i in range(1, n + 1):
         w = weights.node[1 if i == n else 0]
         # Entry by entry: for a slice numba compiles a text that says which shapes do not fit.
@@ -185,19 +204,23 @@ def _add_tracking(
             values[axis] = tracked.position[i, axis] - target.position[i, axis]
             v_target = weights.target_velocity * target.velocity[i, axis]
             values[3 + axis] = tracked.velocity[i, axis] - v_target
-            for k in range(INPUTS * i):
+            for k in range(inputs * i):
                 rows[axis, k] = tracked.d_position[i, axis, k]
                 rows[3 + axis, k] = tracked.d_velocity[i, axis, k]
-        for k in range(INPUTS * i):
-            rows[6, k] = tracked.d_arm_com[i, k]
-            rows[7, k] = tracked.d_yaw[i, 0, k] + weights.yaw_lead * tracked.d_yaw[i, 1, k]
-        weight[6], values[6] = w[2], tracked.arm_com[i]
-        # The short way round: a target half a turn away must not unwind whole turns.
-        turn = (tracked.yaw[i, 0] - target.yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
-        values[7] = turn + weights.yaw_lead * tracked.yaw[i, 1]
-        _add_squares(weight, values, rows, INPUTS * i, quadratic)
+        for axis in range(2):
+            weight[6 + axis], values[6 + axis] = w[2], tracked.arm_com[i, axis]
+            for k in range(inputs * i):
+                rows[6 + axis, k] = tracked.d_arm_com[i, axis, k]
+        _add_squares(weight, values, rows, inputs * i, quadratic)
         for residual in range(_RESIDUALS):
             cost += weight[residual] * values[residual] * values[residual]
+        # The short way round: a target half a turn away must not unwind whole turns.
+        turn = (tracked.yaw[i, 0] - target.yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
+        turn += weights.yaw_lead * tracked.yaw[i, 1]
+        cost += weights.yaw * turn * turn
+        for k in range(inputs * i):
+            of_yaw[k] = tracked.d_yaw[i, 0, k] + weights.yaw_lead * tracked.d_yaw[i, 1, k]
+        add_square(weights.yaw, turn, of_yaw, inputs * i, quadratic)
     return cost
 
 

@@ -58,7 +58,7 @@ class DualSolver:
         self._entries = 0  # of all that are kept
 
     def solve(self, guess: Array) -> Solution:
-        """See ``QpSolver``; ``guess`` (6 n,) [SI inputs]."""
+        """See ``QpSolver``; ``guess`` (inputs n,) [SI]."""
         program, rows = self._program, self._program.rows
         softened = np.zeros(len(program.penalty) + 1)  # by its slack, and 0 of rows without one
         factor, failed = dpotrf(program.hessian.T, lower=1, clean=0)

@@ -2,53 +2,51 @@
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
 import numpy as np
 
 from fsw.autopilot.barriers.constraint_block import block
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array, CondensedModel
 from fsw.autopilot.mpc.qp_data import InputLimits
-from fsw.compiled import kernel, machine_code
+from fsw.record import JOINTS
 
-_ANGLES = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, -1.0]])  # +-th1, +-(th1 + th2)
-_RATES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # of each joint
-_ROWS = len(_ANGLES) + len(_RATES)  # of a node
+_RATE_SHARE: Final = 0.6  # of what a joint can do; the rest is for the loops
 
 
 class JointLimits:
-    """Angles of the links and rates of the joints within limits at every node.
+    """Angles, sums of angles and rates of the joints within limits at every node.
 
     One slack a node, of as many rad as rad/s: where the arm is found outside, either may give way.
     """
 
     def __init__(self, model: CondensedModel, limits: InputLimits) -> None:
-        airframe, horizon = model.airframe, model.horizon
-        self.rows = block((_ROWS,), 1, horizon)
-        angle1 = airframe.joint1_limit - limits.joint_margin
-        angle12 = airframe.joint12_limit - limits.joint_margin
-        node = np.repeat([angle1, angle12, limits.joint_rate], [2, 2, len(_RATES)])
-        self.rows.lower_bound[:] = np.tile(-node, horizon)
-        angles = model.gamma[1:, Q_ARM : Q_ARM + 2]  # (n, 2, 6 n)
-        rates = model.gamma[1:, QD_ARM : QD_ARM + 2]
-        gradient = self.rows.gradient.reshape(horizon, _ROWS, -1)
-        gradient[:, : len(_ANGLES)] = -np.einsum("lj,njk->nlk", _ANGLES, angles)
-        gradient[:, len(_ANGLES) :] = -np.einsum("lj,njk->nlk", _RATES, rates)
+        bounded = _rows(model, limits)
+        self._minus = -np.array([row for row, _ in bounded])  # (rows, states)
+        self.rows = block((len(bounded),), 1, model.horizon, model.inputs)
+        self.rows.lower_bound[:] = np.tile([-bound for _, bound in bounded], model.horizon)
+        self.rows.gradient[:] = (self._minus @ model.gamma[1:]).reshape(self.rows.gradient.shape)
+        self._value = self.rows.value.reshape(model.horizon, -1)
 
     def refill(self, horizon: Linearisation) -> None:
         """Bring angles and rates up to date; the gradient never changes."""
-        _fill(horizon.states, self.rows.value)
+        np.matmul(horizon.states[1:], self._minus.T, out=self._value)
 
 
-@kernel
-def _fill_values(states: Array, value: Array) -> None:
-    """Minus what each row bounds, node by node: the order of ``_ANGLES`` and ``_RATES``."""
-    for i in range(1, states.shape[0]):
-        row, th1, th2 = _ROWS * (i - 1), states[i, Q_ARM], states[i, Q_ARM + 1]
-        value[row], value[row + 1] = -th1, th1
-        value[row + 2], value[row + 3] = -(th1 + th2), th1 + th2
-        for joint in range(2):
-            rate = states[i, QD_ARM + joint]
-            value[row + 4 + 2 * joint], value[row + 5 + 2 * joint] = -rate, rate
-
-
-_fill = machine_code(_fill_values)
+def _rows(model: CondensedModel, limits: InputLimits) -> list[tuple[Array, float]]:
+    """Of a state what is to be at most how much: (states,) [1], and rad or rad/s."""
+    airframe, rows = model.airframe, []
+    joints, angles = airframe.bodies.joints, airframe.angle_limits
+    for k in range(angles.rows):
+        row = np.zeros(model.states)
+        row[Q_ARM::2] = angles.row[JOINTS * k : JOINTS * k + joints]
+        rows += [(row, angles.high[k] - limits.joint_margin)]
+        rows += [(-row, -angles.low[k] - limits.joint_margin)]
+    for joint in range(joints):
+        row = np.zeros(model.states)
+        row[QD_ARM + 2 * joint] = 1.0
+        rate = min(limits.joint_rate, _RATE_SHARE * airframe.joint_rate_max[joint])
+        rows += [(row, rate), (-row, rate)]
+    return [(row, bound) for row, bound in rows if bound < math.inf]

@@ -34,7 +34,7 @@ class Ocp:
             (self._limits.rows, config.joint_slack)
         ]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
-        self.qp = QpData(config.horizon, config.limits, tuple(blocks))
+        self.qp = QpData(config.horizon, model.inputs, config.limits, tuple(blocks))
         self._first_barrier_slack = self.qp.inputs + self._limits.rows.slacks
         self._solver = QP_SOLVERS[config.qp_solver](self.qp)
 
@@ -44,7 +44,7 @@ class Ocp:
             barrier.update(safe_set)
 
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
-        """Refill the program around ``guess`` (6 n,) [SI inputs] from ``start`` (19,) [SI]."""
+        """Refill it around ``guess`` (inputs n,) [SI] from ``start`` (states,) [SI]."""
         program = self.qp
         self._horizon.refill(start, guess)
         program.hessian[:] = 0.0

@@ -13,8 +13,8 @@ import numpy as np
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.barriers.zone_rows import layout
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.nominal import REST_STATE
-from fsw.autopilot.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.autopilot.model.nominal import rest_state
+from fsw.autopilot.model.prediction import QDD_ARM, YAW_ACC, Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.reference import still_at
@@ -51,12 +51,13 @@ class Planner:
         self._model = condense(airframe, config.period, config.horizon)
         self._safe_set: SafeSet | None = None
         self._ocp: Ocp | None = None
-        self._inputs: Array = np.zeros(INPUTS * config.horizon)
+        self._joints = airframe.bodies.joints
+        self._inputs: Array = np.zeros(self._model.inputs * config.horizon)
         self._t_us = 0
 
     def warm_up(self) -> None:
         """Compile every kernel and load the solver, before anything flies."""
-        rest = REST_STATE._replace(p=(0.0, 0.0, -1.0))
+        rest = rest_state(self._joints)._replace(p=(0.0, 0.0, -1.0))
         targets = (still_at((0.0, 0.0, -0.7)),) * (self._config.horizon + 1)
         near = wall((-1.0, 0.0, 0.0), 0.0, 0.1)  # too close: rows bind
         for safe_set in (SafeSet(), SafeSet((near, target_sphere((0.0, 0.0, -0.3), 0.1)))):
@@ -81,7 +82,7 @@ class Planner:
             A plan whose every program was solved, or a failure that says which was not.
         """
         begin = self._stopwatch_us()
-        start = to_vector(request.start)
+        start = to_vector(request.start, self._joints)
         refusal = self._refusal(request, start)
         if refusal is not None:
             return PlanFailure(
@@ -114,7 +115,7 @@ class Planner:
             t_us=request.t_apply_us,
             period_us=self._period_us,
             start=request.start,
-            inputs=_as_plan_inputs(inputs),
+            inputs=_as_plan_inputs(inputs.reshape(-1, self._model.inputs)),
             status=solution.status,
             cost=ocp.cost,
             slack_max=ocp.largest_barrier_slack(solution.x),
@@ -138,7 +139,7 @@ class Planner:
             return (
                 f"{len(request.joint_targets)} joint targets given for {len(request.targets)} nodes"
             )
-        if not math.isfinite(sum([first + second for first, second in request.joint_targets])):
+        if not math.isfinite(sum(map(sum, request.joint_targets))):
             return "a joint target is not finite"
         return None
 
@@ -166,7 +167,8 @@ class Planner:
         """The last solution moved on by one period, or rest after a break."""
         if t_us - self._t_us != self._period_us:
             return np.zeros_like(self._inputs)
-        return np.concatenate((self._inputs[INPUTS:], self._inputs[-INPUTS:]))
+        node = self._model.inputs
+        return np.concatenate((self._inputs[node:], self._inputs[-node:]))
 
 
 def _timings(search: Search, total_us: float) -> PlanTimings:
@@ -175,6 +177,5 @@ def _timings(search: Search, total_us: float) -> PlanTimings:
 
 def _as_plan_inputs(inputs: Array) -> tuple[PlanInput, ...]:
     return tuple(
-        PlanInput((ax, ay, az), yaw_acc, (joint1, joint2))
-        for ax, ay, az, yaw_acc, joint1, joint2 in inputs.reshape(-1, INPUTS).tolist()
+        PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:])) for u in inputs.tolist()
     )

@@ -1,7 +1,7 @@
 """The planner's quadratic program as data: dense numbers, refilled in place.
 
-Minimise ``1/2 U' H U + c' U + penalty' s`` over the inputs U (6 n) and the slacks s >= 0 of the
-soft rows, subject to
+Minimise ``1/2 U' H U + c' U + penalty' s`` over the inputs U of all nodes and the slacks s >= 0 of
+the soft rows, subject to
 
 ====================  ============================================  =============
 rows, in this order   meaning                                       cone
@@ -25,7 +25,7 @@ from scipy import sparse
 
 from fsw.autopilot.barriers.constraint_block import ConstraintBlock
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import QDD_ARM, Array
 from fsw.autopilot.signals import Vec4
 
 HARD = -1  # in the place of a slack's index: no slack softens the row
@@ -59,7 +59,7 @@ class InputLimits:
 class Rows:
     """All constraints: ``b - g U``, plus its slack where it has one, lies in its cone."""
 
-    g: Array  # (rows, 6 n)
+    g: Array  # (rows, inputs n)
     b: Array  # (rows,)
     slack: NDArray[np.intp]  # (rows,) index of the slack that softens the row, or ``HARD``
     first_cone: int  # rows from here on are tilt cones
@@ -87,16 +87,17 @@ class QpData:
     def __init__(
         self,
         horizon: int,
+        inputs: int,
         limits: InputLimits,
         blocks: tuple[tuple[ConstraintBlock, float | None], ...],
     ) -> None:
-        """Lay out the rows of a horizon.
+        """Lay out the rows of a ``horizon`` [1] of nodes with so many ``inputs`` [1] each.
 
         With each block comes the penalty of a unit of its slacks; None makes its rows hard. The
         penalty is linear, hence exact: rows that can hold, do hold.
         """
         self._blocks = tuple(rows for rows, _ in blocks)
-        self.inputs = INPUTS * horizon
+        self.inputs = inputs * horizon
         self.hessian = np.zeros((self.inputs, self.inputs))  # upper triangle
         self.linear = np.zeros(self.inputs)
         slack: list[NDArray[np.intp]] = []
@@ -108,8 +109,8 @@ class QpData:
                 slack.append(len(self.penalty) + rows.slack)
                 self.penalty = np.append(self.penalty, np.full(rows.slacks, penalty))
         soft = self.block_rows = sum(map(len, slack))
-        bound_rows, bounds = _bounds(horizon, limits)
-        tilt_rows, tilts = _tilt_cones(horizon, limits.tilt)
+        bound_rows, bounds = _bounds(horizon, inputs, limits)
+        tilt_rows, tilts = _tilt_cones(horizon, inputs, limits.tilt)
         self.rows = Rows(
             np.vstack((np.zeros((soft, self.inputs)), bound_rows, tilt_rows)),
             np.concatenate((np.zeros(soft), bounds, tilts)),
@@ -123,7 +124,7 @@ class QpData:
         return self.inputs + len(self.penalty)
 
     def refill(self, guess: Array) -> None:
-        """Take over the blocks, which are linearised around the inputs ``guess`` (6 n,) [SI]."""
+        """Take over the blocks, which are linearised around a ``guess`` (inputs n,) [SI]."""
         row = 0
         for block in self._blocks:
             end = row + len(block.node)
@@ -132,7 +133,7 @@ class QpData:
             row = end
 
     def least_slacks(self, inputs: Array) -> Array:
-        """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (6 n,) [SI]."""
+        """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (inputs n,) [SI]."""
         rows, slacks = self.rows, np.zeros(len(self.penalty))
         held = np.flatnonzero(rows.slack >= 0)
         np.maximum.at(slacks, rows.slack[held], rows.g[held] @ inputs - rows.b[held])
@@ -161,18 +162,19 @@ class QpData:
         )
 
 
-def _bounds(horizon: int, limits: InputLimits) -> tuple[Array, Array]:
-    """Upper, then lower bounds of (vertical, yaw, joint 1, joint 2) a node."""
-    bound = np.tile([limits.vertical, limits.yaw_acc, *[limits.joint_acc] * 2], horizon)
-    each = np.eye(INPUTS * horizon)
-    bounded = each[np.tile(np.arange(INPUTS) >= 2, horizon)]
+def _bounds(horizon: int, inputs: int, limits: InputLimits) -> tuple[Array, Array]:
+    """Upper, then lower bounds of (vertical, yaw, each joint) a node."""
+    joints = [limits.joint_acc] * (inputs - QDD_ARM)
+    bound = np.tile([limits.vertical, limits.yaw_acc, *joints], horizon)
+    each = np.eye(inputs * horizon)
+    bounded = each[np.tile(np.arange(inputs) >= 2, horizon)]
     return np.vstack((bounded, -bounded)), np.concatenate((bound, bound))
 
 
-def _tilt_cones(horizon: int, tilt: float) -> tuple[Array, Array]:
+def _tilt_cones(horizon: int, inputs: int, tilt: float) -> tuple[Array, Array]:
     """Three rows a node: what the tilt allows, and the two accelerations it must cover."""
     slope = math.tan(tilt)
-    cone = np.zeros((CONE, INPUTS))
+    cone = np.zeros((CONE, inputs))
     cone[0, 2], cone[1, 0], cone[2, 1] = slope, -1.0, -1.0
     rows = np.kron(np.eye(horizon), cone).astype(np.float64)
     return rows, np.tile([slope * GRAVITY, 0.0, 0.0], horizon)

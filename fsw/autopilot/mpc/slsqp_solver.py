@@ -75,7 +75,7 @@ class NonlinearProgram:
     """
 
     def __init__(self, ocp: Ocp, start: Array, targets: TargetPoints) -> None:
-        """Begin at u = 0 from ``start`` (19,) [SI]."""
+        """Begin at u = 0 from ``start`` (states,) [SI]."""
         self._ocp, self._start, self._targets = ocp, start, targets
         program = ocp.qp
         self._inputs = np.zeros(program.inputs)

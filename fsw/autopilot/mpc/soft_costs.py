@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array, P
+from fsw.autopilot.model.prediction import Array, P
 from fsw.autopilot.mpc.costs import Quadratic, add_square
 from fsw.autopilot.signals import Zone
 from fsw.compiled import compiled
@@ -49,7 +49,8 @@ class ZoneCost:
         """See ``fsw.autopilot.mpc.costs.Cost``."""
         self._distances.refill(horizon, targets)
         rows = self._distances.rows
-        return _add_gaps(*self._weights, rows.node, rows.value, rows.gradient, quadratic)
+        weights, inputs = self._weights, horizon.model.inputs
+        return _add_gaps(*weights, inputs, rows.node, rows.value, rows.gradient, quadratic)
 
 
 class SphereCost:
@@ -70,6 +71,7 @@ class SphereCost:
             targets.position + self._offset,
             self._from_radius,
             *self._weights,
+            horizon.model.inputs,
             horizon.states[:, P : P + 3],
             horizon.model.gamma[:, P : P + 3],
             quadratic,
@@ -91,6 +93,7 @@ def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float
 def _add_gaps(
     weight: float,
     terminal: float,
+    inputs: int,
     node: NDArray[np.intp],
     gap: Array,
     gradient: Array,
@@ -98,7 +101,7 @@ def _add_gaps(
 ) -> float:
     cost = 0.0
     for row in range(len(node)):
-        columns = INPUTS * node[row]
+        columns = inputs * node[row]
         w = terminal if columns == len(quadratic.guess) else weight
         value, slope, curvature = one_sided_reciprocal(gap[row], w)
         cost += value
@@ -113,6 +116,7 @@ def _add_sphere(
     from_radius: float,
     weight: float,
     terminal: float,
+    inputs: int,
     position: Array,
     d_position: Array,
     quadratic: Quadratic,
@@ -127,5 +131,5 @@ def _add_sphere(
         w = terminal if i == n else weight
         cost += w * square
         for axis in range(3):
-            add_square(w, e[axis], d_position[i, axis], INPUTS * i, quadratic)
+            add_square(w, e[axis], d_position[i, axis], inputs * i, quadratic)
     return cost

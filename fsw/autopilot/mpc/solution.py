@@ -27,5 +27,5 @@ class QpSolver(Protocol):
     """Solves one ``QpData``, which it is built with, again and again as filled anew."""
 
     def solve(self, guess: Array) -> Solution:
-        """Inputs and slacks at the optimum; the inputs ``guess`` (6 n,) [SI] may save time."""
+        """Inputs and slacks at the optimum; a ``guess`` (inputs n,) [SI] may save time."""
         ...

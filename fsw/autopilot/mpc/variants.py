@@ -132,4 +132,4 @@ VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]
 def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     """The terms of the configured controller, and the cost of requested joints."""
     parts = VARIANTS[config.controller](config, model, safe_set)
-    return replace(parts, costs=(*parts.costs, PostureCost(config.weights)))
+    return replace(parts, costs=(*parts.costs, PostureCost(config.weights, model.airframe)))

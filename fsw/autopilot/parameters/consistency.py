@@ -275,7 +275,9 @@ def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding
 
 def _links(config: FlightConfig, clearance: float) -> Finding:
     """Both ends of a link keep off a point; the nearest place of the link is between them."""
-    longest = max(config.airframe.link_length)
+    bodies = config.airframe.bodies
+    links = [bodies.offset[3 * k : 3 * k + 3] for k in range(1, bodies.joints)]
+    longest = max(math.hypot(*link) for link in (*links, bodies.tip))
     left = math.sqrt(max(clearance**2 - 0.25 * longest**2, 0.0))
     return _finding(
         "links",

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind
@@ -33,7 +33,7 @@ _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHe
 def arm_joint_state(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
     """ARM_JOINT_STATE; the torque is the one commanded, the arm has no torque sensor."""
     estimate = snapshot.estimate
-    p_WE, v_WE = point_in_flight(estimate, context.facts.airframe.link_length)
+    p_WE, v_WE = end_effector(context.facts.airframe.bodies, estimate)
     arrays = estimate.q_arm, estimate.qd_arm, snapshot.actuators.joint_torque
     return (snapshot.t_us, *_bases(arrays), *p_WE, *v_WE, len(arrays[0]), *_rests(arrays))
 

@@ -7,18 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
-from fsw.autopilot.model.kinematics import arm_points
-from fsw.autopilot.model.nominal import REST_STATE
+from fsw.autopilot.model.nominal import rest_state
 from fsw.autopilot.model.prediction import discretise, to_vector
 from fsw.autopilot.signals import PlanInput
 from sitl.scenario import Uniform, Wind
 from studies.flight.double_integrator import DoubleIntegrator, after, points
 from studies.paper.cases import scenario
+from tests.fsw.autopilot.model.geometry_by_rotation import tips
+from tests.fsw.paper_arm import LENGTHS
 
 U = PlanInput((0.3, -0.2, 0.1), 0.05, (0.4, -0.6))
-MOVING = REST_STATE._replace(
+MOVING = rest_state(2)._replace(
     p=(1.0, 2.0, -3.0),
     v=(0.3, -0.1, 0.2),
     yaw=0.4,
@@ -34,16 +36,15 @@ def test_a_period_in_ticks_is_the_planners_period() -> None:
     for _ in range(50):
         state = after(state, U, STILL, 0.002)
     a, b = discretise(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), 0.1)
-    whole = a @ to_vector(MOVING) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
-    np.testing.assert_allclose(to_vector(state), whole, atol=1e-12)
+    whole = a @ to_vector(MOVING, 2) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
+    np.testing.assert_allclose(to_vector(state, 2), whole, atol=1e-12)
 
 
 def test_its_points_are_the_planners_points() -> None:
-    expected = np.zeros((2, 2, 3))
-    arm_points(to_vector(MOVING), *AIRFRAME.link_length, expected)
+    expected = tips(np.array(MOVING.p), Rotation.from_euler("z", MOVING.yaw), (-0.6, 1.1), LENGTHS)
     base, joint2, end_effector = points(MOVING)
     assert base == MOVING.p
-    np.testing.assert_allclose([joint2, end_effector], expected[:, 0], atol=1e-14)
+    np.testing.assert_allclose([joint2, end_effector], expected, atol=1e-14)
 
 
 def test_wind_moves_it_by_half_a_t_squared() -> None:

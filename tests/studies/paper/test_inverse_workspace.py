@@ -10,6 +10,7 @@ import pytest
 from fsw.autopilot.model.airframe import AIRFRAME
 from sitl.scenario_file import load_scenario
 from studies.paper.inverse_workspace import BOTH_ELBOWS, InverseWorkspace
+from tests.fsw.paper_arm import LENGTHS
 
 ELBOWS = {"both": BOTH_ELBOWS, "forward": (1,), "backward": (-1,)}
 
@@ -26,7 +27,7 @@ def reached(elbows: tuple[int, ...], count: int) -> tuple[np.ndarray, np.ndarray
     th12 = random.uniform(-AIRFRAME.joint12_limit, AIRFRAME.joint12_limit, count)
     allowed = np.isin(np.sign(th12 - th1), elbows)
     th1, th12 = th1[allowed], th12[allowed]
-    l1, l2 = AIRFRAME.link_length
+    l1, l2 = LENGTHS
     x = -l1 * np.sin(th1) - l2 * np.sin(th12)
     return x, l1 * np.cos(th1) + l2 * np.cos(th12)
 

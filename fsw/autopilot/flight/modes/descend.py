@@ -24,7 +24,7 @@ class Descend(FlightMode):
     def __init__(self, config: FlightConfig) -> None:
         super().__init__(config)
         self._body = body_of(config.planner.body, config.airframe)
-        self._links = config.airframe.link_length
+        self._bodies = config.airframe.bodies
         self._room = stand_off(config.planner.walls)
 
     def update(self, state: FlightState, estimate: StateEstimate) -> tuple[FlightState, ModeResult]:
@@ -40,7 +40,7 @@ class Descend(FlightMode):
         if not (is_hurried(state.aiding, limits.aiding_loss_us) and safe_set.zones):
             known = state.setpoint.goal is None
             return state if known else replace(state, setpoint=SetpointMemory())
-        place = retreat_place(safe_set, estimate, self._body, self._links, self._room)
+        place = retreat_place(safe_set, estimate, self._body, self._bodies, self._room)
         goal = PositionGoal(MotionSetpoint(False, place))
         return replace(state, setpoint=SetpointMemory(goal=goal))
 

@@ -17,7 +17,7 @@ from fsw.autopilot.flight.modes.base import (
 )
 from fsw.autopilot.flight.setpoints.reference_governor import project
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
@@ -59,7 +59,7 @@ class Mission(FlightMode):
         self, state: FlightState, estimate: StateEstimate, last: EndEffectorTarget
     ) -> EndEffectorTarget:
         """The current reference, or the vehicle's position if that is far off or moves fast."""
-        here = point_in_flight(estimate, self.config.airframe.link_length)[0]
+        here = end_effector(self.config.airframe.bodies, estimate)[0]
         if state.vehicle.flies:
             near = math.dist(last.p_WE, here) < self.config.steering.max_lead_distance
             if near and math.hypot(*last.v_WE) <= self.config.limits.mission_speed:
@@ -75,7 +75,7 @@ class Mission(FlightMode):
         home_z = vehicle.home.p[2] if vehicle.home is not None else -config.airframe.leg_length
         context = MissionContext(
             now_us=estimate.t_us,
-            p_WE=point_in_flight(estimate, config.airframe.link_length)[0],
+            p_WE=end_effector(config.airframe.bodies, estimate)[0],
             height=-estimate.p_WB[2],
             home_z=home_z,
             safe_set=state.kept.safe_set,

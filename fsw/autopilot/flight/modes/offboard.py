@@ -26,7 +26,7 @@ from fsw.autopilot.flight.setpoints.offboard import (
 )
 from fsw.autopilot.flight.state import FlightState, OffboardMemory, SetpointMemory, is_young
 from fsw.autopilot.geometry.vectors import add_scaled
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     Mode,
@@ -194,7 +194,7 @@ def _place_motion(
                 x, y, z = turn_level(motion.p, estimate.yaw)
             p = estimate.p_WB
             if motion.of_end_effector:
-                p = point_in_flight(estimate, config.airframe.link_length)[0]
+                p = end_effector(config.airframe.bodies, estimate)[0]
             place = (x + p[0], y + p[1], z + p[2])
         motion = replace(motion, p=place, p_from=PositionFrom.ORIGIN)
     return motion_refusal(motion) or motion

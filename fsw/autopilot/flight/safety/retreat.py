@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from fsw.autopilot.geometry.vectors import add_scaled
-from fsw.autopilot.model.body import ON_LINK1, ON_LINK2, Body, hull_reach
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.body import Body, hull_reach
+from fsw.autopilot.model.kinematics import frame_of, position
+from fsw.autopilot.model.multibody import Bodies
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.shapes.zones import surfaces
-from fsw.autopilot.signals import SafeSet, StateEstimate, Vec2, Vec3
+from fsw.autopilot.signals import SafeSet, StateEstimate, Vec3
 
 _PASSES = 30  # one zone after the other; in a corner they have to settle
 _TOLERANCE = 1e-3  # m
@@ -15,16 +17,18 @@ _FARTHEST = 1.0
 
 
 def retreat_place(
-    safe_set: SafeSet, estimate: StateEstimate, body: Body, links: Vec2, room: float
+    safe_set: SafeSet, estimate: StateEstimate, body: Body, bodies: Bodies, room: float
 ) -> Vec3:
     """A place for the base [m, NED] from which no zone is closer than ``room`` [m].
 
-    The arm keeps its pose, of ``links`` [m]. A sphere that follows the target comes along and is
-    left out. Between zones that leave no such place it is one in their middle.
+    The arm of a vehicle of ``bodies`` keeps its pose. A sphere that follows the target comes along
+    and is left out. Between zones that leave no such place it is one in their middle.
     """
-    ends = [
-        (point_in_flight(estimate, reach)[0], max(p.radius for p in body.parts if p.on == on))
-        for on, reach in ((ON_LINK1, (links[0], 0.0)), (ON_LINK2, links))
+    frame = frame_of(bodies, estimate)
+    arm = [
+        (position(frame, part.on, part.begin), part.radius)
+        for part in body.parts
+        if part.on != ON_BASE and part.end is None
     ]
     shift: Vec3 = (0.0, 0.0, 0.0)
     for _ in range(_PASSES):
@@ -35,7 +39,7 @@ def retreat_place(
                 shortfall = room - (at.distance - hull_reach(body, at.normal))
                 if shortfall > _TOLERANCE:
                     shift = add_scaled(shift, at.normal, shortfall)
-            for p, radius in ends:
+            for p, radius in arm:
                 for at in surfaces(zone, add_scaled(p, shift, 1.0), estimate.t_us):
                     shortfall = room - (at.distance - radius)
                     if shortfall > _TOLERANCE:

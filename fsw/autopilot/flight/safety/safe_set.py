@@ -74,8 +74,7 @@ class SafeSetCheck:
         part_tube(config)  # takes a moment, and is then known
         planner, airframe = config.planner, config.airframe
         body = body_of(planner.body, airframe)
-        links = airframe.link_length
-        self._margins = Margins(body, links, planner.tunings, planner.period)
+        self._margins = Margins(body, airframe.bodies, planner.tunings, planner.period)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""

@@ -27,15 +27,14 @@ import numpy as np
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
-from fsw.autopilot.geometry.rotation import rotate
-from fsw.autopilot.model.body import ON_LINK1, Body
-from fsw.autopilot.model.kinematics import links
-from fsw.autopilot.model.parts import ON_BASE
+from fsw.autopilot.model.body import Body
+from fsw.autopilot.model.kinematics import frame_of, position
+from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.kind import ShapeKind
 from fsw.autopilot.shapes.zones import all_planes
-from fsw.autopilot.signals import Mat3, SafeSet, StateEstimate, Vec2, Vec4
+from fsw.autopilot.signals import SafeSet, StateEstimate, Vec2
 from fsw.compiled import kernel
 from fsw.frozen import replace
 
@@ -112,18 +111,18 @@ class UncertainClearance:
         self,
         sigmas: float,
         body: Body,
-        lengths: Vec2,
+        bodies: Bodies,
         tunings: tuple[BarrierTuning, BarrierTuning],
         lag: float,
     ) -> None:
-        """Keep ``sigmas`` [1] standard deviations for a body with links of ``lengths`` [m].
+        """Keep ``sigmas`` [1] standard deviations for a body of a vehicle of ``bodies``.
 
         A plan takes effect, and the vehicle follows it, after ``lag`` [s] on average.
         """
         # A plan keeps S(d) + n v: against a boundary that comes at r, d is less by r / k_S.
         self._lead = 1.0 / tunings[0].slope + lag
-        self._sigmas, self._lengths = sigmas, lengths
-        self._places, self._radii = _places(body, lengths[0])
+        self._sigmas, self._bodies = sigmas, bodies
+        self._places, self._radii = _places(body)
         self._stand_off, self._stand_off_inside = (stand_off(one) for one in tunings)
         self._known = (SafeSet(), *_kinds_and_normals(SafeSet()))
 
@@ -180,11 +179,8 @@ class UncertainClearance:
         self, estimate: StateEstimate, pose: Array, normals: Array = _NO_NORMALS
     ) -> tuple[Array, list[float]]:
         """From the base to each place of the body (places, 3) [m, NED], and see ``_look``."""
-        th1, th2 = estimate.q_arm
-        first, second = links((1.0, 1.0), th1, th1 + th2)
         levers, most = np.empty((len(self._places), 3)), np.empty(len(normals))
-        arm = (*first, *second)
-        _look(pose, estimate.R_WB, arm, self._places, normals, levers, most)
+        _look(pose, frame_of(self._bodies, estimate), self._places, normals, levers, most)
         return levers, most.tolist()
 
     def _ahead(
@@ -343,17 +339,17 @@ def _finite(pose: Array) -> Array:
 
 @kernel
 def _look(
-    pose: Array, turn: Mat3, arm: Vec4, places: Array, normals: Array, levers: Array, most: Array
+    pose: Array, frame: Array, places: Array, normals: Array, levers: Array, most: Array
 ) -> None:
     """Each place's lever (places, 3) [m, NED], and the most uncertain one's along each normal.
 
     That is the deviation ``most`` (planes,) [m] along ``normals`` (planes, 3) [NED] of all places.
     """
-    x1, z1, x2, z2 = arm
     for i in range(places.shape[0]):
-        x, y, z, first, second = places[i]
-        at = rotate(turn, (x + first * x1 + second * x2, y, z + first * z1 + second * z2))
-        levers[i, 0], levers[i, 1], levers[i, 2] = at
+        local = (places[i, 1], places[i, 2], places[i, 3])
+        at = position(frame, int(places[i, 0]), local)
+        for axis in range(3):
+            levers[i, axis] = at[axis] - frame[axis]
     for k in range(normals.shape[0]):
         n, variance = (normals[k, 0], normals[k, 1], normals[k, 2]), 0.0
         for i in range(places.shape[0]):
@@ -390,28 +386,23 @@ def place_covariances(pose: Array, levers: Array) -> Array:
     return found
 
 
-def _places(body: Body, length: float) -> tuple[Array, Array]:
-    """Places (places, 5) [m], and their radii (places,) [m]; link 1 has a ``length`` [m].
+def _places(body: Body) -> tuple[Array, Array]:
+    """Places (places, 4) [1, m], and their radii (places,) [m].
 
-    A place is its coordinates along the body's axes and along both links. The deviation is a convex
-    function of it, so the ends of a part are its most uncertain places. The first is the base.
+    A place is what it is on and where there. The deviation is a convex function of it, so the ends
+    of a part are its most uncertain places. The first is the base.
     """
-    base: list[tuple[tuple[float, ...], float]] = []
-    arm: list[tuple[tuple[float, ...], float]] = []
+    found: list[tuple[tuple[float, ...], float]] = []
     for part in body.parts:
         x, y, z = part.begin
-        if part.on != ON_BASE:
-            along = (z, 0.0) if part.on == ON_LINK1 else (length, z)
-            arm.append(((0.0, 0.0, 0.0, *along), part.radius))
-            continue
         if not part.rim > 0.0:
             # A capsule's ends are parts of their own.
-            base.append(((x, y, z, 0.0, 0.0), part.radius))
+            found.append(((part.on, x, y, z), part.radius))
             continue
         around = part.rim / math.cos(math.pi / _RIM)
         for k in range(_RIM):
             angle = 2.0 * math.pi * k / _RIM
-            rim = (x + around * math.cos(angle), y + around * math.sin(angle), z, 0.0, 0.0)
-            base.append((rim, part.radius))
-    places, radii = zip(*base, *arm, strict=True)
+            rim = (part.on, x + around * math.cos(angle), y + around * math.sin(angle), z)
+            found.append((rim, part.radius))
+    places, radii = zip(*found, strict=True)
     return np.array(places), np.array(radii)

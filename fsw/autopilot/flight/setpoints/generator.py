@@ -21,7 +21,7 @@ from fsw.autopilot.flight.setpoints.orbit_path import looking_at, on_orbit
 from fsw.autopilot.flight.setpoints.reference_governor import SETTLE_RATE, ReferenceGovernor
 from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, limit_norm, norm, subtract
-from fsw.autopilot.model.kinematics import end_effector_when_level, point_in_flight
+from fsw.autopilot.model.kinematics import end_effector, end_effector_when_level
 from fsw.autopilot.parameters.flight_config import FlightConfig, SetpointLimits
 from fsw.autopilot.signals import (
     EndEffectorTarget,
@@ -97,7 +97,7 @@ class SetpointGenerator:
     def begin(self, estimate: StateEstimate, *, of_end_effector: bool = False) -> ReferenceState:
         """A point that begins where the vehicle is and moves as it does."""
         if of_end_effector:
-            p, v = point_in_flight(estimate, self._config.airframe.link_length)
+            p, v = end_effector(self._config.airframe.bodies, estimate)
             return ReferenceState(True, p, v, estimate.yaw)
         return ReferenceState(
             of_end_effector=False,
@@ -119,7 +119,7 @@ class SetpointGenerator:
         config = self._config
         moved = step(reference, goal, config.steering, config.planner.period)
         if reference.of_end_effector:
-            vehicle = point_in_flight(estimate, config.airframe.link_length)[0]
+            vehicle = end_effector(config.airframe.bodies, estimate)[0]
         else:
             vehicle = estimate.p_WB
         p = self._governor.limit_lead(moved.p, vehicle)
@@ -178,7 +178,7 @@ class SetpointGenerator:
 
     def _hanging(self, q_arm: JointVector, yaw: float) -> Vec3:
         """From the body to the end-effector while level [m]."""
-        return end_effector_when_level(self._config.airframe.link_length, q_arm, yaw)
+        return end_effector_when_level(self._config.airframe.bodies, q_arm, yaw)
 
 
 def _motion_now(reference: ReferenceState, goal: PositionGoal) -> MotionSetpoint:

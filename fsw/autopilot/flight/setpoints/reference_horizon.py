@@ -10,7 +10,7 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceStat
 from fsw.autopilot.flight.setpoints.reference_governor import ReferenceGovernor
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.geometry.vectors import norm, subtract
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import sample, still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
@@ -57,7 +57,7 @@ class ReferenceHorizon:
             nodes, period_us = self._config.planner.horizon + 1, self._config.mpc_period_us
             targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
             joints = ()
-        p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         if not mode.external_reference and (reference is None or goal is None):
             targets = _led_aside(targets, p_WE, v_WE, self._config.steering.speed)
             return replace(state, limited="") if state.limited else state, (targets, joints)
@@ -81,7 +81,7 @@ class ReferenceHorizon:
         target = mode.target(state, t_us)
         if not mode.external_reference:
             return target
-        p_WE, v_WE = point_in_flight(estimate, self._config.airframe.link_length)
+        p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         _, lowest = self._came_up(state, target)
         return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, lowest)
 

@@ -12,9 +12,10 @@ from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array, condense
+from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.signals import SafeSet, Zone
 from tests.fsw.autopilot.model.geometry_by_rotation import moved_on, tips_of_prediction
+from tests.fsw.paper_arm import INPUTS, LENGTHS
 from tests.fsw.random_states import prediction_vector
 
 NODES = 5
@@ -95,7 +96,7 @@ def measured(horizon: Linearisation) -> tuple[Array, Array]:
     moment = 1e-4
 
     def places(x: Array) -> Array:
-        return np.array([x[0:3], *tips_of_prediction(x, np.array(AIRFRAME.link_length))])
+        return np.array([x[0:3], *tips_of_prediction(x, np.array(LENGTHS))])
 
     states = horizon.states
     before, after = (

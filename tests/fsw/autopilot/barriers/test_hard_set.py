@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
@@ -21,6 +21,7 @@ from tests.fsw.autopilot.barriers.horizons import (
     random_case,
 )
 from tests.fsw.autopilot.model.three_points import positions_of
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import vec3
 
 WALLS = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 0.6, 0.8), -1.5, 0.05))

@@ -27,7 +27,7 @@ from tests.fsw.autopilot.barriers.horizons import (
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude, moved_on
 from tests.fsw.random_states import estimate_of, vec3
 
-MARGINS = Margins(POINTS, AIRFRAME.link_length, (TUNING, TUNING), PERIOD)
+MARGINS = Margins(POINTS, AIRFRAME.bodies, (TUNING, TUNING), PERIOD)
 WALLS = (wall((-1.0, 0.0, 0.0), -1.0, 0.1), wall((0.0, 0.6, 0.8), -2.0, 0.05))
 BRANCHES = (point((0.4, -0.3, -1.0), 0.2), point((2.0, 1.0, 0.0), 0.1))
 SPHERE = target_sphere((0.0, 0.0, -0.225), 0.5)
@@ -40,7 +40,7 @@ def estimate_at_start(case: Case) -> StateEstimate:
     before, after = (moved_on(x, t) for t in (-moment, moment))
     turned = attitude(before[6:9], before[13]).inv() * attitude(after[6:9], after[13])
     w_WB_B = turned.as_rotvec() / (2.0 * moment)
-    (q1, q2), (qd1, qd2) = x[15:17].tolist(), x[17:19].tolist()
+    (q1, q2), (qd1, qd2) = x[15::2].tolist(), x[16::2].tolist()
     return estimate_of(now, vec3(w_WB_B), vec3(x[0:3]), vec3(x[3:6]), (q1, q2), (qd1, qd2))
 
 

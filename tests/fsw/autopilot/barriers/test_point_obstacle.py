@@ -7,7 +7,7 @@ import pytest
 
 from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.vertical_cylinder import column
@@ -23,6 +23,7 @@ from tests.fsw.autopilot.barriers.horizons import (
     safe_speed,
 )
 from tests.fsw.autopilot.model.three_points import positions_of
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import vec3
 
 STEP = 1e-6

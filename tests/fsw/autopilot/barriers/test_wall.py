@@ -8,7 +8,7 @@ import pytest
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import Zone
 from tests.fsw.autopilot.barriers.horizons import (
@@ -21,6 +21,7 @@ from tests.fsw.autopilot.barriers.horizons import (
     random_case,
     safe_speed,
 )
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import vec3
 
 STEP = 1e-4

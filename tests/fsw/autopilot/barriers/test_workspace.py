@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.frame import outward_axis
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from tests.fsw.autopilot.barriers.horizons import (
@@ -19,6 +19,7 @@ from tests.fsw.autopilot.barriers.horizons import (
     random_case,
     safe_speed,
 )
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import vec3
 
 RADIUS = 0.1

@@ -15,9 +15,10 @@ from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.zone_rows import ZoneRows, layout
 from fsw.autopilot.model.airframe import AIRFRAME, airframe_of
 from fsw.autopilot.model.body import DISC, FORM, ON, RADIUS, SPHERE, Body, body_of
-from fsw.autopilot.model.linearisation import Linearisation, position, velocity
+from fsw.autopilot.model.kinematics import position, velocity
+from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.parts import Part
-from fsw.autopilot.model.prediction import INPUTS, Array, condense
+from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.shapes.ball import ball, point
@@ -39,6 +40,7 @@ from tests.fsw.autopilot.barriers.horizons import (
 )
 from tests.fsw.autopilot.mpc.requests import below, hovering, planned, planner, request
 from tests.fsw.autopilot.shapes import by_coal
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import random_estimate, vec3
 from tests.fsw.vehicle_places import placed
 from vehicles.description import EndEffector, Vehicle
@@ -156,7 +158,7 @@ def middle_of(part: Part, on: tuple[Array, Rotation]) -> by_coal.Solid:
 
 @pytest.mark.parametrize("kind", ["half-space", "ball", "box", "cylinder", "vertical cylinder"])
 def test_margins_of_the_full_body_are_coals_distances(kind: str) -> None:
-    margins = Margins(FULL, AIRFRAME.link_length, (TUNING, TUNING), PERIOD)
+    margins = Margins(FULL, AIRFRAME.bodies, (TUNING, TUNING), PERIOD)
     random, compared = np.random.default_rng(1), 0
     for _ in range(40):
         estimate = random_estimate(random)._replace(p_WB=vec3(random.uniform(-1.5, 1.5, 3)))

@@ -22,7 +22,7 @@ from tests.fsw.autopilot.model.geometry_by_rotation import attitude, tips
 from tests.fsw.random_states import estimate_of, vec3
 from tests.fsw.records import boundless, compensated_joints
 
-LENGTHS = np.array(AIRFRAME.link_length)
+LENGTHS = np.array((0.15, 0.15))
 LIMITS = CompensationLimits()
 BOUNDLESS = boundless(AIRFRAME)
 # Three steps end so near; the damping takes so much of a rate.

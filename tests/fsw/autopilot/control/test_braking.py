@@ -26,6 +26,7 @@ from fsw.autopilot.model.prediction import A, J, S, V, continuous_model
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.signals import PlanInput, PredictionState, Vec2, Vec3
+from tests.fsw.paper_arm import LENGTHS
 
 DT = 0.002
 MODEL = NominalModel(AIRFRAME, DT)
@@ -52,7 +53,7 @@ def points(x: PredictionState) -> Array:
     right /= np.linalg.norm(right)
     ahead = np.cross(right, down)
     angles, tips = (x.q_arm[0], sum(x.q_arm)), [np.array(x.p)]
-    for length, angle in zip(AIRFRAME.link_length, angles, strict=True):
+    for length, angle in zip(LENGTHS, angles, strict=True):
         tips.append(tips[-1] + length * (math.sin(angle) * ahead + math.cos(angle) * down))
     return np.array(tips)
 

@@ -26,6 +26,7 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 from fsw.autopilot.tick_record import Tick
+from tests.fsw.paper_arm import LENGTHS
 from tests.fsw.random_states import estimate_of
 from tests.fsw.records import changed, observe, observed, placed, with_given
 
@@ -130,7 +131,7 @@ def test_at_rest_on_its_plan_the_weight_is_carried_level(inner: Inner) -> None:
     """The arm bent so that its weight hangs below joint 1."""
     m1, m2 = AIRFRAME.bodies.mass[:2]
     c1, c2 = AIRFRAME.bodies.com[2], AIRFRAME.bodies.com[5]
-    upper, lower = m1 * c1 + m2 * AIRFRAME.link_length[0], m2 * c2
+    upper, lower = m1 * c1 + m2 * LENGTHS[0], m2 * c2
     th1 = -0.25
     th12 = math.asin(upper / lower * math.sin(-th1))
     bent = (th1, th12 - th1)
@@ -205,7 +206,7 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
 
 def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
     q_arm = (0.5, -0.9)
-    (m1, m2), l1 = AIRFRAME.bodies.mass[:2], AIRFRAME.link_length[0]
+    (m1, m2), l1 = AIRFRAME.bodies.mass[:2], LENGTHS[0]
     c1, c2 = AIRFRAME.bodies.com[2], AIRFRAME.bodies.com[5]
     estimate = estimate_of(Rotation.identity(), q_arm=q_arm)
     cascade = Cascade(AIRFRAME, TUNING, "pid", DT)

@@ -18,7 +18,7 @@ from fsw.autopilot.estimation.estimator import attitude, estimate_state
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
-from fsw.autopilot.model.nominal import NominalModel, next_state
+from fsw.autopilot.model.nominal import NominalModel, move_plan
 from fsw.autopilot.model.rotors import rotor_decay
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
@@ -122,11 +122,16 @@ def test_the_plans_state_moves_on_as_in_python(lag: AttitudeLag) -> None:
     nominal = NominalModel(replace(AIRFRAME, attitude_lag=lag), 0.002)
     for ticks in range(20):
         x, u = as_state(prediction_vector(random)), plan_input(random)
-        plain = x
+        plain = Tick()
+        plain.joint_count = 2
+        plain.nominal, plain.input = x, u
         for _ in range(ticks):
-            plain = next_state(nominal.model, plain, u)
+            move_plan(nominal.model, plain.plan, plain.u, 2)
         np.testing.assert_allclose(
-            list(numbers(nominal.advance(x, u, ticks))), list(numbers(plain)), rtol=0, atol=1e-9
+            list(numbers(nominal.advance(x, u, ticks))),
+            list(numbers(plain.nominal)),
+            rtol=0,
+            atol=1e-9,
         )
 
 

@@ -49,10 +49,11 @@ AHEAD = wall((-1.0, 0.0, 0.0), -1.0, 0.1)  # the vehicle must stay at x < 0.9
 
 
 def law_of(tuning: FilterTuning = STRICT, lag: float = LAG) -> FilterLaw:
-    return filter_law(tuning, (TUNING, TUNING), AIRFRAME.link_length, lag, 2.5)
+    return filter_law(tuning, (TUNING, TUNING), lag, 2.5)
 
 
 LAW = law_of()
+BODIES = AIRFRAME.bodies
 POINTS = filter_probes(body_of("points", AIRFRAME))
 
 
@@ -65,7 +66,9 @@ def at(p: Vec3, t_us: int = 0, rotation: Rotation | None = None) -> StateEstimat
 def asked(
     zones: tuple[Zone, ...], p: Vec3, v: Vec3, wanted: Vec3, a: Vec3 = ZERO, law: FilterLaw = LAW
 ) -> tuple[Vec3, bool, float]:
-    return filtered(law, POINTS, moving_zones(SafeSet(zones), None), at(p), v, a, wanted)
+    return filtered(
+        law, AIRFRAME.bodies, POINTS, moving_zones(SafeSet(zones), None), at(p), v, a, wanted
+    )
 
 
 def least_needed(distance: float, rate: float, along: float = 0.0) -> float:
@@ -82,7 +85,7 @@ def least_needed(distance: float, rate: float, along: float = 0.0) -> float:
 
 def test_without_zones_or_far_from_them_nothing_is_changed() -> None:
     wanted = (2.5, 0.1, -0.3)
-    assert filtered(LAW, POINTS, NO_ZONES, at(ZERO), ZERO, ZERO, wanted) == (
+    assert filtered(LAW, BODIES, POINTS, NO_ZONES, at(ZERO), ZERO, ZERO, wanted) == (
         wanted,
         False,
         math.inf,
@@ -173,7 +176,9 @@ def test_the_margin_is_what_the_referee_sees_of_every_part(kind: str, keep_in: b
         seen = min(by_referee(shape, keep_in, part, *on[part.on]) for part in full.parts) - 0.05
         if 0.0 < seen < STRICT.near:
             compared += 1
-            _, _, margin = filtered(law, filter_probes(full), zones, there, ZERO, ZERO, ZERO)
+            _, _, margin = filtered(
+                law, AIRFRAME.bodies, filter_probes(full), zones, there, ZERO, ZERO, ZERO
+            )
             assert margin == pytest.approx(seen, abs=5e-4)
     assert compared > 10
 
@@ -203,7 +208,14 @@ def test_every_wall_of_a_room_keeps_the_vehicle_in() -> None:
             p[axis] = sign * (half - 0.05)
             parts = POINTS[:1]  # the base alone
             result, changed, margin = filtered(
-                LAW, parts, room, at(vec3(p)), vec3(np.multiply(4.0, p)), ZERO, ZERO
+                LAW,
+                AIRFRAME.bodies,
+                parts,
+                room,
+                at(vec3(p)),
+                vec3(np.multiply(4.0, p)),
+                ZERO,
+                ZERO,
             )
             assert changed
             assert margin == pytest.approx(0.05)
@@ -214,12 +226,16 @@ def test_a_zone_that_moves_is_where_it_is_now_and_its_speed_counts() -> None:
     zone = Zone(ball((2.0, 0.0, -1.0), 0.3), 0.1, velocity=(-1.0, 0.0, 0.0), t_us=1_000_000)
     zones = moving_zones(SafeSet((zone,)), None)
     there = at((0.3, 0.0, -1.0), t_us=2_000_000)
-    result, changed, margin = filtered(LAW, POINTS, zones, there, ZERO, ZERO, ZERO)
+    result, changed, margin = filtered(LAW, BODIES, POINTS, zones, there, ZERO, ZERO, ZERO)
     assert margin == pytest.approx(0.3)
     assert changed
     assert result[0] < -0.5, "it yields"
     earlier = there._replace(t_us=1_000_000)
-    assert filtered(LAW, POINTS, zones, earlier, ZERO, ZERO, ZERO) == (ZERO, False, math.inf)
+    assert filtered(LAW, BODIES, POINTS, zones, earlier, ZERO, ZERO, ZERO) == (
+        ZERO,
+        False,
+        math.inf,
+    )
 
 
 def test_the_sphere_rides_on_the_target_and_holds_the_base_alone() -> None:
@@ -228,10 +244,14 @@ def test_the_sphere_rides_on_the_target_and_holds_the_base_alone() -> None:
     assert len(moving_zones(safe_set, None)) == 1, "without a target there is no sphere"
     zones = moving_zones(SafeSet(safe_set.zones[:1]), target)
     centre = at((1.05, 0.0, -1.2), t_us=1_100_000)
-    _, changed, margin = filtered(LAW, POINTS, zones, centre, (0.5, 0.0, 0.0), ZERO, ZERO)
+    _, changed, margin = filtered(
+        LAW, AIRFRAME.bodies, POINTS, zones, centre, (0.5, 0.0, 0.0), ZERO, ZERO
+    )
     assert (changed, margin) == (False, pytest.approx(0.1))
     behind = centre._replace(p_WB=(0.98, 0.0, -1.2))
-    result, changed, margin = filtered(LAW, POINTS, zones, behind, ZERO, ZERO, ZERO)
+    result, changed, margin = filtered(
+        LAW, AIRFRAME.bodies, POINTS, zones, behind, ZERO, ZERO, ZERO
+    )
     assert changed
     assert margin == pytest.approx(0.03)
     assert result[0] > 0.5
@@ -244,10 +264,12 @@ def test_who_turns_with_the_target_is_left_alone_and_who_does_not_is_turned() ->
     # 0.1 s later, as far beside the centre as the law lets a vehicle be that moves like the sphere.
     here = at((1.05, 0.013 - 0.05, -1.2), t_us=1_100_000)
     same = (0.5, 0.26, 0.0)
-    result, changed, margin = filtered(LAW, POINTS, zones, here, same, turning, turning)
+    result, changed, margin = filtered(
+        LAW, AIRFRAME.bodies, POINTS, zones, here, same, turning, turning
+    )
     assert (result, changed) == (turning, False)
     assert margin == pytest.approx(0.05)
-    result, changed, _ = filtered(LAW, POINTS, zones, here, same, turning, ZERO)
+    result, changed, _ = filtered(LAW, BODIES, POINTS, zones, here, same, turning, ZERO)
     assert changed
     assert result[1] > 1.0, "it would be left behind"
 
@@ -275,7 +297,7 @@ def test_what_clearances_have_grown_by_is_kept_and_is_no_margin() -> None:
     place = (0.8, 0.0, 0.0)
     here, v, wanted = at(place), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0)
     zones = moving_zones(SafeSet((grown,)), None, (0.05,))
-    found, changed, margin = filtered(LAW, POINTS, zones, here, v, ZERO, wanted)
+    found, changed, margin = filtered(LAW, BODIES, POINTS, zones, here, v, ZERO, wanted)
     same, _, nearer = asked((grown,), place, v, wanted)
     assert changed
     assert found == same, "it keeps off by all of it"
@@ -286,7 +308,7 @@ def test_what_clearances_have_grown_by_is_kept_and_is_no_margin() -> None:
 
 @pytest.mark.requirement("REQ-SAFE-5")
 def test_nothing_is_pushed_faster_than_the_speed_of_setpoints() -> None:
-    law = filter_law(STRICT, (TUNING, TUNING), AIRFRAME.link_length, LAG, 2.5, 1.5)
+    law = filter_law(STRICT, (TUNING, TUNING), LAG, 2.5, 1.5)
     outside = (1.6, 0.0, -1.0)  # by 0.7 m: the barrier asks for 2.8 m/s back
     for speed, pushed in ((0.0, True), (1.0, True), (1.5, False), (3.0, False)):
         result, changed, _ = asked((AHEAD,), outside, (-speed, 0.0, 0.0), ZERO, law=law)

@@ -31,7 +31,7 @@ from fsw.autopilot.control.tube import (
 )
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY, Airframe
 from fsw.autopilot.model.multibody import posture
-from fsw.autopilot.model.nominal import REST_INPUT, REST_STATE
+from fsw.autopilot.model.nominal import rest_input, rest_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import estimate_mass
 from tests.fsw.records import allocated, observe, observed
@@ -320,7 +320,7 @@ def _height_under(disturbance: Array, tuning: TrackingTuning) -> Array:
         a = GRAVITY - thrust / believed_mass
         seen = observe(seen, (0.0, 0.0, v), (0.0, 0.0, a), tuning, DT)
         asked = vertical_acceleration(
-            law, (0.0, 0.0, z), seen.v, (0.0, 0.0, a), seen.d[2], REST_STATE, REST_INPUT
+            law, (0.0, 0.0, z), seen.v, (0.0, 0.0, a), seen.d[2], rest_state(2), rest_input(2)
         )
         command = believed_mass * (GRAVITY - asked)
         thrust = command + (thrust - command) * decay

@@ -15,7 +15,7 @@ from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.modes.land import Land
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import FlightState, PlanMemory, SafetyMemory, SetpointMemory
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.signals import (
     Arm,
@@ -520,7 +520,7 @@ def test_a_mode_that_is_done_hands_its_reference_on_and_a_failsafe_goes_on() -> 
 def test_a_mode_that_is_commanded_begins_where_the_end_effector_is() -> None:
     before = flying(Mode.TAKEOFF, mode_origin=(1.0, 2.0, -2.9), climb=50.0)
     state = after(before, SwitchMode(Mode.HOLD))
-    here = point_in_flight(HOVERING, CONFIG.airframe.link_length)[0]
+    here = end_effector(CONFIG.airframe.bodies, HOVERING)[0]
     assert (state.vehicle.mode_origin, state.vehicle.mode_yaw) == (here, 0.5)
     descending = after(before, SwitchMode(Mode.LAND))
     assert Land.continues_reference

@@ -32,7 +32,7 @@ def tips(p: Array, R_WB: Rotation, q_arm: Array, lengths: Array) -> Array:
 
 def tips_of_prediction(x: Array, lengths: Array) -> Array:
     """Joint 2 and end-effector (2, 3) of a prediction state (19,)."""
-    return tips(x[0:3], attitude(x[6:9], x[13]), x[15:17], lengths)
+    return tips(x[0:3], attitude(x[6:9], x[13]), x[15::2], lengths)
 
 
 def moved_on(x: Array, t: float) -> Array:
@@ -45,5 +45,5 @@ def moved_on(x: Array, t: float) -> Array:
     later[0:3] += t * x[3:6] + t * t / 2.0 * x[6:9] + t**3 / 6.0 * jerk
     later[6:9] += t * jerk
     later[13] += t * x[14]
-    later[15:17] += t * x[17:19]
+    later[15::2] += t * x[16::2]
     return later

@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.body import ON_LINK1, Body, body_of, hull_reach
-from fsw.autopilot.model.kinematics import arm_points
-from fsw.autopilot.model.linearisation import (
+from fsw.autopilot.model.airframe import AIRFRAME, airframe_of
+from fsw.autopilot.model.body import Body, body_of, hull_reach, reaches
+from fsw.autopilot.model.kinematics import (
     FRAME,
-    TURNED,
-    Linearisation,
-    chain,
     fill_frame,
-    fill_slopes,
-    fill_turned,
+    frame_of,
     position,
     velocity,
 )
+from fsw.autopilot.model.linearisation import TURNED, Linearisation, chain, fill_slopes, fill_turned
 from fsw.autopilot.model.parts import ON_BASE, Part
-from fsw.autopilot.model.prediction import INPUTS, STATES, Array, condense
+from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.signals import Vec3
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude, moved_on
-from tests.fsw.random_states import prediction_vector, vec3
+from tests.fsw.paper_arm import INPUTS, LENGTHS, STATES
+from tests.fsw.random_states import any_estimate, prediction_vector, vec3
+from tests.vehicles.random_vehicles import random_vehicle
 
 FULL, POINTS = body_of("full", AIRFRAME), body_of("points", AIRFRAME)
 NODES = 3
@@ -41,15 +40,15 @@ def by_rotation(x: Array, on: int, local: Vec3) -> Array:
     if on == ON_BASE:
         return np.asarray(p + R_WB.apply(local))
     link = R_WB * Rotation.from_euler("Y", x[15])
-    if on != ON_LINK1:
-        p = p + link.apply([0.0, 0.0, AIRFRAME.link_length[0]])
-        link = link * Rotation.from_euler("Y", x[16])
+    if on == 2:
+        p = p + link.apply([0.0, 0.0, LENGTHS[0]])
+        link = link * Rotation.from_euler("Y", x[17])
     return np.asarray(p + link.apply(local))
 
 
 def frame_at(x: Array) -> Array:
     frame = np.zeros(FRAME)
-    fill_frame(x, AIRFRAME.link_length, frame)
+    fill_frame(x, AIRFRAME.bodies, frame)
     return frame
 
 
@@ -68,18 +67,27 @@ def test_every_place_is_where_chained_rotations_put_it_and_moves_as_they_do() ->
             )
 
 
-def test_the_papers_points_are_those_of_the_arm() -> None:
-    random, out = np.random.default_rng(2), np.zeros((2, 2, 3))
-    for _ in range(20):
-        x = prediction_vector(random)
-        arm_points(x, *AIRFRAME.link_length, out)
-        frame = frame_at(x)
-        for body in (POINTS, FULL):
-            base, *arm = body.parts[:3]
-            assert position(frame, base.on, base.begin) == tuple(x[0:3])
-            for part, (p, v) in zip(arm, out, strict=True):
-                np.testing.assert_allclose(position(frame, part.on, part.begin), p, atol=1e-12)
-                np.testing.assert_allclose(velocity(frame, part.on, part.begin), v, atol=1e-12)
+def test_no_place_is_further_off_than_the_body_reaches() -> None:
+    """From the base and from every joint that moves it, in any posture."""
+    random = np.random.default_rng(2)
+    for joints in range(1, 7):
+        vehicle = random_vehicle(random, joints)
+        parts = [
+            Part(f"part{k}", on, vec3(random.uniform(-0.3, 0.3, 3)), 0.1)
+            for k, on in enumerate(random.integers(0, joints + 1, 8).tolist())
+        ]
+        airframe = replace(airframe_of(vehicle), parts=tuple(parts))
+        reach = reaches(body_of("full", airframe), airframe.bodies)
+        assert len(reach) == 1 + joints
+        for _ in range(50):
+            frame = frame_of(airframe.bodies, any_estimate(random, joints))
+            for part in parts:
+                at = np.array(position(frame, part.on, part.begin))
+                for origin in range(part.on + 1):
+                    away = np.linalg.norm(at - position(frame, origin, (0.0, 0.0, 0.0)))
+                    assert away <= reach[origin] + 1e-12
+        straight = max(np.linalg.norm(part.begin) for part in parts if part.on == 0)
+        assert reach[0] >= straight
 
 
 def test_slopes_in_the_inputs_are_finite_differences() -> None:
@@ -150,7 +158,7 @@ def test_the_ends_of_every_capsule_are_in_spheres_of_other_parts() -> None:
 
 def test_the_rotors_reach_as_far_as_their_blades_and_the_feet_as_far_as_the_legs() -> None:
     parts = {part.name: part for part in FULL.parts}
-    assert parts["rotors"].rim == AIRFRAME.rotor_arm + AIRFRAME.size.blade
+    assert parts["rotors"].rim == AIRFRAME.rotor_arm + 0.165
     for k in range(1, 5):
         foot = parts[f"leg{k}_end"]
         assert foot.begin[2] + foot.radius == AIRFRAME.leg_length

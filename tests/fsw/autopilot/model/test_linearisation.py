@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array, condense, discretise
+from fsw.autopilot.model.airframe import AIRFRAME, airframe_of
+from fsw.autopilot.model.kinematics import position, velocity
+from fsw.autopilot.model.linearisation import (
+    TURNED,
+    Linearisation,
+    chain,
+    fill_slopes,
+    fill_turned,
+)
+from fsw.autopilot.model.prediction import Array, condense, discretise
 from tests.fsw.autopilot.model.geometry_by_rotation import tips_of_prediction
 from tests.fsw.autopilot.model.three_points import (
     BASE,
@@ -15,7 +23,9 @@ from tests.fsw.autopilot.model.three_points import (
     points_of,
     positions_of,
 )
-from tests.fsw.random_states import prediction_vector
+from tests.fsw.paper_arm import INPUTS, LENGTHS
+from tests.fsw.random_states import prediction_vector, vec3
+from tests.vehicles.random_vehicles import random_vehicle
 
 HORIZON = 5
 MODEL = condense(AIRFRAME, 0.1, HORIZON)
@@ -41,7 +51,7 @@ def test_points_of_every_node_are_those_of_the_stepped_state() -> None:
         position, velocity = positions_of(horizon)
         x = start
         for node in range(HORIZON + 1):
-            swung = tips_of_prediction(x, np.array(AIRFRAME.link_length))
+            swung = tips_of_prediction(x, np.array(LENGTHS))
             np.testing.assert_allclose(position[node, BASE], x[0:3], atol=1e-10)
             np.testing.assert_allclose(velocity[node, BASE], x[3:6], atol=1e-10)
             np.testing.assert_allclose(position[node, JOINT2:], swung, atol=1e-10)
@@ -71,6 +81,43 @@ def test_gradients_equal_finite_differences_over_random_states() -> None:
                 np.testing.assert_allclose(
                     gradient[..., column], (more - less) / (2.0 * STEP), atol=3e-8, rtol=1e-6
                 )
+
+
+@pytest.mark.parametrize("joints", range(1, 7))
+def test_gradients_of_any_arm_equal_finite_differences(joints: int) -> None:
+    """Of a place on every link, and of what the cost tracks, in every input."""
+    random, node = np.random.default_rng(joints), HORIZON
+    model = condense(airframe_of(random_vehicle(random, joints)), 0.1, HORIZON)
+    unknowns = model.inputs * HORIZON
+    places = [(on, vec3(random.uniform(-0.3, 0.3, 3))) for on in range(joints + 1)]
+    start, inputs = prediction_vector(random, joints), random.uniform(-2.0, 2.0, unknowns)
+
+    def at(inputs: Array) -> Linearisation:
+        horizon = Linearisation(model)
+        horizon.refill(start, inputs)
+        return horizon
+
+    def seen(horizon: Linearisation) -> Array:
+        frame, tracked = horizon.horizon.frames[node], horizon.tracked
+        found = [look(frame, *place) for place in places for look in (position, velocity)]
+        found += [tracked.position[node], tracked.velocity[node], (*tracked.arm_com[node], 0.0)]
+        return np.array(found)
+
+    here = at(inputs)
+    frame, tracked = here.horizon.frames[node], here.tracked
+    turned, slopes = np.zeros((TURNED, 3)), np.zeros((2, model.states))
+    gradient = np.zeros((2 * len(places) + 3, 3, unknowns))
+    for axis, n in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
+        fill_turned(frame, n, turned)
+        for k, place in enumerate(places):
+            fill_slopes(frame, *place, n, turned, slopes)
+            for row in range(2):
+                chain(here.horizon.impulse, node, slopes[row], gradient[2 * k + row, axis])
+    gradient[-3], gradient[-2] = tracked.d_position[node], tracked.d_velocity[node]
+    gradient[-1, :2] = tracked.d_arm_com[node]
+    for column, step in enumerate(STEP * np.eye(unknowns)):
+        slope = (seen(at(inputs + step)) - seen(at(inputs - step))) / (2.0 * STEP)
+        np.testing.assert_allclose(gradient[..., column], slope, atol=1e-7, rtol=1e-6)
 
 
 def test_refilling_forgets_the_previous_guess() -> None:

@@ -10,15 +10,9 @@ from scipy.integrate import solve_ivp
 
 from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
 from fsw.autopilot.model.nominal import NominalModel
-from fsw.autopilot.model.prediction import (
-    INPUTS,
-    STATES,
-    Array,
-    condense,
-    discretise,
-    to_vector,
-)
+from fsw.autopilot.model.prediction import Array, condense, discretise, to_vector
 from fsw.autopilot.signals import PlanInput
+from tests.fsw.paper_arm import INPUTS, STATES
 from tests.fsw.random_states import as_state, prediction_vector
 
 LAG = AttitudeLag(kp=50.0, kd=15.0)
@@ -35,7 +29,7 @@ def equations_of_motion(x: Array, u: Array) -> Array:
         rate[11 + axis] = (LAG.kp * (u[axis] - a) - LAG.kd * j - s) / VEHICLE.rotor_lag
     rate[8] = (u[2] - x[8]) / VEHICLE.rotor_lag
     rate[13], rate[14] = x[14], u[3]
-    rate[15:17], rate[17:19] = x[17:19], u[4:6]
+    rate[15::2], rate[16::2] = x[16::2], u[4:6]
     return rate
 
 
@@ -92,7 +86,7 @@ def test_plain_float_model_equals_the_matrices_at_the_ticks_rate() -> None:
         x, u = prediction_vector(random), random.uniform(-3.0, 3.0, INPUTS)
         command = PlanInput((u[0], u[1], u[2]), u[3], (u[4], u[5]))
         np.testing.assert_allclose(
-            to_vector(plain.step(as_state(x), command)), a @ x + b @ u, atol=1e-11
+            to_vector(plain.step(as_state(x), command), 2), a @ x + b @ u, atol=1e-11
         )
 
 
@@ -102,9 +96,9 @@ def test_fifty_plain_ticks_make_one_planning_period() -> None:
     a, b = discretise(VEHICLE, 0.1)
     command = PlanInput((u[0], u[1], u[2]), u[3], (u[4], u[5]))
     moved = NominalModel(VEHICLE, 0.002).advance(as_state(x), command, 50)
-    np.testing.assert_allclose(to_vector(moved), a @ x + b @ u, atol=1e-9)
+    np.testing.assert_allclose(to_vector(moved, 2), a @ x + b @ u, atol=1e-9)
 
 
 def test_vector_layout_keeps_every_entry() -> None:
     x = np.arange(STATES, dtype=float)
-    np.testing.assert_array_equal(to_vector(as_state(x)), x)
+    np.testing.assert_array_equal(to_vector(as_state(x), 2), x)

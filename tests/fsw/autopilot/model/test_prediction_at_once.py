@@ -10,10 +10,8 @@ from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.nominal import NominalModel
 from fsw.autopilot.model.prediction import (
-    INPUTS,
     Q_ARM,
     QD_ARM,
-    STATES,
     YAW,
     YAW_RATE,
     A,
@@ -23,11 +21,12 @@ from fsw.autopilot.model.prediction import (
     discretise,
 )
 from fsw.autopilot.signals import PlanInput
+from tests.fsw.paper_arm import INPUTS, STATES
 from tests.fsw.random_states import as_state
 
 AT_ONCE = replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True))
 MOVED = [(P, V), (P + 1, V + 1), (P + 2, V + 2), (YAW, YAW_RATE)] + [
-    (Q_ARM + joint, QD_ARM + joint) for joint in range(2)
+    (Q_ARM + 2 * joint, QD_ARM + 2 * joint) for joint in range(2)
 ]
 
 

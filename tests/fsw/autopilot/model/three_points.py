@@ -8,16 +8,10 @@ import numpy as np
 
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.model.linearisation import (
-    TURNED,
-    Linearisation,
-    chain,
-    fill_slopes,
-    fill_turned,
-    position,
-    velocity,
-)
-from fsw.autopilot.model.prediction import STATES, Array
+from fsw.autopilot.model.kinematics import position, velocity
+from fsw.autopilot.model.linearisation import TURNED, Linearisation, chain, fill_slopes, fill_turned
+from fsw.autopilot.model.prediction import Array
+from tests.fsw.paper_arm import STATES
 
 BASE, JOINT2, END_EFFECTOR = 0, 1, 2
 _PLACES = [(part.on, part.begin) for part in body_of("points", AIRFRAME).parts]

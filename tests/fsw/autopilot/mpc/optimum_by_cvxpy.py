@@ -18,10 +18,11 @@ import numpy as np
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.signals import TARGET_SPHERE, SafeSet, Zone
 from tests.fsw.autopilot.model.three_points import BASE, END_EFFECTOR, Points, points_of
+from tests.fsw.paper_arm import INPUTS
 
 _PERIOD = 0.1  # s
 
@@ -79,12 +80,12 @@ class _Linear:
         return self._horizon.states[node, 14] + self._horizon.model.gamma[node, 14] @ self._change
 
     def angles(self, node: int) -> Any:
-        gamma = self._horizon.model.gamma[node, 15:17]
-        return self._horizon.states[node, 15:17] + gamma @ self._change
+        gamma = self._horizon.model.gamma[node, 15::2]
+        return self._horizon.states[node, 15::2] + gamma @ self._change
 
     def joint_rates(self, node: int) -> Any:
-        gamma = self._horizon.model.gamma[node, 17:19]
-        return self._horizon.states[node, 17:19] + gamma @ self._change
+        gamma = self._horizon.model.gamma[node, 16::2]
+        return self._horizon.states[node, 16::2] + gamma @ self._change
 
 
 class InfeasibleError(Exception):
@@ -152,7 +153,7 @@ def _cost(question: Question, linear: _Linear, U: cp.Variable, config: PlannerCo
         total += weights.yaw * cp.square(
             linear.yaw(node) + weights.yaw_lead * linear.yaw_rate(node) - question.target_yaw[node]
         )
-        total += (5.0 if last else 1.0) * cp.square(linear.arm_com(node))
+        total += (5.0 if last else 1.0) * cp.sum_squares(linear.arm_com(node))
     return total
 
 

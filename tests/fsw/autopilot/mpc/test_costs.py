@@ -13,7 +13,7 @@ from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, YAW, Array, condense
+from fsw.autopilot.model.prediction import YAW, Array, condense
 from fsw.autopilot.mpc.costs import Cost, CostWeights, PostureCost, TrackingCost
 from fsw.autopilot.mpc.soft_costs import (
     SoftWeights,
@@ -26,6 +26,7 @@ from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, Zone
 from tests.fsw.autopilot.mpc.quadratics import quadratic
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import prediction_vector
 
 N = 5
@@ -47,7 +48,7 @@ def soft(*zones: Zone, weights: SoftWeights = SOFT) -> ZoneCost:
 COSTS: dict[str, Cost] = {
     "tracking": TrackingCost(CostWeights()),
     "printed": TrackingCost(CostWeights(relative_velocity=False)),
-    "posture": PostureCost(CostWeights()),
+    "posture": PostureCost(CostWeights(), AIRFRAME),
     "soft walls": soft(*WALLS),
     "soft points": soft(*POINTS),
     "outside the sphere": SphereCost(SPHERE, (5.0, 20.0), only_outside=True),
@@ -102,7 +103,7 @@ def test_joints_that_are_asked_for_weigh_alike_at_every_node_and_none_weigh_noth
     horizon = horizon_of(start, guess)
     points = (horizon.tracked.position, np.zeros((N + 1, 3)), np.zeros(N + 1))
     asked = TargetPoints(*points, np.tile([0.3, -0.4], (N + 1, 1)))
-    cost = PostureCost(CostWeights(posture=8.0))
+    cost = PostureCost(CostWeights(posture=8.0), AIRFRAME)
     assert quadratic(cost, horizon, guess, asked)[0] == pytest.approx(8.0 * 0.25 * N)
     value, slope, _ = quadratic(cost, horizon, guess, TargetPoints(*points))
     assert (value, slope.any()) == (0.0, False)

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.prediction import INPUTS, Array, condense
+from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.mpc.clarabel_solver import WholeSolver
 from fsw.autopilot.mpc.dual_solver import DualSolver
 from fsw.autopilot.mpc.ocp import QP_SOLVERS, Ocp
@@ -21,6 +21,7 @@ from fsw.autopilot.mpc.qp_data import QpData
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, SolverStatus
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import prediction_vector
 
 CONFIG = PlannerConfig(body="points")

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Q_ARM, QD_ARM, Array, condense
+from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array, condense
 from fsw.autopilot.mpc.joint_limits import JointLimits
 from fsw.autopilot.mpc.qp_data import InputLimits
+from tests.fsw.paper_arm import INPUTS, with_angle_limits
 from tests.fsw.random_states import prediction_vector
 
 NODES = 4
-UNLIKE = replace(AIRFRAME, joint1_limit=0.9, joint12_limit=1.3)
+UNLIKE = with_angle_limits(0.9, 1.3)
 INPUTS_WITHIN = InputLimits(joint_rate=2.5, joint_margin=0.1)
 MODEL = condense(UNLIKE, 0.1, NODES)
 
@@ -22,7 +20,7 @@ MODEL = condense(UNLIKE, 0.1, NODES)
 def angles(start: Array, inputs: Array) -> tuple[Linearisation, Array]:
     horizon = Linearisation(MODEL)
     horizon.refill(start, inputs)
-    return horizon, horizon.states[1:, Q_ARM : Q_ARM + 2]
+    return horizon, horizon.states[1:, Q_ARM::2]
 
 
 def test_each_node_is_as_far_from_its_limits_as_its_angles_and_rates_either_way() -> None:
@@ -33,7 +31,7 @@ def test_each_node_is_as_far_from_its_limits_as_its_angles_and_rates_either_way(
         horizon, q = angles(start, inputs)
         limits.refill(horizon)
         left = (limits.rows.value - limits.rows.lower_bound).reshape(NODES, 8)
-        rates = horizon.states[1:, QD_ARM : QD_ARM + 2]
+        rates = horizon.states[1:, QD_ARM::2]
         expected = [
             [0.8 - a, 0.8 + a, 1.2 - a - b, 1.2 + a + b, 2.5 - c, 2.5 + c, 2.5 - d, 2.5 + d]
             for (a, b), (c, d) in zip(q, rates, strict=True)

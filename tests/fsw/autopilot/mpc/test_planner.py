@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.prediction import INPUTS, Array, CondensedModel, condense, to_vector
+from fsw.autopilot.model.prediction import Array, CondensedModel, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.mpc.planner_config import PlannerConfig
@@ -37,6 +37,7 @@ from tests.fsw.autopilot.mpc.requests import (
     planner,
     request,
 )
+from tests.fsw.paper_arm import INPUTS, LENGTHS
 from tests.fsw.random_states import as_state, prediction_vector, vec3
 
 CONFIG = PlannerConfig(body="points")
@@ -51,7 +52,7 @@ def flat(plan: Plan) -> Array:
 
 def nodes_of(plan: Plan) -> Array:
     """Predicted states (n + 1, 19)."""
-    return MODEL.phi @ to_vector(plan.start) + MODEL.gamma @ flat(plan).ravel()
+    return MODEL.phi @ to_vector(plan.start, 2) + MODEL.gamma @ flat(plan).ravel()
 
 
 @pytest.mark.drawn(1)
@@ -79,7 +80,7 @@ def test_joints_stay_within_their_limits_when_the_target_is_out_of_reach() -> No
     for side in (-1.0, 1.0):
         target = EndEffectorTarget(0, (side * 3.0, 0.0, -2.0), STILL, STILL)
         answer = planned(planner().plan(request(hovering(), target)))
-        angles = nodes_of(answer)[:, 15:17]
+        angles = nodes_of(answer)[:, 15::2]
         assert np.abs(angles[:, 0]).max() <= AIRFRAME.joint1_limit + 1e-3
         assert np.abs(angles.sum(axis=1)).max() <= AIRFRAME.joint12_limit + 1e-3
         assert np.abs(angles).max() > 0.1
@@ -101,7 +102,7 @@ def test_the_plan_goes_towards_its_target(axis: int, sign: float) -> None:
     offset[axis] = sign * 0.4
     target = below((start.p[0] + offset[0], start.p[1] + offset[1], start.p[2]))
     last = nodes_of(planned(planner().plan(request(start, target))))[-1]
-    end_effector = tips_of_prediction(last, np.array(AIRFRAME.link_length))[1]
+    end_effector = tips_of_prediction(last, np.array(LENGTHS))[1]
     assert sign * end_effector[axis] > 0.05
     assert abs(end_effector[1 - axis]) < 0.005
 
@@ -186,7 +187,7 @@ def test_joints_that_are_no_numbers_or_too_few_are_refused(joints: Any, reason: 
 def test_joints_that_are_asked_for_are_moved_towards() -> None:
     asked = request(hovering(), below((0.0, 0.0, -1.2)))
     folded = planned(planner().plan(replace(asked, joint_targets=((0.3, -0.5),) * 6)))
-    first, second = nodes_of(folded)[-1, 15:17]
+    first, second = nodes_of(folded)[-1, 15::2]
     assert 0.05 < first < 0.35
     assert -0.6 < second < -0.05
 

@@ -11,7 +11,7 @@ import pytest
 from fsw.autopilot.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, Array, condense, to_vector
+from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.costs import CostWeights, TrackingCost
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import QpData
@@ -31,6 +31,7 @@ from tests.fsw.autopilot.model.three_points import END_EFFECTOR
 from tests.fsw.autopilot.mpc.optimum_by_cvxpy import InfeasibleError, Question, optimum
 from tests.fsw.autopilot.mpc.quadratics import quadratic
 from tests.fsw.autopilot.mpc.requests import STILL, below, hovering, planned, planner, request
+from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import as_state, prediction_vector, vec3
 
 CONFIG = PlannerConfig(body="points")
@@ -140,7 +141,7 @@ def test_at_rest_before_a_point_every_controller_is_held_by_it_as_written_a_seco
 ) -> None:
     config, way = replace(CONFIG, controller=controller), np.array(direction)
     start, asked = question(np.random.default_rng(1), SafeSet())
-    start[:] = to_vector(hovering())
+    start[:] = to_vector(hovering(), 2)
     asked = around(asked, start, np.zeros(INPUTS * N))
     here = asked.points.position[0, END_EFFECTOR]
     asked = replace(
@@ -209,6 +210,7 @@ def test_every_soft_block_has_slacks_of_its_own_at_its_penalty_and_a_hard_one_ha
 
     program = QpData(
         1,
+        INPUTS,
         CONFIG.limits,
         ((block([0, 0]), 7.0), (block([0, 1, 2]), None), (block([1, 0]), 3.0), (block([0]), 0.0)),
     )

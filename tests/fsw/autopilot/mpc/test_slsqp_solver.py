@@ -15,7 +15,7 @@ from scipy.optimize import approx_fprime, fmin_slsqp
 from benchmarks.optimiser.slopes import slopes_of
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.prediction import INPUTS, STATES, Array, condense
+from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.slsqp_solver import MAX_ITERATIONS, TOLERANCE, NonlinearProgram, minimise
@@ -25,6 +25,7 @@ from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import PlanFailure, SafeSet, SolverStatus
 from tests.fsw.autopilot.mpc.requests import STILL, below, hovering, planned, planner, request
+from tests.fsw.paper_arm import INPUTS, STATES
 
 CONFIG = PlannerConfig(body="points")
 N = CONFIG.horizon
@@ -43,7 +44,7 @@ def instance(random: np.random.Generator, safe_set: SafeSet) -> tuple[Array, Tar
     start = np.zeros(STATES)
     start[0:3] = random.uniform(-0.6, 0.6, 3)
     start[13] = random.uniform(-3.0, 3.0)
-    start[15:17] = random.uniform(-0.5, 0.5, 2)
+    start[15::2] = random.uniform(-0.5, 0.5, 2)
     speed = random.uniform(-0.15, 0.15, 3)
     off = random.normal(size=3)
     off *= 0.02 / np.linalg.norm(off)

@@ -11,7 +11,7 @@ from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import INPUTS, condense
+from fsw.autopilot.model.prediction import condense
 from fsw.autopilot.mpc.costs import PostureCost, TrackingCost
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.soft_costs import SphereCost, ZoneCost
@@ -21,6 +21,7 @@ from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet
 from tests.fsw.autopilot.mpc.quadratics import quadratic
+from tests.fsw.paper_arm import INPUTS
 
 CONFIG = PlannerConfig(body="points")
 N = CONFIG.horizon

@@ -9,7 +9,7 @@ import pytest
 from fsw.autopilot.flight.modes.hold import Hold
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import SetpointMemory
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.signals import MotionSetpoint, Vec3
 from tests.fsw.autopilot.flight.in_flight import CONFIG, HANDOVER, flying, vehicle_at
 
@@ -38,7 +38,7 @@ def test_without_a_setpoint_a_moving_end_effector_is_braked(speed: float, brakes
     after = HOLD.activate(flying(), estimate, HANDOVER).setpoint
     assert (after.reference is not None) is brakes
     if after.reference is not None:
-        p_WE, v_WE = point_in_flight(estimate, CONFIG.airframe.link_length)
+        p_WE, v_WE = end_effector(CONFIG.airframe.bodies, estimate)
         assert after.reference.of_end_effector
         assert (after.reference.p, after.reference.v) == (p_WE, v_WE)
         assert after.goal == PositionGoal(MotionSetpoint(True, v=(0.0, 0.0, 0.0)))

@@ -23,7 +23,7 @@ from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, Vec2, Vec3, Zone
 from tests.fsw.autopilot.flight.in_flight import CONFIG, vehicle_at
 
-LINKS = CONFIG.airframe.link_length
+BODIES = CONFIG.airframe.bodies
 POINTS = body_of("points", CONFIG.airframe)
 CHECK = SafeSetCheck(replace(CONFIG, planner=replace(CONFIG.planner, body="points")))
 ROOM = stand_off(CONFIG.planner.walls)
@@ -31,7 +31,7 @@ AHEAD = wall((-1.0, 0.0, 0.0), -1.0, 0.1)
 
 
 def retreated(zones: tuple[Zone, ...], p: Vec3, q_arm: Vec2 = (0.0, 0.0)) -> Vec3:
-    return retreat_place(SafeSet(zones), vehicle_at(p)._replace(q_arm=q_arm), POINTS, LINKS, ROOM)
+    return retreat_place(SafeSet(zones), vehicle_at(p)._replace(q_arm=q_arm), POINTS, BODIES, ROOM)
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
@@ -42,7 +42,7 @@ def test_off_a_wall_it_goes_straight_along_the_normal() -> None:
 
 def test_an_arm_that_is_stretched_out_is_taken_along() -> None:
     x, _, _ = retreated((AHEAD,), (0.8, 0.3, -1.0), (1.0, 0.5))
-    reach = LINKS[0] * math.sin(1.0) + LINKS[1] * math.sin(1.5)
+    reach = 0.15 * math.sin(1.0) + 0.15 * math.sin(1.5)
     assert x == pytest.approx(0.9 - ROOM - reach)
 
 

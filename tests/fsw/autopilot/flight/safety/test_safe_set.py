@@ -9,7 +9,7 @@ import pytest
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck, joined
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import MissionMemory
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import frame_of, position
 from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
@@ -139,9 +139,8 @@ def test_margins_are_of_base_elbow_and_end_effector() -> None:
     estimate = vehicle_at((0.0, 0.0, -1.0))._replace(q_arm=(0.5, 0.4))
     target = EndEffectorTarget(0, (0.0, 0.0, -0.775), (0.0,) * 3, (0.0,) * 3)
     report = CHECK.margins(InflatedSafeSet().of(SafeSet((NORTH,))), estimate, target)
-    l1, _ = CONFIG.airframe.link_length
-    elbow = point_in_flight(estimate, (l1, 0.0))[0]
-    tip = point_in_flight(estimate, CONFIG.airframe.link_length)[0]
+    frame = frame_of(CONFIG.airframe.bodies, estimate)
+    elbow, tip = (position(frame, on, (0.0, 0.0, 0.15)) for on in (1, 2))
     assert elbow != tip
     places = (estimate.p_WB, elbow, tip)
     assert report.margins == pytest.approx([5.0 - p[0] - 0.1 for p in places])

@@ -22,8 +22,7 @@ from fsw.autopilot.flight.safety.uncertain_clearance import (
 )
 from fsw.autopilot.geometry.rotation import yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.body import ON_LINK1, body_of
-from fsw.autopilot.model.kinematics import links
+from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes.ball import ball
@@ -31,9 +30,9 @@ from fsw.autopilot.shapes.box import box
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, StateEstimate, Vec3, Zone
+from tests.fsw.paper_arm import LENGTHS
 from tests.fsw.random_states import mat3
 
-LENGTHS = AIRFRAME.link_length
 BARRIERS = (BarrierTuning(), BarrierTuning())
 ROOM = stand_off(BARRIERS[0])
 NORTH, EAST = wall((-1.0, 0.0, 0.0), -5.0, 0.1), wall((0.0, -1.0, 0.0), -5.0, 0.2)
@@ -43,7 +42,7 @@ STEP = 1.1e-3  # m, a little more than a step
 
 def clearance(body: str = "points", sigmas: float = 3.0) -> UncertainClearance:
     of_name = body_of("full" if body == "full" else "points", AIRFRAME)
-    return UncertainClearance(sigmas, of_name, LENGTHS, BARRIERS, 0.07)
+    return UncertainClearance(sigmas, of_name, AIRFRAME.bodies, BARRIERS, 0.07)
 
 
 def vehicle(
@@ -121,8 +120,10 @@ def places(estimate: StateEstimate, seed: int) -> Array:
     """Places all over the full body, seen from its base (n, 3) [m, NED]."""
     random = np.random.default_rng(seed)
     th1, th2 = estimate.q_arm
-    (x1, z1), (x2, z2) = links(LENGTHS, th1, th1 + th2)
-    first, second = np.array((x1, 0.0, z1)), np.array((x2, 0.0, z2))
+    first, second = (
+        length * np.array((np.sin(angle), 0.0, np.cos(angle)))
+        for length, angle in zip(LENGTHS, (th1, th1 + th2), strict=True)
+    )
     found = []
     for part in body_of("full", AIRFRAME).parts:
         ends = [(share, np.pi * k / 24.0) for share in (0.0, 1.0) for k in range(48)]
@@ -134,7 +135,7 @@ def places(estimate: StateEstimate, seed: int) -> Array:
             if part.on != ON_BASE:
                 along = at[2]
                 at = first * along / LENGTHS[0]
-                if part.on != ON_LINK1:
+                if part.on == 2:
                     at = first + second * along / LENGTHS[1]
             found.append(at)
     turned: Array = np.array(found) @ np.reshape(estimate.R_WB, (3, 3)).T

@@ -17,7 +17,7 @@ from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.model.kinematics import point_in_flight
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
@@ -132,7 +132,7 @@ def test_a_reference_from_outside_is_governed_and_of_one_of_the_vehicles_own_the
     None
 ):
     estimate = vehicle_at(HERE)
-    p_WE, _ = point_in_flight(estimate, CONFIG.airframe.link_length)
+    p_WE, _ = end_effector(CONFIG.airframe.bodies, estimate)
     walled = flying()
     ahead = SafeSet((wall((-1.0, 0.0, 0.0), -0.2, 0.1),))
     walled = replace(walled, kept=InflatedSafeSet().of(ahead))
@@ -169,7 +169,7 @@ class UpAndDown(FlightMode):
 
 def test_a_reference_that_comes_up_from_the_ground_is_limited_once_it_was_up() -> None:
     mode = UpAndDown(CONFIG)
-    origin, _ = point_in_flight(vehicle_at((0.0, 0.0, GROUND_Z)), CONFIG.airframe.link_length)
+    origin, _ = end_effector(CONFIG.airframe.bodies, vehicle_at((0.0, 0.0, GROUND_Z)))
     state = flying(Mode.MISSION, mode_origin=origin)
     for t_us in range(0, 6_000_000, CONFIG.mpc_period_us):
         up = origin[2] - mode.reference(state, t_us).p_WE[2]

@@ -1,0 +1,25 @@
+"""The arm of ``paper`` in numbers of the tests' own, and how many its states and inputs are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.prediction import inputs_of, states_of
+from fsw.record import ANGLE_LIMITS, padded
+
+JOINTS: Final = 2
+LENGTHS: Final = (0.15, 0.15)  # m, of the links
+STATES: Final = states_of(JOINTS)
+INPUTS: Final = inputs_of(JOINTS)
+
+
+def with_angle_limits(first: float, both: float) -> Airframe:
+    """The airframe of paper with other limits of joint 1 and of both joints' sum [rad]."""
+    limits = replace(
+        AIRFRAME.angle_limits,
+        low=padded((-first, -both), ANGLE_LIMITS),
+        high=padded((first, both), ANGLE_LIMITS),
+    )
+    return replace(AIRFRAME, angle_limits=limits)
