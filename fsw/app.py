@@ -36,7 +36,7 @@ from fsw.link.sim_link import SimLink
 from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.log.flight_log import LogSubject
+from fsw.log.flight_log import LogSubject, vehicle_facts
 from fsw.log.revision import revision
 from fsw.log.run_directory import run_directory
 from fsw.log.run_files import RunFiles
@@ -53,6 +53,7 @@ from fsw.runtime.realtime import (
     scheduler,
 )
 from fsw.runtime.timing import GroupTimer
+from vehicles.vehicle_file import load_vehicle
 
 if TYPE_CHECKING:
     from fsw.storage.kept_file import ParameterFile
@@ -257,7 +258,9 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[A
     from fsw.runtime.assembly import flight_software
 
     def load() -> FlightProgram[Any]:
-        return flight_software(options.control, origin=options.links.origin)
+        return flight_software(
+            options.control, origin=options.links.origin, vehicle=load_vehicle(options.vehicle)
+        )
 
     def compile_first() -> None:
         load()
@@ -281,6 +284,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         "scenario": options.scenario,
         "scenario_digest": options.scenario_digest,
         **options.control.facts(),
+        **vehicle_facts(load_vehicle(options.vehicle)),
     }
     if options.seed is not None:
         facts["seed"] = options.seed

@@ -31,6 +31,11 @@ class FswOptions:
     )
     links: LinkChoice = group(LinkChoice)
     control: ControlChoice = group(ControlChoice)
+    vehicle: str = option(
+        "--vehicle NAME",
+        "vehicle that it flies: one that comes with Pandion, or a .toml file",
+        default="paper",
+    )
     params: Path | None = declared(PARAMS)
     out: Path | None = declared(OUT)
     wait_s: float = option(

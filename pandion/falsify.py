@@ -15,6 +15,7 @@ from command_line.version import version
 from fsw.log.run_directory import new_run_directory
 from pandion.display import Display
 from pandion.falsify_options import FalsifyOptions
+from sitl.scenario import vehicle_of
 
 if TYPE_CHECKING:
     from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -77,7 +78,7 @@ def _check(scenario: Scenario) -> None:
 def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
     from fsw.autopilot.parameters.flight_config import flight_config
 
-    config = flight_config(body=scenario.body)  # as pandion fly
+    config = flight_config(body=scenario.body, vehicle=vehicle_of(scenario))  # as pandion fly
     if options.own.controller:
         raise UnusableError(
             "--controller flies no plan that it could be pushed off: search with --over"

@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from command_line.options import as_words, declared, group, json_file, read, switch
+from command_line.options import as_words, declared, group, json_file, option, read, switch
 from command_line.output import command_name, json_text, print_error, try_write, unwritable, without
 from command_line.parser import COULD_NOT_START
 from command_line.version import version
@@ -25,14 +25,16 @@ from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from pandion.view_beside import ViewBeside
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
+from sitl.scenario import vehicle_of
 from sitl.scenario_file import (
     ScenarioError,
-    check_flown,
     check_pacing,
     load_scenario,
     scenario_digest,
     suite_of,
 )
+from vehicles.description import Vehicle
+from vehicles.vehicle_file import VehicleError, load_vehicle
 
 COMPLETED, NOT_COMPLETED = 0, 1  # exit codes
 # The flight software compiles when it is started for the first time; the supervisor ends the wait
@@ -47,6 +49,10 @@ class FlyOptions(RunOptions):
     control: ControlChoice = group(ControlChoice)
     params: Path | None = declared(PARAMS)
     links: LinkChoice = group(LinkChoice)
+    believed_vehicle: str | None = option(
+        "--believed-vehicle NAME",
+        "vehicle that the flight software takes it for (default the one that flies)",
+    )
     out: Path | None = declared(OUT)
     json: str | None = json_file("the result")
     view: bool = switch(
@@ -67,6 +73,7 @@ class PlannedFlight:
     name: str  # of the scenario
     sensors: str  # suite
     body: str  # that the scenario is for
+    believed: str  # vehicle, by name or path, that the flight software flies
     digest: str  # of the scenario's file
     duration_s: float
     out: Path
@@ -105,9 +112,10 @@ def planned(options: FlyOptions) -> PlannedFlight:
         LinkError: An address of a link is none.
         OSError: The directory for the logs cannot be made.
     """
-    scenario = load_scenario(options.scenario, options.sensors)
+    scenario = load_scenario(options.scenario, options.sensors, options.vehicle)
     check_pacing(scenario, realtime=options.realtime)
-    check_flown(scenario)
+    believed = options.believed_vehicle or scenario.vehicle
+    check_alike(vehicle_of(scenario), believed)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
@@ -119,10 +127,32 @@ def planned(options: FlyOptions) -> PlannedFlight:
         name=scenario.name,
         sensors=suite_of(scenario),
         body=scenario.body,
+        believed=believed,
         digest=scenario_digest(options.scenario),
         duration_s=scenario.duration_s if options.duration_s is None else options.duration_s,
         out=run_directory(options.out, f"{scenario.name}-seed{options.seed}"),
     )
+
+
+def check_alike(flown: Vehicle, believed: str) -> None:
+    """Refuse a vehicle that the flight software cannot take the one that is flown for.
+
+    Raises:
+        ScenarioError: With why not.
+    """
+    try:
+        other = load_vehicle(believed)
+    except VehicleError as error:
+        raise ScenarioError(f"--believed-vehicle: {error}") from error
+    for what, count, wanted in (
+        ("rotors", len(other.rotors), len(flown.rotors)),
+        ("joints", len(other.joints), len(flown.joints)),
+    ):
+        if count != wanted:
+            raise ScenarioError(
+                f"--believed-vehicle {believed} has {count} {what}, and {flown.name}, which "
+                f"flies, has {wanted}"
+            )
 
 
 def _banner(flight: PlannedFlight, display: Display) -> None:
@@ -165,6 +195,7 @@ def _fsw_options(flight: PlannedFlight, port: int) -> FswOptions:
         sim=f"udp:127.0.0.1:{port}",
         links=options.links,
         control=replace(options.control, body=options.control.body or flight.body),
+        vehicle=flight.believed,
         params=options.params,
         out=flight.out,
         wait_s=_WAIT_S,

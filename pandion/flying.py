@@ -20,7 +20,7 @@ from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, fl
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
 from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
-from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.log.flight_log import FlightLog, LogSubject, vehicle_facts
 from fsw.log.revision import revision
 from fsw.storage.parameter_file import load, save
 from pandion.flown import Result, Verdict, write_json
@@ -30,7 +30,7 @@ from pandion.result import FlightReports, as_json
 from pandion.scenarios import AnyScenario, load_scenario, save_scenario
 from sitl.limits import LimitUse
 from sitl.result import TruthResult
-from sitl.scenario import Points
+from sitl.scenario import Points, vehicle_of
 from sitl.scenario_file import ScenarioError, scenario_digest, suite_of
 from sitl.simulation import STEP_US, Simulation
 from sitl.truth_log import TruthLog
@@ -60,6 +60,7 @@ def fly(
     safety_filter: bool = True,
     allow_inconsistent: bool = False,
     allow_slow: bool = False,
+    vehicle: str | None = None,
     log: bool = True,
     processes: bool = False,
 ) -> Result:
@@ -86,6 +87,8 @@ def fly(
         safety_filter: False: nothing keeps a controller off a zone, and the flight says so.
         allow_inconsistent: Fly a configuration that cannot keep its safe set.
         allow_slow: Fly own parts that a vehicle could not wait for.
+        vehicle: One that comes with Pandion, or the path of a ``.toml`` file; None: the
+            scenario's.
         log: Keep a log, for ``topics``, ``report`` and ``view``; without it is twice as fast.
         processes: See above; not with own parts, but with a reference.
 
@@ -95,7 +98,7 @@ def fly(
         RefusedError: The vehicle refuses to arm or to follow.
         ValueError: An argument is unknown or out of range.
     """
-    flown = load_scenario(scenario, sensors=sensors, duration_s=duration_s)
+    flown = load_scenario(scenario, sensors=sensors, duration_s=duration_s, vehicle=vehicle)
     if reference is not None:
         curve, start = trajectory(reference, flown.duration_s), flown.start
         if isinstance(curve, Points) and curve.yaw_deg:
@@ -116,7 +119,13 @@ def fly(
         known = ", ".join(CONTROLLERS)
         raise ValueError(f'unknown controller "{controller}"; known: {known}, or module:Name')
     name = "blf" if own else str(controller)
-    config = flight_config(name, _INNER[tracking], body=flown.body, soft=allow_inconsistent)
+    config = flight_config(
+        name,
+        _INNER[tracking],
+        body=flown.body,
+        soft=allow_inconsistent,
+        vehicle=vehicle_of(flown),
+    )
     config = with_parameters(config, params)
     if not safety_filter:
         config = replace(config, safety_filter=replace(config.safety_filter, enabled=0))
@@ -175,6 +184,7 @@ class _Recording:
             "body": config.planner.body,
             "soft": int(config.soft),
             "seed": job.seed,
+            **vehicle_facts(vehicle_of(scenario)),
         }
         values = {name: one.read(config) for name, one in BY_NAME.items()}
         subject = LogSubject(

@@ -13,6 +13,7 @@ from command_line.output import console_beside, json_text, print_error, say, wri
 from command_line.parser import COULD_NOT_START
 from fsw.autopilot.signals import Origin
 from pandion.display import Display
+from vehicles.vehicle_file import parse_vehicle
 
 if TYPE_CHECKING:
     from fsw.runtime.program import FlightProgram
@@ -80,6 +81,7 @@ def _program(log: UlogFile) -> FlightProgram[Any]:
     return flight_software(
         choice_of(partial(fact, log)),
         origin=_origin(log),
+        vehicle=parse_vehicle(fact(log, "vehicle_file"), fact(log, "vehicle")),
         to_plan=False,
     )
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from sitl.scenario import Scenario
-from sitl.scenario_file import check_flown, parse_scenario
 from sitl.scenario_file import load_scenario as load_by_name
+from sitl.scenario_file import parse_scenario, with_vehicle
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
 
@@ -16,7 +16,11 @@ AnyScenario: TypeAlias = str | Path | Scenario
 
 
 def load_scenario(
-    scenario: AnyScenario, *, sensors: str | None = None, duration_s: float | None = None
+    scenario: AnyScenario,
+    *,
+    sensors: str | None = None,
+    duration_s: float | None = None,
+    vehicle: str | None = None,
 ) -> Scenario:
     """A scenario by name, by the path of its file, or one that is there already.
 
@@ -24,6 +28,7 @@ def load_scenario(
         scenario: ``"walls"``, ``"my/scenario.toml"`` or a ``Scenario``.
         sensors: Suite to fly it with: ``perfect``, ``mocap``, ``vio`` or ``rtk``; None: its own.
         duration_s: How long it is flown [s]; None: as it says.
+        vehicle: One that comes with Pandion, or the path of a ``.toml`` file; None: its own.
 
     Returns:
         A frozen dataclass; ``dataclasses.replace`` makes a changed one.
@@ -39,8 +44,9 @@ def load_scenario(
     if duration_s is not None:
         found = replace(found, duration_s=float(duration_s))
         found = parse_scenario(scenario_text(found), found.name)
+    if vehicle is not None:
+        found = with_vehicle(found, vehicle)
     check(found)
-    check_flown(found)
     return found
 
 

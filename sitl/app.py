@@ -39,7 +39,7 @@ def _run(options: SitlOptions, events: Events) -> int:
         raise CouldNotStart("--realtime flies at speed 1; --speed needs --lockstep")
     if options.for_px4:
         return _run_for_px4(options, events)
-    scenario = load_scenario(options.scenario, options.sensors)
+    scenario = load_scenario(options.scenario, options.sensors, options.vehicle)
     check_pacing(scenario, realtime=options.realtime)
     if options.duration_s is not None:
         scenario = dataclasses.replace(scenario, duration_s=options.duration_s)
@@ -68,10 +68,10 @@ def _run(options: SitlOptions, events: Events) -> int:
 def _run_for_px4(options: SitlOptions, events: Events) -> int:
     listener = parse_listener(options.listen or _TCP)
     suite = options.sensors
-    scenario = load_scenario(options.scenario, suite)
+    scenario = load_scenario(options.scenario, suite, options.vehicle)
     if suite_of(scenario) == PERFECT:
         suite = _NOISY
-        scenario = load_scenario(options.scenario, suite)
+        scenario = load_scenario(options.scenario, suite, options.vehicle)
         events.report("remark", f"sitl: sensors {suite}: PX4 takes sensors without noise for stuck")
     check_pacing(scenario, realtime=False)
     for i, fault in enumerate(scenario.faults):

@@ -51,6 +51,10 @@ class RunOptions:
         f"sensors of the vehicle: {', '.join(SUITE_NAMES)} (default the scenario's)",
         one_of("suite", *SUITE_NAMES),
     )
+    vehicle: str | None = option(
+        "--vehicle NAME",
+        "vehicle that flies: one that comes with Pandion, or a .toml file (default the scenario's)",
+    )
     realtime: bool = switch(
         "--realtime",
         "the simulator keeps real time and does not wait for the flight software",

@@ -24,7 +24,6 @@ _UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
-FLOWN = "paper"  # vehicle that our own flight software flies
 SUITE_NAMES: tuple[str, ...] = get_args(SuiteName)
 
 
@@ -40,17 +39,34 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in PACKAGED.glob("*.toml")))
 
 
-def load_scenario(name_or_path: str, suite: str | None = None) -> Scenario:
+def load_scenario(
+    name_or_path: str, suite: str | None = None, vehicle: str | None = None
+) -> Scenario:
     """Read a packaged scenario by name, or any by path; ``suite`` as of ``parse_scenario``.
+
+    With a ``vehicle``, by name or path, in place of its own.
 
     Raises:
         ScenarioError: Unknown name, unreadable file, unknown key or impossible value.
     """
     path = _path(name_or_path)
     try:
-        return parse_scenario(_content(path).decode("utf-8"), path.stem, suite, path.parent)
+        found = parse_scenario(_content(path).decode("utf-8"), path.stem, suite, path.parent)
+        return found if vehicle is None else with_vehicle(found, vehicle)
     except UnicodeDecodeError as error:
         raise ScenarioError(f"scenario {path} is not TOML: it is not UTF-8") from error
+
+
+def with_vehicle(scenario: Scenario, vehicle: str) -> Scenario:
+    """The scenario with another vehicle, by name or path, which starts in its own home posture.
+
+    Raises:
+        ScenarioError: There is no such vehicle, or it cannot be.
+    """
+    start = dataclasses.replace(scenario.start, arm_deg=())
+    found = dataclasses.replace(scenario, vehicle=vehicle, start=start)
+    _check_vehicle(found)
+    return found
 
 
 def check_pacing(scenario: Scenario, *, realtime: bool) -> None:
@@ -62,19 +78,6 @@ def check_pacing(scenario: Scenario, *, realtime: bool) -> None:
     for i, fault in enumerate(scenario.faults):
         if fault.of_real_time and not realtime:
             raise ScenarioError(f"faults[{i}]: {fault} needs real time; add --realtime")
-
-
-def check_flown(scenario: Scenario) -> None:
-    """Refuse a vehicle that our own flight software does not fly.
-
-    Raises:
-        ScenarioError: With what flies it none the less.
-    """
-    if scenario.vehicle != FLOWN:
-        raise ScenarioError(
-            f'vehicle = "{scenario.vehicle}": the flight software flies "{FLOWN}" alone; the '
-            "simulator flies others under PX4 (pandion sitl --for px4)"
-        )
 
 
 def suite_of(scenario: Scenario) -> str:

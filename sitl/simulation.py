@@ -251,13 +251,16 @@ class Simulation:
     def exact_state(self, out: Array) -> None:
         """Write the numbers of :meth:`sense` where sensors tell the exact state.
 
-        ``out`` (16 + 2j,) [SI]: position, velocity, attitude, rate, specific force, joints and
-        their rates.
+        ``out`` (16 + 2 ``JOINTS_MAX``,) [SI]: position, velocity, attitude, rate, specific force,
+        joints and their rates, both with room for those of any vehicle, which is left alone.
         """
         state, felt = self._state, self._felt
         out[:THRUST] = state[:THRUST]
         out[THRUST], out[THRUST + 1], out[THRUST + 2] = felt
-        out[THRUST + 3 :] = state[THRUST + self._rotors :]
+        angles, joints = THRUST + self._rotors, self._joints
+        at, rates_at = THRUST + 3, THRUST + 3 + JOINTS_MAX
+        out[at : at + joints] = state[angles : angles + joints]
+        out[rates_at : rates_at + joints] = state[angles + joints : angles + 2 * joints]
 
     def measurements(self) -> tuple[Measurement, ...] | None:
         """What arrives from the sensors in this step; None with the suite ``perfect``.

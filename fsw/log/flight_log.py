@@ -27,6 +27,8 @@ from fsw.log.topics import TOPICS
 from messages import ulog
 from messages.block_file import BlockFile
 from messages.ground_truth import TRUTH_TOPICS
+from vehicles.description import Vehicle
+from vehicles.vehicle_file import vehicle_text
 
 Number = int | float | bool
 
@@ -46,6 +48,11 @@ class LogSubject:
     parameters: Mapping[str, float]  # those that a ground station may change, by their names there
     airframe: Airframe
     profile: int = FULL  # what is written how often, LOG_PROFILE
+
+
+def vehicle_facts(vehicle: Vehicle) -> dict[str, str | int]:
+    """What a log says of the vehicle as the flight software knows it: its file."""
+    return {"vehicle": vehicle.name, "vehicle_file": vehicle_text(vehicle)}
 
 
 class FlightLog:

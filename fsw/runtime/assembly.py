@@ -20,17 +20,24 @@ from fsw.link.services.mission_store import MissionStore, Site
 from fsw.runtime import clock
 from fsw.runtime.program import FlightProgram
 from fsw.storage.parameter_store import ParameterStore
+from vehicles.description import Vehicle
 
 
 def flight_software(
-    choice: ControlChoice, *, origin: Origin = DEFAULT_ORIGIN, to_plan: bool = True
+    choice: ControlChoice,
+    *,
+    origin: Origin = DEFAULT_ORIGIN,
+    vehicle: Vehicle | None = None,
+    to_plan: bool = True,
 ) -> FlightProgram[Any]:
     """Build the program and, unless ``to_plan`` is False, compile it: a minute the first time.
+
+    For a ``vehicle``; without one, the paper's.
 
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    config = configured(choice, origin)
+    config = configured(choice, origin, vehicle)
     planner = Planner(config.planner, config.airframe, clock.stopwatch_us)
     flight = TunedAutopilot(config)
     if to_plan:
@@ -59,7 +66,9 @@ def flight_software(
     )
 
 
-def configured(choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN) -> FlightConfig:
+def configured(
+    choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN, vehicle: Vehicle | None = None
+) -> FlightConfig:
     """The configuration of the start.
 
     Raises:
@@ -73,6 +82,7 @@ def configured(choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN) -> Flight
         solver=choice.solver,
         body=choice.body or FULL,
         soft=choice.allow_inconsistent,
+        vehicle=vehicle,
     )
     return replace(config, origin=origin)
 

@@ -19,11 +19,10 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
 from fsw.autopilot.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
-from sitl.scenario import Scenario
+from sitl.scenario import Scenario, vehicle_of
 from sitl.scenario_file import (
     ScenarioError,
     build_table,
-    check_flown,
     load_scenario,
     named_files,
     suite_of,
@@ -377,7 +376,6 @@ def _scenario(
                 f"faults: {one} cannot be flown in one process; can be of {', '.join(_FAILING)}"
             )
     check(found)
-    check_flown(found)
     return found
 
 
@@ -385,7 +383,11 @@ def _config(
     controller: str, keys: _Keys, flown: Scenario, fixed: tuple[tuple[str, float], ...]
 ) -> FlightConfig:
     config = flight_config(
-        controller, _INNER[keys.tracking], body=flown.body, soft=keys.allow_inconsistent
+        controller,
+        _INNER[keys.tracking],
+        body=flown.body,
+        soft=keys.allow_inconsistent,
+        vehicle=vehicle_of(flown),
     )
     config = tuned(config, fixed)
     for sentence in contradictions(config):

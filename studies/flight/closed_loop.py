@@ -40,7 +40,7 @@ from fsw.autopilot.signals import (
     TickOutputs,
 )
 from sitl.scenario import Scenario
-from sitl.scenario_file import ScenarioError, check_flown
+from sitl.scenario_file import ScenarioError
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from studies.flight.collector import collector_off
 from studies.flight.mission import announced, moves, target
@@ -175,7 +175,7 @@ class CalmStretch:
         """Fly none unless it is ``allowed``."""
         self._loop, self._calm = loop, calm
         self._allowed = allowed and loop.simulation.tells_its_state
-        self._reading = np.empty(READINGS)
+        self._reading = np.zeros(READINGS)
 
     def fly(self) -> bool:
         """Go on as far as nothing happens, often not at all; whether the run is not over then."""
@@ -248,7 +248,6 @@ class ScenarioFlight:
             ScenarioError: The body of the configuration starts outside the safe set.
             OwnPartError: A part cannot be used.
         """
-        check_flown(simulation.scenario)
         check_body(simulation.scenario, config)
         self.recorder = FlightRecorder()
         self.planner = InlinePlanner(planner_of(config, parts))

@@ -19,7 +19,7 @@ from cmaes import CMA
 
 from command_line.ranges import Range
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from sitl.scenario import Scenario
+from sitl.scenario import Scenario, vehicle_of
 from sitl.scenario_file import ScenarioError, build_table
 from studies.campaign.campaign import Campaign
 from studies.campaign.keys import CampaignError, applied, range_of, rounded
@@ -99,7 +99,10 @@ class Task:
 
     def config(self, mark: Mark) -> FlightConfig:
         """What flies for a mark; inconsistent configurations fly as well."""
-        config = flight_config(mark.controller, body=self.plan.bases[0].scenario.body, soft=True)
+        flown = self.plan.bases[0].scenario
+        config = flight_config(
+            mark.controller, body=flown.body, soft=True, vehicle=vehicle_of(flown)
+        )
         planner = replace(config.planner, tightening=mark.tightening_m, centred=mark.centred)
         if mark.softened:
             planner = replace(

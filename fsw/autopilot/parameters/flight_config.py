@@ -11,14 +11,16 @@ from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.safety_filter import FilterTuning
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
 from fsw.autopilot.model.battery import BatteryModel
 from fsw.autopilot.model.body import BODIES, BodyName
+from fsw.autopilot.model.multibody import posture, tip_in_body
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.solvers import SOLVERS
 from fsw.autopilot.mpc.variants import VARIANTS
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.signals import Origin
+from vehicles.description import Vehicle
 
 CONTROLLERS = tuple(VARIANTS)
 INNERS: tuple[Inner, ...] = ("tracking", "pid")
@@ -181,8 +183,11 @@ def flight_config(
     solver: str = "clarabel",
     body: str = "full",
     soft: bool = False,
+    vehicle: Vehicle | None = None,
 ) -> FlightConfig:
     """The configuration of a controller, an inner loop, a lambda, a solver and a body, by name.
+
+    For a ``vehicle``; without one, the paper's.
 
     Raises:
         ValueError: for an unknown name, listing the known ones.
@@ -204,4 +209,29 @@ def flight_config(
             walls=replace(planner.walls, lambda_=wanted),
             workspace=replace(planner.workspace, lambda_=wanted),
         )
-    return FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)
+    config = FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)
+    return config if vehicle is None else of_vehicle(config, vehicle)
+
+
+def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:
+    """The configuration for another vehicle."""
+    airframe, battery = airframe_of(vehicle), vehicle.battery
+    b = airframe.bodies
+    tip, _ = tip_in_body(posture(b, airframe.home_posture), b)
+    hanging = round(tip[2], 6)
+    tracking = replace(config.tuning.tracking, point_below_base=0.5 * hanging)
+    return replace(
+        config,
+        airframe=airframe,
+        tuning=replace(config.tuning, tracking=tracking),
+        surroundings=replace(config.surroundings, hanging=hanging),
+        battery=replace(
+            config.battery,
+            capacity=battery.capacity,
+            full=battery.full,
+            empty=battery.empty,
+            resistance=battery.resistance,
+            efficiency=battery.efficiency,
+            idle_power=battery.idle_power,
+        ),
+    )
