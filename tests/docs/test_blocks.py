@@ -14,6 +14,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -152,7 +153,10 @@ def execute(fence: Fence, workplace: Path) -> None:
 
 
 def load(fence: Fence, workplace: Path) -> None:
-    """Load a scenario and build its simulation; its first line may name a file to write."""
+    """Load a scenario and build its simulation; its first line may name a file to write.
+
+    Blocks of vehicles are written alone.
+    """
     title = re.match(r"# (\S+\.toml)\n", fence.text)
     name = fence.reason if fence.mark == "added to" else title.group(1) if title else ""
     text = fence.text
@@ -160,6 +164,8 @@ def load(fence: Fence, workplace: Path) -> None:
         before = (workplace / name).read_text(encoding="utf-8") if fence.mark else ""
         text = f"{before}\n{text}"
         (workplace / name).write_text(text, encoding="utf-8")
+    if not {"rotors", "parts"}.isdisjoint(tomllib.loads(text)):
+        return  # of a vehicle, which the commands beside it check
     scenario = parse_scenario(text, "example")
     check(scenario)
     assert Simulation(scenario, 0).ended is None, str(fence)
