@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -11,12 +12,12 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import SafeSet, Vec3, Vec4
+from fsw.autopilot.signals import RotorVector, SafeSet, Vec3, Vec4
 from view import colours
 from view.colours import Rgb
 from view.flight import Trail
 from view.scene import Margin, Posture, Scene
-from view.vehicle import places, rotor_hubs
+from view.vehicle import chain, rotor_hubs
 from view.zone_meshes import Mesh, moved, zone_mesh
 
 Array = NDArray[Any]
@@ -58,7 +59,7 @@ class VehicleFigure:
                 visible=False,
                 **self._tone,
             )
-            for k, length in enumerate(airframe.link_length, start=1)
+            for k, length in enumerate(_lengths(airframe), start=1)
         ]
         self._joint = scene.add_icosphere(
             f"{name}-joint2", radius=size.link, color=ghost or colours.GREY, visible=False,
@@ -71,7 +72,7 @@ class VehicleFigure:
         self._shown = False
         self._colours: dict[str, Rgb] = {}
 
-    def show(self, posture: Posture | None, thrust: Vec4 | None = None) -> None:
+    def show(self, posture: Posture | None, thrust: RotorVector | None = None) -> None:
         """Move it to a ``posture``; without one it is not visible. ``thrust`` [N] of each rotor."""
         if (posture is not None) != self._shown:
             self._shown = posture is not None
@@ -80,10 +81,10 @@ class VehicleFigure:
         if posture is None:
             return
         self._body.position, self._body.wxyz = posture.p, posture.q
-        base, joint2, tip = places(posture, self._airframe)
-        for link, begin, end in zip(self._links, (base, joint2), (joint2, tip), strict=True):
+        arm = chain(posture, self._airframe)
+        for link, (begin, end) in zip(self._links, pairwise(arm), strict=True):
             link.position, link.wxyz = _between(begin, end)
-        self._joint.position, self._tool.position = joint2, tip
+        self._joint.position, self._tool.position = arm[-2], arm[-1]
         for arrow, newtons in zip(self._arrows, thrust or (), strict=False):
             arrow.scale = (1.0, 1.0, max(newtons / self._airframe.rotor_thrust_max, 0.01))
 
@@ -357,3 +358,9 @@ def _arrow() -> tuple[Array, Array]:
         for k in range(n)
     ]
     return np.concatenate(rows), np.array(faces)
+
+
+def _lengths(airframe: Airframe) -> list[float]:
+    """Of the arm's links [m], which no posture changes."""
+    still = Posture((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0,) * airframe.bodies.joints)
+    return [math.dist(begin, end) for begin, end in pairwise(chain(still, airframe))]

@@ -269,9 +269,9 @@ class Tick(Record):
     @property
     def commanded(self) -> ActuatorCommand:
         """The last command."""
-        found = _COMMAND.unpack_from(self.memory, _SENT_AT)
-        end = ROTORS + self.joint_count
-        return ActuatorCommand(found[: self.rotor_count], found[ROTORS:end])
+        found: Any = _COUNTED_COMMAND.unpack_from(self.memory, _COUNTS_AT)
+        rotors, joints = 2 + found[0], 2 + ROTORS + found[1]
+        return ActuatorCommand(found[2:rotors], found[2 + ROTORS : joints])
 
     @commanded.setter
     def commanded(self, command: ActuatorCommand) -> None:
@@ -357,6 +357,7 @@ _ESTIMATE: Final = struct.Struct(f"<q{19 + 2 * JOINTS + 1}d")
 _PLAN: Final = struct.Struct(f"<{15 + 2 * JOINTS}d")
 _INPUT: Final = struct.Struct(f"<{4 + JOINTS}d")
 _COMMAND: Final = struct.Struct(f"<{ROTORS + JOINTS}d")
+_COUNTED_COMMAND: Final = struct.Struct(f"<2q{ROTORS + JOINTS}d")  # rotor_count, joint_count, sent
 _JOINTS: Final = struct.Struct(f"<{JOINTS}d")
 _ONE: Final = struct.Struct("<d")
 _TWO: Final = struct.Struct("<2d")
@@ -367,6 +368,7 @@ _UPRIGHT_AT: Final = Tick.place("estimate", "R_WB") + 8 * 8
 _PLAN_AT: Final = Tick.place("plan")
 _INPUT_AT: Final = Tick.place("u")
 _SENT_AT: Final = Tick.place("sent")
+_COUNTS_AT: Final = Tick.place("rotor_count")
 _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")
 

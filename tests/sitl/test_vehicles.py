@@ -26,10 +26,10 @@ from sitl.result import EndKind
 from sitl.scenario import Hold, Pilot, Scenario, Start, start_angles, vehicle_of
 from sitl.scenario_file import (
     ScenarioError,
-    check_flown,
     load_scenario,
     parse_scenario,
     scenario_digest,
+    with_vehicle,
 )
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
@@ -282,10 +282,13 @@ def test_a_critical_point_anywhere_on_a_link_is_judged() -> None:
     assert "the probe hit the ground" in simulation.ended.sentence
 
 
-def test_what_our_flight_software_does_not_fly_is_refused_before_a_flight() -> None:
-    check_flown(scenario("paper"))
-    with pytest.raises(ScenarioError, match=r'vehicle = "octo-4r": .* flies "paper" alone'):
-        check_flown(scenario("octo-4r"))
+def test_another_vehicle_flies_a_scenario_in_its_own_posture_or_is_refused() -> None:
+    walls = replace(load_scenario("walls"), start=Start("airborne", arm_deg=(10.0, 20.0)))
+    found = with_vehicle(walls, "octo-4r")
+    assert start_angles(found) == vehicle_of(found).home_posture
+    assert len(start_angles(found)) == 4
+    with pytest.raises(ScenarioError, match='vehicle: unknown vehicle "octo"'):
+        with_vehicle(walls, "octo")
 
 
 @pytest.mark.parametrize("name", SHIPPED)

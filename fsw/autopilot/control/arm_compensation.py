@@ -22,15 +22,12 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from fsw.autopilot.control.joint_reference import JointReferenceLimits
 from fsw.autopilot.geometry.rotation import rotate, rotate_back
 from fsw.autopilot.geometry.vectors import add, add_scaled, clamp, cross, dot, norm, subtract
+from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.arm_coordinates import ArmCoordinates, to_coordinates, to_joints
-from fsw.autopilot.model.kinematics import body_axes
 from fsw.autopilot.model.multibody import Bodies, factorise, next_axes, solve
-from fsw.autopilot.model.prediction import YAW, YAW_RATE, A, J
 from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec3
 from fsw.autopilot.tick_record import ArmTask, Estimate, PlanState
 from fsw.compiled import compilable
@@ -99,9 +96,11 @@ def compensate(
     _reach(a, bodies, arm)
     planned, moving = (a.tip[0], a.tip[1], a.tip[2]), _moved(a, a.rate, n)
     off, drifting = _seen_from_base(estimate, plan, planned, moving)
+    _align(a, n)
     off, drifting = _reachable(a, n, off), _reachable(a, n, drifting)
     off, drifting = _within_correction(limits, off_plan, off, drifting)
     goal, wanted = add(planned, off), add(moving, drifting)
+    left = off
     for step in range(_STEPS):
         if step > 0:
             _reach(a, bodies, arm)
@@ -114,13 +113,12 @@ def compensate(
         for i in range(n):
             a.c[i] += a.step[i]
         to_joints(arm, a.c, a.q)
-    _reach(a, bodies, arm)
+    # The last step is short: what moves the end-effector is still what it was before it.
     for i in range(n):
         low, high = arm.low[i] + joint_limits.margin, arm.high[i] - joint_limits.margin
         held = a.c[i] <= low + _ROUNDING or a.c[i] >= high - _ROUNDING
         a.low[i] = -a.rate[i] if held else -math.inf
         a.high[i] = -a.rate[i] if held else math.inf
-    left = subtract(goal, (a.tip[0], a.tip[1], a.tip[2]))
     _solve_within(a, n, subtract(wanted, _moved(a, a.rate, n)), left)
     for i in range(n):
         a.rate[i] += a.step[i]
@@ -129,21 +127,22 @@ def compensate(
 
 @compilable
 def planned_axes(plan: PredictionState | PlanState) -> tuple[Mat3, Vec3]:
-    """The base's attitude R_WB in the plan's state, and its rate [rad/s, B]."""
-    x, axes = np.empty(YAW_RATE + 1), np.empty((4, 3))
-    for i in range(3):
-        x[A + i] = plan.a[i]
-    for i in range(2):
-        x[J + i] = plan.j[i]
-    x[YAW], x[YAW_RATE] = plan.yaw, plan.yaw_rate
-    body_axes(x, axes)
-    b1 = (float(axes[0, 0]), float(axes[0, 1]), float(axes[0, 2]))
-    b3 = (float(axes[1, 0]), float(axes[1, 1]), float(axes[1, 2]))
-    d1, d3 = (axes[2, 0], axes[2, 1], axes[2, 2]), (axes[3, 0], axes[3, 1], axes[3, 2])
+    """The base's attitude R_WB in the plan's state, and its rate [rad/s, B].
+
+    What ``body_axes`` says, of real numbers and without arrays.
+    """
+    # Thrust is along f = g e3 - a; b1 is across it and across an axis h that turns
+    f: Vec3 = (-plan.a[0], -plan.a[1], GRAVITY - plan.a[2])
+    size, c, s = norm(f), math.cos(plan.yaw), math.sin(plan.yaw)
+    b3 = (f[0] / size, f[1] / size, f[2] / size)
+    turned = cross(b3, (-plan.j[0] / size, -plan.j[1] / size, 0.0))
+    h, dh = (-s, c, 0.0), (-c * plan.yaw_rate, -s * plan.yaw_rate, 0.0)
+    n = cross(h, b3)
+    dn, long = add(cross(dh, b3), cross(h, cross(turned, b3))), norm(n)
+    b1 = (n[0] / long, n[1] / long, n[2] / long)
     b2 = cross(b3, b1)
     R = (b1[0], b2[0], b3[0], b1[1], b2[1], b3[1], b1[2], b2[2], b3[2])
-    # The rate w of axes b with rates w x b.
-    return R, (-float(dot(d3, b2)), float(dot(d3, b1)), float(dot(d1, b2)))
+    return R, (dot(turned, b1), dot(turned, b2), dot(dn, b2) / long)
 
 
 @compilable
@@ -206,24 +205,28 @@ def _moved(a: ArmTask, change: Floats, n: int) -> Vec3:
 
 
 @compilable
-def _reachable(a: ArmTask, n: int, off: Vec3) -> Vec3:
-    """The part of a displacement of the end-effector, or of its rate, that joints can make."""
-    _set_up(a, n, off)
+def _align(a: ArmTask, n: int) -> None:
+    """Prepare ``_reachable``. Reads jacobian; writes factor."""
+    _set_up(a, n)
     for i in range(n):
         a.gram[JOINTS * i + i] += _ALIGNED * _ALIGNED
     factorise(a.factor, a.gram, n)
+
+
+@compilable
+def _reachable(a: ArmTask, n: int, off: Vec3) -> Vec3:
+    """The part of a displacement of the end-effector, or of its rate, that joints can make."""
     for i in range(n):
-        a.step[i] = a.slope[i]
+        a.step[i] = dot(_at(a.jacobian, i), off)
     solve(a.factor, a.step, n)
     return _moved(a, a.step, n)
 
 
 @compilable
-def _set_up(a: ArmTask, n: int, off: Vec3) -> None:
-    """The least-squares problem of a displacement. Writes gram, slope."""
+def _set_up(a: ArmTask, n: int) -> None:
+    """The products of the Jacobian's columns. Writes gram."""
     for i in range(n):
         one = _at(a.jacobian, i)
-        a.slope[i] = dot(one, off)
         for k in range(i + 1):
             a.gram[JOINTS * i + k] = a.gram[JOINTS * k + i] = dot(one, _at(a.jacobian, k))
 
@@ -235,8 +238,9 @@ def _solve_within(a: ArmTask, n: int, off: Vec3, left: Vec3) -> None:
     What is ``left`` [m, B] to its place damps them, most where a turn bends the way from it.
     Reads axis, jacobian, low, high; writes step.
     """
-    _set_up(a, n, off)
+    _set_up(a, n)
     for i in range(n):
+        a.slope[i] = dot(_at(a.jacobian, i), off)
         bend = -dot(left, cross(_at(a.axis, i), _at(a.jacobian, i)))
         a.gram[JOINTS * i + i] += _DAMPING * _DAMPING + dot(left, left) + max(bend, 0.0)
     factorise(a.factor, a.gram, n)

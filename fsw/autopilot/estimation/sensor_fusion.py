@@ -512,10 +512,9 @@ def _anew(memory: FusionMemory) -> FusionMemory:
 
 def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFault:
     """What is wrong with a reading of the encoders at ``now`` [s]; ``came`` [s] the last one."""
-    first, second = sample.angles
     if not sample.time <= now + TIME_TOLERANCE:
         return SensorFault.FUTURE
-    if not (abs(first) < math.pi and abs(second) < math.pi):
+    if not all(abs(angle) < math.pi for angle in sample.angles):
         return SensorFault.IMPLAUSIBLE
     if came < 0.0:
         return SensorFault.NONE
