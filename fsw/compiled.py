@@ -74,6 +74,11 @@ def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
 _DISPATCHERS: list[Any] = []
 
 
+def compiled_so_far() -> int:
+    """How many kernels there are in this process, each for the types of its arguments."""
+    return sum(len(one.overloads) for one in _DISPATCHERS)
+
+
 def forget_bitcode() -> None:
     """Free what only compiling needs of kernels that are loaded: 30 MB.
 
