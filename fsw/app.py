@@ -53,7 +53,6 @@ from fsw.runtime.realtime import (
     scheduler,
 )
 from fsw.runtime.timing import GroupTimer
-from vehicles.vehicle_file import load_vehicle
 
 if TYPE_CHECKING:
     from fsw.storage.kept_file import ParameterFile
@@ -256,6 +255,7 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[A
     # Imported here because SciPy, Clarabel and numba take a second, which a refusal need not wait.
     from fsw.compiled import cache
     from fsw.runtime.assembly import flight_software
+    from vehicles.vehicle_file import load_vehicle
 
     def load() -> FlightProgram[Any]:
         return flight_software(
@@ -279,6 +279,8 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[A
 
 def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
     """What the flight log says about the flight."""
+    from vehicles.vehicle_file import load_vehicle
+
     facts: dict[str, str | int] = {
         "ver_sw": revision(),
         "scenario": options.scenario,

@@ -220,7 +220,7 @@ def _is_like(one: Field, ours: Field) -> bool:
     """Whether a field is a number or text as ours; an array of more than a few may have grown."""
     if _kind(one) != _kind(ours):
         return False
-    longer = min(one.count, ours.count) > _VECTOR or ours.type == "char"
+    longer = min(one.count, ours.count) > _VECTOR or ours.type == "char" or bool(ours.per)
     return longer or one.count == ours.count
 
 

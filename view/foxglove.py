@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.kinematics import links
 from fsw.autopilot.signals import Vec3, Zone
 from view.flight_data import FlightData, Table, UlogError
+from view.scene import Posture
+from view.vehicle import airframe_of, chain, rotor_hubs, sizes_of
 from view.zone_meshes import Mesh, zone_mesh
 
 Array = NDArray[Any]
@@ -150,8 +150,8 @@ def _line(points: Array, colour: dict[str, float], thickness: float) -> dict[str
 
 def _still(flight: FlightData, places: Array) -> Shown:
     """What is drawn once: frame and rotors of the vehicle, the reference's path."""
-    t, arm, size = flight.begin, AIRFRAME.rotor_arm, AIRFRAME.size
-    hubs: tuple[Vec3, ...] = ((-arm, 0, 0), (0, -arm, 0), (arm, 0, 0), (0, arm, 0))
+    airframe = airframe_of(flight.information)
+    t, hubs, size = flight.begin, rotor_hubs(airframe), sizes_of(airframe)
     rotors = [
         {
             "pose": _pose(hub), "bottom_scale": 1.0, "top_scale": 1.0, "color": {**_BODY, "a": 0.4},
@@ -162,7 +162,7 @@ def _still(flight: FlightData, places: Array) -> Shown:
     hull = {
         "pose": _pose((0.0, 0.0, 0.0)), "size": _xyz((2.0 * size.hull,) * 3), "color": _BODY,
     }  # fmt: skip
-    beams = [_line(np.array(hubs[k::2]), _BODY, 0.02) for k in range(2)]
+    beams = [_line(np.array(((0.0, 0.0, 0.0), hub)), _BODY, 0.02) for hub in hubs]
     vehicle = _entity(t, "vehicle", BASE, cylinders=rotors, spheres=[hull], lines=beams)
     followed = flight.tables.get("sim_tracking")
     target = followed["target"] if followed is not None else places[:0]
@@ -175,14 +175,12 @@ def _arm(flight: FlightData) -> Iterator[Shown]:
     joints = flight.tables.get("arm_joint_state")
     if joints is None:
         return
-    rows = slice(None, None, _SCENE_EVERY)
+    airframe, rows = airframe_of(flight.information), slice(None, None, _SCENE_EVERY)
+    sizes = sizes_of(airframe)
     for t, q in zip(joints.t[rows].tolist(), joints["q"][rows].tolist(), strict=True):
-        first, second = links(AIRFRAME.link_length, q[0], q[0] + q[1])
-        elbow = np.array((first[0], 0.0, first[1]))
-        tip = elbow + (second[0], 0.0, second[1])
-        size = 2.0 * AIRFRAME.size.tool
-        tool = {"pose": _pose(tip), "size": _xyz((size,) * 3), "color": _ARM}
-        shown = _line(np.array(((0.0, 0.0, 0.0), elbow, tip)), _ARM, 2.0 * AIRFRAME.size.link)
+        arm = chain(Posture((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tuple(q)), airframe)
+        tool = {"pose": _pose(arm[-1]), "size": _xyz((2.0 * sizes.tool,) * 3), "color": _ARM}
+        shown = _line(np.array(arm), _ARM, 2.0 * sizes.link)
         yield _scene(t, _entity(t, "arm", BASE, lines=[shown], spheres=[tool]), topic="/arm")
 
 

@@ -24,7 +24,7 @@ from view.plots import Plot
 from view.scene import Scene
 from view.stage import Stage
 from view.tlog_flight import curves_of
-from view.vehicle import places
+from view.vehicle import tip_of
 
 _FRAME_S: Final = 1.0 / 30.0  # a frame takes some milliseconds more
 _TEXT_S: Final = 0.25
@@ -156,7 +156,7 @@ class LivePage:
         if now.estimate is None:
             self._drag.value = False
             return
-        tip = places(now.estimate, AIRFRAME).tip
+        tip = tip_of(now.estimate, AIRFRAME)
         self._gizmo = self._server.scene.add_transform_controls(
             "/end-effector target", scale=0.35, disable_rotations=True, position=tip,
             depth_test=False,
@@ -238,7 +238,7 @@ class LivePage:
         if self._is_due("kept", now_s, _KEPT_S):
             self._recent.append(scene)
         if self._is_due("trail", now_s, _TRAIL_S):
-            self._trail.append((places(scene.estimate, AIRFRAME).tip, scene.minimum))
+            self._trail.append((tip_of(scene.estimate, AIRFRAME), scene.minimum))
             if len(self._trail) >= _PIECE:
                 points, margins = zip(*self._trail, strict=True)
                 trail = Trail(np.array(points), np.array(margins))

@@ -11,14 +11,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.body import BODIES, body_of
+from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import (
     MissionUpdate,
     Plan,
     SafeSet,
     SafeSetAnnouncement,
     SolverStatus,
-    Vec2,
     Vec3,
     Vec4,
 )
@@ -61,7 +62,7 @@ class LogFlight:
         self.data = data = read_flight(path)
         if "vehicle_attitude" not in data.tables or "vehicle_local_position" not in data.tables:
             raise UlogError(f"{data.path} says nothing about where the vehicle was")
-        self.airframe = airframe_of(data.information.get("numbers"))
+        self.airframe = airframe_of(data.information)
         self.begin, self.end = data.begin, data.end
         self.unusable = data.unusable
         info = data.information
@@ -96,9 +97,9 @@ class LogFlight:
             estimate=estimate,
             truth=self._posture(t, (truth, "p_WB"), (truth, "q_WB"), (truth, "q_arm")),
             velocity=None if at is None else (float(at["vx"]), float(at["vy"]), float(at["vz"])),
-            thrust=None if told is None else _four(told["rotor_thrust"]),
-            torque=None if told is None else _pair(told["joint_torque"]),
-            joint_rates=None if joints is None else _pair(joints["qd"]),
+            thrust=None if told is None else _numbers(told["rotor_thrust"]),
+            torque=None if told is None else _numbers(told["joint_torque"]),
+            joint_rates=None if joints is None else _numbers(joints["qd"]),
             target=None if reference is None else _finite(reference["p_ref"]),
             base_target=None
             if aimed is None
@@ -200,19 +201,18 @@ class LogFlight:
         table = self._table("actuator_command")
         if not len(table):
             return None
-        rows = [table["rotor_thrust"][:, k] for k in range(4)]
-        limits = (0.0, self.airframe.rotor_thrust_max)
-        return _curve("rotor thrust [N]", table.t, ["rear", "left", "front", "right"], rows, limits)
+        rows, limits = list(table["rotor_thrust"].T), (0.0, self.airframe.rotor_thrust_max)
+        return _curve("rotor thrust [N]", table.t, rotor_names(self.airframe), rows, limits)
 
     def _joint_curve(self) -> Curve | None:
         table = self._table("arm_joint_state")
         if not len(table):
             return None
-        first, both = table["q"][:, 0], table["q"].sum(axis=1)
-        limits = (self.airframe.joint1_limit, self.airframe.joint12_limit)
-        lines = [math.degrees(side * limit) for limit in limits for side in (-1.0, 1.0)]
-        rows = [np.degrees(first), np.degrees(both)]
-        return _curve("arm [deg]", table.t, ["joint 1", "link 2"], rows, tuple(lines))
+        limits = angle_rows(self.airframe.angle_limits, table["q"].shape[1])
+        lines = [math.degrees(limit) for one in limits for limit in (one.low, one.high)]
+        rows = [np.degrees(table["q"] @ one.row) for one in limits]
+        shown = tuple(line for line in lines if math.isfinite(line))
+        return _curve("arm [deg]", table.t, [one.name for one in limits], rows, shown)
 
     def _tilt_curve(self) -> Curve | None:
         table = self._table("vehicle_attitude")
@@ -263,7 +263,8 @@ class LogFlight:
         where = _finite(point)
         if where is None:
             return None
-        q_arm = (0.0, 0.0) if joints is None else _pair(joints[arm[1]])
+        rest = (0.0,) * self.airframe.bodies.joints
+        q_arm = rest if joints is None else _numbers(joints[arm[1]])
         return Posture(where, _four(attitude[q[1]]), q_arm)
 
     def _plan(self, t: float) -> Horizon | None:
@@ -444,8 +445,8 @@ def _text(value: bytes) -> str:
     return value.rstrip(b"\0").decode("utf-8", "replace")
 
 
-def _pair(values: Array) -> Vec2:
-    return float(values[0]), float(values[1])
+def _numbers(values: Array) -> tuple[float, ...]:
+    return tuple(map(float, values))
 
 
 def _four(values: Array) -> Vec4:

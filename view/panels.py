@@ -8,11 +8,13 @@ from html import escape
 from typing import Final
 
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.arm_coordinates import angle_rows
+from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.periods import PLANNING_US
 from view import colours
 from view.colours import Rgb, css, millimetres
 from view.scene import Event, Margin, Scene, Timing, Worst
-from view.vehicle import ROTORS, tilt
+from view.vehicle import tilt
 
 PLANNING_LIMIT: Final = 1e-6 * PLANNING_US  # s, a planning cycle must be over by then
 _SOON: Final = 0.05  # m; a margin below it is shown as close
@@ -170,15 +172,16 @@ def _margin_row(one: Margin, least: float) -> str:
 
 def _inputs(now: Scene, airframe: Airframe) -> str:
     rows = []
-    for name, thrust in zip(ROTORS, now.thrust or (), strict=False):
-        rows.append(_limited(f"rotor {name}", thrust, airframe.rotor_thrust_max, "N"))
+    for name, thrust in zip(rotor_names(airframe), now.thrust or (), strict=False):
+        rows.append(_limited(name, thrust, airframe.rotor_thrust_max, "N"))
     for k, torque in enumerate(now.torque or (), start=1):
         rows.append(_limited(f"joint {k} torque", torque, airframe.joint_torque_max[k - 1], "N m"))
     if now.estimate is not None:
-        th1, th2 = now.estimate.q_arm
         deg = math.degrees
-        rows.append(_limited("joint 1", deg(th1), deg(airframe.joint1_limit), "°"))
-        rows.append(_limited("link 2", deg(th1 + th2), deg(airframe.joint12_limit), "°"))
+        for one in angle_rows(airframe.angle_limits, len(now.estimate.q_arm)):
+            angle = sum(a * q for a, q in zip(one.row, now.estimate.q_arm, strict=True))
+            limit = one.high if angle >= 0.0 else -one.low
+            rows.append(_limited(one.name, deg(angle), deg(limit), "°"))
         rows.append(_limited("tilt", deg(tilt(now.estimate)), deg(airframe.tilt_max), "°"))
     return _section("Inputs and limits", _table(rows)) if rows else ""
 

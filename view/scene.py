@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from fsw.autopilot.signals import SafeSet, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, RotorVector, SafeSet, Vec3, Vec4
 
 NOWHERE: Vec3 = (math.nan, math.nan, math.nan)
 
@@ -16,7 +16,7 @@ class Posture(NamedTuple):
 
     p: Vec3  # m, NED, body origin
     q: Vec4  # [w, x, y, z], body to NED
-    q_arm: Vec2  # rad: th1 from straight down, th2 relative to link 1
+    q_arm: JointVector  # rad
 
 
 class Horizon(NamedTuple):
@@ -92,9 +92,9 @@ class Scene:
     estimate: Posture | None = None
     truth: Posture | None = None
     velocity: Vec3 | None = None  # m/s, NED, estimated
-    thrust: Vec4 | None = None  # N, commanded: rear, left, front, right
-    torque: Vec2 | None = None  # N m, commanded
-    joint_rates: Vec2 | None = None  # rad/s
+    thrust: RotorVector | None = None  # N, commanded
+    torque: JointVector | None = None  # N m, commanded
+    joint_rates: JointVector | None = None  # rad/s
     target: Vec3 | None = None  # m, NED: where the end-effector should be now
     base_target: Vec3 | None = None  # m, NED: where the running plan has the base now
     horizon: Horizon | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -11,12 +12,12 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import SafeSet, Vec3, Vec4
+from fsw.autopilot.signals import RotorVector, SafeSet, Vec3, Vec4
 from view import colours
 from view.colours import Rgb
 from view.flight import Trail
 from view.scene import Margin, Posture, Scene
-from view.vehicle import places, rotor_hubs
+from view.vehicle import chain, legs, rotor_hubs, sizes_of
 from view.zone_meshes import Mesh, moved, zone_mesh
 
 Array = NDArray[Any]
@@ -44,11 +45,12 @@ class VehicleFigure:
         self._ghost = ghost
         self._body = scene.add_frame(name, show_axes=False, visible=False)
         self._arrows: list[viser.MeshHandle] = []
+        self._sizes = sizes_of(airframe)
         self._add_hull()
         for k, hub in enumerate(rotor_hubs(airframe)):
             self._add_rotor(k, hub)
         self._add_legs()
-        size = airframe.size
+        size = self._sizes
         self._links = [
             scene.add_cylinder(
                 f"{name}-link{k}",
@@ -58,7 +60,7 @@ class VehicleFigure:
                 visible=False,
                 **self._tone,
             )
-            for k, length in enumerate(airframe.link_length, start=1)
+            for k, length in enumerate(_lengths(airframe), start=1)
         ]
         self._joint = scene.add_icosphere(
             f"{name}-joint2", radius=size.link, color=ghost or colours.GREY, visible=False,
@@ -71,7 +73,7 @@ class VehicleFigure:
         self._shown = False
         self._colours: dict[str, Rgb] = {}
 
-    def show(self, posture: Posture | None, thrust: Vec4 | None = None) -> None:
+    def show(self, posture: Posture | None, thrust: RotorVector | None = None) -> None:
         """Move it to a ``posture``; without one it is not visible. ``thrust`` [N] of each rotor."""
         if (posture is not None) != self._shown:
             self._shown = posture is not None
@@ -80,10 +82,10 @@ class VehicleFigure:
         if posture is None:
             return
         self._body.position, self._body.wxyz = posture.p, posture.q
-        base, joint2, tip = places(posture, self._airframe)
-        for link, begin, end in zip(self._links, (base, joint2), (joint2, tip), strict=True):
+        arm = chain(posture, self._airframe)
+        for link, (begin, end) in zip(self._links, pairwise(arm), strict=True):
             link.position, link.wxyz = _between(begin, end)
-        self._joint.position, self._tool.position = joint2, tip
+        self._joint.position, self._tool.position = arm[-2], arm[-1]
         for arrow, newtons in zip(self._arrows, thrust or (), strict=False):
             arrow.scale = (1.0, 1.0, max(newtons / self._airframe.rotor_thrust_max, 0.01))
 
@@ -101,7 +103,7 @@ class VehicleFigure:
                 handle.color = colour
 
     def _add_hull(self) -> None:
-        size = self._airframe.size
+        size = self._sizes
         self._hull = self._scene.add_icosphere(
             f"{self._name}/hull", radius=0.6 * size.hull, color=self._ghost or colours.GREY,
             scale=(1.25, 1.25, 0.62), **self._tone,
@@ -113,10 +115,10 @@ class VehicleFigure:
             )  # fmt: skip
 
     def _add_rotor(self, k: int, hub: Vec3) -> None:
-        name, size, tone = f"{self._name}/rotor{k}", self._airframe.size, self._tone
+        name, size, tone = f"{self._name}/rotor{k}", self._sizes, self._tone
         middle, turn = _between((0.0, 0.0, 0.0), hub)
         self._scene.add_cylinder(
-            f"{name}/arm", radius=0.011, height=self._airframe.rotor_arm,
+            f"{name}/arm", radius=0.011, height=math.hypot(*hub),
             color=self._ghost or colours.DARK, position=middle, wxyz=turn, **tone,
         )  # fmt: skip
         front = self._ghost or (colours.BLUE if k == 2 else colours.GREY)
@@ -138,11 +140,7 @@ class VehicleFigure:
             )  # fmt: skip
 
     def _add_legs(self) -> None:
-        size, length = self._airframe.size, self._airframe.leg_length
-        hips = 0.35 * size.feet_spread
-        for k, (north, east) in enumerate(((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))):
-            foot = (north * size.feet_spread, east * size.feet_spread, length - size.leg)
-            hip = (north * hips, east * hips, 0.02)
+        for k, (hip, foot) in enumerate(legs(self._airframe)):
             middle, turn = _between(hip, foot)
             self._scene.add_cylinder(
                 f"{self._name}/leg{k}", radius=0.006, height=math.dist(hip, foot),
@@ -357,3 +355,9 @@ def _arrow() -> tuple[Array, Array]:
         for k in range(n)
     ]
     return np.concatenate(rows), np.array(faces)
+
+
+def _lengths(airframe: Airframe) -> list[float]:
+    """Of the arm's links [m], which no posture changes."""
+    still = Posture((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0,) * airframe.bodies.joints)
+    return [math.dist(begin, end) for begin, end in pairwise(chain(still, airframe))]

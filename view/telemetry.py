@@ -13,8 +13,10 @@ from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.signals import (
     CommandResult,
+    JointVector,
     PlanInput,
     PredictionState,
+    RotorVector,
     SafeSet,
     Vec3,
     Vec4,
@@ -26,6 +28,7 @@ from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from messages import dialect
 from messages.frames import Frame, wire_fields
+from messages.joint_arrays import STATE_AT, STATE_COUNT_AT, joined
 from view.flight_events import EventKind
 from view.log_flight import GROUPS, status_name
 from view.scene import (
@@ -152,8 +155,8 @@ class Telemetry:
             estimate=self._posture(position, arm),
             velocity=None if position is None else _vec3(position[4:7]),
             thrust=None if servos is None else self._thrust(servos),
-            torque=None if arm is None else (arm[9], arm[10]),
-            joint_rates=None if arm is None else (arm[5], arm[6]),
+            torque=None if arm is None else _arm(arm, 2),
+            joint_rates=None if arm is None else _arm(arm, 1),
             target=self._place(ids.END_EFFECTOR_TARGET, mask_at=12),
             base_target=self._place(ids.POSITION_TARGET_LOCAL_NED, mask_at=12),
             horizon=self._horizon(),
@@ -193,15 +196,16 @@ class Telemetry:
         attitude = self._newest(ids.ATTITUDE)
         if position is None or attitude is None:
             return None
-        q_arm = (0.0, 0.0) if arm is None else (arm[1], arm[2])
+        q_arm = (0.0,) * self.airframe.bodies.joints if arm is None else _arm(arm, 0)
         if not all(map(math.isfinite, (*position[1:4], *attitude[1:4], *q_arm))):
             return None  # an estimate that is lost, or somebody's frame
         return Posture(_vec3(position[1:4]), quaternion(*attitude[1:4]), q_arm)
 
-    def _thrust(self, servos: tuple[Any, ...]) -> Vec4:
-        share = [max(pulse - 1000, 0) / 1000.0 for pulse in servos[1:5]]
-        a, b, c, d = (self.airframe.rotor_thrust_max * one for one in share)
-        return a, b, c, d
+    def _thrust(self, servos: tuple[Any, ...]) -> RotorVector:
+        pulses = servos[1 : 1 + self.airframe.rotors]
+        return tuple(
+            [self.airframe.rotor_thrust_max * max(pulse - 1000, 0) / 1000.0 for pulse in pulses]
+        )
 
     def _place(self, message_id: int, mask_at: int) -> Vec3 | None:
         values = self._newest(message_id, lasts=_SHORT_S)
@@ -367,6 +371,11 @@ class Telemetry:
                 late=int(values[2]),
                 skipped=int(values[3]),
             )
+
+
+def _arm(values: tuple[Any, ...], which: int) -> JointVector:
+    """Positions (0), velocities (1) or torques (2) of an ARM_JOINT_STATE."""
+    return joined(values, *STATE_AT[which], int(values[STATE_COUNT_AT]))
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Vec4:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
 from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import Vec3
 from fsw.link.wire.message_ids import ATTITUDE, LOCAL_POSITION_NED, SYSTEM_ID
 from messages.frames import Frame
@@ -22,7 +23,7 @@ from view.flight import Curve, Trail
 from view.flight_data import UlogError
 from view.scene import Event, Scene, Worst
 from view.telemetry import RESTARTED_S, Telemetry
-from view.vehicle import places, tilt
+from view.vehicle import tilt, tip_of
 
 Array = NDArray[Any]
 
@@ -137,7 +138,7 @@ class TlogFlight:
 
     def trail(self) -> Trail:
         """The end-effector's path."""
-        points = [places(one.estimate, self.airframe).tip for one in self._scenes if one.estimate]
+        points = [tip_of(one.estimate, self.airframe) for one in self._scenes if one.estimate]
         return Trail(np.array(points), np.array([one.minimum for one in self._scenes]))
 
     def reference(self) -> Array:
@@ -168,8 +169,8 @@ class TlogFlight:
 def curves_of(scenes: list[Scene], airframe: Any) -> tuple[Curve, ...]:
     """Curves from scenes, for a vehicle with an ``airframe``'s limits."""
     t = np.array([one.t for one in scenes])
-    nothing = (math.nan,) * 4
-    thrust = np.array([one.thrust or nothing for one in scenes]).reshape(-1, 4)
+    nothing = (math.nan,) * airframe.rotors
+    thrust = np.array([one.thrust or nothing for one in scenes]).reshape(-1, airframe.rotors)
     took = [1e3 * one.solver.total if one.solver else math.nan for one in scenes]
     lean = [math.degrees(tilt(one.estimate)) if one.estimate else math.nan for one in scenes]
     margins = np.array([one.minimum for one in scenes])
@@ -177,8 +178,6 @@ def curves_of(scenes: list[Scene], airframe: Any) -> tuple[Curve, ...]:
     return (
         Curve("margin [m]", t, ("least",), (margins,), (0.0,)),
         Curve("planning cycle [ms]", t, ("cycle",), (np.array(took),), (100.0,)),
-        Curve(
-            "rotor thrust [N]", t, ("rear", "left", "front", "right"), tuple(thrust.T), (0.0, limit)
-        ),
+        Curve("rotor thrust [N]", t, tuple(rotor_names(airframe)), tuple(thrust.T), (0.0, limit)),
         Curve("tilt [deg]", t, ("tilt",), (np.array(lean),), (math.degrees(airframe.tilt_max),)),
     )

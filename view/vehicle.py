@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
@@ -11,43 +12,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_json import json_numbers
-from fsw.autopilot.geometry.rotation import euler_zyx, matrix_from_quaternion
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate
+from fsw.autopilot.geometry.vectors import add
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import airframe_of as model_of
 from fsw.autopilot.model.kinematics import (
-    frame_of,
-    position,
     predicted_end_effector,
 )
+from fsw.autopilot.model.multibody import place_links
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.model.prediction import P, condense, to_vector
-from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec3
+from fsw.autopilot.signals import PlanInput, PredictionState, Vec3
+from fsw.autopilot.tick_record import Multibody
+from vehicles.vehicle_file import VehicleError, parse_vehicle
 from view.scene import Horizon, Posture
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
-ROTORS = ("1 (rear)", "2 (left)", "3 (front)", "4 (right)")  # as the vehicle's texts name them
 
 
-class Places(NamedTuple):
-    """The arm's points in space [m, NED]."""
+def chain(posture: Posture, airframe: Airframe = AIRFRAME) -> list[Vec3]:
+    """Each joint's origin and the end-effector [m, NED] of a ``posture`` [m, rad, NED]."""
+    R, b, m = matrix_from_quaternion(posture.q), airframe.bodies, Multibody()
+    place_links(m, b, posture.q_arm)
+    origins = m.origin.reshape(-1, 3)[: b.joints].tolist()
+    tip = np.array(origins[-1]) + m.rotation.reshape(-1, 3, 3)[b.joints - 1] @ b.tip
+    return [add(posture.p, rotate(R, (x, y, z))) for x, y, z in (*origins, tip.tolist())]
 
-    base: Vec3
-    joint2: Vec3
-    tip: Vec3
 
-
-def places(posture: Posture, airframe: Airframe = AIRFRAME) -> Places:
-    """Base, joint 2 and end-effector of a ``posture`` [m, rad, NED]."""
-    R = matrix_from_quaternion(posture.q)
-    estimate = StateEstimate(
-        0, posture.p, _STILL, R, _STILL, euler_zyx(R)[2], posture.q_arm, (0.0, 0.0)
-    )
-    frame = frame_of(airframe.bodies, estimate)
-    return Places(*(position(frame, point.on, point.begin) for point in airframe.points))
+def tip_of(posture: Posture, airframe: Airframe = AIRFRAME) -> Vec3:
+    """The end-effector of a ``posture`` [m, NED]."""
+    return chain(posture, airframe)[-1]
 
 
 def rotor_hubs(airframe: Airframe = AIRFRAME) -> tuple[Vec3, ...]:
-    """The hubs in the body frame [m, FRD]: rear, left, front, right."""
-    reach = airframe.rotor_arm
-    return ((-reach, 0.0, 0.0), (0.0, -reach, 0.0), (reach, 0.0, 0.0), (0.0, reach, 0.0))
+    """The hubs in the body frame [m, FRD], as far as the torques of the rotors tell."""
+    rows = [airframe.wrench[6 * i : 6 * i + 6] for i in range(airframe.rotors)]
+    return tuple((row[4] / -row[2], -row[3] / -row[2], 0.0) for row in rows)
+
+
+class Sizes(NamedTuple):
+    """How thick the parts of a vehicle are drawn."""
+
+    hull: float  # m, radius of the sphere that holds frame and battery
+    blade: float  # m, radius of a rotor
+    disc: float  # m, half the thickness of the space that the blades sweep
+    link: float  # m, radius
+    tool: float  # m, radius about the end-effector
+
+
+def sizes_of(airframe: Airframe) -> Sizes:
+    """The sizes of a vehicle's parts; where it has none they are thin."""
+    rotors = next(part for part in airframe.parts if part.rim > 0.0)
+    arm, hubs = [part for part in airframe.parts if part.on != ON_BASE], rotor_hubs(airframe)
+    return Sizes(
+        hull=airframe.parts[0].radius,
+        blade=rotors.rim - max(math.dist(hub[:2], rotors.begin[:2]) for hub in hubs),
+        disc=rotors.radius,
+        link=max([part.radius for part in arm if part.end is not None], default=0.0),
+        tool=max([part.radius for part in arm if part.on == airframe.bodies.joints], default=0.0),
+    )
+
+
+def legs(airframe: Airframe) -> tuple[tuple[Vec3, Vec3], ...]:
+    """Both ends of what is long on the base [m, FRD]."""
+    return tuple(
+        (part.begin, part.end)
+        for part in airframe.parts
+        if part.on == ON_BASE and part.end is not None
+    )
 
 
 def tilt(posture: Posture) -> float:
@@ -79,13 +111,20 @@ def condense_once(airframe: Airframe, nodes: int, period: float) -> Any:
     return condense(airframe, period, nodes)
 
 
-def airframe_of(numbers: str | int | None) -> Airframe:
-    """The airframe that a log was flown with, from its information ``numbers``; else the usual."""
+def airframe_of(information: Mapping[str, str | int]) -> Airframe:
+    """The airframe of a log, of its vehicle's file and its numbers; else the paper's."""
     try:
-        airframe: Airframe = _filled(AIRFRAME, "airframe", json_numbers(str(numbers)))
+        text = str(information["vehicle_file"])
+        airframe = model_of(parse_vehicle(text, str(information.get("vehicle", "vehicle"))))
+    except (KeyError, VehicleError):
+        airframe = AIRFRAME
+    try:
+        filled: Airframe = _filled(
+            airframe, "airframe", json_numbers(str(information.get("numbers")))
+        )
     except (ValueError, TypeError, AttributeError):
-        return AIRFRAME
-    return airframe
+        return airframe
+    return filled
 
 
 def _filled(value: Any, name: str, known: Mapping[str, Any]) -> Any:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.periods import PLANNING_US, TICK_US
 from fsw.autopilot.signals import ActuatorCommand, Plan, PlanFailure, PlanRequest, Vec2
+
+if TYPE_CHECKING:  # it imports numpy, which must not be there before numerics are pinned
+    from fsw.autopilot.model.airframe import Airframe
 
 Clock = Callable[[], int]
 """Monotonic wall time [us]. Measures the loop; no law ever sees it."""

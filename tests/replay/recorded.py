@@ -12,9 +12,10 @@ from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import Command, TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
-from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.log.flight_log import FlightLog, LogSubject, vehicle_facts
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import LAND, Flight, command
+from vehicles.vehicle_file import load_vehicle
 
 CHOICE = ControlChoice(body="points")
 
@@ -44,7 +45,7 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
-    facts: dict[str, str | int] = CHOICE.facts()
+    facts = {**CHOICE.facts(), **vehicle_facts(load_vehicle("paper"))}
     log = FlightLog(path, LogSubject(facts, flat(flight_config(body="points")), {}, AIRFRAME))
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:

@@ -24,7 +24,7 @@ from tests.view.browsing import (
 from view.live_link import VehicleLink
 from view.live_page import LivePage
 from view.page import Server, address, open_server
-from view.vehicle import places
+from view.vehicle import tip_of
 
 pytestmark = IN_A_BROWSER
 
@@ -72,7 +72,7 @@ def test_dragging_the_gizmo_moves_the_target(live: tuple[Page, Server, VehicleLi
     before = eventually(lambda: link.scene().target)
     posture = link.scene().estimate
     assert posture is not None
-    tip = np.array(places(posture).tip)
+    tip = np.array(tip_of(posture))
     (client,) = server.get_clients().values()
     begin, end = (seen(browser, client.camera, tip + along) for along in ARROW)
     browser.drag(begin, end)

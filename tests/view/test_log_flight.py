@@ -13,10 +13,11 @@ import pytest
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import PlanInput, PredictionState
 from tests.view.flights import BALL, HEIGHT, OFFSET_M, SPIKE_N, WORST_M, WORST_S, write_flight
+from vehicles.vehicle_file import load_vehicle, vehicle_text
 from view.flight_data import UlogError
 from view.log_flight import LogFlight
 from view.scene import Posture
-from view.vehicle import airframe_of, horizon, places
+from view.vehicle import airframe_of, chain, horizon
 
 BEGIN_S = 1.0
 
@@ -104,9 +105,9 @@ def test_a_log_without_places_is_refused(tmp_path: Path) -> None:
 def test_the_arm_hangs_where_the_model_has_it() -> None:
     quarter = np.sqrt(0.5)
     east = Posture((1.0, 2.0, -3.0), (quarter, 0.0, 0.0, quarter), (np.pi / 2, -np.pi / 2))
-    at = places(east)
-    assert at.joint2 == pytest.approx((1.0, 2.15, -3.0))
-    assert at.tip == pytest.approx((1.0, 2.15, -2.85))
+    joint2, tip = chain(east)[1:]
+    assert joint2 == pytest.approx((1.0, 2.15, -3.0))
+    assert tip == pytest.approx((1.0, 2.15, -2.85))
 
 
 def test_a_plan_leads_to_where_its_inputs_push() -> None:
@@ -121,7 +122,14 @@ def test_a_plan_leads_to_where_its_inputs_push() -> None:
 
 
 def test_the_airframe_is_the_logged_one() -> None:
-    logged = json.dumps({"airframe.link_length.1": 0.2, "airframe.rotor_thrust_max": 20.0})
+    octo = load_vehicle("octo-4r")
+    logged = {
+        "vehicle": "octo-4r",
+        "vehicle_file": vehicle_text(octo),
+        "numbers": json.dumps({"airframe.rotor_lag": 0.03, "airframe.rotor_thrust_max": 20.0}),
+    }
     airframe = airframe_of(logged)
-    assert (airframe.link_length, airframe.rotor_thrust_max) == ((0.15, 0.2), 20.0)
-    assert airframe_of(None) == airframe_of("{") == AIRFRAME
+    assert (airframe.rotors, airframe.bodies.joints) == (8, 4)
+    assert (airframe.rotor_lag, airframe.rotor_thrust_max) == (0.03, 20.0)
+    assert airframe_of({}) == airframe_of({"numbers": "{"}) == AIRFRAME
+    assert airframe_of({"vehicle_file": "no = vehicle"}) == AIRFRAME

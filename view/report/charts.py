@@ -9,6 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.autopilot.model.arm_coordinates import angle_rows
+from fsw.autopilot.model.rotors import rotor_names
 from sitl.body import spoken
 from view.flight_data import Table
 from view.flight_events import EventKind
@@ -27,7 +29,7 @@ from view.report.chart import (
     spread,
 )
 from view.report.reported import Reported
-from view.vehicle import ROTORS
+from view.vehicle import airframe_of
 
 Array = NDArray[Any]
 
@@ -200,14 +202,14 @@ def inputs(flights: Sequence[Reported]) -> Chart | None:
     if sent is None:
         return None
     t = flight.since(sent.t)
-    most, torque = (
-        flight.number(f"airframe.{name}_max") for name in ("rotor_thrust", "joint_torque")
-    )
-    rotors = [(f"rotor {name}", COLOURS[k]) for k, name in enumerate(ROTORS)]
+    airframe = airframe_of(flight.data.information)
+    joints = airframe.bodies.joints
+    most, torque = airframe.rotor_thrust_max, max(airframe.joint_torque_max[:joints])
+    rotors = [(name, COLOURS[k % len(COLOURS)]) for k, name in enumerate(rotor_names(airframe))]
     thrusts = spread("rotors", t, sent["rotor_thrust"], rotors)
     torques = [
-        line(f"joint {k + 1}", t, sent["joint_torque"][:, k], COLOURS[k + 4], width=0.8)
-        for k in range(2)
+        line(f"joint {k + 1}", t, sent["joint_torque"][:, k], _of_joint(k), width=0.8)
+        for k in range(joints)
     ]
     return over_time(
         "inputs",
@@ -235,8 +237,8 @@ def plan_inputs(flights: Sequence[Reported]) -> Chart | None:
     flat = 9.81 * math.tan(flight.number("planner.limits.tilt"))
     shown = [line(f"a {name}", t, table["a"][:, k], COLOURS[k], width=0.9)
              for k, name in enumerate(("north", "east", "down"))]  # fmt: skip
-    joints = [line(f"joint {k + 1} acc.", flight.since(arm.t), arm["qdd"][:, k], COLOURS[k + 4],
-                   width=0.9) for k in range(2)]  # fmt: skip
+    joints = [line(f"joint {k + 1} acc.", flight.since(arm.t), arm["qdd"][:, k], _of_joint(k),
+                   width=0.9) for k in range(arm["qdd"].shape[1])]  # fmt: skip
     return over_time(
         "plan_inputs",
         "The planner's inputs",
@@ -265,25 +267,29 @@ def motion(flights: Sequence[Reported]) -> Chart | None:
         t_arm, angles, rates = flight.since(state.t), state["q"], state["qd"]
     else:
         return None
-    first, both = (_DEG * flight.number(f"airframe.joint{n}_limit") for n in ("1", "12"))
-    fastest = flight.number("airframe.joint_rate_max.0")
-    tilt_max = _DEG * flight.number("airframe.tilt_max")
-    summed = angles[:, 0] + angles[:, 1]
+    airframe = airframe_of(flight.data.information)
+    limits = angle_rows(airframe.angle_limits, angles.shape[1])
+    ends = [_DEG * end for one in limits for end in (one.low, one.high) if math.isfinite(end)]
+    fastest = max(airframe.joint_rate_max[: angles.shape[1]])
+    tilt_max = _DEG * airframe.tilt_max
+    said = ", ".join(
+        f"{one.name} {_DEG * one.low:.0f} to {_DEG * one.high:.0f} deg" for one in limits
+    )
     return over_time(
         "motion",
         "Tilt and joints against their limits",
         f"By the {'true' if truth is not None else 'estimated'} state. Dashed: tilt {tilt_max:.0f} "
-        f"deg, joint 1 ±{first:.0f} deg, joint 1 + 2 ±{both:.0f} deg, ±{fastest:g} rad/s.",
+        f"deg, {said}, ±{fastest:g} rad/s.",
         [
             Row("tilt [deg]", [line("tilt", t, tilt_deg(q), COLOURS[0])], (tilt_max,),
                 (0.0, 1.08 * tilt_max)),
             Row("angles [deg]", [
-                line("joint 1", t_arm, _DEG * angles[:, 0], COLOURS[4]),
-                line("joint 1 + 2", t_arm, _DEG * summed, COLOURS[5]),
-            ], (-both, -first, first, both)),
+                line(one.name, t_arm, _DEG * (angles @ one.row), _of_joint(k))
+                for k, one in enumerate(limits)
+            ], tuple(ends)),
             Row("rates [rad/s]", [
-                line(f"joint {k + 1} rate", t_arm, rates[:, k], COLOURS[k + 4], width=0.9)
-                for k in range(2)
+                line(f"joint {k + 1} rate", t_arm, rates[:, k], _of_joint(k), width=0.9)
+                for k in range(rates.shape[1])
             ], (-fastest, fastest)),
         ],
         _marks(flights),
@@ -547,7 +553,7 @@ def worst_second(flights: Sequence[Reported]) -> Chart | None:
             if y.ndim == 1:
                 y = y[:, None]
             for j in range(y.shape[1]):
-                shown = f"{name} {ROTORS[j]}" if y.shape[1] > 1 else name
+                shown = _rotor(flight, j) if y.shape[1] > 1 else name
                 shade = COLOURS[j] if alone else colour
                 row.append(line(_named(flight, flights, shown), t[inside] - zero, y[inside, j],
                                 shade, width=1.0, showlegend=alone or j == 0))  # fmt: skip
@@ -638,3 +644,12 @@ def _marks(flights: Sequence[Reported]) -> list[tuple[float, str]]:
 
 
 __all__ = ["TRUTH", "charts", "event_marks", "worst_sentence"]
+
+
+def _of_joint(k: int) -> str:
+    """The colour of a joint, behind those of four rotors."""
+    return COLOURS[(k + 4) % len(COLOURS)]
+
+
+def _rotor(flight: Reported, k: int) -> str:
+    return rotor_names(airframe_of(flight.data.information))[k]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import Airframe, AngleLimits
@@ -106,19 +107,36 @@ def within_limits(arm: ArmCoordinates, q: JointVector, margin: float) -> JointVe
     return tuple(found)
 
 
+class AngleRow(NamedTuple):
+    """A limit of a joint's angle, or of a sum of them."""
+
+    name: str  # "joint 1", or "joints 1 and 2 together"
+    row: JointVector  # (j,) [1]
+    low: float  # rad
+    high: float  # rad
+
+
+def angle_rows(limits: AngleLimits, joints: int) -> list[AngleRow]:
+    """The limits of an arm of so many ``joints``."""
+    found = []
+    for i in range(limits.rows):
+        row = limits.row[JOINTS * i : JOINTS * i + joints]
+        names = [str(k) for k, share in enumerate(row, start=1) if share]
+        name = f"joint {names[0]}"
+        if len(names) > 1:
+            name = f"joints {', '.join(names[:-1])} and {names[-1]} together"
+        found.append(AngleRow(name, row, limits.low[i], limits.high[i]))
+    return found
+
+
 def first_beyond(limits: AngleLimits, q: JointVector, room: float) -> str | None:
     """The first joint, or sum of joints, that is more than ``room`` [rad] beyond its limits.
 
-    As a sentence without its last word, "limit": of joints at ``q`` (j,) [rad].
+    As a sentence, of joints at ``q`` (j,) [rad].
     """
-    for i in range(limits.rows):
-        row = limits.row[JOINTS * i : JOINTS * i + len(q)]
-        angle = sum(a * b for a, b in zip(row, q, strict=True))
-        if limits.low[i] - room <= angle <= limits.high[i] + room:
-            continue
-        names = [str(k) for k, share in enumerate(row, start=1) if share]
-        at = f"at {math.degrees(angle):.0f} deg"
-        if len(names) == 1:
-            return f"joint {names[0]} {at} is beyond its"
-        return f"joints {', '.join(names[:-1])} and {names[-1]} together {at} are beyond their"
+    for one in angle_rows(limits, len(q)):
+        angle = sum(a * b for a, b in zip(one.row, q, strict=True) if a)
+        if not one.low - room <= angle <= one.high + room:
+            are = "are beyond their" if " and " in one.name else "is beyond its"
+            return f"{one.name} at {math.degrees(angle):.0f} deg {are} limit"
     return None

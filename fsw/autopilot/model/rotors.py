@@ -15,7 +15,7 @@ Source: docs/equations.md T1.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
@@ -25,6 +25,16 @@ from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
 from fsw.record import Floats
 
+_SIDES: Final = (
+    "front",
+    "front right",
+    "right",
+    "rear right",
+    "rear",
+    "rear left",
+    "left",
+    "front left",
+)
 WEIGHING_TIME = 1.0  # s
 _WEIGHING_THRUST = 5.0  # m/s^2
 
@@ -102,3 +112,15 @@ def motion_state(
         (-f * (wdy * R[0] - wdx * R[1]), -f * (wdy * R[3] - wdx * R[4])),
         turning,
     )
+
+
+def rotor_names(airframe: Airframe) -> list[str]:
+    """What to call each rotor: its number, and its side where no other rotor is on that."""
+    w, sides = airframe.wrench, []
+    for at in range(0, 6 * airframe.rotors, 6):
+        # A thrust along -z turns the vehicle by where it acts: x forward, y to the right.
+        sides.append(_SIDES[round(math.atan2(-w[at + 3], w[at + 4]) / (0.25 * math.pi)) % 8])
+    return [
+        f"rotor {k} ({side})" if sides.count(side) == 1 else f"rotor {k}"
+        for k, side in enumerate(sides, start=1)
+    ]

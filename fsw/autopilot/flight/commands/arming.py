@@ -85,8 +85,7 @@ def _joints(context: CommandContext) -> str:
     joints, rates = context.health.joints, context.health.joint_rates
     if not all(abs(rate) <= _SWINGING for rate in rates):
         return "the arm swings; wait until it hangs still"
-    beyond = first_beyond(context.airframe.angle_limits, joints, _BEYOND)
-    return "" if beyond is None else f"{beyond} limit"
+    return first_beyond(context.airframe.angle_limits, joints, _BEYOND) or ""
 
 
 def _storage(context: CommandContext) -> str:

@@ -15,21 +15,11 @@ from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, se
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.rotors import rotor_decay
+from fsw.autopilot.model.rotors import rotor_decay, rotor_names
 from fsw.autopilot.signals import ActuatorReport, JointVector
 from fsw.autopilot.tick_record import NO_ROTOR, Tick, Watched
 from fsw.compiled import machine_code, packed
 
-_SIDES: Final = (
-    "front",
-    "front right",
-    "right",
-    "rear right",
-    "rear",
-    "rear left",
-    "left",
-    "front left",
-)
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
 _WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
 _MIN_GIVEN: Final = 0.1  # N, of a rotor that does not obey
@@ -140,18 +130,6 @@ def _of_joints(before: Damage, s: Watched, joints: int, now_us: int, angles_repe
         since_us = now_us - round(1e6 * float(s.joint_for[failed[0]]))
     report, health = before.report._replace(joints=kinds), before.health._replace(joints=kinds)
     return before._replace(joint=text, joint_us=since_us, report=report, health=health)
-
-
-def rotor_names(airframe: Airframe) -> list[str]:
-    """What to call each rotor: its number, and its side where no other rotor is on that."""
-    w, sides = airframe.wrench, []
-    for at in range(0, 6 * airframe.rotors, 6):
-        # A thrust along -z turns the vehicle by where it acts: x forward, y to the right.
-        sides.append(_SIDES[round(math.atan2(-w[at + 3], w[at + 4]) / (0.25 * math.pi)) % 8])
-    return [
-        f"rotor {k} ({side})" if sides.count(side) == 1 else f"rotor {k}"
-        for k, side in enumerate(sides, start=1)
-    ]
 
 
 def _sentence(s: Watched, found: ActuatorReport, name: str) -> str:

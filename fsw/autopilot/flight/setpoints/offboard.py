@@ -40,8 +40,7 @@ def joints_refusal(q_arm: JointVector, airframe: Airframe) -> str | None:
     """Why the arm cannot have the angles ``q_arm`` (j,) [rad]."""
     if len(q_arm) != airframe.bodies.joints:
         return f"{len(q_arm)} joints are set, and the arm has {airframe.bodies.joints}"
-    beyond = first_beyond(airframe.angle_limits, q_arm, _ROUNDING)
-    return None if beyond is None else f"{beyond} limit"
+    return first_beyond(airframe.angle_limits, q_arm, _ROUNDING)
 
 
 def tilted(setpoint: AttitudeSetpoint, last: Tilt, most: float, dt: float) -> Tilt:

@@ -26,7 +26,7 @@ LENGTHS = np.array((0.15, 0.15))
 LIMITS = CompensationLimits()
 BOUNDLESS = boundless(AIRFRAME)
 # Three steps end so near; the damping takes so much of a rate.
-CLOSE, SLOW = 2e-6, 2e-3  # m, rad/s
+CLOSE, SLOW = 2e-6, 3e-3  # m, rad/s
 MOST = tuple(high - JointReferenceLimits().margin for high in arm_coordinates(AIRFRAME).high[:2])
 JOINTS = JointReferenceLimits()
 UNBOUNDED = replace(LIMITS, whole=0.3, most=0.4)

@@ -142,7 +142,7 @@ def test_the_estimate_is_the_one_of_python() -> None:
         w, x, y, z = (float(value) for value in q / np.linalg.norm(q))
         p, v, gyro, accel = (vec3(random.uniform(-2.0, 2.0, 3)) for _ in range(4))
         sensors = SensorFrame(1, p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
-        missing, rotation, yaw = attitude(p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
+        missing, rotation, yaw = attitude(p, v, (w, x, y, z), gyro, accel)
         estimate = estimate_state(sensors)
         assert missing == 0
         assert estimate is not None

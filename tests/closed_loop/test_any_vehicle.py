@@ -1,0 +1,48 @@
+"""Vehicles that come with Pandion fly by their files, and none needs machine code of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.compiled import compiled_so_far
+from sitl.scenario import Scenario, vehicle_of
+from sitl.scenario_file import load_scenario
+from studies.flight.closed_loop import simulate
+from studies.flight.result import FlightResult
+from vehicles.vehicle_file import vehicle_names
+
+OTHERS = [name for name in vehicle_names() if name != "paper"]
+
+
+def scenario(name: str, vehicle: str, duration_s: float, suite: str | None = None) -> Scenario:
+    return replace(load_scenario(name, suite, vehicle), duration_s=duration_s)
+
+
+def flown(one: Scenario) -> FlightResult:
+    return simulate(one, 0, flight_config(body=one.body, vehicle=vehicle_of(one)))
+
+
+@pytest.mark.parametrize("suite", [None, "mocap"])
+@pytest.mark.parametrize("vehicle", OTHERS)
+def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | None) -> None:
+    truth = flown(scenario("walls", vehicle, 25.0, suite)).truth
+    assert truth.completed, truth.end_reason
+    assert truth.min_margin_m is not None
+    assert truth.min_margin_m > 0.01
+    assert truth.tracking_error_max_m is not None
+    assert truth.tracking_error_max_m < 0.25
+    assert [key for key, use in truth.limits.items() if not use.kept] == []
+
+
+def test_a_second_vehicle_compiles_nothing() -> None:
+    flown(scenario("walls", "paper", 3.0, "mocap"))
+    flown(scenario("walls", "paper", 3.0))
+    before = compiled_so_far()
+    assert before > 50
+    for vehicle in OTHERS:
+        flown(scenario("walls", vehicle, 3.0, "mocap"))
+        flown(scenario("walls", vehicle, 3.0))
+    assert compiled_so_far() == before
