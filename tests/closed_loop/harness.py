@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.measurements import Sample
@@ -106,7 +106,7 @@ class Flight:
     late_ticks: Callable[[int], int] = on_time
     announces: bool = True  # the safe set
     upload: MissionUpdate | None = None  # told to the next tick
-    state: FlightState = field(default_factory=FlightState)
+    state: FlightState = field(init=False)
     texts: list[str] = field(default_factory=list)
     results: list[tuple[int, int]] = field(default_factory=list)  # command, MAV_RESULT
     modes: list[Mode] = field(default_factory=list)  # each change
@@ -120,6 +120,7 @@ class Flight:
         planner = replace(self.config.planner, body=self.scenario.body)
         self.config = replace(self.config, planner=planner)
         self.loop = TunedAutopilot(self.config)
+        self.state = first_state(self.config.airframe)
         self.planner = self.planner or real_planner(self.config)
         self.closed = ClosedLoop(self.sim, self._tick, None, Late(self), self.config.airframe)
         self.inputs: TickInputs | None = None  # of the last tick

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -93,3 +94,71 @@ def random_vehicle(random: Random, joints: int, rotors: int = 4, tilt: float = 0
             critical_points=(CriticalPoint(name="base", on="base"),),
         )
     )
+
+
+def multirotor_with_arm(random: Random) -> Vehicle:
+    """One that could have been built: a ring of rotors, and an arm that hangs below the base."""
+    rotors, joints = int(random.integers(4, 9)), int(random.integers(1, 5))
+    mass, ring = float(random.uniform(1.0, 6.0)), float(random.uniform(0.18, 0.5))
+    spare = float(random.uniform(0.65, 1.8))
+    share = float(random.uniform(0.05, 0.2))  # of the base's mass, in the arm
+    lengths = [ring * float(random.uniform(0.6, 1.2)) / joints for _ in range(joints)]
+    arm, z = [], float(random.uniform(0.0, 0.06))
+    for k, length in enumerate(lengths, start=1):
+        axis = (0.0, 1.0, 0.0) if k == 1 else _AXES[int(random.integers(3))]
+        link = share * mass * length / sum(lengths)
+        moments = (link * length**2 / 12.0, link * length**2 / 12.0, link * (0.1 * length) ** 2)
+        most = float(random.uniform(0.8, 1.8))
+        arm.append(
+            Joint(
+                name=f"joint{k}",
+                xyz=(0.0, 0.0, z),
+                axis=axis,
+                position_min=-most,
+                position_max=most,
+                rate_max=float(random.uniform(2.0, 6.0)),
+                torque_max=4.0 * 9.81 * share * mass * sum(lengths),
+                armature=0.002,
+                viscous=0.002,
+                coulomb=0.004,
+                link=Link(
+                    mass=link, com=(0.0, 0.0, length / 2.0), inertia=(*moments, 0.0, 0.0, 0.0)
+                ),
+            )
+        )
+        z = length
+    whole = mass * (1.0 + share)
+    leg = sum(lengths) + 0.1
+    xx = mass * (0.4 * ring) ** 2
+    return checked(
+        Vehicle(
+            name="made_up",
+            base=Base(
+                mass=mass,
+                com=(*(float(one) for one in random.uniform(-0.01, 0.01, 2)), 0.0),
+                inertia=(xx, xx * float(random.uniform(0.8, 1.2)), 1.6 * xx, 0.0, 0.0, 0.0),
+            ),
+            rotors=tuple(
+                replace(
+                    one,
+                    position=tuple(ring / _RING * p for p in one.position),
+                    thrust_max=one.thrust_max * spare,
+                    lag=0.03,
+                )
+                for one in rotor_ring(random, rotors, 9.81 * whole)
+            ),
+            joints=tuple(arm),
+            end_effector=EndEffector(position=(0.0, 0.0, z)),
+            feet=Feet(
+                positions=tuple(
+                    (x * ring, y * ring, leg) for x in (-0.6, 0.6) for y in (-0.6, 0.6)
+                ),
+                stiffness=400.0 * whole,
+                slip_rate=0.1,
+            ),
+            critical_points=(CriticalPoint(name="base", on="base"),),
+        )
+    )
+
+
+_AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
