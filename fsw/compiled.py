@@ -124,7 +124,8 @@ def compilable(function: Callable[P, R]) -> Callable[P, R]:
     So every law can be read, tested and stepped through as it stands, and flies as machine
     code (docs/decisions/0017-one-compiled-call-a-tick.md).
     """
-    return cast(Callable[P, R], register_jitable(fastmath=False, error_model="numpy")(function))
+    in_kernels = register_jitable(fastmath=False, error_model="numpy", no_cfunc_wrapper=True)
+    return cast(Callable[P, R], in_kernels(function))
 
 
 def packed(numbers: Any) -> NDArray[Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from fsw.autopilot.control.tube import limits_used
-from fsw.autopilot.model.airframe import GRAVITY, airframe_of, check_arm, wrench_of
+from fsw.autopilot.model.airframe import GRAVITY, wrench_of
 from fsw.autopilot.model.multibody import Bodies, bodies_of, posture
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube
-from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig, of_vehicle
 from vehicles.description import Vehicle
-from vehicles.vehicle_file import VehicleError
 
 Array = NDArray[np.float64]
 _POSTURES: Final = 400  # that are drawn within the limits
@@ -66,12 +65,8 @@ def figures(vehicle: Vehicle) -> Figures:
 
 def start_up(vehicle: Vehicle) -> str:
     """What the flight software's analysis says at start with its default loops, in a sentence."""
-    try:
-        check_arm(vehicle)
-        airframe = airframe_of(vehicle)
-    except VehicleError as error:
-        return str(error)
-    config = replace(FlightConfig(), airframe=airframe)
+    config = of_vehicle(FlightConfig(), vehicle)
+    airframe = config.airframe
     pushed, loop = config.surroundings.disturbance, loop_tube(config)
     used = limits_used(airframe, config.tuning.tracking, loop, pushed)
     most = max(used, key=lambda name: used[name])

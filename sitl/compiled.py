@@ -60,7 +60,7 @@ def machine_code(function: Callable[P, R], *example: Any) -> Callable[P, R]:
 
 def compilable(function: Callable[P, R]) -> Callable[P, R]:
     """Let compiled code take a pure function into itself; called from Python it stays Python."""
-    same: Callable[P, R] = register_jitable(error_model="numpy")(function)
+    same: Callable[P, R] = register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
     return same
 
 

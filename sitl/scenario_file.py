@@ -13,7 +13,15 @@ from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.toml_tables import TableReader, nearest, shown
 from sitl.ranges import ROUNDED
-from sitl.scenario import V3, Scenario, ScenarioWall, ScenarioZone, Sensors, vehicle_of
+from sitl.scenario import (
+    V3,
+    Scenario,
+    ScenarioWall,
+    ScenarioZone,
+    Sensors,
+    start_angles,
+    vehicle_of,
+)
 from sitl.sensors.keys import MeasuredSensors, SuiteName
 
 _DIGITS = 12
@@ -60,13 +68,21 @@ def load_scenario(
 def with_vehicle(scenario: Scenario, vehicle: str) -> Scenario:
     """The scenario with another vehicle, by name or path, which starts in its own home posture.
 
+    A sphere that follows the end-effector is where that posture has the base.
+
     Raises:
         ScenarioError: There is no such vehicle, or it cannot be.
     """
     start = dataclasses.replace(scenario.start, arm_deg=())
     found = dataclasses.replace(scenario, vehicle=vehicle, start=start)
     _check_vehicle(found)
-    return found
+    if found.workspace is None:
+        return found
+    from sitl.plant.trim import end_effector  # its kernels take a moment
+
+    _, _, down = end_effector(vehicle_of(found), start_angles(found))
+    workspace = dataclasses.replace(found.workspace, d_iw_m=round(max(down, 0.0), _DIGITS))
+    return dataclasses.replace(found, workspace=workspace)
 
 
 def check_pacing(scenario: Scenario, *, realtime: bool) -> None:

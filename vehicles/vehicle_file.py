@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -69,6 +70,7 @@ def load_vehicle(name_or_path: str) -> Vehicle:
     return parse_vehicle(text, name)
 
 
+@lru_cache(maxsize=64)  # of 3 ms, and every flight asks several times
 def parse_vehicle(text: str, name: str) -> Vehicle:
     """The vehicle that a TOML text describes.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fsw.autopilot.signals import Vec3, Zone
 from view.flight_data import FlightData, Table, UlogError
 from view.scene import Posture
-from view.vehicle import airframe_of, chain, rotor_hubs
+from view.vehicle import airframe_of, chain, rotor_hubs, sizes_of
 from view.zone_meshes import Mesh, zone_mesh
 
 Array = NDArray[Any]
@@ -151,7 +151,7 @@ def _line(points: Array, colour: dict[str, float], thickness: float) -> dict[str
 def _still(flight: FlightData, places: Array) -> Shown:
     """What is drawn once: frame and rotors of the vehicle, the reference's path."""
     airframe = airframe_of(flight.information)
-    t, hubs, size = flight.begin, rotor_hubs(airframe), airframe.size
+    t, hubs, size = flight.begin, rotor_hubs(airframe), sizes_of(airframe)
     rotors = [
         {
             "pose": _pose(hub), "bottom_scale": 1.0, "top_scale": 1.0, "color": {**_BODY, "a": 0.4},
@@ -176,11 +176,11 @@ def _arm(flight: FlightData) -> Iterator[Shown]:
     if joints is None:
         return
     airframe, rows = airframe_of(flight.information), slice(None, None, _SCENE_EVERY)
-    size = 2.0 * airframe.size.tool
+    sizes = sizes_of(airframe)
     for t, q in zip(joints.t[rows].tolist(), joints["q"][rows].tolist(), strict=True):
         arm = chain(Posture((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tuple(q)), airframe)
-        tool = {"pose": _pose(arm[-1]), "size": _xyz((size,) * 3), "color": _ARM}
-        shown = _line(np.array(arm), _ARM, 2.0 * airframe.size.link)
+        tool = {"pose": _pose(arm[-1]), "size": _xyz((2.0 * sizes.tool,) * 3), "color": _ARM}
+        shown = _line(np.array(arm), _ARM, 2.0 * sizes.link)
         yield _scene(t, _entity(t, "arm", BASE, lines=[shown], spheres=[tool]), topic="/arm")
 
 

@@ -17,7 +17,7 @@ from view import colours
 from view.colours import Rgb
 from view.flight import Trail
 from view.scene import Margin, Posture, Scene
-from view.vehicle import chain, rotor_hubs
+from view.vehicle import chain, legs, rotor_hubs, sizes_of
 from view.zone_meshes import Mesh, moved, zone_mesh
 
 Array = NDArray[Any]
@@ -45,11 +45,12 @@ class VehicleFigure:
         self._ghost = ghost
         self._body = scene.add_frame(name, show_axes=False, visible=False)
         self._arrows: list[viser.MeshHandle] = []
+        self._sizes = sizes_of(airframe)
         self._add_hull()
         for k, hub in enumerate(rotor_hubs(airframe)):
             self._add_rotor(k, hub)
         self._add_legs()
-        size = airframe.size
+        size = self._sizes
         self._links = [
             scene.add_cylinder(
                 f"{name}-link{k}",
@@ -102,7 +103,7 @@ class VehicleFigure:
                 handle.color = colour
 
     def _add_hull(self) -> None:
-        size = self._airframe.size
+        size = self._sizes
         self._hull = self._scene.add_icosphere(
             f"{self._name}/hull", radius=0.6 * size.hull, color=self._ghost or colours.GREY,
             scale=(1.25, 1.25, 0.62), **self._tone,
@@ -114,10 +115,10 @@ class VehicleFigure:
             )  # fmt: skip
 
     def _add_rotor(self, k: int, hub: Vec3) -> None:
-        name, size, tone = f"{self._name}/rotor{k}", self._airframe.size, self._tone
+        name, size, tone = f"{self._name}/rotor{k}", self._sizes, self._tone
         middle, turn = _between((0.0, 0.0, 0.0), hub)
         self._scene.add_cylinder(
-            f"{name}/arm", radius=0.011, height=self._airframe.rotor_arm,
+            f"{name}/arm", radius=0.011, height=math.hypot(*hub),
             color=self._ghost or colours.DARK, position=middle, wxyz=turn, **tone,
         )  # fmt: skip
         front = self._ghost or (colours.BLUE if k == 2 else colours.GREY)
@@ -139,11 +140,7 @@ class VehicleFigure:
             )  # fmt: skip
 
     def _add_legs(self) -> None:
-        size, length = self._airframe.size, self._airframe.leg_length
-        hips = 0.35 * size.feet_spread
-        for k, (north, east) in enumerate(((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))):
-            foot = (north * size.feet_spread, east * size.feet_spread, length - size.leg)
-            hip = (north * hips, east * hips, 0.02)
+        for k, (hip, foot) in enumerate(legs(self._airframe)):
             middle, turn = _between(hip, foot)
             self._scene.add_cylinder(
                 f"{self._name}/leg{k}", radius=0.006, height=math.dist(hip, foot),

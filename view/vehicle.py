@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from fsw.autopilot.model.kinematics import (
     predicted_end_effector,
 )
 from fsw.autopilot.model.multibody import place_links
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.model.prediction import P, condense, to_vector
 from fsw.autopilot.signals import PlanInput, PredictionState, Vec3
 from fsw.autopilot.tick_record import Multibody
@@ -46,6 +48,38 @@ def rotor_hubs(airframe: Airframe = AIRFRAME) -> tuple[Vec3, ...]:
     """The hubs in the body frame [m, FRD], as far as the torques of the rotors tell."""
     rows = [airframe.wrench[6 * i : 6 * i + 6] for i in range(airframe.rotors)]
     return tuple((row[4] / -row[2], -row[3] / -row[2], 0.0) for row in rows)
+
+
+class Sizes(NamedTuple):
+    """How thick the parts of a vehicle are drawn."""
+
+    hull: float  # m, radius of the sphere that holds frame and battery
+    blade: float  # m, radius of a rotor
+    disc: float  # m, half the thickness of the space that the blades sweep
+    link: float  # m, radius
+    tool: float  # m, radius about the end-effector
+
+
+def sizes_of(airframe: Airframe) -> Sizes:
+    """The sizes of a vehicle's parts; where it has none they are thin."""
+    rotors = next(part for part in airframe.parts if part.rim > 0.0)
+    arm, hubs = [part for part in airframe.parts if part.on != ON_BASE], rotor_hubs(airframe)
+    return Sizes(
+        hull=airframe.parts[0].radius,
+        blade=rotors.rim - max(math.dist(hub[:2], rotors.begin[:2]) for hub in hubs),
+        disc=rotors.radius,
+        link=max([part.radius for part in arm if part.end is not None], default=0.0),
+        tool=max([part.radius for part in arm if part.on == airframe.bodies.joints], default=0.0),
+    )
+
+
+def legs(airframe: Airframe) -> tuple[tuple[Vec3, Vec3], ...]:
+    """Both ends of what is long on the base [m, FRD]."""
+    return tuple(
+        (part.begin, part.end)
+        for part in airframe.parts
+        if part.on == ON_BASE and part.end is not None
+    )
 
 
 def tilt(posture: Posture) -> float:

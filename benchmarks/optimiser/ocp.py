@@ -154,8 +154,8 @@ def _node(
         program.cost += barrier * slack[k]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]
     for angle, limit in (
-        (th1, AIRFRAME.joint1_limit),
-        (th12, AIRFRAME.joint12_limit),
+        (th1, AIRFRAME.angle_limits.high[0]),
+        (th12, AIRFRAME.angle_limits.high[1]),
     ):
         program.at_least_zero([limit + slack[0] - angle, limit + slack[0] + angle])
     if slack.numel() > 1:
@@ -171,7 +171,7 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
     p, v = x[P : P + 3], x[V : V + 3]
     points = [(p, v)]
     angle, rate = 0.0, 0.0
-    for joint, length in enumerate(AIRFRAME.link_length):
+    for joint, length in enumerate((AIRFRAME.bodies.offset[5], AIRFRAME.bodies.tip[2])):
         angle, rate = angle + x[Q_ARM + 2 * joint], rate + x[QD_ARM + 2 * joint]
         ahead, down = length * ca.sin(angle), length * ca.cos(angle)
         p = p + ahead * b1 + down * b3
@@ -192,7 +192,7 @@ def _add_cost(
     target_v = node[3:6] if w.relative_velocity else 0.0
     m1, m2 = airframe.bodies.mass[:2]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]
-    moment1 = m1 * airframe.bodies.com[2] + m2 * airframe.link_length[0]
+    moment1 = m1 * airframe.bodies.com[2] + m2 * airframe.bodies.offset[5]
     cog = (moment1 * ca.sin(th1) + m2 * airframe.bodies.com[5] * ca.sin(th12)) / (m1 + m2)
     program.cost += (w.tracking_terminal if last else w.tracking) * ca.sumsqr(tip[0] - node[:3])
     program.cost += (w.velocity_terminal if last else w.velocity) * ca.sumsqr(tip[1] - target_v)

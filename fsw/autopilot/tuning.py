@@ -64,7 +64,7 @@ def number_at(config: object, path: str) -> float:
 def flat(config: object) -> dict[str, Number]:
     """The numbers of nested dataclasses and tuples by dotted path, in the order of declaration.
 
-    ``planner.walls.alpha`` is a field, ``airframe.link_length.0`` the first of a tuple. What is
+    ``planner.walls.alpha`` is a field, ``airframe.home_posture.0`` the first of a tuple. What is
     neither a number nor holds any is left out.
     """
     return dict(_numbers("", config))

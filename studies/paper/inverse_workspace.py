@@ -42,7 +42,9 @@ class InverseWorkspace:
     def __init__(
         self, airframe: Airframe = AIRFRAME, elbows: tuple[int, ...] = BOTH_ELBOWS
     ) -> None:
-        self._airframe = airframe
+        # Of the paper's arm: two links in a plane, with limits of the first and of both together.
+        self._links = airframe.bodies.offset[5], airframe.bodies.tip[2]  # m
+        self._limits = airframe.angle_limits.high[0], airframe.angle_limits.high[1]  # rad
         self._elbows = elbows
         self.boundary = self._outline()  # (n, 2) m
         self._nearest = cKDTree(self.boundary)
@@ -52,7 +54,7 @@ class InverseWorkspace:
 
         ``x`` (n,) [m] is forward of the end-effector, ``up`` (n,) [m] above it.
         """
-        l1, l2 = self._airframe.link_length
+        l1, l2 = self._links
         cosine = (x * x + up * up - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
         bend = np.arccos(np.clip(cosine, -1.0, 1.0))
         reachable = np.abs(cosine) <= 1.0
@@ -75,7 +77,7 @@ class InverseWorkspace:
 
         A grid over the whole set is refined around its best point until 0.01 mm.
         """
-        reach = sum(self._airframe.link_length)
+        reach = sum(self._links)
         step, span = reach / 60.0, reach
         best = Inscribed(0.0, 0.0, self.inscribed_radius(0.0, 0.0))
         while step > 1e-5:
@@ -94,16 +96,12 @@ class InverseWorkspace:
         return np.asarray(np.where(self.contains(x, up), distance, -distance))
 
     def _permitted(self, th1: Array, th12: Array) -> NDArray[np.bool_]:
-        limits = self._airframe
-        return np.asarray(
-            (np.abs(th1) <= limits.joint1_limit + _ROUNDING)
-            & (np.abs(th12) <= limits.joint12_limit + _ROUNDING)
-        )
+        first, both = self._limits
+        return np.asarray((np.abs(th1) <= first + _ROUNDING) & (np.abs(th12) <= both + _ROUNDING))
 
     def _outline(self) -> Array:
         """Points of every limiting arc that have the outside on one side."""
-        limits = self._airframe
-        first, second = limits.joint1_limit, limits.joint12_limit
+        first, second = self._limits
         sweep1 = np.linspace(-first, first, _ARC_POINTS)
         sweep12 = np.linspace(-second, second, _ARC_POINTS)
         arcs = [(sweep1, sweep1), (sweep1, sweep1 + math.pi)]  # stretched, folded
@@ -112,7 +110,7 @@ class InverseWorkspace:
         return np.concatenate([self._exposed(th1, th12) for th1, th12 in arcs])
 
     def _exposed(self, th1: Array, th12: Array) -> Array:
-        l1, l2 = self._airframe.link_length
+        l1, l2 = self._links
         x = -l1 * np.sin(th1) - l2 * np.sin(th12)
         up = l1 * np.cos(th1) + l2 * np.cos(th12)
         bend = np.remainder(th12 - th1 + math.pi, 2.0 * math.pi) - math.pi

@@ -30,6 +30,7 @@ from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.registry import BY_NAME
 from tests.docs.fences import DOCS
+from tests.fsw.paper_arm import LIMIT1, LIMIT12
 
 TRACEABILITY = DOCS / "reference" / "requirements-traceability.csv"
 PAGE = (DOCS / "reference" / "safety-manual.md").read_text(encoding="utf-8")
@@ -192,10 +193,7 @@ def test_numbers_in_sentences_and_limits_are_those_that_are_flown() -> None:
     assert f"{every:.0f} mm for {most:.2f} m/s² on all axes" in sentences["REQ-SAFE-2"]
     thrust, torque = body.rotor_thrust_max, body.joint_torque_max[0]
     assert f"within 0 to {thrust:.1f} N and {torque:g} N·m" in sentences["REQ-ACT-7"]
-    first, both, tilt = (
-        round(math.degrees(limit))
-        for limit in (body.joint1_limit, body.joint12_limit, body.tilt_max)
-    )
+    first, both, tilt = (round(math.degrees(limit)) for limit in (LIMIT1, LIMIT12, body.tilt_max))
     rate, (turn, yaw) = body.joint_rate_max[0], body.body_rate_max
     of_joints = f"joints ({first} and {both} deg, {rate:g} rad/s), its tilt ({tilt} deg)"
     assert f"{of_joints} and its body rates ({turn:g} and {yaw:g} rad/s)" in sentences["REQ-ACT-8"]

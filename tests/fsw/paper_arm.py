@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Final
 
@@ -11,6 +12,7 @@ from fsw.record import ANGLE_LIMITS, padded
 
 JOINTS: Final = 2
 LENGTHS: Final = (0.15, 0.15)  # m, of the links
+LIMIT1, LIMIT12 = math.pi / 3.0, math.pi / 2.0  # rad, of joint 1 and of both joints' sum
 STATES: Final = states_of(JOINTS)
 INPUTS: Final = inputs_of(JOINTS)
 

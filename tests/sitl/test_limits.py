@@ -15,6 +15,7 @@ from sitl.plant.state import at_rest
 from sitl.plant.vector import Array
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Controls, Simulation
+from tests.fsw.paper_arm import LIMIT1, LIMIT12
 from tests.sitl.state_view import StateView
 from tests.sitl.vehicles import PAPER, random_vehicle
 
@@ -145,8 +146,8 @@ def test_both_sides_have_the_same_limits() -> None:
     most = {limit.key: limit.most for limit in limits(PAPER)}
     assert most == pytest.approx(
         {
-            "joint_1_angle": AIRFRAME.joint1_limit,
-            "link_2_angle": AIRFRAME.joint12_limit,
+            "joint_1_angle": LIMIT1,
+            "link_2_angle": LIMIT12,
             "joint_1_rate": AIRFRAME.joint_rate_max[0],
             "joint_2_rate": AIRFRAME.joint_rate_max[0],
             "tilt": AIRFRAME.tilt_max,

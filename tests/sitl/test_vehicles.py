@@ -20,7 +20,7 @@ from sitl.plant.parameters import GRAVITY, plant
 from sitl.plant.places import row_of, rows_of
 from sitl.plant.state import at_rest
 from sitl.plant.stiffness import FASTEST, fastest_rates
-from sitl.plant.trim import level_hover, standing_height
+from sitl.plant.trim import end_effector, level_hover, standing_height
 from sitl.plant.vector import Array
 from sitl.result import EndKind
 from sitl.scenario import Hold, Pilot, Scenario, Start, start_angles, vehicle_of
@@ -280,6 +280,17 @@ def test_a_critical_point_anywhere_on_a_link_is_judged() -> None:
     assert simulation.ended is not None
     assert simulation.ended.kind is EndKind.COLLISION
     assert "the probe hit the ground" in simulation.ended.sentence
+
+
+def test_the_sphere_of_a_workspace_is_where_the_home_posture_has_the_base() -> None:
+    """A longer arm than paper's would begin outside of it."""
+    for name in vehicle_names():
+        scenario = load_scenario("workspace", None, name)
+        assert scenario.workspace is not None
+        vehicle = vehicle_of(scenario)
+        _, _, down = end_effector(vehicle, vehicle.home_posture)
+        assert math.isclose(scenario.workspace.d_iw_m, down, abs_tol=1e-9)
+        Simulation(scenario, 0)  # which refuses a start outside
 
 
 def test_another_vehicle_flies_a_scenario_in_its_own_posture_or_is_refused() -> None:

@@ -13,7 +13,7 @@ from fsw.autopilot.model.parts import Part, parts_of, points_of
 from fsw.autopilot.signals import Vec2
 from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS
 from vehicles.description import Rotor, Vehicle
-from vehicles.vehicle_file import VehicleError, load_vehicle
+from vehicles.vehicle_file import load_vehicle
 
 GRAVITY = 9.81  # m/s^2, along +z of the world
 
@@ -27,19 +27,6 @@ class AttitudeLag:
     # Eq 16 as printed: u is the acceleration. The states a, j and s then keep their start values,
     # and a start with zeros in them has no tilt in the arm's kinematics either.
     at_once: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class BodySize:
-    """How far the vehicle reaches beyond its joints and its rotors' hubs."""
-
-    hull: float  # m, radius of the sphere that holds frame and battery
-    blade: float  # m, radius of a rotor
-    disc: float  # m, half the thickness of the space that the blades sweep
-    feet_spread: float  # m, feet at (+-spread, +-spread)
-    leg: float  # m, radius
-    link: float  # m, radius
-    tool: float  # m, radius about the end-effector
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +63,6 @@ class Airframe:
     home_posture: Several  # (JOINTS,) rad, to fly in
     points: tuple[Part, ...]  # the critical points
     parts: tuple[Part, ...]  # what takes up space
-    # Of an arm like that of paper, for what knows no other one yet.
-    link_length: Vec2  # m
-    joint1_limit: float  # rad, |th1|
-    joint12_limit: float  # rad, |th1 + th2|
-    size: BodySize
     tilt_max: float  # rad, of the body's z axis against the vertical
     body_rate_max: Vec2  # rad/s, of roll and pitch together, and of yaw
     leg_length: float  # m, body origin above ground when standing
@@ -96,7 +78,6 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     wrench = [number for row in rows for number in row]
     effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
     share = np.linalg.pinv(effect).ravel().tolist()
-    second, both = vehicle.joints[1:2], vehicle.coupled_limits[:1]
     return Airframe(
         mass=vehicle.mass,
         bodies=bodies,
@@ -114,10 +95,6 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         home_posture=_padded(vehicle.home_posture, JOINTS),
         points=points_of(vehicle),
         parts=parts_of(vehicle),
-        link_length=(sum(one.xyz[2] for one in second), vehicle.end_effector.position[2]),
-        joint1_limit=vehicle.joints[0].position_max,
-        joint12_limit=min([one.maximum for one in both], default=math.inf),
-        size=_size(vehicle),
         tilt_max=vehicle.limits.tilt,
         body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
         leg_length=max(z for _, _, z in vehicle.feet.positions),
@@ -145,57 +122,6 @@ def _angle_limits(vehicle: Vehicle) -> AngleLimits:
         low=_padded([low for _, low, _ in limits], ANGLE_LIMITS),
         high=_padded([high for _, _, high in limits], ANGLE_LIMITS),
     )
-
-
-def _size(vehicle: Vehicle) -> BodySize:
-    """How far the parts of a vehicle reach; where there is none they are thin."""
-    first, second = vehicle.joints[0].name, vehicle.joints[-1].name
-
-    def largest(on: str, *, capsule: bool) -> float:
-        radii = [
-            one.radius for one in vehicle.parts if (one.on, one.end is not None) == (on, capsule)
-        ]
-        return max(radii, default=0.0)
-
-    return BodySize(
-        hull=largest("base", capsule=False),
-        blade=max(rotor.radius for rotor in vehicle.rotors),
-        disc=max(rotor.half_height for rotor in vehicle.rotors),
-        feet_spread=max(max(abs(x), abs(y)) for x, y, _ in vehicle.feet.positions),
-        leg=largest("base", capsule=True),
-        link=max(
-            *(largest(on, capsule=True) for on in (first, second)), largest(first, capsule=False)
-        ),
-        tool=largest(second, capsule=False),
-    )
-
-
-def check_arm(vehicle: Vehicle) -> None:
-    """Refuse an arm that the compensation does not know yet.
-
-    Raises:
-        VehicleError: With what it is, and what they know.
-    """
-    joints, limits = vehicle.joints, vehicle.coupled_limits
-    below = [*(joint.xyz for joint in joints[1:]), vehicle.end_effector.position]
-    below += [joint.link.com for joint in joints]
-    first, second = joints[0], joints[-1]
-    planar = all(joint.axis == (0.0, 1.0, 0.0) and not any(joint.rpy) for joint in joints)
-    if not (
-        len(joints) == 2
-        and planar
-        and not any(first.xyz)
-        and all(x == y == 0.0 for x, y, _ in below)
-        and first.position_max == -first.position_min < math.inf
-        and second.position_max == -second.position_min == math.inf
-        and [limit.row for limit in limits] == [(1.0, 1.0)]
-        and limits[0].maximum == -limits[0].minimum
-    ):
-        raise VehicleError(
-            f"vehicle {vehicle.name}: the flight software flies an arm like that of paper as yet: "
-            "two joints about y, from the body's origin straight down, with limits of joint 1 and "
-            "of both joints' sum alone, each as far to either side"
-        )
 
 
 def wrench_of(rotor: Rotor) -> Several:

@@ -21,7 +21,7 @@ from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.multibody import Bodies, next_axes
 from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, Array, J, P, V
-from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec2, Vec3
+from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec3
 from fsw.compiled import compilable, compiled, kernel, machine_code, packed
 from fsw.record import JOINTS, Floats
 
@@ -254,18 +254,6 @@ def end_effector_when_level(bodies: Bodies, q_arm: JointVector, yaw: float) -> V
     Joints at ``q_arm`` (j,) [rad], the body at ``yaw`` [rad].
     """
     return position(level_frame(bodies, q_arm, yaw), bodies.joints, bodies.tip)
-
-
-@compilable
-def links(lengths: Vec2, th1: float, th12: float) -> tuple[Vec2, Vec2]:
-    """Both links of an arm like that of paper as vectors (forward, down) in the body [m].
-
-    Links of ``lengths`` [m], from straight down ``th1`` [rad] and ``th12`` [rad].
-    """
-    return (
-        (lengths[0] * math.sin(th1), lengths[0] * math.cos(th1)),
-        (lengths[1] * math.sin(th12), lengths[1] * math.cos(th12)),
-    )
 
 
 @compilable

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from fsw.autopilot.model.airframe import AIRFRAME
 from sitl.scenario_file import load_scenario
 from studies.paper.inverse_workspace import BOTH_ELBOWS, InverseWorkspace
-from tests.fsw.paper_arm import LENGTHS
+from tests.fsw.paper_arm import LENGTHS, LIMIT1, LIMIT12
 
 ELBOWS = {"both": BOTH_ELBOWS, "forward": (1,), "backward": (-1,)}
 
@@ -23,8 +22,8 @@ def workspace(request: pytest.FixtureRequest) -> InverseWorkspace:
 def reached(elbows: tuple[int, ...], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Base positions seen from the end-effector, by forward kinematics within the limits."""
     random = np.random.default_rng(1)
-    th1 = random.uniform(-AIRFRAME.joint1_limit, AIRFRAME.joint1_limit, count)
-    th12 = random.uniform(-AIRFRAME.joint12_limit, AIRFRAME.joint12_limit, count)
+    th1 = random.uniform(-LIMIT1, LIMIT1, count)
+    th12 = random.uniform(-LIMIT12, LIMIT12, count)
     allowed = np.isin(np.sign(th12 - th1), elbows)
     th1, th12 = th1[allowed], th12[allowed]
     l1, l2 = LENGTHS

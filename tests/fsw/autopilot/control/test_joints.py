@@ -26,6 +26,7 @@ from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
 from fsw.autopilot.tick_record import ArmTask, Joints, Tick
 from fsw.record import JOINTS
+from tests.fsw.paper_arm import LENGTHS, LIMIT1, LIMIT12
 from tests.fsw.random_states import estimate_of
 from tests.fsw.records import boundless, changed, placed
 
@@ -50,7 +51,7 @@ def planar_arm(airframe: Airframe = AIRFRAME, field: Vec2 = FIELD) -> Any:
             np.diag(airframe.bodies.inertia[6 * link : 6 * link + 3]),
         )
         model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, airframe.link_length[link]]))
+        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, LENGTHS[link]]))
     return model
 
 
@@ -162,9 +163,6 @@ def test_a_steady_torque_that_nothing_told_of_is_taken_off_within_two_tenths_of_
     off = np.abs(angles - [0.4, 0.6]).max(axis=1)
     assert off[round(0.1 / DT) :].max() > 5e-3, "it is a push"
     assert off[round(0.3 / DT) :].max() < 5e-3
-
-
-LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
 
 
 @pytest.mark.requirement("REQ-ACT-8")

@@ -45,6 +45,7 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, HOME, flying, vehicle_at
+from tests.fsw.paper_arm import LIMIT1
 from tests.fsw.records import with_record
 
 COMMANDER = Commander(CONFIG)
@@ -377,7 +378,7 @@ def test_an_orbit_begins_with_the_heading_of_its_beginning() -> None:
 
 
 def test_joints_are_moved_on_the_way_or_where_the_vehicle_stays() -> None:
-    limit = CONFIG.airframe.joint1_limit
+    limit = LIMIT1
     on_the_way = after(steered(), MoveJoints((0.5, None))).setpoint
     assert on_the_way.reference == UNDER_WAY
     assert on_the_way.goal == PositionGoal(

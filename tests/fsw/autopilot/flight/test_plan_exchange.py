@@ -38,6 +38,7 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 from fsw.autopilot.tick_record import new_tick
+from tests.fsw.paper_arm import LIMIT1, LIMIT12
 from tests.fsw.random_states import as_state, estimate_of, prediction_vector, random_estimate
 from tests.fsw.records import measured_motion
 
@@ -178,8 +179,8 @@ def test_a_slung_arm_is_planned_from_the_nearest_pose_it_may_have() -> None:
     limits = InputLimits(joint_rate=2.0, joint_margin=0.1)
     far = measured._replace(q_arm=(2.0, 3.0), qd_arm=(-20.0, 15.0))
     slung = with_arm_in_bounds(far, AIRFRAME, limits)
-    assert slung.q_arm[0] == AIRFRAME.joint1_limit - 0.1
-    assert sum(slung.q_arm) == pytest.approx(AIRFRAME.joint12_limit - 0.1)
+    assert slung.q_arm[0] == LIMIT1 - 0.1
+    assert sum(slung.q_arm) == pytest.approx(LIMIT12 - 0.1)
     assert slung.qd_arm == (-2.0, 2.0)
     within = measured._replace(q_arm=(0.3, -0.5), qd_arm=(1.0, -2.0))
     same = with_arm_in_bounds(within, AIRFRAME, limits)
@@ -253,4 +254,4 @@ def test_an_arm_that_was_slung_about_is_caught_before_it_is_planned_on() -> None
     slung = moving()._replace(p=(1.0, 0.0, 0.0), q_arm=(2.0, 1.0), qd_arm=(9.0, -9.0))
     start, _ = EXCHANGE.start(PlanMemory(), moving(), slung, START_US)
     assert start.qd_arm == (3.0, -3.0)
-    assert abs(start.q_arm[0] - DELAY_S * 3.0) <= AIRFRAME.joint1_limit + 1e-12
+    assert abs(start.q_arm[0] - DELAY_S * 3.0) <= LIMIT1 + 1e-12

@@ -16,13 +16,12 @@ import cvxpy as cp
 import numpy as np
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.signals import TARGET_SPHERE, SafeSet, Zone
 from tests.fsw.autopilot.model.three_points import BASE, END_EFFECTOR, Points, points_of
-from tests.fsw.paper_arm import INPUTS
+from tests.fsw.paper_arm import INPUTS, LIMIT1, LIMIT12
 
 _PERIOD = 0.1  # s
 
@@ -112,8 +111,8 @@ def optimum(question: Question, config: PlannerConfig) -> Optimum:
     for node in range(1, n + 1):
         th1, th2 = linear.angles(node)[0], linear.angles(node)[1]
         constraints += [
-            cp.abs(th1) <= AIRFRAME.joint1_limit - margin + joint_slack[node - 1],
-            cp.abs(th1 + th2) <= AIRFRAME.joint12_limit - margin + joint_slack[node - 1],
+            cp.abs(th1) <= LIMIT1 - margin + joint_slack[node - 1],
+            cp.abs(th1 + th2) <= LIMIT12 - margin + joint_slack[node - 1],
             cp.abs(linear.joint_rates(node)) <= config.limits.joint_rate + joint_slack[node - 1],
         ]
     ocp = cp.Problem(

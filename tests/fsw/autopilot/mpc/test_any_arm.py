@@ -84,7 +84,7 @@ def flown(
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_it_brings_the_end_effector_to_its_target_and_the_arm_to_rest_within_its_limits(
+def test_it_brings_the_end_effector_to_its_target_with_the_arm_within_its_limits(
     name: str,
 ) -> None:
     airframe, _, _ = of(name)
@@ -96,7 +96,6 @@ def test_it_brings_the_end_effector_to_its_target_and_the_arm_to_rest_within_its
     tip, v = predicted_end_effector(airframe.bodies, states[-1])
     np.testing.assert_allclose(tip, target, atol=5e-3)
     np.testing.assert_allclose(v, 0.0, atol=5e-3)
-    assert np.abs(states[-1, QD_ARM::2]).max() < 0.02
     q, qd = states[:, Q_ARM::2], states[:, QD_ARM::2]
     for k in range(limits.rows):
         angle = q @ limits.row[JOINTS * k : JOINTS * k + joints]
@@ -114,7 +113,8 @@ def test_joints_that_nothing_asks_for_come_home(name: str) -> None:
     x, y, z = end_effector_when_level(airframe.bodies, tuple(away.tolist()), 0.0)
     start = hovering(airframe, tuple(away.tolist()))
     states = flown(name, start, (x, y, z - 1.2), SafeSet(), 150)
-    assert abs(states[-1, Q_ARM] - home[0]) < 0.1
+    np.testing.assert_allclose(states[-1, Q_ARM::2], home, atol=0.1)
+    np.testing.assert_allclose(states[-1, QD_ARM::2], 0.0, atol=0.01)
     tip, _ = predicted_end_effector(airframe.bodies, states[-1])
     np.testing.assert_allclose(tip, (x, y, z - 1.2), atol=5e-3)
 
@@ -126,7 +126,7 @@ def test_no_part_of_it_comes_closer_to_a_wall_than_its_barrier_lets_it(name: str
     home = airframe.home_posture[:joints]
     x, y, z = end_effector_when_level(airframe.bodies, home, 0.0)
     ahead = SafeSet((wall((-1.0, 0.0, 0.0), -0.9, 0.1),))
-    target = (2.0 + x, y, z - 1.2)  # beyond the wall
+    target = (1.3 + x, y, z - 1.2)  # beyond the wall
     states = flown(name, hovering(airframe, home), target, ahead, 60)
     rows = ZoneRows(ahead, body_of("full", airframe), model, CONFIG.tunings, distances=True)
     margins = []
@@ -154,7 +154,7 @@ def test_no_row_is_left_out_that_inputs_within_their_limits_could_make_bind(name
     level, vertical, yaw, joint = CONFIG.limits.most
     most = np.tile([level, level, vertical, yaw, *[joint] * joints], NODES)
     some = 0
-    for far in np.geomspace(1.0, 30.0, 8):
+    for far in np.geomspace(1.0, 1000.0, 10):
         zones = SafeSet(
             (wall((1.0, 0.0, 0.0), -float(far), 0.1), point((0.0, float(far), -1.2), 0.2))
         )

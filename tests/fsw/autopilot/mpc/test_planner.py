@@ -37,7 +37,7 @@ from tests.fsw.autopilot.mpc.requests import (
     planner,
     request,
 )
-from tests.fsw.paper_arm import INPUTS, LENGTHS
+from tests.fsw.paper_arm import INPUTS, LENGTHS, LIMIT1, LIMIT12
 from tests.fsw.random_states import as_state, prediction_vector, vec3
 
 CONFIG = PlannerConfig(body="points")
@@ -81,8 +81,8 @@ def test_joints_stay_within_their_limits_when_the_target_is_out_of_reach() -> No
         target = EndEffectorTarget(0, (side * 3.0, 0.0, -2.0), STILL, STILL)
         answer = planned(planner().plan(request(hovering(), target)))
         angles = nodes_of(answer)[:, 15::2]
-        assert np.abs(angles[:, 0]).max() <= AIRFRAME.joint1_limit + 1e-3
-        assert np.abs(angles.sum(axis=1)).max() <= AIRFRAME.joint12_limit + 1e-3
+        assert np.abs(angles[:, 0]).max() <= LIMIT1 + 1e-3
+        assert np.abs(angles.sum(axis=1)).max() <= LIMIT12 + 1e-3
         assert np.abs(angles).max() > 0.1
 
 

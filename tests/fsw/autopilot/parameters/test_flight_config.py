@@ -30,7 +30,7 @@ def test_a_predicted_vertical_acceleration_follows_as_the_rotors_do(rotor_lag: f
         ("rotor_lag", ["airframe.rotor_lag"]),
         ("limits.tilt", ["planner.limits.tilt"]),
         ("period", ["planner.period_us", "tick_period_us"]),
-        ("link_length", ["airframe.link_length.0", "airframe.link_length.1"]),
+        ("home_posture", [f"airframe.home_posture.{k}" for k in range(6)]),
     ],
 )
 def test_a_number_of_the_vehicle_is_configured_in_one_place(word: str, paths: list[str]) -> None:

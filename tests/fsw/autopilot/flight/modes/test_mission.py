@@ -27,12 +27,13 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, flying, limits, vehicle_at
+from tests.fsw.paper_arm import LENGTHS
 
 MISSION = Mission(CONFIG)
 REST: Vec3 = (0.0, 0.0, 0.0)
 LEAD = CONFIG.steering.max_lead_distance
 PACE = CONFIG.limits.mission_speed
-DOWN = sum(CONFIG.airframe.link_length)  # m, a hanging end-effector below the body
+DOWN = sum(LENGTHS)  # m, a hanging end-effector below the body
 HERE: Vec3 = (0.0, 0.0, -2.0)  # of the end-effector
 ABOVE: Vec3 = (0.0, 0.0, -2.0 - DOWN)  # of the body, then
 GO = MissionStep(MissionAction.GO, (1.0, 0.0, -2.0))

@@ -20,6 +20,7 @@ from fsw.autopilot.flight.setpoints.offboard import (
 )
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.signals import MAX_DISTANCE, AttitudeSetpoint, MotionSetpoint, Vec2
+from tests.fsw.paper_arm import LIMIT1, LIMIT12
 
 angles = st.floats(-1.2, 1.2)
 turns = st.floats(-3.1, 3.1)
@@ -128,9 +129,6 @@ def test_a_heading_is_refused_beyond_its_range_either_way(name: str, most: float
 def test_an_attitude_is_refused_out_of_range(setpoint: AttitudeSetpoint, words: str | None) -> None:
     reported = attitude_refusal(setpoint)
     assert reported is None if words is None else words in (reported or "")
-
-
-LIMIT1, LIMIT12 = AIRFRAME.joint1_limit, AIRFRAME.joint12_limit
 
 
 @pytest.mark.parametrize(
