@@ -201,7 +201,7 @@ class LogFlight:
         table = self._table("actuator_command")
         if not len(table):
             return None
-        rows, limits = list(table["rotor_thrust"].T), (0.0, self.airframe.rotor_thrust_max)
+        rows, limits = list(table["rotor_thrust"].T), (0.0, self.airframe.strongest_thrust)
         return _curve("rotor thrust [N]", table.t, rotor_names(self.airframe), rows, limits)
 
     def _joint_curve(self) -> Curve | None:

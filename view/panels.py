@@ -172,8 +172,9 @@ def _margin_row(one: Margin, least: float) -> str:
 
 def _inputs(now: Scene, airframe: Airframe) -> str:
     rows = []
-    for name, thrust in zip(rotor_names(airframe), now.thrust or (), strict=False):
-        rows.append(_limited(name, thrust, airframe.rotor_thrust_max, "N"))
+    tops = airframe.rotor_thrust_max
+    for name, thrust, top in zip(rotor_names(airframe), now.thrust or (), tops, strict=False):
+        rows.append(_limited(name, thrust, top, "N"))
     for k, torque in enumerate(now.torque or (), start=1):
         rows.append(_limited(f"joint {k} torque", torque, airframe.joint_torque_max[k - 1], "N m"))
     if now.estimate is not None:

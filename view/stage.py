@@ -86,8 +86,9 @@ class VehicleFigure:
         for link, (begin, end) in zip(self._links, pairwise(arm), strict=True):
             link.position, link.wxyz = _between(begin, end)
         self._joint.position, self._tool.position = arm[-2], arm[-1]
-        for arrow, newtons in zip(self._arrows, thrust or (), strict=False):
-            arrow.scale = (1.0, 1.0, max(newtons / self._airframe.rotor_thrust_max, 0.01))
+        tops = self._airframe.rotor_thrust_max
+        for arrow, newtons, top in zip(self._arrows, thrust or (), tops, strict=False):
+            arrow.scale = (1.0, 1.0, max(newtons / top, 0.01))
 
     def colour(self, margins: tuple[Margin, ...]) -> None:
         """Give the parts that are kept clear the colour of their least margin."""

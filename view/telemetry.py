@@ -204,7 +204,10 @@ class Telemetry:
     def _thrust(self, servos: tuple[Any, ...]) -> RotorVector:
         pulses = servos[1 : 1 + self.airframe.rotors]
         return tuple(
-            [self.airframe.rotor_thrust_max * max(pulse - 1000, 0) / 1000.0 for pulse in pulses]
+            [
+                most * max(pulse - 1000, 0) / 1000.0
+                for pulse, most in zip(pulses, self.airframe.rotor_thrust_max, strict=False)
+            ]
         )
 
     def _place(self, message_id: int, mask_at: int) -> Vec3 | None:

@@ -174,7 +174,7 @@ def curves_of(scenes: list[Scene], airframe: Any) -> tuple[Curve, ...]:
     took = [1e3 * one.solver.total if one.solver else math.nan for one in scenes]
     lean = [math.degrees(tilt(one.estimate)) if one.estimate else math.nan for one in scenes]
     margins = np.array([one.minimum for one in scenes])
-    limit = airframe.rotor_thrust_max
+    limit = airframe.strongest_thrust
     return (
         Curve("margin [m]", t, ("least",), (margins,), (0.0,)),
         Curve("planning cycle [ms]", t, ("cycle",), (np.array(took),), (100.0,)),

@@ -70,7 +70,7 @@ class VehicleFacts:
 
     def thrust_share(self, command: ActuatorCommand) -> float:
         """What rotors are asked for, of all that they can give [1]."""
-        return sum(command.rotor_thrust) / (self.airframe.rotors * self.airframe.rotor_thrust_max)
+        return sum(command.rotor_thrust) / self.airframe.full_thrust
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,8 +114,7 @@ class SimLink:
             )
             for armed in (False, True)
         }
-        self._thrust_scale = 1.0 / airframe.rotor_thrust_max
-        self._torque_scales = tuple([1.0 / most for most in airframe.joint_torque_max[:joints]])
+        self._airframe = airframe
         self._steps = SensorClock(
             facts.tick_period_us, clock, self._note_what_is_odd, inbox.accept_clock_jump
         )
@@ -354,7 +353,7 @@ class SimLink:
     def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
         values = encode_replies.hil_actuator_controls(
-            stamp_us, outputs.actuators, self._thrust_scale, self._torque_scales
+            self._airframe, stamp_us, outputs.actuators
         )
         return self._controls_frames[outputs.armed](*values)
 

@@ -142,8 +142,7 @@ class LogEncoder:
         self._took_over = False  # the pilot, from a failsafe whose condition still holds
         self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
         self._measured = measured
-        self._per_newton = 1.0 / airframe.rotor_thrust_max
-        self._bodies = airframe.bodies
+        self._airframe = airframe
         self._changing = tuple(name for name in self.inputs.names if name not in (TYPED, SAMPLES))
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
@@ -222,14 +221,14 @@ class LogEncoder:
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
         estimate, sent = snapshot.estimate, snapshot.actuators
-        t_us, k = snapshot.t_us, self._per_newton
+        t_us = snapshot.t_us
         attitude, position, motors, arm = self._of.detail.heads
         return self._of.detail.pack(
             (
                 attitude, t_us, *quaternion_from_matrix(estimate.R_WB),
                 position, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
                 *validity(snapshot), -estimate.p_WB[2], _sees_ground(snapshot),
-                motors, t_us, *[k * f for f in sent.rotor_thrust],
+                motors, t_us, *self._airframe.shares(sent).rotor_thrust,
                 arm, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
             )
         )  # fmt: skip
@@ -290,7 +289,7 @@ class LogEncoder:
         margins, barrier, smallest = report.shown(topics.MARGINS)
         least = min(report.margins, default=math.nan)
         argmin = 0xFF if smallest is None else smallest
-        p, v = end_effector(self._bodies, snapshot.estimate)
+        p, v = end_effector(self._airframe.bodies, snapshot.estimate)
         wanted = (
             (*_NOWHERE, *_NOWHERE, math.nan)
             if target is None

@@ -188,7 +188,8 @@ def planned_rates(plan: PredictionState) -> Vec3:
 
 def _shares(effects: list[float], airframe: Airframe) -> list[float]:
     """Effects of each rotor's thrust over the largest that all of them have together [1/N]."""
-    most = airframe.rotor_thrust_max * sum(max(one, 0.0) for one in effects)
+    tops = airframe.rotor_thrust_max
+    most = sum(top * max(one, 0.0) for top, one in zip(tops, effects, strict=False))
     return [one / most if most > 0.0 else 0.0 for one in effects]
 
 

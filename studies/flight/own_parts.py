@@ -66,7 +66,7 @@ PushLaw: TypeAlias = Callable[[float], Any]
 
 HANDOVER_S: Final = 0.5  # for which our autopilot keeps a vehicle that it has caught
 _CALLS: Final = 50  # of which the median time counts
-_INPUTS: Final = 6  # numbers of a PlanInput
+_BASE_INPUTS: Final = 4  # numbers of a PlanInput beside the joints'
 _MAX_A: Final = 50.0  # m/s^2 and rad/s^2; more is a slip of unit
 _MAX_SHARE: Final = 3.0  # of a rotor's thrust or a joint's torque; the same
 _MIN_LIFT: Final = 0.25  # of the weight, of the first command of a vehicle that hovers
@@ -85,8 +85,8 @@ class Observation:
     v_WB: Array  # (3,) m/s
     R_WB: Array  # (3, 3), body to world
     w_WB_B: Array  # (3,) rad/s, written in B
-    q_arm: Array  # (2,) rad, th1 from straight down, th2 relative
-    qd_arm: Array  # (2,) rad/s
+    q_arm: Array  # (j,) rad, joints
+    qd_arm: Array  # (j,) rad/s
     p_WE: Array  # (3,) m
     p_target: Array  # (3,) m, the end-effector's reference
     v_target: Array  # (3,) m/s
@@ -101,7 +101,7 @@ class Observation:
 
     @property
     def state(self) -> Array:
-        """Position, velocity, rotation vector, body rates, joints and their rates (16,) [SI]."""
+        """Position, velocity, rotation vector, body rates, joints and their rates (12 + 2j,) [SI]."""
         turn = Rotation.from_matrix(self.R_WB).as_rotvec()
         parts = self.p_WB, self.v_WB, turn, self.w_WB_B, self.q_arm, self.qd_arm
         return np.concatenate(parts)
@@ -111,14 +111,14 @@ class OwnPlanner(Protocol):
     """What ``planner=`` takes: ``plan`` answers a request, or says why not."""
 
     def plan(self, request: PlanRequest) -> Any:
-        """Answer with a Plan, a PlanFailure, None, or inputs (n, 6) [SI].
+        """Answer with a Plan, a PlanFailure, None, or inputs (n, 4 + j) [SI].
 
-        Each row is ``[a_x, a_y, a_z, yaw acceleration, two joint accelerations]`` of a period.
+        Each row is ``[a_x, a_y, a_z, yaw acceleration, joint accelerations]`` of a period.
         """
 
 
 OwnLaw: TypeAlias = Callable[[Observation], Any]
-"""Thrusts (4,) [N] and joint torques (2,) [N m] for what is observed, or all six in one array."""
+"""Thrusts (r,) [N] and joint torques (j,) [N m] for what is observed, or all in one array."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,6 +302,7 @@ class WatchedPlanner:
             raise OwnPartError(f"planner {type(planner).__name__}: must have plan(request)")
         self._plan, self._period_us = plan, config.mpc_period_us
         self._ours = Planner(config.planner, config.airframe, processor_time_us)
+        self._inputs = _BASE_INPUTS + config.airframe.bodies.joints
         self._begun = False
         self._pace = _Pace("planner", config.mpc_period_us, allow_slow)
 
@@ -325,7 +326,7 @@ class WatchedPlanner:
         given = answer.inputs if isinstance(answer, Plan) else answer
         if isinstance(answer, Plan):
             given = [(*one.a, one.yaw_acc, *one.qdd_arm) for one in answer.inputs]
-        found = numbers(f"plan for {t:.3f} s", given, (-1, _INPUTS))
+        found = numbers(f"plan for {t:.3f} s", given, (-1, self._inputs))
         if not len(found):
             raise OwnPartError(f"plan for {t:.3f} s: must have at least one input")
         if not np.abs(found).max() <= _MAX_A:
@@ -333,7 +334,7 @@ class WatchedPlanner:
                 f"plan for {t:.3f} s: an acceleration of {np.abs(found).max():g}, must be within "
                 f"±{_MAX_A:g} m/s² and rad/s²"
             )
-        inputs = tuple([PlanInput((x, y, z), w, (j, k)) for x, y, z, w, j, k in found.tolist()])
+        inputs = tuple([PlanInput((x, y, z), w, tuple(qdd)) for x, y, z, w, *qdd in found.tolist()])
         if isinstance(answer, Plan):
             return replace(
                 answer,
@@ -413,20 +414,21 @@ class WatchedController:
         return state, replace(outputs, actuators=command)
 
     def _checked(self, given: Any, t: float) -> ActuatorCommand:
-        what = f"command at {t:.3f} s"
+        what, airframe = f"command at {t:.3f} s", self._airframe
+        rotors, joints = airframe.rotors, airframe.bodies.joints
         if isinstance(given, tuple) and len(given) == 2:
-            thrust, torque = numbers(what, given[0], (4,)), numbers(what, given[1], (2,))
+            thrust, torque = numbers(what, given[0], (rotors,)), numbers(what, given[1], (joints,))
         else:
-            found = numbers(what, given, (_INPUTS,))
-            thrust, torque = found[:4], found[4:]
-        airframe = self._airframe
-        for name, values, most, unit in (
-            ("thrust", thrust, airframe.rotor_thrust_max, "N"),
-            ("joint torque", torque, airframe.joint_torque_max[0], "N m"),
+            found = numbers(what, given, (rotors + joints,))
+            thrust, torque = found[:rotors], found[rotors:]
+        for name, values, limits, unit in (
+            ("thrust", thrust, airframe.rotor_thrust_max[:rotors], "N"),
+            ("joint torque", torque, airframe.joint_torque_max[:joints], "N m"),
         ):
-            if not np.abs(values).max() <= _MAX_SHARE * most:
+            k = int(np.argmax(np.abs(values) / limits))
+            if not abs(values[k]) <= _MAX_SHARE * limits[k]:
                 raise OwnPartError(
-                    f"{what}: a {name} of {np.abs(values).max():g}, a vehicle has {most:g} {unit}"
+                    f"{what}: a {name} of {abs(values[k]):g}, a vehicle has {limits[k]:g} {unit}"
                 )
         weight = airframe.mass * GRAVITY
         if self._first and not thrust.sum() >= _MIN_LIFT * weight:
@@ -435,9 +437,7 @@ class WatchedController:
                 "thrusts are newtons, one a rotor"
             )
         self._first = False
-        f1, f2, f3, f4 = thrust.tolist()
-        t1, t2 = torque.tolist()
-        return ActuatorCommand((f1, f2, f3, f4), (t1, t2))
+        return ActuatorCommand(tuple(thrust.tolist()), tuple(torque.tolist()))
 
 
 def observed(estimate: StateEstimate, aim: EndEffectorTarget, bodies: Bodies) -> Observation:

@@ -142,7 +142,7 @@ def _track(
     reading = np.zeros(READINGS)
     reading[6], reading[15] = 1.0, -GRAVITY
     r: Tick = ticks[0]
-    top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max[0]
+    top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
     thrust, torque = np.zeros(ROTORS_MAX), np.zeros(JOINTS_MAX)
     for k in range(kept.shape[0]):
         planned, ahead = rows[k], rows[k + 1]
@@ -151,10 +151,11 @@ def _track(
         step = first_step + k
         read_into(r.estimate, reading, START_US + STEP_US * step)
         close_loops(r, law, 1, zones[spans[k, 0] : spans[k, 1]], probes)
-        for i in range(4):
-            thrust[i] = r.sent.rotor_thrust[i] = min(max(r.sent.rotor_thrust[i], 0.0), top)
-        for i in range(2):
-            torque[i] = r.sent.joint_torque[i] = min(max(r.sent.joint_torque[i], -drive), drive)
+        for i in range(int(law.airframe.rotors)):
+            thrust[i] = r.sent.rotor_thrust[i] = min(max(r.sent.rotor_thrust[i], 0.0), top[i])
+        for i in range(int(law.airframe.bodies.joints)):
+            most = drive[i]
+            torque[i] = r.sent.joint_torque[i] = min(max(r.sent.joint_torque[i], -most), most)
         if k % every == 0:
             lift = (x[13] + x[14] + x[15] + x[16]) / mass
             R = r.estimate.R_WB

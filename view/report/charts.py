@@ -204,7 +204,7 @@ def inputs(flights: Sequence[Reported]) -> Chart | None:
     t = flight.since(sent.t)
     airframe = airframe_of(flight.data.information)
     joints = airframe.bodies.joints
-    most, torque = airframe.rotor_thrust_max, max(airframe.joint_torque_max[:joints])
+    most, torque = airframe.strongest_thrust, max(airframe.joint_torque_max[:joints])
     rotors = [(name, COLOURS[k % len(COLOURS)]) for k, name in enumerate(rotor_names(airframe))]
     thrusts = spread("rotors", t, sent["rotor_thrust"], rotors)
     torques = [

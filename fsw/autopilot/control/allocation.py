@@ -74,7 +74,7 @@ def _left_to_others(
     all_obey = True
     for i in range(n):
         m.low[i] = health.least[i]
-        m.top[i] = min(airframe.rotor_thrust_max * health.effectiveness[i], health.most[i])
+        m.top[i] = min(airframe.rotor_thrust_max[i] * health.effectiveness[i], health.most[i])
         if not m.low[i] < m.top[i]:
             f, at = m.low[i], 6 * i
             x, y, z = x - w[at + 3] * f, y - w[at + 4] * f, z - w[at + 5] * f

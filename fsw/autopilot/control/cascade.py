@@ -344,10 +344,9 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
 def send(r: Tick, airframe: Airframe) -> None:
     """The new command for what is wanted. Reads health; writes sent, flags."""
     wanted = r.wanted
-    top = airframe.rotor_thrust_max
     for i in range(int(airframe.rotors)):
         r.sent.rotor_thrust[i] = wanted.rotor_thrust[i] / r.health.effectiveness[i]
-        if not 0.0 <= r.sent.rotor_thrust[i] <= top:
+        if not 0.0 <= r.sent.rotor_thrust[i] <= airframe.rotor_thrust_max[i]:
             r.flags |= GATE_NEEDED
     for j in range(int(airframe.bodies.joints)):
         r.sent.joint_torque[j] = wanted.joint_torque[j]

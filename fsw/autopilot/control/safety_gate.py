@@ -23,13 +23,13 @@ def gate(
     top, bounds = airframe.rotor_thrust_max, airframe.joint_torque_max
     # What is within limits is finite as well: no comparison with NaN is true.
     thrusts, torques = command
-    allowed = all(0.0 <= f <= top for f in thrusts)
-    # A vehicle has fewer joints than there are bounds.
+    # A vehicle has fewer rotors and joints than there are bounds.
+    allowed = all(0.0 <= f <= most for f, most in zip(thrusts, top, strict=False))
     if allowed and all(-most <= t <= most for t, most in zip(torques, bounds, strict=False)):
         return command, False
     if not math.isfinite(sum(thrusts) + sum(torques)):
         return last, True
     return ActuatorCommand(
-        tuple([clamp(f, 0.0, top) for f in thrusts]),
+        tuple([clamp(f, 0.0, most) for f, most in zip(thrusts, top, strict=False)]),
         tuple([clamp_magnitude(t, most) for t, most in zip(torques, bounds, strict=False)]),
     ), False

@@ -251,7 +251,7 @@ def _fits_all_axes(airframe: Airframe, loop: Tube, disturbance: float) -> bool:
     change = disturbance * loop.vertical_acceleration / GRAVITY  # of the thrust
     lever = 1.0 - change
     hover = airframe.mass * GRAVITY / airframe.rotors
-    shared = 1.0 - change * hover / min(hover, airframe.rotor_thrust_max - hover)
+    shared = 1.0 - change * hover / min(hover, airframe.weakest_thrust - hover)
     used = pushed * loop.snap / _snap_in_hover(airframe)
     return math.sqrt(2.0) * used <= lever and used <= lever * shared
 
@@ -262,7 +262,7 @@ def _snap_in_hover(airframe: Airframe) -> float:
     At angles of zero: straight down the arm weighs most.
     """
     hover = airframe.mass * GRAVITY / airframe.rotors
-    headroom = min(hover, airframe.rotor_thrust_max - hover)
+    headroom = min(hover, airframe.weakest_thrust - hover)
     m = posture(airframe.bodies, (0.0,) * airframe.bodies.joints)
     least = math.inf
     for axis, inertia in ((ROLL, float(m.inertia[0])), (PITCH, float(m.inertia[4]))):

@@ -10,7 +10,7 @@ import numpy as np
 
 from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.model.parts import Part, parts_of, points_of
-from fsw.autopilot.signals import Vec2
+from fsw.autopilot.signals import ActuatorCommand, Vec2
 from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS
 from vehicles.description import Rotor, Vehicle
 from vehicles.vehicle_file import load_vehicle
@@ -55,7 +55,7 @@ class Airframe:
     rotor_lever: float  # m, of roll and pitch, the root of the mean square over rotors
     rotor_arm: float  # m, L
     yaw_per_thrust: float  # m, b
-    rotor_thrust_max: float  # N, of the weakest
+    rotor_thrust_max: Several  # (ROTORS,) N
     rotor_lag: float  # s, of the slowest
     joint_torque_max: Several  # (JOINTS,) N m
     joint_rate_max: Several  # (JOINTS,) rad/s
@@ -69,6 +69,29 @@ class Airframe:
     # kg m^2 of each joint's motor, times the square of its gear's ratio; beside the vehicle's own.
     joint_armature: float = 0.0
     attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
+
+    @property
+    def weakest_thrust(self) -> float:
+        """What every rotor can give [N]."""
+        return min(self.rotor_thrust_max[: self.rotors])
+
+    @property
+    def strongest_thrust(self) -> float:
+        """What no rotor gives more than [N]."""
+        return max(self.rotor_thrust_max)
+
+    @property
+    def full_thrust(self) -> float:
+        """What all rotors give together [N]."""
+        return sum(self.rotor_thrust_max)
+
+    def shares(self, command: ActuatorCommand) -> ActuatorCommand:
+        """The command with each thrust and torque as a share [1] of the largest."""
+        thrusts = zip(command.rotor_thrust, self.rotor_thrust_max, strict=False)
+        torques = zip(command.joint_torque, self.joint_torque_max, strict=False)
+        return ActuatorCommand(
+            tuple([f / most for f, most in thrusts]), tuple([t / most for t, most in torques])
+        )
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
@@ -87,7 +110,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         rotor_lever=math.sqrt(sum(row[3] ** 2 + row[4] ** 2 for row in rows) / len(rows)),
         rotor_arm=math.hypot(*first.position),
         yaw_per_thrust=first.torque_per_thrust,
-        rotor_thrust_max=min(rotor.thrust_max for rotor in rotors),
+        rotor_thrust_max=_padded([rotor.thrust_max for rotor in rotors], ROTORS),
         rotor_lag=max(rotor.lag for rotor in rotors),
         joint_torque_max=_padded([joint.torque_max for joint in vehicle.joints], JOINTS),
         joint_rate_max=_padded([joint.rate_max for joint in vehicle.joints], JOINTS),

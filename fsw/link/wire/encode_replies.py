@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.autopilot.signals import ActuatorCommand, CommandAck, JointVector
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.signals import ActuatorCommand, CommandAck
 from fsw.link.wire.outgoing import WireValues
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
@@ -19,20 +20,14 @@ def command_ack(ack: CommandAck) -> WireValues:
 
 
 def hil_actuator_controls(
-    t_us: int, actuators: ActuatorCommand, thrust_scale: float, torque_scales: JointVector
+    airframe: Airframe, t_us: int, actuators: ActuatorCommand
 ) -> tuple[float, ...]:
     """HIL_ACTUATOR_CONTROLS up to the last control in use, the answer to a HIL_SENSOR of ``t_us``.
 
-    Rotors come first, then joints. ``thrust_scale`` [1/N] and ``torque_scales`` (j,) [1/(N m)] are
-    the inverses of the largest values.
+    Rotors come first, then joints, each as a share of its largest value.
     """
-    pairs = zip(actuators.joint_torque, torque_scales, strict=True)
-    return (
-        t_us,
-        _LOCKSTEP,
-        *[f * thrust_scale for f in actuators.rotor_thrust],
-        *[torque * scale for torque, scale in pairs],
-    )
+    thrust, torque = airframe.shares(actuators)
+    return (t_us, _LOCKSTEP, *thrust, *torque)
 
 
 def end_of_controls(used: int, *, armed: bool) -> tuple[float, ...]:

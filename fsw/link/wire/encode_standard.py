@@ -130,12 +130,11 @@ def servo_outputs(snapshot: FlightSnapshot, context: TelemetryContext) -> WireVa
 
     A rotor's is its share of full thrust, a joint's its torque about 1500.
     """
-    airframe, (thrusts, torques) = context.facts.airframe, snapshot.actuators
+    thrusts, torques = context.facts.airframe.shares(snapshot.actuators)
     pulses = [0] * (len(thrusts) + len(torques))
     if snapshot.armed:
-        pulses = [1000 + round(1000.0 * f / airframe.rotor_thrust_max) for f in thrusts]
-        pairs = zip(torques, airframe.joint_torque_max, strict=False)
-        pulses += [1500 + round(500.0 * t / most) for t, most in pairs]
+        pulses = [1000 + round(1000.0 * f) for f in thrusts]
+        pulses += [1500 + round(500.0 * t) for t in torques]
     first, second = pulses[:8], pulses[8:]
     rest = (*first, *(0,) * (8 - len(first))), (*second, *(0,) * (8 - len(second)))
     return (snapshot.t_us & _U32, *rest[0], 0, *rest[1])

@@ -124,7 +124,7 @@ class Offboard(FlightMode):
             tilt_limit = config.planner.limits.tilt
             tilt = tilted(memory.attitude, last, tilt_limit, config.planner.period)
             airframe = config.airframe
-            thrust = airframe.rotors * airframe.rotor_thrust_max * memory.attitude.thrust
+            thrust = airframe.full_thrust * memory.attitude.thrust
             return as_motion(tilt, thrust / state.cascade.mass), tilt
         assert memory.motion is not None, "one of the two is young"
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead

@@ -32,7 +32,7 @@ class DamageWatch:
     def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
         """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
         self._law = packed(airframe)
-        self._top, self._names = airframe.rotor_thrust_max, rotor_names(airframe)
+        self._tops, self._names = airframe.rotor_thrust_max, rotor_names(airframe)
         self._hover = airframe.mass * GRAVITY / airframe.rotors
         self._tick = tick
         self._decay = rotor_decay(airframe, tick)
@@ -104,7 +104,7 @@ class DamageWatch:
         if not found.disobeys:
             return ActuatorHealth((1.0,) * k + (found.effect,), joints=joints)
         # It is commanded what it gives in hover, and reckoned with as what it really gives.
-        gives = min(max(s.gives, _MIN_GIVEN), self._top)
+        gives = min(max(s.gives, _MIN_GIVEN), self._tops[k])
         return ActuatorHealth(
             (1.0,) * k + (gives / self._hover,),
             (0.0,) * k + (gives,),
