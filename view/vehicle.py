@@ -133,7 +133,10 @@ def _filled(value: Any, name: str, known: Mapping[str, Any]) -> Any:
         parts = {f.name: getattr(value, f.name) for f in fields(value)}
         return replace(value, **{k: _filled(v, f"{name}.{k}", known) for k, v in parts.items()})
     if isinstance(value, tuple):
-        return tuple(_filled(one, f"{name}.{k}", known) for k, one in enumerate(value))
+        # An older log may have one number for all of them.
+        return tuple(
+            _filled(known.get(name, one), f"{name}.{k}", known) for k, one in enumerate(value)
+        )
     return value if value is None else type(value)(known.get(name, value))
 
 

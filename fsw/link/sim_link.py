@@ -352,9 +352,7 @@ class SimLink:
 
     def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
-        values = encode_replies.hil_actuator_controls(
-            self._airframe, stamp_us, outputs.actuators
-        )
+        values = encode_replies.hil_actuator_controls(self._airframe, stamp_us, outputs.actuators)
         return self._controls_frames[outputs.armed](*values)
 
     def _mode(self, t_us: int, outputs: TickOutputs) -> bytes:

@@ -101,7 +101,7 @@ class Observation:
 
     @property
     def state(self) -> Array:
-        """Position, velocity, rotation vector, body rates, joints and their rates (12 + 2j,) [SI]."""
+        """Position, velocity, rotation vector, body rates, joints, their rates (12 + 2j,) [SI]."""
         turn = Rotation.from_matrix(self.R_WB).as_rotvec()
         parts = self.p_WB, self.v_WB, turn, self.w_WB_B, self.q_arm, self.qd_arm
         return np.concatenate(parts)

@@ -191,7 +191,7 @@ def test_numbers_in_sentences_and_limits_are_those_that_are_flown() -> None:
     every = 1e3 * (all_axes(body, loop, most)[0] - loop.wind_beyond)
     assert f"{one:.0f} mm on a horizontal axis for 0.8 m/s²" in sentences["REQ-SAFE-2"]
     assert f"{every:.0f} mm for {most:.2f} m/s² on all axes" in sentences["REQ-SAFE-2"]
-    thrust, torque = body.rotor_thrust_max, body.joint_torque_max[0]
+    thrust, torque = body.weakest_thrust, body.joint_torque_max[0]
     assert f"within 0 to {thrust:.1f} N and {torque:g} N·m" in sentences["REQ-ACT-7"]
     first, both, tilt = (round(math.degrees(limit)) for limit in (LIMIT1, LIMIT12, body.tilt_max))
     rate, (turn, yaw) = body.joint_rate_max[0], body.body_rate_max

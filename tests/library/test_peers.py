@@ -62,7 +62,7 @@ class RotorPySE3:
         # What the arm's weight asks of the rotors is not in its model.
         thrust = thrust + self.thrust - self.thrust.mean()
         torque = self.torque - 2.0 * (seen.q_arm - self.q_arm) - 0.15 * seen.qd_arm
-        return np.clip(thrust, 0.0, pandion.AIRFRAME.rotor_thrust_max), torque
+        return np.clip(thrust, 0.0, pandion.AIRFRAME.weakest_thrust), torque
 
 
 @pytest.mark.long

@@ -154,7 +154,7 @@ def test_both_sides_have_the_same_limits() -> None:
             "roll_pitch_rate": AIRFRAME.body_rate_max[0],
             "yaw_rate": AIRFRAME.body_rate_max[1],
             "joint_torque": AIRFRAME.joint_torque_max[0],
-            "rotor_thrust": AIRFRAME.rotor_thrust_max,
+            "rotor_thrust": AIRFRAME.weakest_thrust,
         }
     )
 

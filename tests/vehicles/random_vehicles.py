@@ -142,7 +142,7 @@ def multirotor_with_arm(random: Random) -> Vehicle:
                 replace(
                     one,
                     position=tuple(ring / _RING * p for p in one.position),
-                    thrust_max=one.thrust_max * spare,
+                    thrust_max=one.thrust_max * spare * float(random.uniform(0.9, 1.1)),
                     lag=0.03,
                 )
                 for one in rotor_ring(random, rotors, 9.81 * whole)

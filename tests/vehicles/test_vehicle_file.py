@@ -44,7 +44,7 @@ def test_paper_is_the_vehicle_that_the_flight_software_knows() -> None:
     paper = load_vehicle("paper")
     assert math.isclose(paper.mass, AIRFRAME.mass)
     assert paper.base.inertia[:3] == AIRFRAME.bodies.base_inertia[:3]
-    assert [rotor.thrust_max for rotor in paper.rotors] == [AIRFRAME.rotor_thrust_max] * 4
+    assert [rotor.thrust_max for rotor in paper.rotors] == [AIRFRAME.weakest_thrust] * 4
     lengths = [paper.joints[1].xyz[2], paper.end_effector.position[2]]
     assert lengths == list(LENGTHS)
     assert [joint.link.mass for joint in paper.joints] == list(AIRFRAME.bodies.mass[:2])

@@ -130,6 +130,6 @@ def test_the_airframe_is_the_logged_one() -> None:
     }
     airframe = airframe_of(logged)
     assert (airframe.rotors, airframe.bodies.joints) == (8, 4)
-    assert (airframe.rotor_lag, airframe.rotor_thrust_max) == (0.03, 20.0)
+    assert (airframe.rotor_lag, airframe.weakest_thrust) == (0.03, 20.0)
     assert airframe_of({}) == airframe_of({"numbers": "{"}) == AIRFRAME
     assert airframe_of({"vehicle_file": "no = vehicle"}) == AIRFRAME

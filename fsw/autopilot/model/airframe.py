@@ -78,12 +78,12 @@ class Airframe:
     @property
     def strongest_thrust(self) -> float:
         """What no rotor gives more than [N]."""
-        return max(self.rotor_thrust_max)
+        return max(self.rotor_thrust_max[: self.rotors])
 
     @property
     def full_thrust(self) -> float:
         """What all rotors give together [N]."""
-        return sum(self.rotor_thrust_max)
+        return sum(self.rotor_thrust_max[: self.rotors])
 
     def shares(self, command: ActuatorCommand) -> ActuatorCommand:
         """The command with each thrust and torque as a share [1] of the largest."""

@@ -36,7 +36,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.telemetry_context import TelemetryContext
 
-VEHICLE = replace(AIRFRAME, rotor_thrust_max=16.0)
+VEHICLE = replace(AIRFRAME, rotor_thrust_max=(16.0,) * 4)
 FACTS = VehicleFacts(
     VEHICLE,
     tick_period_us=2_000,

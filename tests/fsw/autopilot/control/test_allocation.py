@@ -180,7 +180,7 @@ def test_of_any_layout_yaw_goes_first_then_thrust_and_roll_and_pitch_are_kept(
     random = np.random.default_rng(10 * rotors + failed)
     for _ in range(40):
         airframe = any_airframe(random, rotors, float(random.uniform(0.0, 0.3)))
-        top, n = airframe.rotor_thrust_max, rotors
+        top, n = airframe.weakest_thrust, rotors
         least, most = [0.0] * n, [math.inf] * n
         stuck = int(random.integers(n)) if failed else -1
         if failed:
@@ -243,7 +243,7 @@ def test_of_any_layout_roll_and_pitch_that_are_too_much_are_cut_by_no_more_than_
     for _ in range(40):
         airframe = any_airframe(random, rotors, float(random.uniform(0.0, 0.3)))
         shares = np.array(airframe.share).reshape(-1, 4)[:rotors]
-        top, hover = airframe.rotor_thrust_max, airframe.mass * 9.81
+        top, hover = airframe.weakest_thrust, airframe.mass * 9.81
         wish = random.uniform([-40.0, -40.0], [40.0, 40.0])
         f = np.array(allocated(airframe, (*wish, float(random.uniform(-0.5, 0.5))), hover, 1e9))
         axes = [[wish[0], 0.0], [0.0, wish[1]]]
@@ -273,7 +273,7 @@ def test_a_level_ring_hovers_without_any_of_its_rotors(rotors: int) -> None:
         airframe = any_airframe(random, rotors, 0.0)
         none = tuple(0.0 if k == lost else math.inf for k in range(rotors))
         health = ActuatorHealth((1.0,) * rotors, (0.0,) * rotors, none)
-        hover = 0.25 * rotors * airframe.rotor_thrust_max
+        hover = 0.25 * rotors * airframe.weakest_thrust
         w = np.array(airframe.wrench).reshape(-1, 6)[:rotors]
         # Turned towards the lost rotor: it is the one opposite that must do it.
         roll, pitch = -0.2 * w[lost, 3:5] / np.linalg.norm(w[lost, 3:5])

@@ -56,8 +56,8 @@ def four(random: np.random.Generator, high: float) -> Vec4:
 def memory(random: np.random.Generator) -> Tick:
     r = in_hover(AIRFRAME, random_estimate(random))
     torque = (float(random.uniform(-2.0, 2.0)), float(random.uniform(-2.0, 2.0)))
-    r.commanded = ActuatorCommand(four(random, AIRFRAME.rotor_thrust_max), torque)
-    r.rotors[:4] = random.uniform(0.0, AIRFRAME.rotor_thrust_max, 4)
+    r.commanded = ActuatorCommand(four(random, AIRFRAME.weakest_thrust), torque)
+    r.rotors[:4] = random.uniform(0.0, AIRFRAME.weakest_thrust, 4)
     r.mass, r.height = float(random.uniform(2.5, 4.5)), float(random.uniform(-0.2, 0.2))
     r.observed.v[:], r.observed.d[:] = random.uniform(-1.0, 1.0, (2, 3))
     r.attitude[:] = random.uniform(-0.2, 0.2, 3)

@@ -194,7 +194,7 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
     field = GRAVITY + planned.vertical
     first, both = bounds(LIMITS)
     inertia = AIRFRAME.bodies.base_inertia[1]
-    turning = 2.0 * AIRFRAME.rotor_arm * 0.5 * AIRFRAME.rotor_thrust_max / inertia
+    turning = 2.0 * AIRFRAME.rotor_arm * 0.5 * AIRFRAME.weakest_thrust / inertia
     link1 = FOLLOWING * LIMITS.acceleration + ADDED * planned.joint_acc
     link2 = FOLLOWING * LIMITS.acceleration + ADDED * 2.0 * planned.joint_acc
     most = [0.0, 0.0]

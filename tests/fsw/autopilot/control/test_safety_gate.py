@@ -20,7 +20,7 @@ commands = st.builds(
 )
 allowed = st.builds(
     ActuatorCommand,
-    rotor_thrust=st.tuples(*[st.floats(0.0, AIRFRAME.rotor_thrust_max)] * 4),
+    rotor_thrust=st.tuples(*[st.floats(0.0, AIRFRAME.weakest_thrust)] * 4),
     joint_torque=st.tuples(*[st.floats(-2.0, 2.0)] * 2),
 )
 
@@ -31,7 +31,7 @@ def test_what_is_sent_is_finite_and_within_limits(
     wanted: ActuatorCommand, last: ActuatorCommand, armed: bool
 ) -> None:
     sent, _ = gate(AIRFRAME, wanted, last, armed)
-    assert all(0.0 <= f <= AIRFRAME.rotor_thrust_max for f in sent.rotor_thrust)
+    assert all(0.0 <= f <= AIRFRAME.weakest_thrust for f in sent.rotor_thrust)
     assert all(abs(t) <= AIRFRAME.joint_torque_max[0] for t in sent.joint_torque)
 
 

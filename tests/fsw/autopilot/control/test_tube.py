@@ -176,7 +176,7 @@ def test_every_figure_of_the_tube_is_that_of_the_loop_that_is_flown() -> None:
 
 def test_the_share_of_torque_is_that_of_what_the_mixer_can_give_in_hover() -> None:
     bodies = replace(AIRFRAME.bodies, base_inertia=(0.25, 0.35, 0.9, 0.0, 0.0, 0.0))
-    unlike = replace(AIRFRAME, bodies=bodies, rotor_thrust_max=15.0)
+    unlike = replace(AIRFRAME, bodies=bodies, rotor_thrust_max=(15.0,) * 4)
     per_unit, weight = _tube(), unlike.mass * GRAVITY
     f = allocated(unlike, (100.0, 0.0, 0.0), 4.0 * (15.0 - weight / 4.0), 0.0)
     lift = min(weight / 4.0, 15.0 - weight / 4.0)
@@ -263,7 +263,7 @@ def test_the_reach_on_all_axes_is_more_and_grows_faster_than_the_disturbance() -
     assert large[1] - CALM_HEIGHT > 4.0 * (small[1] - CALM_HEIGHT)
 
 
-HEAVY = replace(AIRFRAME, rotor_thrust_max=0.4 * AIRFRAME.mass * GRAVITY)
+HEAVY = replace(AIRFRAME, rotor_thrust_max=(0.4 * AIRFRAME.mass * GRAVITY,) * 4)
 
 
 @pytest.mark.requirement("REQ-SAFE-2")

@@ -10,6 +10,7 @@ import pytest
 
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import (
     AttitudeSetpoint,
     BatteryWarning,
@@ -358,7 +359,8 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
 
 
 def test_actuators_are_fractions_of_their_limits() -> None:
-    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, 1 / 16.0, (1 / 2.0,) * 2)
+    airframe = replace(AIRFRAME, rotor_thrust_max=(16.0,) * 4, joint_torque_max=(2.0,) * 2)
+    values = encode_replies.hil_actuator_controls(airframe, 3_004_000, ACTUATORS)
     end = encode_replies.end_of_controls(6, armed=True)
     message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values, *end))
     assert message.time_usec == 3_004_000

@@ -281,7 +281,7 @@ def test_an_attitude_is_an_acceleration_by_the_mass_that_was_weighed() -> None:
     light = replace(state, cascade=changed(state.cascade, mass=2.0))
     goal = aimed(light).goal
     assert goal is not None
-    thrust = 0.5 * 4.0 * CONFIG.airframe.rotor_thrust_max
+    thrust = 0.5 * 4.0 * CONFIG.airframe.weakest_thrust
     assert goal.motion.a == pytest.approx((0.0, 0.0, 9.81 - thrust / 2.0))
 
 
