@@ -25,6 +25,7 @@ from messages.ulog import Topic
 from messages.ulog_reader import unpacker
 from sitl.scenario import Scenario, vehicle_of
 from sitl.simulation import SAMPLE_STEPS, START_US, Simulation
+from vehicles.vehicle_file import vehicle_text
 
 _FLUSH_BYTES: Final = 1 << 16
 _TRACKING_HEAD: Final = ulog.data_head(FIRST_NUMBER + 1, SIM_TRACKING)
@@ -89,7 +90,10 @@ class TruthLog:
 def _definitions(scenario: Scenario, seed: int, state: Topic) -> bytes:
     topics = (state, *TRUTH_TOPICS[1:])
     parts = [ulog.opening(START_US), ulog.information("sys_name", "Pandion simulator")]
+    vehicle = vehicle_of(scenario)
     parts += [ulog.information("scenario", scenario.name), ulog.information("seed", seed)]
+    parts += [ulog.information("vehicle", vehicle.name)]
+    parts += [ulog.information("vehicle_file", vehicle_text(vehicle))]
     parts += [ulog.format_of(topic) for topic in topics]
     numbered = enumerate(topics, start=FIRST_NUMBER)
     parts += [ulog.subscription(number, topic) for number, topic in numbered]

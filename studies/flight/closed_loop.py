@@ -148,7 +148,9 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
     arrived = simulation.measurements()
     if arrived is not None:
         samples = tuple([sample(one) for one in arrived])
-        return only_the_time(simulation.sensor_time_us, samples), samples
+        return only_the_time(
+            simulation.sensor_time_us, samples, len(simulation.vehicle.joints)
+        ), samples
     now = simulation.sense()
     # By position: keywords take a third longer, in every step.
     frame = SensorFrame(

@@ -42,8 +42,7 @@ def sample(said: Measurement) -> Sample:
         case ImuMeasurement():
             return ImuSample(time, said.accel_B, said.gyro_B)
         case JointMeasurement():
-            first, second = said.angles
-            return JointSample(time, (first, second))
+            return JointSample(time, said.angles)
         case PoseMeasurement():
             return PoseSample(
                 time,
@@ -73,8 +72,11 @@ def sample(said: Measurement) -> Sample:
     return RangeSample(time, said.distance, said.variance)
 
 
-def only_the_time(t_us: int, samples: tuple[Sample, ...]) -> SensorFrame:
-    """The frame of a tick that has samples instead, as the link makes it."""
+def only_the_time(t_us: int, samples: tuple[Sample, ...], joints: int = 2) -> SensorFrame:
+    """The frame of a tick that has samples instead, as the link makes it.
+
+    Of a vehicle with so many ``joints``.
+    """
     newest = samples[-1] if samples else None
     return SensorFrame(
         t_us,
@@ -83,6 +85,6 @@ def only_the_time(t_us: int, samples: tuple[Sample, ...]) -> SensorFrame:
         q_WB=(math.nan, *_NO_VECTOR),
         gyro_B=newest.rate if isinstance(newest, ImuSample) else _NO_VECTOR,
         accel_B=newest.acceleration if isinstance(newest, ImuSample) else _NO_VECTOR,
-        q_arm=(math.nan, math.nan),
-        qd_arm=(math.nan, math.nan),
+        q_arm=(math.nan,) * joints,
+        qd_arm=(math.nan,) * joints,
     )

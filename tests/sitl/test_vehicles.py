@@ -39,7 +39,7 @@ from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.state_view import StateView
 from tests.sitl.vehicles import PAPER, inputs, random_vehicle
 from vehicles.description import CriticalPoint, Vehicle
-from vehicles.vehicle_file import PACKAGED, load_vehicle, vehicle_names
+from vehicles.vehicle_file import PACKAGED, load_vehicle, parse_vehicle, vehicle_names
 
 SHIPPED = vehicle_names()
 
@@ -311,7 +311,10 @@ def test_the_log_of_the_truth_has_the_state_of_any_vehicle(name: str, tmp_path: 
         log.add(simulation)
         simulation.advance(Controls.off(simulation.vehicle))
     log.close()
-    data = {one.name: one.data for one in ULog(str(path)).data_list}["sim_ground_truth"]
+    log_read = ULog(str(path))
+    told = log_read.msg_info_dict
+    assert parse_vehicle(told["vehicle_file"], told["vehicle"]) == simulation.vehicle
+    data = {one.name: one.data for one in log_read.data_list}["sim_ground_truth"]
     truth, last = simulation.truth(), 59
     assert len(data["timestamp"]) == 60
     assert f"thrust[{len(truth.thrust) - 1}]" in data

@@ -2,12 +2,10 @@
 
 import math
 
-from fsw.autopilot.flight.safety import damage_watch
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import SafeSet
 from view import colours, panels
 from view.scene import Battery, Event, Margin, Posture, Scene, Solver, Timing, Worst
-from view.vehicle import ROTORS
 
 LEVEL = Posture((0.0, 0.0, -1.0), (1.0, 0.0, 0.0, 0.0), (0.5, 0.25))
 SCENE = Scene(
@@ -81,8 +79,3 @@ def test_colours_warn_of_small_margins() -> None:
     assert colours.of_margin(-0.1) == colours.of_margin(0.0) == colours.RED
     assert colours.of_margin(2.0) == colours.GREEN
     assert colours.of_margin(math.nan) == colours.GREY
-
-
-def test_a_rotor_has_the_name_that_the_vehicle_gives_it() -> None:
-    """The report called the same one rear in one figure and 1 in another."""
-    assert ROTORS == damage_watch.ROTORS

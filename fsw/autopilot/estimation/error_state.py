@@ -89,6 +89,7 @@ FILTER: Final = np.dtype(
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle
+        ("agility", float),  # how much quicker rotors turn it than the paper's; 1 at least
         (
             "joints",
             float,

@@ -185,9 +185,12 @@ def copied(x: Filter) -> Filter:
     return np.ndarray(1, FILTER, bytearray(memory if type(memory) is bytearray else x.tobytes()))
 
 
-def at_start(joints: int) -> FusionMemory:
-    """Memory before the first sample, of a vehicle of so many ``joints``."""
+def at_start(joints: int, agility: float = 1.0) -> FusionMemory:
+    """Memory before the first sample, of a vehicle of so many ``joints``.
+
+    Its rotors turn it ``agility`` times [1] as quickly as the paper's, and 1 at least.
+    """
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
-    x["joint_count"] = joints
+    x["joint_count"], x["agility"] = joints, agility
     x["model_walk"] = MIN_WALKS
     return FusionMemory(x)

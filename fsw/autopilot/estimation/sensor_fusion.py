@@ -496,8 +496,9 @@ def _rests(memory: FusionMemory, now: float) -> bool:
 
 def _anew(memory: FusionMemory) -> FusionMemory:
     """The memory with a filter that starts from the next samples, because it is no number."""
+    x = memory.numbers[0]
     return memory._replace(
-        numbers=at_start(int(memory.numbers[0]["joint_count"])).numbers,
+        numbers=at_start(int(x["joint_count"]), float(x["agility"])).numbers,
         joints_came=-1.0,
         imu_came=-1.0,
         started=False,

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.multibody import base_acceleration
+from fsw.autopilot.model.multibody import base_acceleration, posture
 from fsw.autopilot.signals import Vec2, Vec3, Vec4
 from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
@@ -112,6 +112,15 @@ def motion_state(
         (-f * (wdy * R[0] - wdx * R[1]), -f * (wdy * R[3] - wdx * R[4])),
         turning,
     )
+
+
+def agility(airframe: Airframe) -> float:
+    """Angular acceleration [rad/s^2] that rotors give with a torque of hover thrust at their lever.
+
+    About roll or pitch, whichever is larger.
+    """
+    J = posture(airframe.bodies, airframe.home_posture).inertia
+    return airframe.mass * GRAVITY * airframe.rotor_lever / float(min(J[0], J[4]))
 
 
 def rotor_names(airframe: Airframe) -> list[str]:

@@ -154,6 +154,7 @@ EVIDENCE: Final = np.dtype(
         ("aid_first", np.int64, (3,)),
         ("waiting", float, (3, _AT + WITNESS)),
         ("waits", np.int64, (3,)),
+        ("agility", float),  # of the vehicle: what of a turn rotors do not explain grows with it
         ("squares", float, (COUNT, 4)),  # mean squares of residuals with the model, by window
         # Residual over threshold, by window, the long one last: at the last look, what both of the
         # last two looks have had, and the threshold [SI].
@@ -224,7 +225,7 @@ def look(
 ) -> None:
     """Take in the newest measurements at ``now`` [s], and compute all residuals."""
     s, x = e[0], numbers[0]
-    s.looked = now
+    s.looked, s.agility = now, max(x.agility, 1.0)
     if _begins(x.witness):
         _begin_anew(s)
         return
@@ -254,7 +255,7 @@ def look(
         _note_largest(s, now, k)
     # How quickly the model has been off, which is what a filter without a half of the unit needs.
     x.model_walk[0] = MIN_WALKS[0]
-    x.model_walk[1] = max(MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
+    x.model_walk[1] = max(s.agility * MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
 
 
 @compilable
@@ -447,7 +448,7 @@ def _unit_and_model(s: Any, now: float, k: int, lasting: Vec3, learns: bool) -> 
     turn0, spun0 = _difference(d, c, 1 + TURN, first), _difference(d, c, 1 + SPUN2, first)
     spun = _difference(b, a, 1 + SPUN2, last)
     r = _turned_beside(turn, turn0, spun, spun0)
-    _note_model(s, now, GM, k, r, _TURN_OFF, 0.0, learns)
+    _note_model(s, now, GM, k, r, s.agility * _TURN_OFF, 0.0, learns)
     _note_model(s, now, AM, k, subtract(force, lasting), _FORCE_OFF[k], 0.0, learns)
 
 
@@ -514,7 +515,8 @@ def _unit_and_pose(
     turn0, turn = rotation_vector(_apart(a, b, _MEASURED + 3)), rotation_vector(seen)
     spun0, spun = _difference(b, a, _AT + SPUN2, before), _difference(c, b, _AT + SPUN2, over)
     r = _turned_beside(_over(turn, over), _over(turn0, before), spun, spun0)
-    _note_model(s, now, MP_TURN, k, r, _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning, learns)
+    least, noise = s.agility * _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning
+    _note_model(s, now, MP_TURN, k, r, least, noise, learns)
     bent = _bend(c, b, a, _MEASURED)
     felt, made = _bend(c, b, a, _AT + FELT2), _bend(c, b, a, _AT + MADE2)
     noise = _BEND_SIGMAS * math.sqrt(18.0) * sigma / (over * over)
@@ -592,7 +594,8 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
     r = _turned_beside(rate, rate0, spun, spun0)
     iron += _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
     room = (iron + 2.0 * noise) / over
-    _note_model(s, now, MB, k, _across(r, v, (0.0, 0.0, 0.0)), _TURN_OFF_AIDED, room, learns)
+    across, least = _across(r, v, (0.0, 0.0, 0.0)), s.agility * _TURN_OFF_AIDED
+    _note_model(s, now, MB, k, across, least, room, learns)
 
 
 @compilable

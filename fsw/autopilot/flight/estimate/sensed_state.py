@@ -35,6 +35,7 @@ from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import JointSample, Sample
+from fsw.autopilot.model.rotors import agility
 from fsw.autopilot.signals import (
     EstimatorReport,
     JointVector,
@@ -54,6 +55,7 @@ _EVERY_TICK = (_IMU, Sensor.ENCODERS)
 # In flight 15, and 35 of the last, at most while readings repeat; 50 and 70 within 10 ms of stuck
 # encoders.
 _HELD, _LAST_HELD = 35.0, 70.0
+_AGILE = 35.0  # rad/s^2, of the vehicle whose thresholds the estimator's are
 _ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
@@ -82,6 +84,7 @@ class SensedState:
 
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
         self._joints = cascade.law.airframe.bodies.joints
+        self._agility = max(agility(cascade.law.airframe) / _AGILE, 1.0)
         self._fusion = SensorFusion(tuning, self._joints)
         self._cascade = cascade
         self._tuning = tuning
@@ -92,6 +95,19 @@ class SensedState:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
         self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate))
+
+    def _memory(self, state: FlightState, now: float) -> FusionMemory:
+        """The filter's memory at ``now`` [s].
+
+        After a first stamp that was ahead of all others every reading is older than what it left. A
+        clock that is set back by little is waited for: of what was known nothing is lost.
+        """
+        before = state.fusion
+        return (
+            at_start(self._joints, self._agility)
+            if before is None or now < before.now - _SET_BACK
+            else before
+        )
 
     def covariance(self, memory: FusionMemory | None) -> Array | None:
         """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""
@@ -112,7 +128,7 @@ class SensedState:
         Before there was one, nothing flies that has to wait, and ``catch_up`` is done at once.
         """
         now = 1e-6 * inputs.sensors.t_us
-        before = _memory(state, now, self._joints)
+        before = self._memory(state, now)
         pushed: JointVector = ()
         model = UNKNOWN
         if state.cascade.has_estimate:
@@ -142,7 +158,7 @@ class SensedState:
         *missed, inputs = missed_inputs(state.t_us, inputs)
         for one in missed:
             now = 1e-6 * one.sensors.t_us
-            memory = _memory(state, now, self._joints)
+            memory = self._memory(state, now)
             memory, estimate = self._fusion.take_in(memory, one.samples, now)
             memory, found = self._fused(state, memory, one.samples, estimate)
             state, known = replace(state, fusion=memory), found or estimate
@@ -164,7 +180,7 @@ class SensedState:
         ``state`` has the memory of the tick before.
         """
         now = memory.now
-        before = _memory(state, now, self._joints)
+        before = self._memory(state, now)
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
@@ -391,16 +407,6 @@ def _recently(aid: Health) -> float:
     A fault that its last reading had, that is: a sensor that has fallen silent is silent.
     """
     return max(_LATELY, 1.5 * aid.apart) if aid.fault_at >= aid.came else _LATELY
-
-
-def _memory(state: FlightState, now: float, joints: int) -> FusionMemory:
-    """The filter's memory at ``now`` [s].
-
-    After a first stamp that was ahead of all others every reading is older than what it left. A
-    clock that is set back by little is waited for: of what was known nothing is lost.
-    """
-    before = state.fusion
-    return at_start(joints) if before is None or now < before.now - _SET_BACK else before
 
 
 def _is_back(before: FusionMemory, memory: FusionMemory, now: float) -> bool:

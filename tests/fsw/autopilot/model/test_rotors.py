@@ -9,17 +9,19 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY, airframe_of
 from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import (
     estimate_mass,
     lag_rotor,
     rotor_decay,
+    rotor_names,
 )
 from fsw.autopilot.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
 from tests.fsw.records import measured_motion
+from vehicles.vehicle_file import load_vehicle
 
 MOMENT = 1e-3  # s
 
@@ -145,3 +147,12 @@ def test_the_scales_stay_near_what_is_believed() -> None:
     for _ in range(5000):
         mass = estimate_mass(AIRFRAME, mass, (10.0,) * 4, 100.0, 0.002)
     assert mass == pytest.approx(0.7 * AIRFRAME.mass)
+
+
+def test_a_rotor_is_named_by_its_side_where_that_tells_it_from_the_others() -> None:
+    assert rotor_names(AIRFRAME) == [
+        "rotor 1 (rear)", "rotor 2 (left)", "rotor 3 (front)", "rotor 4 (right)"
+    ]  # fmt: skip
+    assert rotor_names(airframe_of(load_vehicle("x500-2r")))[0] == "rotor 1 (front right)"
+    eight = rotor_names(airframe_of(load_vehicle("octo-4r")))
+    assert eight == [f"rotor {k}" for k in range(1, 9)], "two are on each side"
