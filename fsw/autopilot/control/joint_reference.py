@@ -9,7 +9,8 @@ in the arm's coordinates (``model/arm_coordinates.py``), of the paper's arm :mat
   is therefore in reach in the next tick as well, for each coordinate whatever the others do.
 - The acceleration is cut coordinate by coordinate. The rate of the paper's second joint is the
   difference of those of its coordinates, and cutting both changes to the same size leaves it
-  between the last rate and the wanted one, both of which are allowed.
+  between the last rate and the wanted one, both of which are allowed. Where other coordinates would
+  not leave it there, all changes are cut by one factor.
 - Rates of joints that are too much, and rates towards a limit beside the coordinates, are cut for
   all joints by one factor.
 
@@ -51,6 +52,7 @@ APPROACH = 0.08
 # s. What is wanted may jump, with every correction of an estimate. The reference makes up for it in
 # this time, a quarter of that of the joint loop; what moves on steadily it follows without lag.
 CATCH_UP = 0.01
+_OTHERS = 0.25  # of the acceleration is counted on to brake before a limit beside the coordinates
 _SHARE_OF_RATE = 0.7  # of ``joint_rate_max``, that a reference may have
 
 
@@ -78,12 +80,20 @@ def refer(
     # All by the same factor: none then approaches its limit faster than before.
     share = _share_of_rates(k, a, airframe, arm, limits, dt)
     to_coordinates(arm, k.reference_rate, a.step)
+    longest = 0.0
     for i in range(n):
-        change = share * a.rate[i] - a.step[i]
-        a.rate[i] = a.step[i] + clamp_magnitude(change, most * dt)
-    to_joints(arm, a.rate, k.reference_rate)
+        a.goal[i] = share * a.rate[i] - a.step[i]
+        a.rate[i] = a.step[i] + clamp_magnitude(a.goal[i], most * dt)
+        longest = max(longest, abs(a.goal[i]))
+    to_joints(arm, a.rate, a.qd)
+    if _share_of_rates(k, a, airframe, arm, limits, dt) < 1.0 and longest > most * dt:
+        # All changes by one factor: what lies between two sets of rates is allowed if both are.
+        for i in range(n):
+            a.rate[i] = a.step[i] + most * dt / longest * a.goal[i]
+        to_joints(arm, a.rate, a.qd)
     for i in range(n):
-        k.reference[i] += k.reference_rate[i] * dt
+        k.reference_rate[i] = a.qd[i]
+        k.reference[i] += a.qd[i] * dt
 
 
 @compilable
@@ -123,7 +133,8 @@ def _share_of_rates(
     for i in range(int(arm.others)):
         angle, rate = along_other(arm, i, k.reference), along_other(arm, i, a.qd)
         room = arm.other_high[i] - angle if rate > 0.0 else angle - arm.other_low[i]
-        most = max(braking_rate(room - limits.margin, limits.acceleration, APPROACH, dt), 0.0)
+        slow = _OTHERS * limits.acceleration
+        most = max(braking_rate(room - limits.margin, slow, APPROACH, dt), 0.0)
         if abs(rate) > most:
             share = min(share, most / abs(rate))
     return share
