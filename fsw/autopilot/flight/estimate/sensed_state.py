@@ -41,17 +41,12 @@ from fsw.autopilot.signals import (
     StateEstimate,
     StatusText,
     TickInputs,
-    Vec2,
 )
 from fsw.frozen import replace
 
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
 _EVERY_TICK = (_IMU, Sensor.ENCODERS)
-# rad/s^2 of each joint that torques should have made of it and did not. In flight 15 and 35 at
-# most while readings repeat; 50 and 70 within 10 ms of stuck encoders.
-_HELD = (35.0, 70.0)
-_ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
 _NOISY = 4.0  # times the stated variance
@@ -306,34 +301,14 @@ def _without_stuck(
     before = watch = memory.encoders
     for one in samples:
         if type(one) is JointSample:
-            watch = _watched(watch, memory, one.angles, state)
+            undone = tuple(state.cascade.watch.undone[: len(one.angles)].tolist())
+            judged = state.vehicle.flies and not state.damage.joint
+            watch = watch.after(one.angles, undone, judged=judged)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, law, one)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
     return memory, watch, samples
-
-
-def _watched(
-    watch: EncoderWatch, memory: FusionMemory, angles: Vec2, state: FlightState
-) -> EncoderWatch:
-    """Encoders are stuck when they say the same while torques should have moved the joints.
-
-    What of the acceleration does not show, the filter takes for a disturbance. Friction holds a
-    joint as well, but not one that is asked to move on. Of one encoder alone nothing tells whether
-    it or its joint is stuck: that is left to the watch over the joints.
-    """
-    asked = state.cascade.joint_reference
-    if angles != watch.angles or not state.vehicle.flies:
-        return EncoderWatch(angles, asked)
-    stuck = watch.stuck
-    watch = EncoderWatch(angles, watch.asked, watch.repeats + 1, stuck)
-    if watch.repeating and not stuck:
-        first, second = memory.numbers["joints"][0][:, 2].tolist()
-        held = abs(first) > _HELD[0] or abs(second) > _HELD[1]
-        moved = max(abs(asked[0] - watch.asked[0]), abs(asked[1] - watch.asked[1]))
-        return watch._replace(stuck=held and moved > _ASKED)
-    return watch
 
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:
