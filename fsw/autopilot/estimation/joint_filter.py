@@ -128,7 +128,8 @@ def read(x: Any, law: Any, now: float, angles: Vec2, age: float) -> int:
 @compilable
 def _furthest(x: Any, joint: int, seconds: float) -> float:
     """By how much a ``joint`` can have moved in some ``seconds`` [s] since it was read [rad]."""
-    return _NEAR + (_FASTEST + min(abs(x.encoder_rate[joint]), _SWINGS)) * seconds
+    rate = min(abs(float(x.encoder_rate[joint])), _SWINGS)
+    return _NEAR + (_FASTEST + rate) * seconds
 
 
 @compilable
