@@ -142,6 +142,16 @@ def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> 
     assert seen.least_m > (-0.05 if suite == "rtk" else 0.0)
 
 
+@pytest.mark.requirement("REQ-ACT-2", "REQ-ACT-4")
+def test_an_arm_without_torque_that_swings_as_it_takes_off_is_believed_and_named() -> None:
+    """Its encoders were rejected, nobody was named, and it swung the vehicle into the wall."""
+    fault = Fault("joint", "off", instance=1.0)
+    seen = fly("takeoff", (fault,), "mocap", seed=7)
+    assert first_of(seen, "joint failed: joint 1") <= 1.0
+    assert not seen.contact
+    assert not [said for said in seen.texts if "joint encoders jump" in said.text]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["garbage", "stuck", "delayed"])
 def test_a_rotor_that_does_not_obey_is_flown_with_beside_walls(kind: str) -> None:

@@ -195,7 +195,7 @@ def test_one_encoder_that_is_stuck_beside_walls_is_told_and_touches_nothing(join
     [
         (lies(LONG, BESIDE, p_WB=NOTHING), ("no position measurement", "pose", "for 0.25 s")),
         (lies(LONG, BESIDE, gyro_B=NOTHING), ("sensor lost: IMU implausible", "for 0.05")),
-        (lies(LONG, BESIDE, q_arm=(NAN, NAN)), ("sensor lost: joint encoders say",)),
+        (lies(LONG, BESIDE, q_arm=(NAN, NAN)), ("sensor lost: joint encoders implausible",)),
     ],
     ids=["no pose", "no IMU", "no encoders"],
 )

@@ -1,4 +1,4 @@
-"""Landings with an accelerometer that is wrong: the rotors never stop in the air."""
+"""Rotors never stop in the air, and they do on the ground, whatever the vehicle believes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import pytest
 
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.measurements import ImuSample, Sample, Vec3
-from fsw.autopilot.signals import Mode
-from sitl.scenario import Scenario
+from fsw.autopilot.signals import Mode, SensorFrame
+from sitl.scenario import Pilot, Scenario
 from sitl.scenario_file import load_scenario
-from tests.closed_loop.harness import ARM, LAND, Flight, command, hover
+from sitl.simulation import START_US
+from tests.closed_loop.harness import ARM, LAND, SET_MODE, Flight, command, hover
 
 ALMOST = 0.02  # m, of the lowest foot above the ground
 LEGS = 0.32  # m, below the base
@@ -105,3 +106,29 @@ def test_a_landing_ends_within_a_second_of_the_ground(suite: str, mass: float) -
     assert flight.sim.time_s - touched_s < 1.0
     assert flight.sim.truth().q_WB[0] > 0.999, "upright"
     assert not any("no plan" in text for text in flight.texts)
+
+
+@pytest.mark.requirement("REQ-MODE-13")
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.TRAJECTORY])
+def test_a_vehicle_that_sinks_to_the_ground_and_believes_to_fly_stops_its_rotors(
+    mode: Mode,
+) -> None:
+    """Its height runs away; on the ground it would press on, and turn over as gyros drift."""
+    flight = Flight(replace(hover(), pilot=Pilot("trajectory")), spoil=rising)
+    flight.step(command(ARM, 1.0))
+    if mode is Mode.TRAJECTORY:
+        flight.step(command(SET_MODE, 1.0, 4.0, 11.0))
+    assert flight.mode is mode
+    flight.run(3.0)
+    assert lowest_foot(flight) > 0.2
+    flight.run(7.0)
+    assert flight.mode is Mode.DISARMED
+    assert lowest_foot(flight) < ALMOST
+    assert [text for text in flight.texts if "ground contact: rotors carry less" in text]
+    assert flight.texts[-1] == "land to disarmed: touched down"
+
+
+def rising(frame: SensorFrame) -> SensorFrame:
+    """The height that it is told is that of a climb at 0.3 m/s."""
+    x, y, z = frame.p_WB
+    return replace(frame, p_WB=(x, y, z - 0.3e-6 * (frame.t_us - START_US)))

@@ -107,11 +107,13 @@ FILTER: Final = np.dtype(
         ("encoder_calm", np.int64),
         ("encoder_doubted", np.int64),
         ("encoder_zero", float, (JOINTS,)),  # rad, by which readings have leapt so far
+        ("encoder_rate", float, (JOINTS,)),  # rad/s, by the last reading that did not leap
         # Of what is doubted: how far readings have leapt [rad], and in which time [s].
         ("encoder_leap", float, (JOINTS,)),
         ("encoder_leapt", float),
         ("encoder_scale", float),  # by how much their variance is larger than stated
         ("encoder_surprise", float, (JOINTS,)),  # rad, of the last one that was believed
+        ("encoder_taken", float, (JOINTS,)),  # rad, as much of it as was taken in
         # What is known of the biases while the readings are of no use.
         ("kept_bias", float, (6,)),
         ("kept_variance", float, (6,)),

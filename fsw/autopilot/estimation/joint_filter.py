@@ -11,7 +11,8 @@ the same covariance, because they are read together.
 A reading tells of the past. The state stays at the time of the newest one, and a ring keeps what
 torques have made of the joints since; the present follows from both. So readings may be late, or
 few. One that is far from what is expected is not believed (``imu.doubt``). One that has leapt, as
-no joint can, and then follows the joint again has another zero.
+no joint can, and then follows the joint again has another zero. A joint whose drive is dead gets to
+tens of radians a second, step by step, until an end stop throws it back.
 """
 
 from __future__ import annotations
@@ -40,8 +41,10 @@ _MAX_SIGMA: Final = 0.03  # rad; of a wider one garbage would pass
 # one step of an encoder does not make it.
 _SCALE_FROM: Final = 4.0
 _SCALE_LIMIT: Final = 1e4  # of the variance
-# By how much a joint moves from one reading to the next, with the noise of both.
+# By how much a joint moves from one reading to the next, with the noise of both, beside what it did
+# before: one without torque gains up to 6 rad/s in 2 ms.
 _FASTEST: Final = 10.0  # rad/s
+_SWINGS: Final = 50.0  # rad/s; 47 was the most that a joint without torque swung at
 _NEAR: Final = 0.02  # rad
 _NONE: Final = SensorFault.NONE.value
 _REPEATED: Final = SensorFault.REPEATED.value
@@ -122,17 +125,28 @@ def read(x: Any, law: Any, now: float, angles: Floats, age: float) -> int:
 @compilable
 def _note_reading(x: Any, angles: Floats, apart: float) -> None:
     """Whether ``angles`` have leapt since the last reading, ``apart`` [s] before."""
-    longest = 0.0
+    steady = True
     for i in range(x.joint_count):
-        longest = max(longest, abs(angles[i] - x.encoders[i]))
-    if longest <= _NEAR + _FASTEST * apart:
+        if not abs(angles[i] - x.encoders[i]) <= _furthest(x, i, apart):
+            steady = False
+    if steady:
         x.encoder_steady += 1
     else:
         x.encoder_steady, x.encoder_leapt = 0, x.encoder_leapt + apart
-        for i in range(x.joint_count):
-            x.encoder_leap[i] += angles[i] - x.encoders[i]
     for i in range(x.joint_count):
+        step = angles[i] - x.encoders[i]
+        if steady:
+            x.encoder_rate[i] = step / apart
+        else:
+            x.encoder_leap[i] += step
         x.encoders[i] = angles[i]
+
+
+@compilable
+def _furthest(x: Any, joint: int, seconds: float) -> float:
+    """By how much a ``joint`` can have moved in some ``seconds`` [s] since it was read [rad]."""
+    rate = min(abs(float(x.encoder_rate[joint])), _SWINGS)
+    return _NEAR + (_FASTEST + rate) * seconds
 
 
 @compilable
@@ -158,7 +172,7 @@ def _move_zero(x: Any) -> None:
     What garbage has leapt adds up to how the joint has moved meanwhile.
     """
     for i in range(x.joint_count):
-        if abs(x.encoder_leap[i]) > _NEAR + _FASTEST * x.encoder_leapt:
+        if abs(x.encoder_leap[i]) > _furthest(x, i, x.encoder_leapt):
             x.encoder_zero[i] += x.encoder_leap[i]
 
 
@@ -250,7 +264,10 @@ def _correct(x: Any, law: Any, angles: Floats) -> None:
         surprise = angles[i] - x.joints[i, 0]
         more = surprise - x.encoder_surprise[i]
         squared, x.encoder_surprise[i] = max(squared, more * more / total), surprise
-        surprise = clamp(surprise, -most, most)
+        # What is much as it was in the last reading, as noise is not, is motion, and taken in.
+        limit = most + (abs(x.encoder_taken[i]) if abs(more) <= most else 0.0)
+        surprise = clamp(surprise, -limit, limit)
+        x.encoder_taken[i] = surprise
         x.joints[i, 0] += g0 * surprise
         x.joints[i, 1] += g1 * surprise
         x.joints[i, 2] += g2 * surprise

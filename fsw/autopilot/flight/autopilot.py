@@ -27,7 +27,7 @@ from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import moved_along
 from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
-from fsw.autopilot.flight.land_detector import with_range
+from fsw.autopilot.flight.land_detector import is_light, with_range
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
 from fsw.autopilot.flight.plan_exchange import (
@@ -355,6 +355,10 @@ class Autopilot:
         tilted = safety.rolled_us >= 0 or safety.pitched_us >= 0
         if tilted or not estimate.R_WB[8] > watch.upright:
             safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
+        closed = state.vehicle.flies and state.vehicle.unloaded is None
+        light = closed and is_light(self.config, state)
+        if light or safety.light_us >= 0:
+            safety = watch.carried(safety, estimate.t_us, light=light)
         if self._jumped(state, estimate.t_us):
             safety = watch.jumped(safety, estimate.t_us, estimate.t_us - state.t_us)
         return state if safety is state.safety else replace(state, safety=safety)

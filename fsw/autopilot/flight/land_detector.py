@@ -11,6 +11,9 @@ Where rotors' torques stand in for the gyro the ground must not carry any of the
 what the legs feel would be taken for a tilt. Then rotors stop as soon as the legs are close above
 the ground, and the vehicle falls less far than its legs stand.
 
+In every mode a vehicle whose rotors carry less than the weight for a second stands, whatever it
+believes of its height: the failsafe table lands it (``evidence.stands_on_ground``).
+
 Source: docs/concepts/failsafes.md.
 """
 
@@ -19,6 +22,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.autopilot.flight.failsafe.evidence import FALLING_US
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.state import FlightState, VehicleMemory
 from fsw.autopilot.measurements import RangeSample
@@ -34,7 +38,6 @@ _SIGMAS: Final = 3.0  # by which a height may be wrong
 _CLOSE: Final = 0.1  # m of the legs above the ground; from there it falls at 1.4 m/s
 _RANGE_AGE: Final = 0.3  # s, in which a distance is one of now
 _CONTACT_US: Final = 100_000  # of contact before loops open
-_DOUBTED_US: Final = 1_000_000  # the same where height or velocity say that there is no ground
 _SURE_US: Final = 200_000  # with open loops, in which a fall is seen
 
 
@@ -122,6 +125,11 @@ def _measured_height(
     return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
 
 
+def is_light(config: FlightConfig, state: FlightState) -> bool:
+    """Whether rotors carry so little of the weight that what flies would fall."""
+    return bool(sum(state.cascade.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY)
+
+
 def feel_ground(
     config: FlightConfig, state: FlightState, estimate: StateEstimate
 ) -> tuple[FlightState, bool]:
@@ -133,11 +141,12 @@ def feel_ground(
     if state.aiding.gyro_lost and is_close(config, state, estimate):
         return state, True
     if vehicle.unloaded is None:
-        if not sum(state.cascade.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY:
+        if not is_light(config, state):
             return in_the_air(state, estimate), False
         blind = state.aiding.unaided_us >= config.limits.aiding_loss_us
         expected = may_be_low(config, state, estimate) and (blind or sinking < _SINKS)
-        if now_us - vehicle.moved_us >= (_CONTACT_US if expected else _DOUBTED_US):
+        # Longer where height or velocity say that there is no ground.
+        if now_us - vehicle.moved_us >= (_CONTACT_US if expected else FALLING_US):
             state = replace(state, vehicle=replace(vehicle, unloaded=(now_us, sinking)))
         return state, False
     since_us, before = vehicle.unloaded

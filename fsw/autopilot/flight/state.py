@@ -183,6 +183,7 @@ class SafetyMemory:
     filter_us: int = -1  # when the safety filter changed an acceleration last
     rolled_us: int = -1  # since when the roll has been beyond its limit; -1: it is not
     pitched_us: int = -1  # the same of the pitch
+    light_us: int = -1  # since when rotors have carried too little to fly; -1: they carry enough
     jump_us: int = 0  # how far time or the sensors' clock jumped from one tick to the next, lately
     jumped_us: int = -1  # when
     counters: SafetyCounters = field(default_factory=SafetyCounters)

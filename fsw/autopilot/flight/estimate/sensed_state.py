@@ -51,12 +51,7 @@ from fsw.record import padded
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
 _EVERY_TICK = (_IMU, Sensor.ENCODERS)
-# rad/s^2 of a joint that torques should have made of it and did not; the last one moves the least.
-# In flight 15, and 35 of the last, at most while readings repeat; 50 and 70 within 10 ms of stuck
-# encoders.
-_HELD, _LAST_HELD = 35.0, 70.0
 _AGILE = 35.0  # rad/s^2, of the vehicle whose thresholds the estimator's are
-_ASKED = 0.1  # rad that joints were asked to move meanwhile; friction has held one for half of it
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
 _NOISY = 4.0  # times the stated variance
@@ -327,34 +322,14 @@ def _without_stuck(
     before = watch = memory.encoders
     for one in samples:
         if type(one) is JointSample:
-            watch = _watched(watch, memory, one.angles, state)
+            undone = tuple(state.cascade.watch.undone[: len(one.angles)].tolist())
+            judged = state.vehicle.flies and not state.damage.joint
+            watch = watch.after(one.angles, undone, judged=judged)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, law, one)
     if watch.stuck:
         samples = tuple([one for one in samples if not isinstance(one, JointSample)])
     return memory, watch, samples
-
-
-def _watched(
-    watch: EncoderWatch, memory: FusionMemory, angles: JointVector, state: FlightState
-) -> EncoderWatch:
-    """Encoders are stuck when they say the same while torques should have moved the joints.
-
-    What of the acceleration does not show, the filter takes for a disturbance. Friction holds a
-    joint as well, but not one that is asked to move on. Of one encoder alone nothing tells whether
-    it or its joint is stuck: that is left to the watch over the joints.
-    """
-    asked = state.cascade.joint_reference
-    if angles != watch.angles or not state.vehicle.flies:
-        return EncoderWatch(angles, asked)
-    stuck = watch.stuck
-    watch = EncoderWatch(angles, watch.asked, watch.repeats + 1, stuck)
-    if watch.repeating and not stuck:
-        *others, last = memory.numbers["joints"][0][: len(angles), 2].tolist()
-        held = abs(last) > _LAST_HELD or any(abs(one) > _HELD for one in others)
-        moved = max(abs(a - b) for a, b in zip(asked, watch.asked, strict=True))
-        return watch._replace(stuck=held and moved > _ASKED)
-    return watch
 
 
 def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:

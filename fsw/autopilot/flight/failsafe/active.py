@@ -26,6 +26,7 @@ _RULED_OUT: Final = frozenset(
         Condition.POSITION_LOST,
         Condition.BREACH,
         Condition.FENCE_BREACH,
+        Condition.GROUND_CONTACT,
         Condition.ROTOR_LOST,
         Condition.POSITION_LOW,
         Condition.SENSOR_LOST,
@@ -83,6 +84,7 @@ def all_is_well(state: FlightState, estimate: StateEstimate, config: FlightConfi
         and aiding.attitude_sigma <= limits.attitude_loss
         and safety.rolled_us < 0
         and safety.pitched_us < 0
+        and safety.light_us < 0
         and safety.breach_us < 0
         and safety.fence_us < 0
         and safety.off_plan_us < 0

@@ -57,6 +57,7 @@ class Condition(Enum):
     BREACH = "outside the safe set"
     FENCE_BREACH = "outside the fence"
     FAR_OUTSIDE = "too far outside to retreat"
+    GROUND_CONTACT = "ground contact"
     ROTOR_LOST = "rotor lost"
     ROTOR_FAILED = "rotor failed"
     JOINT_FAILED = "joint failed"

@@ -22,6 +22,7 @@ BLIND_TICKS: Final = 250_000 // TICK_US
 # command, is 25 of 2 ms, of which at least 12 are in the same second.
 MISSED_TICKS: Final = 10
 JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
+FALLING_US: Final = 1_000_000  # in which what rotors do not carry falls plainly, or stands
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
 _HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be believed again
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
@@ -156,6 +157,15 @@ def inertial_is_lost(context: FailsafeContext) -> bool:
         and now_us - one.since_us > (0 if one.fault is SensorFault.STALE else _HALF_LOST_US)
         for one in lost_sensors(context)
     )
+
+
+def stands_on_ground(context: FailsafeContext) -> bool:
+    """In flight, rotors have carried for a second too little to fly: the ground does the rest.
+
+    Where a descent is commanded the land detector finds it first, and loops are open by then.
+    """
+    since_us = context.state.safety.light_us
+    return since_us >= 0 and context.estimate.t_us - since_us >= FALLING_US
 
 
 def tilt_is_lost(context: FailsafeContext) -> bool:

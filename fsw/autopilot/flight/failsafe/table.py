@@ -145,6 +145,16 @@ FAILSAFES: Final = (
         parameters=("SAFE_BREACH_ACT", "COM_FAIL_ACT_T"),
     ),
     Failsafe(
+        Condition.GROUND_CONTACT,
+        evidence.stands_on_ground,
+        _always(Action.LAND),
+        Severity.CRITICAL,
+        detail=wording.carried,
+        of_vehicle=True,
+        slow=True,
+        within_us=_SLOWLY,
+    ),
+    Failsafe(
         Condition.ROTOR_LOST,
         lambda c: c.state.damage.report.lost and c.state.vehicle.flies,
         actions.on_rotor_lost,

@@ -104,6 +104,12 @@ def by_mm(length: float) -> str:
     return f" by {1e3 * length:.0f} mm"
 
 
+def carried(context: FailsafeContext) -> str:
+    """What tells that the ground carries the vehicle, and for how long it has."""
+    since_us = context.state.safety.light_us
+    return f": rotors carry less than the weight{lasting(context, since_us)}"
+
+
 def lasting(context: FailsafeContext, since_us: int) -> str:
     """Since when a condition is so."""
     return f", for {1e-6 * (context.estimate.t_us - since_us):.2f} s"

@@ -23,7 +23,6 @@ from fsw.compiled import machine_code, packed
 _HOWS: Final = {STUCK: "does not move", LIMP: "gives no torque"}
 _WEAK_AT_MOST: Final = 0.9  # of what is commanded; a weak rotor that is found gives less
 _MIN_GIVEN: Final = 0.1  # N, of a rotor that does not obey
-_UNDECIDED: Final = 0.4  # s, for which a joint that gives no torque may be encoders that are stuck
 
 
 class DamageWatch:
@@ -53,7 +52,7 @@ class DamageWatch:
         """What is known of actuators a tick, or some ``ticks``, later.
 
         Reads what was commanded in the record ``before``; writes the watch of that ``after``.
-        Where the encoders' ``angles_repeat``, a joint without torque may be one that is not seen.
+        Where the encoders' ``angles_repeat``, a joint that has failed may be one that is not seen.
         Where the angles are not known by encoders, joints are not judged.
         """
         dt, decay = self._tick, self._decay
@@ -119,11 +118,8 @@ def _of_joints(before: Damage, s: Watched, joints: int, now_us: int, angles_repe
     if kinds == known:
         return before
     failed = [k for k in range(joints) if kinds[k] != SOUND]
-    undecided = angles_repeat and LIMP in kinds and not before.joint
-    if undecided and max(s.joint_for[k] for k in failed) < _UNDECIDED:
-        return before  # a joint that hangs loose would move: encoders that are stuck show soon
     text = " and ".join([f"joint {k + 1} {_HOWS[kinds[k]]}" for k in failed])
-    if angles_repeat and LIMP in kinds:  # one that hangs loose hardly ever stands so still
+    if angles_repeat:
         text += f", or {sentence(Sensor.ENCODERS, SensorFault.STUCK)}"
     since_us = before.joint_us
     if not before.joint:

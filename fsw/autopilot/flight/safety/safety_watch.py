@@ -64,6 +64,10 @@ class SafetyWatch:
             pitched_us=_since(memory.pitched_us, estimate.t_us, active=pitched),
         )
 
+    def carried(self, memory: SafetyMemory, now_us: int, *, light: bool) -> SafetyMemory:
+        """Note since when rotors carry too little of the weight to fly."""
+        return replace(memory, light_us=_since(memory.light_us, now_us, active=light))
+
     def off_plan(
         self,
         memory: SafetyMemory,

@@ -146,6 +146,24 @@ def test_noise_of_a_tenth_of_a_second_makes_no_joint_run_away(sigma: float) -> N
     assert arm.off < 16.0
 
 
+@pytest.mark.parametrize("bounce", [0.0, 0.5])
+def test_a_joint_without_torque_that_swings_to_its_end_stop_is_followed(bounce: float) -> None:
+    """At 45 rad/s, within 15 ms, as one whose drive is dead; its zero stays where it was."""
+    spin_up, fast, stop = 0.015, 45.0, 2.0  # s, rad/s, rad
+
+    def swing(t: float) -> float:
+        rising = min(max(t, 0.0), spin_up)
+        angle = fast * (0.5 * rising**2 / spin_up + max(t - spin_up, 0.0))
+        return angle if angle < stop else stop - bounce * min(angle - stop, 0.4)
+
+    arm = Arm(spoil=lambda now, said: (said[0], said[1] + swing(now - 1.5)))
+    assert not arm.faults
+    assert tuple(arm.x.encoder_zero) == (0.0, 0.0)
+    (_, q2), _ = present_joints(arm.x, TICK * 999)
+    end = swing(TICK * 999 - 1.5) - angle(TICK * 999)
+    assert q2 == pytest.approx(end, abs=0.01)
+
+
 def test_after_garbage_the_zero_is_where_it_was() -> None:
     random = np.random.default_rng(4)
 

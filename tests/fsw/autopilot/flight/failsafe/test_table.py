@@ -168,6 +168,7 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 300_000)), Condition.TILT_LOST),
         (replace(FINE, safety=SafetyMemory(pitched_us=NOW_US - 300_000)), Condition.TILT_LOST),
         (replace(FINE, safety=OVER_THE_FENCE), Condition.FENCE_BREACH),
+        (replace(FINE, safety=SafetyMemory(light_us=NOW_US - 1_000_000)), Condition.GROUND_CONTACT),
         (replace(FINE, damage=Damage(rotor="rotor 2")), Condition.ROTOR_FAILED),
         (replace(FINE, damage=Damage(joint="joint 1")), Condition.JOINT_FAILED),
         (replace(FINE, plan=PlanMemory(awaited_missed=True)), Condition.PLAN_LATE),
@@ -206,6 +207,7 @@ def test_each_evidence_is_its_condition(evidence: Evidence, condition: Condition
     [
         replace(FINE, invalid_ticks=4),  # a lost frame or two are flown through
         replace(FINE, safety=SafetyMemory(rolled_us=NOW_US - 299_999, pitched_us=NOW_US)),
+        replace(FINE, safety=SafetyMemory(light_us=NOW_US - 999_999)),  # a fall ends before
         replace(FINE, safety=SafetyMemory(jump_us=60_000, jumped_us=NOW_US - 1_000_000)),
         replace(FINE, host=HostHealth(missed_ticks=9, clock_jump_us=499_999, datagrams=2000)),
         replace(FINE, landed=True, damage=Damage("rotor 1", joint="joint 2")),
