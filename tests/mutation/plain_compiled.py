@@ -18,6 +18,10 @@ def cache() -> KernelCache:
     return KernelCache(None, 0, "")
 
 
+def compiled_so_far() -> int:
+    return 0
+
+
 def forget_bitcode() -> None:
     pass
 
