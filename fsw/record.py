@@ -41,7 +41,10 @@ PerRotor = Annotated[Floats, ROTORS]
 
 def padded(values: tuple[float, ...], size: int) -> tuple[float, ...]:
     """``values`` (n,) and zeros behind them (size,) [any]: of one length for every vehicle."""
-    return values + (0.0,) * (size - len(values))
+    return values + _ZEROS[size - len(values)]
+
+
+_ZEROS: Final = tuple([(0.0,) * count for count in range(ANGLE_LIMITS * JOINTS + 1)])
 
 
 _NUMBER: Final = 8  # bytes, of whole numbers and of others

@@ -295,6 +295,11 @@ class Tick(Record):
         return north, east
 
     @property
+    def joint_acceleration(self) -> JointVector:
+        """What was found for the joints (j,) [rad/s^2] by ``accelerate_joints``."""
+        return _JOINTS.unpack_from(self.memory, _WORK_AT)[: self.joint_count]
+
+    @property
     def joint_reference(self) -> JointVector:
         """What the joints were asked for (j,) [rad]."""
         return _JOINTS.unpack_from(self.memory, _REFERENCE_AT)[: self.joint_count]
@@ -302,7 +307,8 @@ class Tick(Record):
     @property
     def known(self) -> StateEstimate | None:
         """The estimate; None: there has been none yet."""
-        return estimate_in(self, 0, self.joint_count) if self.has_estimate else None
+        known, _, _, joints = _HEAD.unpack_from(self.memory, _HEAD_AT)
+        return estimate_in(self, 0, joints) if known else None
 
     @known.setter
     def known(self, x: StateEstimate) -> None:
@@ -314,11 +320,12 @@ class Tick(Record):
     @property
     def nominal(self) -> PredictionState | None:
         """The plan's state; None: there is none."""
-        if not self.has_plan:
+        _, planned, _, joints = _HEAD.unpack_from(self.memory, _HEAD_AT)
+        if not planned:
             return None
         n: Any = _PLAN.unpack_from(self.memory, _PLAN_AT)
         p, v, a, j, s = n[:3], n[3:6], n[6:9], n[9:11], n[11:13]
-        q, qd = n[15 : 15 + self.joint_count], n[15 + JOINTS : 15 + JOINTS + self.joint_count]
+        q, qd = n[15 : 15 + joints], n[15 + JOINTS : 15 + JOINTS + joints]
         return PredictionState(p, v, a, j, s, n[13], n[14], q, qd)
 
     @nominal.setter
@@ -359,6 +366,7 @@ _INPUT: Final = struct.Struct(f"<{4 + JOINTS}d")
 _COMMAND: Final = struct.Struct(f"<{ROTORS + JOINTS}d")
 _COUNTED_COMMAND: Final = struct.Struct(f"<2q{ROTORS + JOINTS}d")  # rotor_count, joint_count, sent
 _JOINTS: Final = struct.Struct(f"<{JOINTS}d")
+_HEAD: Final = struct.Struct("<4q")  # has_estimate, has_plan, rotor_count, joint_count
 _ONE: Final = struct.Struct("<d")
 _TWO: Final = struct.Struct("<2d")
 
@@ -368,6 +376,8 @@ _UPRIGHT_AT: Final = Tick.place("estimate", "R_WB") + 8 * 8
 _PLAN_AT: Final = Tick.place("plan")
 _INPUT_AT: Final = Tick.place("u")
 _SENT_AT: Final = Tick.place("sent")
+_HEAD_AT: Final = Tick.place("has_estimate")
+_WORK_AT: Final = Tick.place("bodies", "work")
 _COUNTS_AT: Final = Tick.place("rotor_count")
 _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")

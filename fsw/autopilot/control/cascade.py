@@ -174,7 +174,7 @@ class Cascade:
     def expected(self, r: Tick) -> tuple[JointVector, Model]:
         """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle."""
         model = self._expected(self.packed, r.array)
-        return tuple(r.bodies.work[: r.joint_count].tolist()), model
+        return r.joint_acceleration, model
 
     def joint_acceleration(self, r: Tick) -> JointVector:
         """The joints' part of ``expected`` [rad/s^2]."""

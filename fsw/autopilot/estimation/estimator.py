@@ -55,9 +55,9 @@ def read_frame(sensors: SensorFrame, r: Tick) -> int:
 def reading_of(sensors: SensorFrame) -> Floats:
     """The numbers of a frame (READINGS,) [SI]."""
     s = sensors
-    parts = *s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *padded(s.q_arm, CAPACITY)
-    parts = *parts, *padded(s.qd_arm, CAPACITY)
-    return np.frombuffer(_FRAME.pack(*parts))
+    arm = padded(s.q_arm, CAPACITY) + padded(s.qd_arm, CAPACITY)
+    frame = _FRAME.pack(*s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *arm)
+    return np.frombuffer(frame)
 
 
 @kernel

@@ -122,7 +122,7 @@ def angle_rows(limits: AngleLimits, joints: int) -> list[AngleRow]:
     for i in range(limits.rows):
         row = limits.row[JOINTS * i : JOINTS * i + joints]
         names = [str(k) for k, share in enumerate(row, start=1) if share]
-        name = f"joint {names[0]}"
+        name = f"joint {''.join(names)}"
         if len(names) > 1:
             name = f"joints {', '.join(names[:-1])} and {names[-1]} together"
         found.append(AngleRow(name, row, limits.low[i], limits.high[i]))

@@ -25,7 +25,7 @@ from tests.fsw.records import boundless, compensated_joints
 LENGTHS = np.array((0.15, 0.15))
 LIMITS = CompensationLimits()
 BOUNDLESS = boundless(AIRFRAME)
-# Three steps end so near; the damping takes so much of a rate.
+# Three steps end so near; damping, and a pose that is a step old, take so much of a rate.
 CLOSE, SLOW = 2e-6, 3e-3  # m, rad/s
 MOST = tuple(high - JointReferenceLimits().margin for high in arm_coordinates(AIRFRAME).high[:2])
 JOINTS = JointReferenceLimits()
