@@ -90,7 +90,7 @@ def _swap_fsw() -> None:
         return self._new(odometry, arm, hil)
 
     def controls_of(self: Any, stamp_us: int, outputs: Any) -> bytes:
-        scales = self._thrust_scale, self._torque_scales
+        scales = self._thrust_scales, self._torque_scales
         t_us, flags, *used = hil_actuator_controls(stamp_us, outputs.actuators, *scales)
         *rest, mode = end_of_controls(len(used), armed=outputs.armed)
         message = sender.hil_actuator_controls_encode(t_us, [*used, *rest], mode, flags)

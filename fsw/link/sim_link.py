@@ -114,7 +114,8 @@ class SimLink:
             )
             for armed in (False, True)
         }
-        self._thrust_scale = 1.0 / airframe.rotor_thrust_max
+        rotors = airframe.rotors
+        self._thrust_scales = tuple([1.0 / most for most in airframe.rotor_thrust_full[:rotors]])
         self._torque_scales = tuple([1.0 / most for most in airframe.joint_torque_max[:joints]])
         self._steps = SensorClock(
             facts.tick_period_us, clock, self._note_what_is_odd, inbox.accept_clock_jump
@@ -354,7 +355,7 @@ class SimLink:
     def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
         values = encode_replies.hil_actuator_controls(
-            stamp_us, outputs.actuators, self._thrust_scale, self._torque_scales
+            stamp_us, outputs.actuators, self._thrust_scales, self._torque_scales
         )
         return self._controls_frames[outputs.armed](*values)
 

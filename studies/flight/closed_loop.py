@@ -161,8 +161,8 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
 
 def controls(airframe: Airframe, command: ActuatorCommand, *, armed: bool) -> Controls:
     """The shares of full thrust and torque that a ``command`` [N, N m] is."""
-    force, torques = airframe.rotor_thrust_max, airframe.joint_torque_max
-    thrust = tuple([f / force for f in command.rotor_thrust])
+    forces, torques = airframe.rotor_thrust_full, airframe.joint_torque_max
+    thrust = tuple([f / most for f, most in zip(command.rotor_thrust, forces, strict=False)])
     torque = tuple([t / most for t, most in zip(command.joint_torque, torques, strict=False)])
     return Controls(thrust, torque, armed)
 

@@ -49,7 +49,7 @@ from fsw.autopilot.model.actuator_health import (
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import ArmCoordinates, arm_coordinates
-from fsw.autopilot.model.body import Body, body_of
+from fsw.autopilot.model.body import Body, body_of, reaches
 from fsw.autopilot.model.multibody import load_on_base, move_bodies, torque_to_turn
 from fsw.autopilot.model.rotors import (
     MotionState,
@@ -149,6 +149,7 @@ class Cascade:
             filter_law(
                 clear.tuning,
                 clear.barriers,
+                reaches(clear.body, airframe.bodies)[0],
                 gains.k[3] / gains.k[2],
                 tuning.tracking.acceleration_limit,
                 clear.speed,

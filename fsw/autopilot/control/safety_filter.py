@@ -75,7 +75,7 @@ class FilterTuning:
     # m/s^2, d_r. In workspace the loops fall short of the condition by 0.2 against the assumed
     # disturbance; in walls and branches 0.4 is left. What they do by themselves is left alone.
     allowance: float = -1.0
-    near: float = 0.6  # m from the base; what is farther off is left out
+    near: float = 0.3  # m beyond the vehicle's own reach; what is farther off is left out
     vertical: float = 3.0  # m/s^2, at most
     enabled: int = 1  # 0: the loops' own acceleration is realised
 
@@ -87,6 +87,7 @@ class FilterLaw:
     tuning: FilterTuning
     kept: Vec2  # alpha [m/s^2] and k_S [1/s] of zones
     following: Vec2  # of the sphere that follows the target
+    near: float  # m from the base; zones that are farther off are left out
     lag: float  # s, tau
     level: float  # m/s^2, at most, an axis
     speed: float  # m/s, at most, along a zone's normal
@@ -95,17 +96,20 @@ class FilterLaw:
 def filter_law(
     tuning: FilterTuning,
     barriers: tuple[BarrierTuning, BarrierTuning],
+    reach: float,
     lag: float,
     level: float,
     speed: float = math.inf,
 ) -> FilterLaw:
     """The law for a loop that takes ``lag`` [s] and stands ``level`` [m/s^2].
 
-    It pushes up to a ``speed`` [m/s].
+    No place of the vehicle is farther from the base than ``reach`` [m]. The law pushes up to a
+    ``speed`` [m/s].
     """
     kept, following = barriers
     return FilterLaw(
         tuning=tuning,
+        near=reach + tuning.near,
         kept=(kept.alpha, kept.slope),
         following=(following.alpha, following.slope),
         lag=lag,
@@ -152,7 +156,7 @@ def filtered(
         for k in range(zones.shape[0]):
             x, y, z = subtract(estimate.p_WB, (shift[k, 0], shift[k, 1], shift[k, 2]))
             for which in range(int(zones[k, PLANES])):
-                if surface_at(zones, k, which, x, y, z).distance <= law.tuning.near:
+                if surface_at(zones, k, which, x, y, z).distance <= law.near:
                     wanted, lacked, least = _kept_off(
                         law, probes, zones, k, which, shift, estimate.t_us, frame, v, a, wanted
                     )

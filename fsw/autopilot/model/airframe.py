@@ -56,6 +56,7 @@ class Airframe:
     rotor_arm: float  # m, L
     yaw_per_thrust: float  # m, b
     rotor_thrust_max: float  # N, of the weakest
+    rotor_thrust_full: Several  # (ROTORS,) N, of each at full command
     rotor_lag: float  # s, of the slowest
     joint_torque_max: Several  # (JOINTS,) N m
     joint_rate_max: Several  # (JOINTS,) rad/s
@@ -88,6 +89,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         rotor_arm=math.hypot(*first.position),
         yaw_per_thrust=first.torque_per_thrust,
         rotor_thrust_max=min(rotor.thrust_max for rotor in rotors),
+        rotor_thrust_full=_padded([rotor.thrust_max for rotor in rotors], ROTORS),
         rotor_lag=max(rotor.lag for rotor in rotors),
         joint_torque_max=_padded([joint.torque_max for joint in vehicle.joints], JOINTS),
         joint_rate_max=_padded([joint.rate_max for joint in vehicle.joints], JOINTS),

@@ -100,8 +100,8 @@ def put_matrix(frame: Array, at: int, b1: Array, b3: Array) -> None:
 def put_rate(frame: Array, at: int, b1: Array, b3: Array, d1: Array, d3: Array) -> None:
     """The change of ``put_matrix`` by the product rule, for any change of its axes.
 
-    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on: of ``b1`` (3,) [1, NED] and
-    ``b3`` (3,) [1, NED] by ``d1`` (3,) [any, NED] and ``d3`` (3,) [any, NED].
+        Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on: ``b1`` (3,) [1, NED] changes by
+    ``d1`` (3,) [any, NED] and ``b3`` (3,) [1, NED] by ``d3`` (3,) [any, NED].
     """
     a, b = cross(d3, b1), cross(b3, d1)
     for row in range(3):

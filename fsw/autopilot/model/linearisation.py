@@ -204,11 +204,11 @@ def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
 
 @kernel
 def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, turned: Array, slopes: Array) -> None:
-    """Derivatives of ``n . p`` and ``n . v`` in the state, into ``slopes`` (2, states) [SI].
+    """Derivatives of ``n . p`` and ``n . v`` of a place in the state.
 
-    ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m, part] are as in ``in_body``. The direction
-    ``n`` [1, NED] is any, ``turned`` (10, 3) [SI] that of ``fill_turned`` for it. Snap moves
-    nothing at once, so its entries stay as they are: 0.
+    Into ``slopes`` (2, states) [SI]. ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m, part]
+    are as in ``in_body``. The direction ``n`` [1, NED] is any, ``turned`` (10, 3) [SI] that of
+    ``fill_turned`` for it. Snap moves nothing at once, so its entries stay as they are: 0.
     """
     place, along = in_body(frame, on, local)
     for k in range(3):

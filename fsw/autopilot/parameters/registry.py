@@ -447,7 +447,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("SAFE_FLT_DIST", "safety_filter.allowance", "m/s^2", -5.0, 5.0,
          "Safety filter: acceleration left for a disturbance that is not measured"),
         ("SAFE_FLT_NEAR", "safety_filter.near", "m", 0.1, 5.0,
-         "Safety filter: distance from the base beyond which a zone is left out"),
+         "Safety filter: distance from the vehicle beyond which a zone is left out"),
         ("SAFE_FLT_AZ_MAX", "safety_filter.vertical", "m/s^2", 0.5, 6.0,
          "Safety filter: maximum vertical acceleration"),
         ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.autopilot.signals import ActuatorCommand, CommandAck, JointVector
+from fsw.autopilot.signals import ActuatorCommand, CommandAck, JointVector, RotorVector
 from fsw.link.wire.outgoing import WireValues
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
@@ -19,19 +19,20 @@ def command_ack(ack: CommandAck) -> WireValues:
 
 
 def hil_actuator_controls(
-    t_us: int, actuators: ActuatorCommand, thrust_scale: float, torque_scales: JointVector
+    t_us: int, actuators: ActuatorCommand, thrust_scales: RotorVector, torque_scales: JointVector
 ) -> tuple[float, ...]:
     """HIL_ACTUATOR_CONTROLS up to the last control in use, the answer to a HIL_SENSOR of ``t_us``.
 
-    Rotors come first, then joints. ``thrust_scale`` [1/N] and ``torque_scales`` (j,) [1/(N m)] are
-    the inverses of the largest values.
+    Rotors come first, then joints. ``thrust_scales`` (r,) [1/N] and ``torque_scales`` (j,)
+    [1/(N m)] are the inverses of the largest values.
     """
-    pairs = zip(actuators.joint_torque, torque_scales, strict=True)
+    rotors = zip(actuators.rotor_thrust, thrust_scales, strict=True)
+    joints = zip(actuators.joint_torque, torque_scales, strict=True)
     return (
         t_us,
         _LOCKSTEP,
-        *[f * thrust_scale for f in actuators.rotor_thrust],
-        *[torque * scale for torque, scale in pairs],
+        *[thrust * scale for thrust, scale in rotors],
+        *[torque * scale for torque, scale in joints],
     )
 
 

@@ -358,7 +358,9 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
 
 
 def test_actuators_are_fractions_of_their_limits() -> None:
-    values = encode_replies.hil_actuator_controls(3_004_000, ACTUATORS, 1 / 16.0, (1 / 2.0,) * 2)
+    values = encode_replies.hil_actuator_controls(
+        3_004_000, ACTUATORS, (1 / 16.0,) * 4, (1 / 2.0,) * 2
+    )
     end = encode_replies.end_of_controls(6, armed=True)
     message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values, *end))
     assert message.time_usec == 3_004_000
