@@ -55,6 +55,7 @@ from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
 from fsw.autopilot.model.body import body_of
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.model.nominal import rest_input
 from fsw.autopilot.mpc.reference import merge
 from fsw.autopilot.parameters.consistency import Finding
@@ -168,6 +169,7 @@ class Autopilot:
         r = with_nominal(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
         self._plans.model.move(r, 1)
         self._cascade.step(r)
+        end_effector(self.config.airframe.bodies, estimate)
         self._safe_sets.warm_up(estimate)
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
