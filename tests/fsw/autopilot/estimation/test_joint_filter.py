@@ -159,7 +159,7 @@ def test_a_joint_without_torque_that_swings_to_its_end_stop_is_followed(bounce: 
     arm = Arm(spoil=lambda now, said: (said[0], said[1] + swing(now - 1.5)))
     assert not arm.faults
     assert not any(arm.x.encoder_zero)
-    (_, q2), _ = present_joints(arm.x, TICK * 999)
+    (_, q2), _ = present(arm.x, TICK * 999)
     end = swing(TICK * 999 - 1.5) - angle(TICK * 999)
     assert q2 == pytest.approx(end, abs=0.01)
 
