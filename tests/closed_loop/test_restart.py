@@ -17,6 +17,7 @@ from fsw.autopilot.flight.state import (
     PlanMemory,
     SafetyMemory,
     VehicleMemory,
+    first_state,
 )
 from fsw.autopilot.measurements import PoseSample, Sample
 from fsw.autopilot.shapes.half_space import wall
@@ -285,7 +286,7 @@ def test_only_what_the_ground_has_and_what_is_counted_stays() -> None:
         safety=SafetyMemory(breach_us=5, counters=SafetyCounters(breaches=1)),
         offboard=OffboardMemory(motion_us=7, accepted=3, refused=2),
     )
-    after, fresh = restarted(counted), FlightState()
+    after, fresh = restarted(counted), first_state(flight.config.airframe)
     kept = {"mission", "tuning", "battery", "host", "constraints", "aiding"}
     for name in kept:
         assert getattr(after, name) is getattr(counted, name)

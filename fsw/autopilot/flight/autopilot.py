@@ -55,6 +55,7 @@ from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
 from fsw.autopilot.model.body import body_of
+from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.model.nominal import rest_input
 from fsw.autopilot.mpc.reference import merge
 from fsw.autopilot.parameters.consistency import Finding
@@ -172,6 +173,7 @@ class Autopilot:
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
+        end_effector(self.config.airframe.bodies, estimate)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
