@@ -286,7 +286,8 @@ def test_only_what_the_ground_has_and_what_is_counted_stays() -> None:
         safety=SafetyMemory(breach_us=5, counters=SafetyCounters(breaches=1)),
         offboard=OffboardMemory(motion_us=7, accepted=3, refused=2),
     )
-    after, fresh = restarted(counted), first_state(flight.config.airframe)
+    airframe = flight.config.airframe
+    after, fresh = restarted(counted, airframe), first_state(airframe)
     kept = {"mission", "tuning", "battery", "host", "constraints", "aiding"}
     for name in kept:
         assert getattr(after, name) is getattr(counted, name)

@@ -201,7 +201,7 @@ class Autopilot:
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         if state.vehicle.restarts:
-            state = restarted(state)
+            state = restarted(state, self.config.airframe)
         came = inputs
         if state.index >= 0 and inputs.samples:
             state, inputs = self._sensed.take_missed(state, inputs)
