@@ -17,6 +17,7 @@ from fsw.autopilot.flight.state import (
     PlanMemory,
     SafetyMemory,
     VehicleMemory,
+    first_state,
 )
 from fsw.autopilot.measurements import PoseSample, Sample
 from fsw.autopilot.shapes.half_space import wall
@@ -29,7 +30,6 @@ from fsw.autopilot.signals import (
     SafeSetAnnouncement,
     SafetyCounters,
 )
-from fsw.autopilot.tick_record import new_tick
 from sitl.scenario import Hold
 from sitl.scenario_file import parse_scenario
 from tests.closed_loop.harness import (
@@ -286,8 +286,8 @@ def test_only_what_the_ground_has_and_what_is_counted_stays() -> None:
         safety=SafetyMemory(breach_us=5, counters=SafetyCounters(breaches=1)),
         offboard=OffboardMemory(motion_us=7, accepted=3, refused=2),
     )
-    weighed = new_tick(counted.cascade.mass, 4, 2)
-    after, fresh = restarted(counted), FlightState(cascade=weighed)
+    airframe = flight.config.airframe
+    after, fresh = restarted(counted, airframe), first_state(airframe)
     kept = {"mission", "tuning", "battery", "host", "constraints", "aiding"}
     for name in kept:
         assert getattr(after, name) is getattr(counted, name)

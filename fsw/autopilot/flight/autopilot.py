@@ -174,6 +174,7 @@ class Autopilot:
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
+        end_effector(self.config.airframe.bodies, estimate)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
@@ -201,7 +202,7 @@ class Autopilot:
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         if state.vehicle.restarts:
-            state = restarted(state)
+            state = restarted(state, self.config.airframe)
         came = inputs
         if state.index >= 0 and inputs.samples:
             state, inputs = self._sensed.take_missed(state, inputs)

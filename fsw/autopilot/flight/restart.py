@@ -10,6 +10,7 @@ setpoints do not.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
@@ -19,9 +20,10 @@ from fsw.autopilot.flight.state import (
     PlanMemory,
     SafetyMemory,
     VehicleMemory,
+    first_state,
 )
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import StateEstimate
-from fsw.autopilot.tick_record import new_tick
 
 RESTARTED: Final = "flight software restarted"
 _REST_US: Final = 1_000_000  # without thrust, for which what falls is fast or has come down
@@ -44,12 +46,11 @@ def rests(state: FlightState, estimate: StateEstimate, unaided_us: int) -> bool:
     return slow and for_us >= _REST_US
 
 
-def restarted(state: FlightState) -> FlightState:
+def restarted(state: FlightState, airframe: Airframe) -> FlightState:
     """The state from which the next tick begins anew."""
     vehicle, plan, offboard = state.vehicle, state.plan, state.offboard
-    r = state.cascade
-    return FlightState(
-        cascade=new_tick(r.mass, r.rotor_count, r.joint_count),
+    return replace(
+        first_state(airframe),
         # What was answered stays as well: the same command, sent again, is no second restart.
         vehicle=VehicleMemory(gcs_heard_us=vehicle.gcs_heard_us, answered=vehicle.answered),
         mission=state.mission,
