@@ -225,9 +225,8 @@ def check_verb(words: list[str]) -> None:
     assert verb in VERBS
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.suppress(SystemExit):
-        main(
-            [*words[: 2 if verb in ("px4", "vehicle") else 1], "--help"]
-        )  # whose actions have options
+        # The actions of some verbs have options of their own.
+        main([*words[: 2 if verb in ("px4", "vehicle") else 1], "--help"])
     options = {word.partition("=")[0] for word in words if word.startswith("--")}
     known = printed.getvalue()
     unknown = [option for option in options if option not in known]
