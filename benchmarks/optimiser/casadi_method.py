@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.optimiser.instances import Instance
-from benchmarks.optimiser.ocp import INPUTS, STATES
+from benchmarks.optimiser.instances import INPUTS, STATES, Instance
 from benchmarks.optimiser.solved import Solved, timed
 from fsw.autopilot.barriers.cbf_row import cbf_lower_bound
 from fsw.autopilot.barriers.safe_approach import safe_approach_speed
@@ -24,7 +23,14 @@ from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.kinematics import position, velocity
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import YAW, Array, P, V, condense, to_vector
+from fsw.autopilot.model.prediction import (
+    YAW,
+    Array,
+    P,
+    V,
+    condense,
+    to_vector,
+)
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.shapes.frame import outward_axis
 from fsw.autopilot.signals import PlanRequest, SafeSet

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fsw.autopilot.model.prediction import inputs_of, states_of
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import PlanRequest
 from studies.flight.closed_loop import simulate
 from studies.paper.cases import CASES, Case, configuration, scenario, with_horizon
 
+STATES, INPUTS = states_of(2), inputs_of(2)  # of paper, whose all these requests are
 SEED = 100  # never used for tuning
 # 0.1 s ahead the lagging vehicle can hardly be moved: with n = 1 it hits the first wall. Shorter
 # horizons are asked about the flight of this one.

@@ -10,8 +10,7 @@ import numpy as np
 
 from benchmarks.optimiser.casadi_method import SOLVERS, CasadiMethod, given, installed
 from benchmarks.optimiser.converged import target_points
-from benchmarks.optimiser.instances import Instance
-from benchmarks.optimiser.ocp import INPUTS
+from benchmarks.optimiser.instances import INPUTS, Instance
 from benchmarks.optimiser.slopes import slopes_of
 from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
 from fsw.autopilot.model.airframe import AIRFRAME

@@ -15,6 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from benchmarks.optimiser.instances import INPUTS, STATES
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.model.kinematics import body_axes
@@ -26,16 +27,12 @@ from fsw.autopilot.model.prediction import (
     P,
     V,
     discretise,
-    inputs_of,
-    states_of,
 )
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.signals import TARGET_SPHERE, SafeSet, Zone
 
 # A node's parameters: target position, velocity, yaw; directions as rows; required h of each row.
 TARGET, DIRECTIONS = 7, 9
-# Written for the arm of paper alone, sharing no formula with the planner.
-STATES, INPUTS = states_of(2), inputs_of(2)
 
 
 @dataclass

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.compiled import compiled_so_far
 from sitl.scenario import Scenario, vehicle_of
@@ -38,6 +40,9 @@ def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | Non
 
 
 def test_a_second_vehicle_compiles_nothing() -> None:
+    config = flight_config()
+    Planner(config.planner, config.airframe, lambda: 0.0).warm_up()  # as before any flight
+    Autopilot(config).warm_up()
     flown(scenario("walls", "paper", 3.0, "mocap"))
     flown(scenario("walls", "paper", 3.0))
     before = compiled_so_far()
