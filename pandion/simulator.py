@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import airframe_of
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.signals import ActuatorCommand, StateEstimate, TickOutputs
 from pandion.scenarios import AnyScenario, load_scenario
 from sitl.plant.integrator import held, step
 from sitl.plant.parameters import plant
+from sitl.plant.places import rows_of
 from sitl.result import TruthResult
-from sitl.scenario import Scenario
+from sitl.scenario import Scenario, vehicle_of
 from sitl.simulation import Simulation, Truth
 from sitl.start import effects, first_state, flown_vehicle
 from studies.flight.closed_loop import ScenarioFlight, controls, readings
@@ -27,11 +28,11 @@ from studies.flight.kernels import compile_first
 from studies.flight.mission import target
 from studies.flight.own_parts import Observation, OwnParts, PushLaw, numbers, observed
 from studies.flight.result import FlightResult
+from vehicles.description import JOINTS_MAX, ROTORS_MAX
 
 Array = NDArray[np.float64]
 Floats = Array | Sequence[float]
 _NAN3 = (math.nan,) * 3
-_UNKNOWN = StateEstimate(0, _NAN3, _NAN3, (math.nan,) * 9, _NAN3, math.nan, _NAN3[:2], _NAN3[:2])
 
 
 class Simulator:
@@ -48,6 +49,7 @@ class Simulator:
         *,
         sensors: str | None = None,
         duration_s: float | None = None,
+        vehicle: str | None = None,
         disturbance: PushLaw | None = None,
     ) -> None:
         """Load the scenario; :meth:`reset` begins a flight.
@@ -57,12 +59,16 @@ class Simulator:
             seed: Root of all randomness of the flight, 0 or more.
             sensors: As of ``pandion.load_scenario``.
             duration_s: The same.
+            vehicle: Name or file of the one that flies; None: the scenario's.
             disturbance: Acceleration (3,) [m/s², NED] of the base at a time [s], on top.
 
         Raises:
             ScenarioError: The scenario cannot be flown.
         """
-        self.scenario: Scenario = load_scenario(scenario, sensors=sensors, duration_s=duration_s)
+        self.scenario: Scenario = load_scenario(
+            scenario, sensors=sensors, duration_s=duration_s, vehicle=vehicle
+        )
+        self._airframe = airframe_of(vehicle_of(self.scenario))
         self.seed = seed
         self._parts = OwnParts(disturbance=disturbance)
         self._pilot: Autopilot | None = None
@@ -81,15 +87,16 @@ class Simulator:
         frame, samples = readings(self.simulation)
         estimate = None if samples else estimate_state(frame)
         aim = target(self.simulation.clock, self.simulation.t_us)
-        seen = observed(estimate or _UNKNOWN, aim, AIRFRAME.bodies)
+        bodies = self._airframe.bodies
+        seen = observed(estimate or _unknown(bodies.joints), aim, bodies)
         return replace(seen, samples=samples) if samples else seen
 
     def step(self, thrust: Floats, torque: Floats, armed: bool = True) -> Observation:
         """Let rotors and joints do this for 2 ms; what is observed then.
 
         Args:
-            thrust: Of the rear, left, front and right rotor (4,) [N], 0 to 17.2 each.
-            torque: Of the two joints (2,) [N m], ±2 each.
+            thrust: Of the rotors (r,) [N], in the order of the vehicle's file.
+            torque: Of the joints (j,) [N m].
             armed: Of a vehicle that is not, rotors and joints are off.
 
         Raises:
@@ -98,10 +105,11 @@ class Simulator:
         """
         if self.over:
             raise RuntimeError(f"the flight is over: {self.end_reason}; reset() begins another")
-        f = numbers("thrust", thrust, (4,)).tolist()
-        t = numbers("torque", torque, (2,)).tolist()
+        airframe = self._airframe
+        f = numbers("thrust", thrust, (airframe.rotors,)).tolist()
+        t = numbers("torque", torque, (airframe.bodies.joints,)).tolist()
         command = ActuatorCommand(tuple(f), tuple(t))
-        self.simulation.advance(controls(AIRFRAME, command, armed=armed))
+        self.simulation.advance(controls(airframe, command, armed=armed))
         if self._pilot is not None:
             self._pilot.conclude()
         return self.observe()
@@ -128,7 +136,7 @@ class Simulator:
 
     @property
     def hover(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Thrusts (4,) [N] and torques (2,) [N m] that hold the vehicle as it starts."""
+        """Thrusts (r,) [N] and torques (j,) [N m] that hold the vehicle as it starts."""
         trim = self.simulation.trim
         return np.array(trim.thrust), np.array(trim.torque)
 
@@ -138,7 +146,7 @@ class Simulator:
         return self.simulation.result()
 
     def linear_model(self) -> tuple[Array, Array]:
-        """A (16, 16) and B (16, 6) [SI] of a step of 2 ms about the hover that a flight begins in.
+        """A (12 + 2j, 12 + 2j) and B (12 + 2j, r + j) [SI] of a step of 2 ms about the first hover.
 
         Of ``Observation.state``, and of thrusts and joint torques; rotors without their lag.
         """
@@ -146,7 +154,9 @@ class Simulator:
         model, blocks = plant(vehicle, effects(self.scenario)), held()
         plants: Any = np.array([model])
         rest, _ = first_state(vehicle, self.scenario, self.simulation.clock.target_at(0.0).p)
-        places, states = np.empty((2, 4, 3)), np.empty((2, len(rest)))
+        rotors, joints = len(vehicle.rotors), len(vehicle.joints)
+        places, states = np.empty((2, rows_of(vehicle), 3)), np.empty((2, len(rest)))
+        motors, size = slice(13, 13 + rotors), 12 + 2 * joints
         out: list[Array] = []
         hover = np.array([*trim.thrust, *trim.torque])
 
@@ -156,22 +166,28 @@ class Simulator:
             turn = Rotation.from_rotvec(x[6:9]) * Rotation.from_quat(rest[6:10], scalar_first=True)
             state[6:10] = turn.as_quat(scalar_first=True)
             state[10:13] += x[9:12]
-            state[13:17] = f = (hover + u)[:4]
-            state[17:] += x[12:]
-            torque = (*(hover + u)[4:].tolist(), *(0.0,) * 4)
+            state[motors] = f = (hover + u)[:rotors]
+            state[motors.stop :] += x[12:]
+            torque = (*(hover + u)[rotors:].tolist(), *(0.0,) * (JOINTS_MAX - joints))
             none = (0.0, 0.0, 0.0)
-            push = (*f.tolist(), *(0.0,) * 4), torque, none, none, 0.001
+            push = (*f.tolist(), *(0.0,) * (ROTORS_MAX - rotors)), torque, none, none, 0.001
             step(plants, blocks, state, *push, places, states)
             back = Rotation.from_quat(state[6:10], scalar_first=True)
-            return np.concatenate([state[:6], back.as_rotvec(), state[10:13], state[17:]])
+            arm = state[motors.stop :]
+            return np.concatenate([state[:6], back.as_rotvec(), state[10:13], arm])
 
-        for k in range(22):
-            by = np.zeros(22)
+        for k in range(size + rotors + joints):
+            by = np.zeros(size + rotors + joints)
             by[k] = 1e-5
-            more, less = moved(by[:16], by[16:]), moved(-by[:16], -by[16:])
+            more, less = moved(by[:size], by[size:]), moved(-by[:size], -by[size:])
             out.append((more - less) / 2e-5)
         both = np.array(out).T
-        return both[:, :16], both[:, 16:]
+        return both[:, :size], both[:, size:]
+
+
+def _unknown(joints: int) -> StateEstimate:
+    arm = (math.nan,) * joints
+    return StateEstimate(0, _NAN3, _NAN3, (math.nan,) * 9, _NAN3, math.nan, arm, arm)
 
 
 class Autopilot:
@@ -194,13 +210,15 @@ class Autopilot:
         if simulator.simulation.step:
             raise RuntimeError("the flight has begun: reset() the simulator first")
         compile_first(halves=("fsw",))
-        config = config or flight_config(body=simulator.scenario.body)
+        config = config or flight_config(
+            body=simulator.scenario.body, vehicle=vehicle_of(simulator.scenario)
+        )
         self._flight = ScenarioFlight(simulator.simulation, config, simulator.seed)
         self._outputs: TickOutputs | None = None
         simulator._pilot = self
 
     def __call__(self, seen: Observation | None = None) -> tuple[Any, Any, bool]:
-        """Thrusts (4,) [N], joint torques (2,) [N m] and whether the vehicle is armed."""
+        """Thrusts (r,) [N], joint torques (j,) [N m] and whether the vehicle is armed."""
         self._outputs = self._flight.respond()
         (thrust, torque), mode = self._outputs.actuators, self._outputs.mode
         return thrust, torque, mode.armed

@@ -143,7 +143,7 @@ class MotionSetpoint:
 class AttitudeSetpoint:
     """An attitude or body rates, and a thrust."""
 
-    thrust: float  # 0 to 1, of what four rotors give
+    thrust: float  # 0 to 1, of what all rotors give
     q_WB: Vec4 | None = None  # unit quaternion [w, x, y, z]; None: rates alone
     w_WB_B: Vec3 | None = None  # rad/s
 

@@ -165,7 +165,8 @@ def score(job: Job, result: FlightResult) -> Outcome:
 
 
 def _largest_deg(truth: TruthResult, angle: str) -> float | None:
-    return math.degrees(truth.limits[angle].largest) if truth.limits else None
+    use = truth.limits.get(angle)  # the paper's vehicle has it, others have others
+    return None if use is None else math.degrees(use.largest)
 
 
 @cache

@@ -170,3 +170,21 @@ def test_a_flight_that_is_over_is_not_stepped() -> None:
     simulator.step(thrust, torque)
     with pytest.raises(RuntimeError, match="has begun"):
         pandion.Autopilot(simulator)
+
+
+@pytest.mark.parametrize("vehicle", ["hexa-3r", "octo-4r"])
+def test_any_vehicle_is_stepped_by_hand_as_it_flies(vehicle: str) -> None:
+    simulator = pandion.Simulator("walls", seed=9, duration_s=BRIEF_S, vehicle=vehicle)
+    thrust, torque = simulator.hover
+    A, B = simulator.linear_model()
+    assert A.shape == (12 + 2 * len(torque),) * 2
+    assert B.shape == (len(A), len(thrust) + len(torque))
+    # z points down. An arm whose joints give way is not lifted whole.
+    bodies = simulator._airframe.bodies
+    up = -B[5, : len(thrust)].sum() / (0.002 * len(thrust))
+    assert 1.0 / simulator._airframe.mass < up < 1.0 / bodies.base_mass
+    autopilot = pandion.Autopilot(simulator)
+    while not simulator.over:
+        simulator.step(*autopilot())
+    flown = pandion.fly("walls", seed=9, duration_s=BRIEF_S, vehicle=vehicle, log=False)
+    assert simulator.result == flown.truth

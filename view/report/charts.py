@@ -647,7 +647,7 @@ __all__ = ["TRUTH", "charts", "event_marks", "worst_sentence"]
 
 
 def _of_joint(k: int) -> str:
-    """The colour of a joint, behind those of four rotors."""
+    """The colour of a joint, behind those of rotors."""
     return COLOURS[(k + 4) % len(COLOURS)]
 
 
