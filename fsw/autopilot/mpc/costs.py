@@ -48,8 +48,8 @@ class CostWeights:
     posture: float = 2.0  # on joint angles that a ground station asks for
     # Ours, of an arm with more joints than two, which the costs above settle: towards the posture
     # to fly in, with what its rate makes of it, or joints that nothing asks for drift for ever.
-    home: float = 0.05
-    home_lead: float = 1.0  # s
+    home: float = 0.02
+    home_lead: float = 0.5  # s
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
