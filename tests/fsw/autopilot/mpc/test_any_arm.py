@@ -112,7 +112,7 @@ def test_joints_that_nothing_asks_for_come_home(name: str) -> None:
     away[0] += 0.4
     x, y, z = end_effector_when_level(airframe.bodies, tuple(away.tolist()), 0.0)
     start = hovering(airframe, tuple(away.tolist()))
-    states = flown(name, start, (x, y, z - 1.2), SafeSet(), 150)
+    states = flown(name, start, (x, y, z - 1.2), SafeSet(), 300)
     np.testing.assert_allclose(states[-1, Q_ARM::2], home, atol=0.1)
     np.testing.assert_allclose(states[-1, QD_ARM::2], 0.0, atol=0.01)
     tip, _ = predicted_end_effector(airframe.bodies, states[-1])
