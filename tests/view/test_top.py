@@ -196,6 +196,7 @@ async def show_margins_that_are_not_finite() -> None:
     fed = Fed()
     app = TopApp(fed, lambda: fed.now)
     async with app.run_test(size=(140, 40)) as pilot:
+        await pilot.pause()  # until its widgets are there
         fed.waiting = [margins(math.nan, math.inf, 0.25)]
         app.refresh_all()
         await pilot.pause()
