@@ -281,7 +281,12 @@ class ScenarioFlight:
         if self._fault is not None:
             samples = self._faulty.samples(samples)
             exact = simulation.measurements() is None
-            sensors = self._faulty.frame(sensors) if exact else only_the_time(sensors.t_us, samples)
+            joints = len(simulation.vehicle.joints)
+            sensors = (
+                self._faulty.frame(sensors)
+                if exact
+                else only_the_time(sensors.t_us, samples, joints)
+            )
         self._stamp_us = sensors.t_us
         answer = self.planner.take(sensors.t_us)
         if answer is not None:

@@ -72,7 +72,7 @@ def sample(said: Measurement) -> Sample:
     return RangeSample(time, said.distance, said.variance)
 
 
-def only_the_time(t_us: int, samples: tuple[Sample, ...], joints: int = 2) -> SensorFrame:
+def only_the_time(t_us: int, samples: tuple[Sample, ...], joints: int) -> SensorFrame:
     """The frame of a tick that has samples instead, as the link makes it.
 
     Of a vehicle with so many ``joints``.

@@ -1,4 +1,4 @@
-"""Vehicles that nobody built: each is refused in a sentence, or flies, from ground to ground."""
+"""Vehicles that nobody built, of rotors and joints as they come: each flies a hop."""
 
 from __future__ import annotations
 
@@ -13,25 +13,18 @@ from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Mode
 from tests.closed_loop.harness import ARM, LAND, TAKEOFF, Flight, command, on_the_ground
 from tests.vehicles.random_vehicles import multirotor_with_arm
-from vehicles.vehicle_file import VehicleError, vehicle_text
+from vehicles.vehicle_file import vehicle_text
 
 COUNT = 30
 
 
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize("number", range(COUNT))
-def test_it_hops_within_its_limits_or_says_why_it_does_not(number: int, tmp_path: Path) -> None:
+def test_it_hops_within_its_limits(number: int, tmp_path: Path) -> None:
     vehicle = multirotor_with_arm(np.random.default_rng(5_000 + number))
     path = tmp_path / f"{vehicle.name}.toml"
     path.write_text(vehicle_text(vehicle), encoding="utf-8")
-    try:
-        config, refusal = flight_config(body="points", vehicle=vehicle), ""
-    except VehicleError as error:
-        refusal = str(error)
-    if refusal:
-        assert "\n" not in refusal
-        assert vehicle.name in refusal
-        return
+    config = flight_config(body="points", vehicle=vehicle)
     flight = Flight(replace(on_the_ground(), vehicle=str(path)), config=config)
     flight.run(0.2)
     stood = flight.sim.truth().p_WB

@@ -90,11 +90,8 @@ FILTER: Final = np.dtype(
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle
         ("agility", float),  # how much quicker rotors turn it than the paper's; 1 at least
-        (
-            "joints",
-            float,
-            (JOINTS, 3),
-        ),  # angle [rad], rate [rad/s] and disturbance [rad/s^2] of each
+        # Of each: angle [rad], rate [rad/s] and disturbance [rad/s^2].
+        ("joints", float, (JOINTS, 3)),
         ("joint_variance", float, (3, 3)),  # [SI], of each
         ("joint_time", float),  # s
         ("pushes", float, (PUSHES, 1 + JOINTS)),  # ring: up to a time [s], accelerations [rad/s^2]

@@ -169,7 +169,6 @@ class Autopilot:
         r = with_nominal(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
         self._plans.model.move(r, 1)
         self._cascade.step(r)
-        end_effector(self.config.airframe.bodies, estimate)
         self._safe_sets.warm_up(estimate)
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import cast
 
 from fsw.autopilot.control.cascade import Inner
@@ -215,7 +215,7 @@ def flight_config(
 
 def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:
     """The configuration for another vehicle."""
-    airframe, battery = airframe_of(vehicle), vehicle.battery
+    airframe = airframe_of(vehicle)
     b = airframe.bodies
     tip, _ = tip_in_body(posture(b, airframe.home_posture), b)
     hanging = round(tip[2], 6)
@@ -225,13 +225,5 @@ def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:
         airframe=airframe,
         tuning=replace(config.tuning, tracking=tracking),
         surroundings=replace(config.surroundings, hanging=hanging),
-        battery=replace(
-            config.battery,
-            capacity=battery.capacity,
-            full=battery.full,
-            empty=battery.empty,
-            resistance=battery.resistance,
-            efficiency=battery.efficiency,
-            idle_power=battery.idle_power,
-        ),
+        battery=replace(config.battery, **asdict(vehicle.battery)),
     )
