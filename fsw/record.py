@@ -18,6 +18,7 @@ rest at zero, and all share one layout and one machine code.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Final, Self, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -42,6 +43,11 @@ PerRotor = Annotated[Floats, ROTORS]
 def padded(values: tuple[float, ...], size: int) -> tuple[float, ...]:
     """``values`` (n,) and zeros behind them (size,) [any]: of one length for every vehicle."""
     return values + _ZEROS[size - len(values)]
+
+
+def padded_rows(rows: Iterable[tuple[float, ...]], size: int) -> tuple[float, ...]:
+    """The numbers of ``rows`` [any] one after the other, zeros behind them (size,) [any]."""
+    return padded(tuple([number for row in rows for number in row]), size)
 
 
 _ZEROS: Final = tuple([(0.0,) * count for count in range(ANGLE_LIMITS * JOINTS + 1)])

@@ -211,6 +211,7 @@ class ArmTask(Record):
     c: PerJoint  # rad, coordinates
     rate: PerJoint  # rad/s, the same
     goal: PerJoint  # rad
+    rotation: _Rotations  # from the link's frame to B
     origin: _Vectors  # m, B, of each joint
     axis: _Vectors  # unit, B
     jacobian: _Vectors  # (3,) m a coordinate: what moves the end-effector in B

@@ -24,10 +24,20 @@ from typing import Final
 
 from fsw.autopilot.control.joint_reference import JointReferenceLimits
 from fsw.autopilot.geometry.rotation import rotate, rotate_back
-from fsw.autopilot.geometry.vectors import add, add_scaled, clamp, cross, dot, norm, subtract
+from fsw.autopilot.geometry.vectors import (
+    add,
+    add_scaled,
+    clamp,
+    cross,
+    dot,
+    norm,
+    put_three,
+    subtract,
+    three,
+)
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.model.arm_coordinates import ArmCoordinates, to_coordinates, to_joints
-from fsw.autopilot.model.multibody import Bodies, factorise, next_axes, solve
+from fsw.autopilot.model.arm_coordinates import ArmCoordinates, bounds_of, to_coordinates, to_joints
+from fsw.autopilot.model.multibody import Bodies, factorise, place_links, place_of_tip, solve
 from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec3
 from fsw.autopilot.tick_record import ArmTask, Estimate, PlanState
 from fsw.compiled import compilable
@@ -106,7 +116,7 @@ def compensate(
             _reach(a, bodies, arm)
         left = subtract(goal, (a.tip[0], a.tip[1], a.tip[2]))
         for i in range(n):
-            low, high = arm.low[i] + joint_limits.margin, arm.high[i] - joint_limits.margin
+            low, high = bounds_of(arm, i, joint_limits.margin)
             a.low[i] = clamp(low - a.c[i], -_LONGEST, _LONGEST)
             a.high[i] = clamp(high - a.c[i], -_LONGEST, _LONGEST)
         _solve_within(a, n, left, left)
@@ -115,7 +125,7 @@ def compensate(
         to_joints(arm, a.c, a.q)
     # The last step is short: what moves the end-effector is still what it was before it.
     for i in range(n):
-        low, high = arm.low[i] + joint_limits.margin, arm.high[i] - joint_limits.margin
+        low, high = bounds_of(arm, i, joint_limits.margin)
         held = a.c[i] <= low + _ROUNDING or a.c[i] >= high - _ROUNDING
         a.low[i] = -a.rate[i] if held else -math.inf
         a.high[i] = -a.rate[i] if held else math.inf
@@ -168,31 +178,20 @@ def _seen_from_base(
 
 @compilable
 def _reach(a: ArmTask, b: Bodies, arm: ArmCoordinates) -> None:
-    """Where the end-effector is at a.q, and its Jacobian. Writes origin, axis, tip, jacobian."""
-    n = int(b.joints)
-    R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    o: Vec3 = (0.0, 0.0, 0.0)
-    for k in range(n):
-        at = 3 * k
-        o = add(o, rotate(R, (b.offset[at], b.offset[at + 1], b.offset[at + 2])))
-        axis, R = next_axes(b, k, R, a.q[k])
-        for i in range(3):
-            a.origin[at + i], a.axis[at + i] = o[i], axis[i]
-    tip = add(o, rotate(R, (b.tip[0], b.tip[1], b.tip[2])))
-    for i in range(3):
-        a.tip[i] = tip[i]
+    """Where the end-effector is at a.q, and its Jacobian.
+
+    Writes rotation, origin, axis, tip, jacobian.
+    """
+    place_links(a, b, a.q)
+    tip, n = place_of_tip(a, b), int(b.joints)
+    put_three(a.tip, 0, tip)
     # Of joints, and from the last on of coordinates.
     for k in range(n - 1, -1, -1):
-        moved = cross(_at(a.axis, k), subtract(tip, _at(a.origin, k)))
+        moved = cross(three(a.axis, 3 * k), subtract(tip, three(a.origin, 3 * k)))
         for i in range(k + 1, n):
-            moved = add_scaled(moved, _at(a.jacobian, i), -arm.row[JOINTS * i + k])
+            moved = add_scaled(moved, three(a.jacobian, 3 * i), -arm.row[JOINTS * i + k])
         for i in range(3):
             a.jacobian[3 * k + i] = moved[i] / arm.row[JOINTS * k + k]
-
-
-@compilable
-def _at(vectors: Floats, k: int) -> Vec3:
-    return vectors[3 * k], vectors[3 * k + 1], vectors[3 * k + 2]
 
 
 @compilable
@@ -200,7 +199,7 @@ def _moved(a: ArmTask, change: Floats, n: int) -> Vec3:
     """What a change of the coordinates (j,) [rad] does to the end-effector [m, B], or a rate."""
     total: Vec3 = (0.0, 0.0, 0.0)
     for k in range(n):
-        total = add_scaled(total, _at(a.jacobian, k), change[k])
+        total = add_scaled(total, three(a.jacobian, 3 * k), change[k])
     return total
 
 
@@ -217,7 +216,7 @@ def _align(a: ArmTask, n: int) -> None:
 def _reachable(a: ArmTask, n: int, off: Vec3) -> Vec3:
     """The part of a displacement of the end-effector, or of its rate, that joints can make."""
     for i in range(n):
-        a.step[i] = dot(_at(a.jacobian, i), off)
+        a.step[i] = dot(three(a.jacobian, 3 * i), off)
     solve(a.factor, a.step, n)
     return _moved(a, a.step, n)
 
@@ -226,9 +225,9 @@ def _reachable(a: ArmTask, n: int, off: Vec3) -> Vec3:
 def _set_up(a: ArmTask, n: int) -> None:
     """The products of the Jacobian's columns. Writes gram."""
     for i in range(n):
-        one = _at(a.jacobian, i)
+        one = three(a.jacobian, 3 * i)
         for k in range(i + 1):
-            a.gram[JOINTS * i + k] = a.gram[JOINTS * k + i] = dot(one, _at(a.jacobian, k))
+            a.gram[JOINTS * i + k] = a.gram[JOINTS * k + i] = dot(one, three(a.jacobian, 3 * k))
 
 
 @compilable
@@ -240,8 +239,8 @@ def _solve_within(a: ArmTask, n: int, off: Vec3, left: Vec3) -> None:
     """
     _set_up(a, n)
     for i in range(n):
-        a.slope[i] = dot(_at(a.jacobian, i), off)
-        bend = -dot(left, cross(_at(a.axis, i), _at(a.jacobian, i)))
+        a.slope[i] = dot(three(a.jacobian, 3 * i), off)
+        bend = -dot(left, cross(three(a.axis, 3 * i), three(a.jacobian, 3 * i)))
         a.gram[JOINTS * i + i] += _DAMPING * _DAMPING + dot(left, left) + max(bend, 0.0)
     factorise(a.factor, a.gram, n)
     for i in range(n):

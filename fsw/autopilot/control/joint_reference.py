@@ -27,6 +27,7 @@ from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.arm_coordinates import (
     ArmCoordinates,
     along_other,
+    bounds_of,
     to_coordinates,
     to_joints,
 )
@@ -73,9 +74,9 @@ def refer(
     n, most = int(arm.joints), limits.acceleration
     _towards(k, a, arm, limits, dt)
     for i in range(n):
-        low = braking_rate(arm.low[i] + limits.margin - a.c[i], most, APPROACH, dt)
-        high = braking_rate(arm.high[i] - limits.margin - a.c[i], most, APPROACH, dt)
-        a.rate[i] = clamp(a.rate[i], low, high)
+        low, high = bounds_of(arm, i, limits.margin)
+        slowest = braking_rate(low - a.c[i], most, APPROACH, dt)
+        a.rate[i] = clamp(a.rate[i], slowest, braking_rate(high - a.c[i], most, APPROACH, dt))
     to_joints(arm, a.rate, a.qd)
     # All by the same factor: none then approaches its limit faster than before.
     share = _share_of_rates(k, a, airframe, arm, limits, dt)
@@ -106,7 +107,7 @@ def _towards(
     to_coordinates(arm, a.qd, a.rate)
     to_coordinates(arm, k.reference, a.c)
     for i in range(n):
-        low, high = arm.low[i] + limits.margin, arm.high[i] - limits.margin
+        low, high = bounds_of(arm, i, limits.margin)
         a.goal[i] = clamp(a.goal[i], low, high) - a.c[i] - a.rate[i] * dt
         longest = max(longest, abs(a.goal[i]))
     if longest > 0.0:

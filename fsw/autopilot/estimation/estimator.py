@@ -20,12 +20,12 @@ from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.autopilot.signals import Mat3, SensorFrame, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate, Tick
 from fsw.compiled import compilable, kernel, machine_code
-from fsw.record import JOINTS as CAPACITY
+from fsw.record import JOINTS as JOINT_CAPACITY
 from fsw.record import Floats, padded
 
 _ANGLES_AT: Final = 16
-_RATES_AT: Final = _ANGLES_AT + CAPACITY
-READINGS: Final = _RATES_AT + CAPACITY
+_RATES_AT: Final = _ANGLES_AT + JOINT_CAPACITY
+READINGS: Final = _RATES_AT + JOINT_CAPACITY
 """Numbers of a frame: position, velocity, quaternion, gyro, accelerometer, joints, their rates.
 
 It has room for the joints of any vehicle; those that one does not have are zero.
@@ -55,7 +55,7 @@ def read_frame(sensors: SensorFrame, r: Tick) -> int:
 def reading_of(sensors: SensorFrame) -> Floats:
     """The numbers of a frame (READINGS,) [SI]."""
     s = sensors
-    arm = padded(s.q_arm, CAPACITY) + padded(s.qd_arm, CAPACITY)
+    arm = padded(s.q_arm, JOINT_CAPACITY) + padded(s.qd_arm, JOINT_CAPACITY)
     frame = _FRAME.pack(*s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *arm)
     return np.frombuffer(frame)
 

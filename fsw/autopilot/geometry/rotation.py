@@ -80,6 +80,16 @@ def quaternion_from_euler(euler: Vec3) -> Vec4:
 
 
 @compilable
+def nine(a: tuple[float, ...] | Floats, at: int) -> Mat3:
+    """The matrix in ``a`` (n,) [any unit], row by row, that begins ``at`` [1]."""
+    return (
+        *(a[at], a[at + 1], a[at + 2]),
+        *(a[at + 3], a[at + 4], a[at + 5]),
+        *(a[at + 6], a[at + 7], a[at + 8]),
+    )
+
+
+@compilable
 def rotate(R: Mat3 | Floats, v: Vec3) -> Vec3:
     """World components of ``v`` [any unit, FRD]."""
     x, y, z = v

@@ -16,6 +16,19 @@ from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable
 
 Vector = Vec3 | NDArray[Any]  # compiled code may hand over a row of an array (3,)
+Several = tuple[float, ...] | NDArray[Any]  # vectors one after the other
+
+
+@compilable
+def three(a: Several, at: int) -> Vec3:
+    """The vector in ``a`` (n,) [any unit, any frame] that begins ``at`` [1]."""
+    return a[at], a[at + 1], a[at + 2]
+
+
+@compilable
+def put_three(a: NDArray[Any], at: int, v: Vec3) -> None:
+    """Write ``v`` [unit of a, any frame] into ``a`` (n,) [any unit] from ``at`` [1] on."""
+    a[at], a[at + 1], a[at + 2] = v
 
 
 @compilable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.model.parts import Part, parts_of, points_of
 from fsw.autopilot.signals import ActuatorCommand, Vec2
-from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS
+from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS, padded, padded_rows
 from vehicles.description import Rotor, Vehicle
 from vehicles.vehicle_file import load_vehicle
 
@@ -98,34 +97,29 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     """What the controllers know of a vehicle."""
     rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
     rows = [wrench_of(rotor) for rotor in rotors]
-    wrench = [number for row in rows for number in row]
     effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
     share = np.linalg.pinv(effect).ravel().tolist()
     return Airframe(
         mass=vehicle.mass,
         bodies=bodies,
         rotors=len(rotors),
-        wrench=_padded(wrench, 6 * ROTORS),
-        share=_padded(share, 4 * ROTORS),
+        wrench=padded_rows(rows, 6 * ROTORS),
+        share=padded(tuple(share), 4 * ROTORS),
         rotor_lever=math.sqrt(sum(row[3] ** 2 + row[4] ** 2 for row in rows) / len(rows)),
         rotor_arm=math.hypot(*first.position),
         yaw_per_thrust=first.torque_per_thrust,
-        rotor_thrust_max=_padded([rotor.thrust_max for rotor in rotors], ROTORS),
+        rotor_thrust_max=padded(tuple([rotor.thrust_max for rotor in rotors]), ROTORS),
         rotor_lag=max(rotor.lag for rotor in rotors),
-        joint_torque_max=_padded([joint.torque_max for joint in vehicle.joints], JOINTS),
-        joint_rate_max=_padded([joint.rate_max for joint in vehicle.joints], JOINTS),
+        joint_torque_max=padded(tuple([joint.torque_max for joint in vehicle.joints]), JOINTS),
+        joint_rate_max=padded(tuple([joint.rate_max for joint in vehicle.joints]), JOINTS),
         angle_limits=_angle_limits(vehicle),
-        home_posture=_padded(vehicle.home_posture, JOINTS),
+        home_posture=padded(vehicle.home_posture, JOINTS),
         points=points_of(vehicle),
         parts=parts_of(vehicle),
         tilt_max=vehicle.limits.tilt,
         body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
         leg_length=max(z for _, _, z in vehicle.feet.positions),
     )
-
-
-def _padded(numbers: Sequence[float], size: int) -> Several:
-    return (*numbers, *[0.0] * (size - len(numbers)))
 
 
 def _angle_limits(vehicle: Vehicle) -> AngleLimits:
@@ -136,14 +130,14 @@ def _angle_limits(vehicle: Vehicle) -> AngleLimits:
         if math.isfinite(joint.position_min) or math.isfinite(joint.position_max)
     ]
     limits += [
-        (_padded(limit.row, JOINTS), limit.minimum, limit.maximum)
+        (padded(limit.row, JOINTS), limit.minimum, limit.maximum)
         for limit in vehicle.coupled_limits
     ]
     return AngleLimits(
         rows=len(limits),
-        row=_padded([number for row, _, _ in limits for number in row], ANGLE_LIMITS * JOINTS),
-        low=_padded([low for _, low, _ in limits], ANGLE_LIMITS),
-        high=_padded([high for _, _, high in limits], ANGLE_LIMITS),
+        row=padded_rows([row for row, _, _ in limits], ANGLE_LIMITS * JOINTS),
+        low=padded(tuple([low for _, low, _ in limits]), ANGLE_LIMITS),
+        high=padded(tuple([high for _, _, high in limits]), ANGLE_LIMITS),
     )
 
 

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+import numpy as np
+
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import Airframe, AngleLimits
 from fsw.autopilot.model.multibody import Several
-from fsw.autopilot.signals import JointVector
+from fsw.autopilot.signals import JointVector, Vec2
 from fsw.compiled import compilable
-from fsw.record import ANGLE_LIMITS, JOINTS, Floats, padded
+from fsw.record import ANGLE_LIMITS, JOINTS, Floats, padded, padded_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +54,16 @@ def arm_coordinates(airframe: Airframe) -> ArmCoordinates:
     high = [limits.high[chosen[k]] if k in chosen else math.inf for k in range(n)]
     return ArmCoordinates(
         joints=n,
-        row=_joined([rows[chosen[k]] if k in chosen else own[k] for k in range(n)], JOINTS),
+        row=padded_rows(
+            [rows[chosen[k]] if k in chosen else own[k] for k in range(n)], JOINTS * JOINTS
+        ),
         low=padded(tuple(low), JOINTS),
         high=padded(tuple(high), JOINTS),
         others=len(left),
-        other_row=_joined([rows[i] for i in left], ANGLE_LIMITS),
+        other_row=padded_rows([rows[i] for i in left], ANGLE_LIMITS * JOINTS),
         other_low=padded(tuple([limits.low[i] for i in left]), ANGLE_LIMITS),
         other_high=padded(tuple([limits.high[i] for i in left]), ANGLE_LIMITS),
     )
-
-
-def _joined(rows: list[Several], most: int) -> Several:
-    return padded(tuple([number for row in rows for number in row]), most * JOINTS)
 
 
 @compilable
@@ -95,16 +95,20 @@ def along_other(arm: ArmCoordinates, other: int, q: Several | Floats) -> float:
     return total
 
 
+@compilable
+def bounds_of(arm: ArmCoordinates, k: int, margin: float) -> Vec2:
+    """Lowest and highest value [rad] of coordinate ``k``, a ``margin`` [rad] within its limits."""
+    return arm.low[k] + margin, arm.high[k] - margin
+
+
 def within_limits(arm: ArmCoordinates, q: JointVector, margin: float) -> JointVector:
     """The angles (j,) [rad] next to ``q`` [rad] that are a ``margin`` [rad] within limits."""
-    found: list[float] = []
+    c, found = np.zeros(arm.joints), np.zeros(arm.joints)
+    to_coordinates(arm, q, c)
     for k in range(arm.joints):
-        row = arm.row[JOINTS * k : JOINTS * k + k + 1]
-        c = sum(a * b for a, b in zip(row, q, strict=False))
-        c = clamp(c, arm.low[k] + margin, arm.high[k] - margin)
-        rest = c - sum(a * b for a, b in zip(row, found, strict=False))
-        found.append(rest / row[k])
-    return tuple(found)
+        c[k] = clamp(float(c[k]), *bounds_of(arm, k, margin))
+    to_joints(arm, c, found)
+    return tuple(found.tolist())
 
 
 class AngleRow(NamedTuple):

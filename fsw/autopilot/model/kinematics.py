@@ -15,8 +15,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.geometry.rotation import rotate
-from fsw.autopilot.geometry.vectors import add, add_scaled, cross, subtract
+from fsw.autopilot.geometry.rotation import nine, rotate
+from fsw.autopilot.geometry.vectors import (
+    add,
+    add_scaled,
+    cross,
+    put_three,
+    subtract,
+    three,
+)
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.multibody import Bodies, next_axes
 from fsw.autopilot.model.parts import ON_BASE
@@ -36,26 +43,6 @@ FRAME: Final = AT_LINKS + LINK * JOINTS
 _AXES: Final = 4  # b1, b3 and their rates
 
 _REST: Final[Vec3] = (0.0, 0.0, 0.0)
-
-
-@kernel
-def three(frame: Array, at: int) -> Vec3:
-    """Three entries of a ``frame`` (FRAME,) [SI] from ``at`` [1] on."""
-    return frame[at], frame[at + 1], frame[at + 2]
-
-
-@kernel
-def _nine(frame: Array, at: int) -> Mat3:
-    return (
-        *(frame[at], frame[at + 1], frame[at + 2]),
-        *(frame[at + 3], frame[at + 4], frame[at + 5]),
-        *(frame[at + 6], frame[at + 7], frame[at + 8]),
-    )
-
-
-@kernel
-def _put(frame: Array, at: int, v: Vec3) -> None:
-    frame[at], frame[at + 1], frame[at + 2] = v
 
 
 @kernel
@@ -120,10 +107,10 @@ def put_base(
     for row in range(3):
         frame[AT_P + row], frame[AT_V + row] = p[row], v[row]
         x, y, z = R[3 * row], R[3 * row + 1], R[3 * row + 2]
-        _put(frame, AT_R + 3 * row, (x, y, z))
+        put_three(frame, AT_R + 3 * row, (x, y, z))
         # R times the cross product with w.
         turning = (y * w[2] - z * w[1], z * w[0] - x * w[2], x * w[1] - y * w[0])
-        _put(frame, AT_TURNING + 3 * row, turning)
+        put_three(frame, AT_TURNING + 3 * row, turning)
 
 
 @compilable
@@ -132,7 +119,7 @@ def put_links(frame: Array, b: Bodies, q: JointVector | Floats, qd: JointVector 
 
     Joints are at ``q`` (j,) [rad] and turn with ``qd`` (j,) [rad/s].
     """
-    R, turning = _nine(frame, AT_R), _nine(frame, AT_TURNING)
+    R, turning = nine(frame, AT_R), nine(frame, AT_TURNING)
     p, v = three(frame, AT_P), three(frame, AT_V)
     # The rate of the base in the world: its cross product is turning times R transposed.
     w = (
@@ -145,10 +132,10 @@ def put_links(frame: Array, b: Bodies, q: JointVector | Floats, qd: JointVector 
         p, v = add(p, rotate(R, offset)), add(v, cross(w, rotate(R, offset)))
         axis, R = next_axes(b, k, R, q[k])
         at = AT_LINKS + LINK * k
-        _put(frame, at + AT_P, p)
-        _put(frame, at + AT_V, v)
-        _put(frame, at + AT_AXIS, axis)
-        _put(frame, at + AT_AXIS_RATE, cross(w, axis))
+        put_three(frame, at + AT_P, p)
+        put_three(frame, at + AT_V, v)
+        put_three(frame, at + AT_AXIS, axis)
+        put_three(frame, at + AT_AXIS_RATE, cross(w, axis))
         w = add_scaled(w, axis, qd[k])
         for column in range(3):
             x, y, z = R[column], R[3 + column], R[6 + column]
@@ -163,14 +150,14 @@ def put_links(frame: Array, b: Bodies, q: JointVector | Floats, qd: JointVector 
 def position(frame: Array, on: int, local: Vec3) -> Vec3:
     """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
     at = place_of(on)
-    return add(three(frame, at), rotate(_nine(frame, at + AT_R), local))
+    return add(three(frame, at), rotate(nine(frame, at + AT_R), local))
 
 
 @kernel
 def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
     """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
     at = place_of(on)
-    return add(three(frame, at + AT_V), rotate(_nine(frame, at + AT_TURNING), local))
+    return add(three(frame, at + AT_V), rotate(nine(frame, at + AT_TURNING), local))
 
 
 @kernel

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.geometry.vectors import add_scaled, cross, dot, subtract
+from fsw.autopilot.geometry.vectors import add_scaled, cross, dot, subtract, three
 from fsw.autopilot.model.kinematics import (
     AT_AXIS,
     AT_AXIS_RATE,
@@ -33,7 +33,6 @@ from fsw.autopilot.model.kinematics import (
     place_of,
     position,
     put_rate,
-    three,
     velocity,
 )
 from fsw.autopilot.model.multibody import Bodies

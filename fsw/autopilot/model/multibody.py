@@ -30,14 +30,15 @@ from typing import Final
 
 from fsw.autopilot.geometry.rotation import (
     matrix_from_quaternion,
+    nine,
     quaternion_from_euler,
     rotate,
 )
-from fsw.autopilot.geometry.vectors import add, add_scaled, cross, dot
+from fsw.autopilot.geometry.vectors import add, add_scaled, cross, dot, put_three, three
 from fsw.autopilot.signals import Mat3, StateEstimate, Vec3
-from fsw.autopilot.tick_record import Estimate, Multibody
+from fsw.autopilot.tick_record import ArmTask, Estimate, Multibody
 from fsw.compiled import compilable
-from fsw.record import JOINTS, Floats
+from fsw.record import JOINTS, Floats, padded_rows
 from vehicles.description import V6, Vehicle
 
 Several = tuple[float, ...]
@@ -67,46 +68,22 @@ class Bodies:
 def bodies_of(vehicle: Vehicle) -> Bodies:
     """The bodies of a vehicle."""
     joints = vehicle.joints
-
-    def padded(rows: list[Several], size: int) -> Several:
-        numbers = [number for row in rows for number in row]
-        return (*numbers, *[0.0] * (size * JOINTS - len(numbers)))
-
     return Bodies(
         joints=len(joints),
         base_mass=vehicle.base.mass,
         base_com=vehicle.base.com,
         base_inertia=vehicle.base.inertia,
-        offset=padded([joint.xyz for joint in joints], 3),
-        turned=padded(
-            [matrix_from_quaternion(quaternion_from_euler(joint.rpy)) for joint in joints], 9
+        offset=padded_rows([joint.xyz for joint in joints], 3 * JOINTS),
+        turned=padded_rows(
+            [matrix_from_quaternion(quaternion_from_euler(joint.rpy)) for joint in joints],
+            9 * JOINTS,
         ),
-        axis=padded([joint.axis for joint in joints], 3),
-        mass=padded([(joint.link.mass,) for joint in joints], 1),
-        com=padded([joint.link.com for joint in joints], 3),
-        inertia=padded([joint.link.inertia for joint in joints], 6),
-        armature=padded([(joint.armature,) for joint in joints], 1),
+        axis=padded_rows([joint.axis for joint in joints], 3 * JOINTS),
+        mass=padded_rows([(joint.link.mass,) for joint in joints], JOINTS),
+        com=padded_rows([joint.link.com for joint in joints], 3 * JOINTS),
+        inertia=padded_rows([joint.link.inertia for joint in joints], 6 * JOINTS),
+        armature=padded_rows([(joint.armature,) for joint in joints], JOINTS),
         tip=vehicle.end_effector.position,
-    )
-
-
-@compilable
-def _get(a: Floats | Several, k: int) -> Vec3:
-    return a[3 * k], a[3 * k + 1], a[3 * k + 2]
-
-
-@compilable
-def _put(a: Floats, k: int, v: Vec3) -> None:
-    a[3 * k], a[3 * k + 1], a[3 * k + 2] = v
-
-
-@compilable
-def _nine(a: Floats | Several, k: int) -> Mat3:
-    i = 9 * k
-    return (
-        *(a[i], a[i + 1], a[i + 2]),
-        *(a[i + 3], a[i + 4], a[i + 5]),
-        *(a[i + 6], a[i + 7], a[i + 8]),
     )
 
 
@@ -176,21 +153,21 @@ def next_axes(b: Bodies, k: int, R: Mat3, angle: float) -> tuple[Vec3, Mat3]:
 
     ``R`` are the axes of the link before, or of the base, in whatever frame.
     """
-    at_zero = _product(R, _nine(b.turned, k))
-    axis = _get(b.axis, k)
+    at_zero = _product(R, nine(b.turned, 9 * k))
+    axis = three(b.axis, 3 * k)
     return rotate(at_zero, axis), _product(at_zero, _about(axis, angle))
 
 
 @compilable
-def place_links(m: Multibody, b: Bodies, q: Several | Floats) -> None:
+def place_links(m: Multibody | ArmTask, b: Bodies, q: Several | Floats) -> None:
     """Where joints and links are at the angles ``q`` (j,) [rad]. Writes rotation, origin, axis."""
     R: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     o: Vec3 = (0.0, 0.0, 0.0)
     for k in range(int(b.joints)):
-        o = add(o, rotate(R, _get(b.offset, k)))
+        o = add(o, rotate(R, three(b.offset, 3 * k)))
         axis, R = next_axes(b, k, R, q[k])
-        _put(m.axis, k, axis)
-        _put(m.origin, k, o)
+        put_three(m.axis, 3 * k, axis)
+        put_three(m.origin, 3 * k, o)
         for i in range(9):
             m.rotation[9 * k + i] = R[i]
 
@@ -230,17 +207,17 @@ def _move_links(m: Multibody, b: Bodies, qd: Several | Floats, rate: Vec3) -> No
     v: Vec3 = (0.0, 0.0, 0.0)
     a: Vec3 = (0.0, 0.0, 0.0)
     for k in range(int(b.joints)):
-        o, axis = _get(m.origin, k), _get(m.axis, k)
+        o, axis = three(m.origin, 3 * k), three(m.axis, 3 * k)
         d = add_scaled(o, before, -1.0)
         a = add(a, add(cross(turning, d), cross(w, cross(w, d))))
         v = add(v, cross(w, d))
         turning = add_scaled(turning, cross(w, axis), qd[k])
         w = add_scaled(w, axis, qd[k])
-        _put(m.rate, k, w)
-        _put(m.speed, k, v)
-        R = _nine(m.rotation, k)
+        put_three(m.rate, 3 * k, w)
+        put_three(m.speed, 3 * k, v)
+        R = nine(m.rotation, 9 * k)
         inertia = _rotated(R, _six(b.inertia, k))
-        arm = rotate(R, _get(b.com, k))
+        arm = rotate(R, three(b.com, 3 * k))
         swept = cross(w, arm)
         _note(
             m.of_link,
@@ -271,29 +248,29 @@ def _note(
     """What one link adds, about the origin: moments of mass, momentum, force that it takes."""
     i = _VECTORS * k
     square = dot(c, c)
-    _put(sums, i, (mass * c[0], mass * c[1], mass * c[2]))
-    _put(
+    put_three(sums, 3 * i, (mass * c[0], mass * c[1], mass * c[2]))
+    put_three(
         sums,
-        i + 1,
+        3 * (i + 1),
         (
             inertia[0] + mass * (square - c[0] * c[0]),
             inertia[1] + mass * (square - c[1] * c[1]),
             inertia[2] + mass * (square - c[2] * c[2]),
         ),
     )
-    _put(
+    put_three(
         sums,
-        i + 2,
+        3 * (i + 2),
         (
             inertia[3] - mass * c[0] * c[1],
             inertia[4] - mass * c[0] * c[2],
             inertia[5] - mass * c[1] * c[2],
         ),
     )
-    _put(sums, i + 3, (mass * v[0], mass * v[1], mass * v[2]))
-    _put(sums, i + 4, add_scaled(spin, cross(c, v), mass))
-    _put(sums, i + 5, (mass * a[0], mass * a[1], mass * a[2]))
-    _put(sums, i + 6, add_scaled(moment, cross(c, a), mass))
+    put_three(sums, 3 * (i + 3), (mass * v[0], mass * v[1], mass * v[2]))
+    put_three(sums, 3 * (i + 4), add_scaled(spin, cross(c, v), mass))
+    put_three(sums, 3 * (i + 5), (mass * a[0], mass * a[1], mass * a[2]))
+    put_three(sums, 3 * (i + 6), add_scaled(moment, cross(c, a), mass))
 
 
 @compilable
@@ -306,32 +283,32 @@ def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate
             for i in range(_SUMS):
                 sums[_SUMS * k + i] += sums[_SUMS * (k + 1) + i]
         i = _VECTORS * k
-        axis, o, h = _get(m.axis, k), _get(m.origin, k), _get(sums, i)
+        axis, o, h = three(m.axis, 3 * k), three(m.origin, 3 * k), three(sums, 3 * i)
         s = cross(o, axis)  # velocity at B's origin of a body that turns about the joint
-        x, y = _get(sums, i + 1), _get(sums, i + 2)
+        x, y = three(sums, 3 * (i + 1)), three(sums, 3 * (i + 2))
         inertia = (x[0], x[1], x[2], y[0], y[1], y[2])
-        _put(m.vq, k, add_scaled(cross(axis, h), s, mass))
-        _put(m.wq, k, add(cross(h, s), _symmetric(inertia, axis)))
+        put_three(m.vq, 3 * k, add_scaled(cross(axis, h), s, mass))
+        put_three(m.wq, 3 * k, add(cross(h, s), _symmetric(inertia, axis)))
         for j in range(k + 1):
-            along, aside = _get(m.axis, j), cross(_get(m.origin, j), _get(m.axis, j))
-            value = dot(along, _get(m.wq, k)) + dot(aside, _get(m.vq, k))
+            along, aside = three(m.axis, 3 * j), cross(three(m.origin, 3 * j), three(m.axis, 3 * j))
+            value = dot(along, three(m.wq, 3 * k)) + dot(aside, three(m.vq, 3 * k))
             m.qq[JOINTS * j + k] = m.qq[JOINTS * k + j] = value
         m.qq[JOINTS * k + k] += b.armature[k] + armature
-        p, spin = _get(sums, i + 3), _get(sums, i + 4)
+        p, spin = three(sums, 3 * (i + 3)), three(sums, 3 * (i + 4))
         spin = add_scaled(spin, cross(o, p), -1.0)  # about the joint
         own = (b.armature[k] + armature) * qd[k]
         m.momentum[k] = dot(axis, spin) + own
-        turned = cross(_get(m.rate, k), axis)
-        m.drift[k] = dot(turned, spin) - dot(axis, cross(_get(m.speed, k), p))
-        m.bias[k] = dot(axis, _get(sums, i + 6)) + dot(s, _get(sums, i + 5))
+        turned = cross(three(m.rate, 3 * k), axis)
+        m.drift[k] = dot(turned, spin) - dot(axis, cross(three(m.speed, 3 * k), p))
+        m.bias[k] = dot(axis, three(sums, 3 * (i + 6))) + dot(s, three(sums, 3 * (i + 5)))
     base, c = b.base_mass, (b.base_com[0], b.base_com[1], b.base_com[2])
     swept = cross(rate, cross(rate, c))
     spin = cross(rate, _symmetric(_six(b.base_inertia, 0), rate))
-    _put(m.bias_v, 0, add_scaled(_get(sums, 5), swept, base))
-    _put(m.bias_w, 0, add_scaled(add(_get(sums, 6), spin), cross(c, swept), base))
+    put_three(m.bias_v, 0, add_scaled(three(sums, 15), swept, base))
+    put_three(m.bias_w, 0, add_scaled(add(three(sums, 18), spin), cross(c, swept), base))
     whole = 1.0 / (mass + base)
-    h = add_scaled(_get(sums, 0), c, base)
-    _put(m.centre, 0, (whole * h[0], whole * h[1], whole * h[2]))
+    h = add_scaled(three(sums, 0), c, base)
+    put_three(m.centre, 0, (whole * h[0], whole * h[1], whole * h[2]))
 
 
 @compilable
@@ -346,12 +323,12 @@ def mass_of(b: Bodies) -> float:
 @compilable
 def _eliminate(m: Multibody, b: Bodies) -> None:
     """Linear motion and joints out of the mass matrix. Writes what comes after in the record."""
-    n, mass, c = int(b.joints), mass_of(b), _get(m.centre, 0)
+    n, mass, c = int(b.joints), mass_of(b), three(m.centre, 0)
     for k in range(n):
-        f = _get(m.vq, k)
-        _put(m.wq_free, k, add_scaled(_get(m.wq, k), cross(c, f), -1.0))
+        f = three(m.vq, 3 * k)
+        put_three(m.wq_free, 3 * k, add_scaled(three(m.wq, 3 * k), cross(c, f), -1.0))
         for i in range(n):
-            less = dot(f, _get(m.vq, i)) / mass
+            less = dot(f, three(m.vq, 3 * i)) / mass
             m.qq_free[JOINTS * k + i] = m.qq[JOINTS * k + i] - less
     factorise(m.factor, m.qq_free, n)
     for axis in range(3):
@@ -366,7 +343,7 @@ def _eliminate(m: Multibody, b: Bodies) -> None:
     S[3], S[4], S[5] = -c[2], 0.0, c[0]
     S[6], S[7], S[8] = c[1], -c[0], 0.0
     for k in range(n):
-        f, t, r = _get(m.vq, k), _get(m.wq_free, k), _get(m.reaction, k)
+        f, t, r = three(m.vq, 3 * k), three(m.wq_free, 3 * k), three(m.reaction, 3 * k)
         for i in range(3):
             for j in range(3):
                 J[3 * i + j] -= t[i] * r[j]
@@ -437,12 +414,12 @@ def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Several | Floats)
 
     ``force`` [N, B] is that of the rotors, at B's origin, ``torque`` (j,) [N m] that of the joints.
     """
-    c, mass = _get(m.centre, 0), mass_of(b)
-    push = add_scaled(force, _get(m.bias_v, 0), -1.0)
-    load = add(cross(c, push), _get(m.bias_w, 0))
+    c, mass = three(m.centre, 0), mass_of(b)
+    push = add_scaled(force, three(m.bias_v, 0), -1.0)
+    load = add(cross(c, push), three(m.bias_w, 0))
     for k in range(int(b.joints)):
-        free = torque[k] - m.bias[k] - dot(_get(m.vq, k), push) / mass
-        load = add_scaled(load, _get(m.reaction, k), free)
+        free = torque[k] - m.bias[k] - dot(three(m.vq, 3 * k), push) / mass
+        load = add_scaled(load, three(m.reaction, 3 * k), free)
     return load
 
 
@@ -477,19 +454,27 @@ def joint_load(m: Multibody, k: int, field: Vec3, turning: Vec3) -> float:
     The ``field`` [m/s^2, B] is gravity less the acceleration of B's origin; the base has an angular
     acceleration ``turning`` [rad/s^2, B].
     """
-    return float(m.bias[k] - dot(_get(m.vq, k), field) + dot(_get(m.wq, k), turning))
+    return float(m.bias[k] - dot(three(m.vq, 3 * k), field) + dot(three(m.wq, 3 * k), turning))
 
 
 @compilable
 def joint_drift(m: Multibody, k: int, field: Vec3) -> float:
     """What changes joint ``k``'s momentum [N m] beside its torque in a ``field`` [m/s^2, B]."""
-    return float(m.drift[k] + dot(_get(m.vq, k), field))
+    return float(m.drift[k] + dot(three(m.vq, 3 * k), field))
+
+
+@compilable
+def place_of_tip(m: Multibody | ArmTask, b: Bodies) -> Vec3:
+    """Position [m, B] of the end-effector, of links that are placed."""
+    last = int(b.joints) - 1
+    tip = (b.tip[0], b.tip[1], b.tip[2])
+    return add(three(m.origin, 3 * last), rotate(nine(m.rotation, 9 * last), tip))
 
 
 @compilable
 def tip_in_body(m: Multibody, b: Bodies) -> tuple[Vec3, Vec3]:
     """Position [m, B] of the end-effector, and its velocity beside the base's own [m/s, B]."""
     last = int(b.joints) - 1
-    arm = rotate(_nine(m.rotation, last), (b.tip[0], b.tip[1], b.tip[2]))
-    v = add(_get(m.speed, last), cross(_get(m.rate, last), arm))
-    return add(_get(m.origin, last), arm), v
+    arm = rotate(nine(m.rotation, 9 * last), (b.tip[0], b.tip[1], b.tip[2]))
+    v = add(three(m.speed, 3 * last), cross(three(m.rate, 3 * last), arm))
+    return add(three(m.origin, 3 * last), arm), v
