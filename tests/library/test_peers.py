@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import pandion
 from tests.fsw.paper_arm import LENGTHS
+from tests.paper_vehicle import ROTOR_ARM, YAW_PER_THRUST
 
 MIRROR = np.diag([1.0, -1.0, -1.0])  # NED to north, west, up; FRD to forward, left, up
 
@@ -33,10 +34,10 @@ class RotorPySE3:
             "Iyy": a.inertia[1],
             "Izz": a.inertia[2],
             "num_rotors": 4,
-            "rotor_pos": {k: a.rotor_arm * np.array([*p, 0.0]) for k, p in places.items()},
+            "rotor_pos": {k: ROTOR_ARM * np.array([*p, 0.0]) for k, p in places.items()},
             "rotor_directions": np.array([-1, 1, -1, 1]),
             "k_eta": 1.0,
-            "k_m": a.yaw_per_thrust,
+            "k_m": YAW_PER_THRUST,
             "tau_m": a.rotor_lag,
             "kp_att": kp,
             "kd_att": kd,

@@ -40,11 +40,7 @@ class AngleLimits:
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """What the controllers know of a vehicle.
-
-    Rotors of a '+' quadrotor are numbered rear, left, front, right, so that with thrusts f the
-    torque is ``[L (f2 - f4), L (f3 - f1), b (f1 - f2 + f3 - f4)]`` in the body (FRD).
-    """
+    """What the controllers know of a vehicle; rotors and joints in the order of its file."""
 
     mass: float  # kg, the whole vehicle
     bodies: Bodies  # that it consists of
@@ -52,8 +48,6 @@ class Airframe:
     wrench: Several  # (6,) each: force [1] and torque [m] in B about its origin, per thrust
     share: Several  # (4,) each: of roll, pitch, thrust and yaw, the pseudoinverse of those
     rotor_lever: float  # m, of roll and pitch, the root of the mean square over rotors
-    rotor_arm: float  # m, L
-    yaw_per_thrust: float  # m, b
     rotor_thrust_max: Several  # (ROTORS,) N
     rotor_lag: float  # s, of the slowest
     joint_torque_max: Several  # (JOINTS,) N m
@@ -95,7 +89,7 @@ class Airframe:
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
     """What the controllers know of a vehicle."""
-    rotors, first, bodies = vehicle.rotors, vehicle.rotors[0], bodies_of(vehicle)
+    rotors, bodies = vehicle.rotors, bodies_of(vehicle)
     rows = [wrench_of(rotor) for rotor in rotors]
     effect = np.array([(row[3], row[4], -row[2], row[5]) for row in rows]).T
     share = np.linalg.pinv(effect).ravel().tolist()
@@ -106,8 +100,6 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         wrench=padded_rows(rows, 6 * ROTORS),
         share=padded(tuple(share), 4 * ROTORS),
         rotor_lever=math.sqrt(sum(row[3] ** 2 + row[4] ** 2 for row in rows) / len(rows)),
-        rotor_arm=math.hypot(*first.position),
-        yaw_per_thrust=first.torque_per_thrust,
         rotor_thrust_max=padded(tuple([rotor.thrust_max for rotor in rotors]), ROTORS),
         rotor_lag=max(rotor.lag for rotor in rotors),
         joint_torque_max=padded(tuple([joint.torque_max for joint in vehicle.joints]), JOINTS),

@@ -27,6 +27,7 @@ from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.signals import PlanInput, PredictionState, Vec2, Vec3
 from tests.fsw.paper_arm import LENGTHS
+from tests.paper_vehicle import YAW_PER_THRUST
 
 DT = 0.002
 MODEL = NominalModel(AIRFRAME, DT)
@@ -252,7 +253,7 @@ def test_fast_ones_are_braked_by_what_the_tuning_allows(sign: float) -> None:
     assert u.qdd_arm == (-sign * tuning.joint, sign * tuning.joint)
     assert u.yaw_acc == -sign * tuning.yaw
     # What drag of the rotors gives at most: that of the hover thrust, over inertia.
-    drag = AIRFRAME.yaw_per_thrust * AIRFRAME.mass * GRAVITY / AIRFRAME.bodies.base_inertia[2]
+    drag = YAW_PER_THRUST * AIRFRAME.mass * GRAVITY / AIRFRAME.bodies.base_inertia[2]
     assert tuning.yaw < drag
 
 

@@ -29,6 +29,7 @@ from fsw.autopilot.tick_record import Tick
 from tests.fsw.paper_arm import LENGTHS
 from tests.fsw.random_states import estimate_of
 from tests.fsw.records import changed, observe, observed, placed, with_given
+from tests.paper_vehicle import YAW_PER_THRUST
 
 DT = 0.002
 TUNING = LoopGains()
@@ -246,7 +247,7 @@ def test_a_large_heading_error_is_turned_away_at_a_limited_rate_either_way() -> 
         inside = torque_of(one_step(turned(0.0), plan_at(sign * 0.05)))[2]
         assert inside == pytest.approx(sign * YAW_INERTIA * TUNING.yaw.kp * 0.05)
         most = torque_of(one_step(turned(0.0), plan_at(sign * 3.0)))[2]
-        yaw_limit = 4.0 * AIRFRAME.yaw_per_thrust * TUNING.yaw_thrust_limit
+        yaw_limit = 4.0 * YAW_PER_THRUST * TUNING.yaw_thrust_limit
         assert most == pytest.approx(sign * min(YAW_INERTIA * TUNING.yaw.limit, yaw_limit))
 
 

@@ -11,6 +11,7 @@ from scipy.signal import cont2discrete
 from fsw.autopilot.control.gains import LoopGains, TrackingTuning, tracking_gains
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.model.prediction import Array
+from tests.paper_vehicle import YAW_PER_THRUST
 
 DT = 0.002
 # Prices and lags unlike the flown ones: the design must follow them.
@@ -72,6 +73,6 @@ def test_each_pid_of_the_paper_settles_a_double_integrator_without_ringing(loop:
 def test_the_heading_loop_is_critically_damped_and_cannot_spend_all_the_rotors_drag() -> None:
     tuning = LoopGains()
     assert np.roots([1.0, tuning.yaw.kd, tuning.yaw.kp]) == pytest.approx([-2.0, -2.0])
-    drag = 4.0 * AIRFRAME.yaw_per_thrust * tuning.yaw_thrust_limit / AIRFRAME.bodies.base_inertia[2]
+    drag = 4.0 * YAW_PER_THRUST * tuning.yaw_thrust_limit / AIRFRAME.bodies.base_inertia[2]
     assert tuning.yaw.ki == 0.0
     assert drag < 2.0 * tuning.yaw.limit

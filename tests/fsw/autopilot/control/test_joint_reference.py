@@ -21,6 +21,7 @@ from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.signals import JointVector, StateEstimate
 from tests.fsw.records import joint_reference, placed, torques_for
+from tests.paper_vehicle import ROTOR_ARM
 
 LIMITS = JointReferenceLimits()
 ARM = arm_coordinates(AIRFRAME)
@@ -194,7 +195,7 @@ def test_the_joints_own_limits_leave_room_for_every_reference() -> None:
     field = GRAVITY + planned.vertical
     first, both = bounds(LIMITS)
     inertia = AIRFRAME.bodies.base_inertia[1]
-    turning = 2.0 * AIRFRAME.rotor_arm * 0.5 * AIRFRAME.weakest_thrust / inertia
+    turning = 2.0 * ROTOR_ARM * 0.5 * AIRFRAME.weakest_thrust / inertia
     link1 = FOLLOWING * LIMITS.acceleration + ADDED * planned.joint_acc
     link2 = FOLLOWING * LIMITS.acceleration + ADDED * 2.0 * planned.joint_acc
     most = [0.0, 0.0]

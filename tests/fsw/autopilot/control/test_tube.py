@@ -35,6 +35,7 @@ from fsw.autopilot.model.nominal import rest_input, rest_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import estimate_mass
 from tests.fsw.records import allocated, observe, observed
+from tests.paper_vehicle import ROTOR_ARM
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
@@ -180,8 +181,8 @@ def test_the_share_of_torque_is_that_of_what_the_mixer_can_give_in_hover() -> No
     per_unit, weight = _tube(), unlike.mass * GRAVITY
     f = allocated(unlike, (100.0, 0.0, 0.0), 4.0 * (15.0 - weight / 4.0), 0.0)
     lift = min(weight / 4.0, 15.0 - weight / 4.0)
-    torque = unlike.rotor_arm * 2.0 * lift
-    assert unlike.rotor_arm * (f[1] - f[3]) >= torque  # there is that much
+    torque = ROTOR_ARM * 2.0 * lift
+    assert ROTOR_ARM * (f[1] - f[3]) >= torque  # there is that much
     most = GRAVITY * torque / 0.35
     for disturbance in (0.2, 0.8):
         share = limits_used(unlike, TrackingTuning(), per_unit, disturbance)["rotor torque"]
@@ -299,7 +300,7 @@ def _worst_shortfall(airframe: Airframe, loop: Tube, disturbance: float) -> floa
             x, y = (inertia * value / (lift * GRAVITY) for value in (across, along))
             thrust = lift * airframe.mass * GRAVITY
             f = allocated(airframe, (float(x), float(y), 0.0), thrust, 0.0)
-            given = airframe.rotor_arm * (f[1] - f[3]), airframe.rotor_arm * (f[2] - f[0])
+            given = ROTOR_ARM * (f[1] - f[3]), ROTOR_ARM * (f[2] - f[0])
             worst = max(worst, abs(x - given[0]), abs(y - given[1]), abs(sum(f) - thrust))
     return worst
 

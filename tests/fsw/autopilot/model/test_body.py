@@ -25,6 +25,7 @@ from fsw.autopilot.signals import Vec3
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude, moved_on
 from tests.fsw.paper_arm import INPUTS, LENGTHS, STATES
 from tests.fsw.random_states import any_estimate, prediction_vector, vec3
+from tests.paper_vehicle import ROTOR_ARM
 from tests.vehicles.random_vehicles import random_vehicle
 
 FULL, POINTS = body_of("full", AIRFRAME), body_of("points", AIRFRAME)
@@ -158,7 +159,7 @@ def test_the_ends_of_every_capsule_are_in_spheres_of_other_parts() -> None:
 
 def test_the_rotors_reach_as_far_as_their_blades_and_the_feet_as_far_as_the_legs() -> None:
     parts = {part.name: part for part in FULL.parts}
-    assert parts["rotors"].rim == AIRFRAME.rotor_arm + 0.165
+    assert parts["rotors"].rim == ROTOR_ARM + 0.165
     for k in range(1, 5):
         foot = parts[f"leg{k}_end"]
         assert foot.begin[2] + foot.radius == AIRFRAME.leg_length

@@ -21,6 +21,7 @@ from fsw.autopilot.model.rotors import (
 from fsw.autopilot.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
 from tests.fsw.records import measured_motion
+from tests.paper_vehicle import ROTOR_ARM, YAW_PER_THRUST
 from vehicles.vehicle_file import load_vehicle
 
 MOMENT = 1e-3  # s
@@ -29,7 +30,7 @@ MOMENT = 1e-3  # s
 def torque(rotors: Vec4, joint1: float) -> Array:
     """What the four rotors and the arm's reaction do to the body: rear, left, front, right."""
     rear, left, front, right = rotors
-    reach, drag = AIRFRAME.rotor_arm, AIRFRAME.yaw_per_thrust
+    reach, drag = ROTOR_ARM, YAW_PER_THRUST
     return np.array(
         [
             reach * (left - right),
