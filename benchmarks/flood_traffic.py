@@ -89,8 +89,8 @@ def out_of_range(writer: FrameWriter, chance: random.Random) -> bytes:
             (_PARAM_SET, (wild, 1, 1, name, 9)),
             (_POSITION_TARGET, (0, *(wild,) * 11, 0, 1, 1, 1)),
             (_ATTITUDE_TARGET, (0, *(wild,) * 4, *nothing[:3], wild, 1, 1, 0)),
-            (_END_EFFECTOR_TARGET, (2**40, *(wild,) * 11, 0, 1, 1, 1)),
-            (_END_EFFECTOR_TARGET, (2**40, *(0.0,) * 11, 0, 1, 1, 99)),  # no such frame
+            (_END_EFFECTOR_TARGET, (2**40, *(wild,) * 11, 0, 1, 1, 1, wild)),
+            (_END_EFFECTOR_TARGET, (2**40, *(0.0,) * 11, 0, 1, 1, 99, 0.0)),  # no such frame
             (_WALL, (0.0, 0.0, 0.0, wild, -1.0, 1, 1, 0, 1)),
         )
     )

@@ -30,7 +30,8 @@ _TRIES: Final = 3
 _ACCEPTED, _IN_PROGRESS = 0, 5
 _POSITION_ONLY: Final = 0x0DF8  # type mask: position, no heading
 _LOCAL_NED: Final = 1
-_SHAPE_NUMBERS: Final = 16
+_SHAPE_NUMBERS = 16
+_NOT_TOUCHED = (0.0,) * 5  # what OBSTACLE_SHAPE says of contact
 _BALL: Final = 1  # PANDION_SHAPE
 _NAN: Final = math.nan
 _PLAN_US: Final = 200_000.0  # between two plans
@@ -188,7 +189,7 @@ class VehicleLink(threading.Thread):
     def _send_setpoint(self, p: Vec3) -> None:
         still = (0.0,) * 6
         mask = _POSITION_ONLY
-        self._send(ids.END_EFFECTOR_TARGET, 0, *p, *still, 0.0, 0.0, mask, 1, 0, _LOCAL_NED)
+        self._send(ids.END_EFFECTOR_TARGET, 0, *p, *still, 0.0, 0.0, mask, 1, 0, _LOCAL_NED, 0.0)
 
     def _shape(
         self,
@@ -203,7 +204,7 @@ class VehicleLink(threading.Thread):
         t_us: int = 0,
     ) -> None:
         filled = (*numbers, *(0.0 for _ in range(_SHAPE_NUMBERS - len(numbers))))
-        place = (1, 0, index, count, kind, int(keep_in))
+        place = (1, 0, index, count, kind, int(keep_in), *_NOT_TOUCHED)
         self._send(ids.OBSTACLE_SHAPE, t_us, clearance, *velocity, *filled, *place)
 
     def _send(self, message_id: int, *values: Any) -> None:

@@ -45,6 +45,7 @@ _ODOMETRY_TAIL: Final = (
     *(_LOCAL_NED, _LOCAL_NED, 0, _MOTION_CAPTURE, 100),
 )
 _HIL_TAIL: Final = (*(0.0,) * 7, _ACCEL_AND_GYRO, 0)
+_NOT_TOUCHED: Final = (0.0,) * 5  # what OBSTACLE_SHAPE says of contact
 _ARM_TAIL: Final = (0.0,) * 6  # the end-effector's place and velocity: not measured
 
 
@@ -153,12 +154,12 @@ def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
     """Message id and wire values."""
     if isinstance(message, SendTarget):
         motion = (*message.point.p, *message.point.v, *message.point.a)
-        tail = (message.yaw, 0.0, 0, SYSTEM_ID, 1, _LOCAL_NED)
-        return (message_ids.END_EFFECTOR_TARGET, message.t_us, *motion, *tail)
+        about = (message.yaw, 0.0, 0, SYSTEM_ID, 1, _LOCAL_NED, 0.0)
+        return (message_ids.END_EFFECTOR_TARGET, message.t_us, *motion, *about)
     if isinstance(message, SendCommand):
         return (message_ids.COMMAND_LONG, *message.params, message.command, SYSTEM_ID, 1, 0)
     one, rest = message, (0.0,) * (NUMBERS - len(message.numbers))
-    about = (one.t_us, one.clearance_m, *one.velocity)
+    begin = (one.t_us, one.clearance_m, *one.velocity)
     tail = (SYSTEM_ID, 1, one.index, one.count, one.number, int(one.keep_in))
-    values: WireValues = (*about, *one.numbers, *rest, *tail)
+    values: WireValues = (*begin, *one.numbers, *rest, *tail, *_NOT_TOUCHED)
     return (message_ids.OBSTACLE_SHAPE, *values)

@@ -11,7 +11,7 @@ from messages.generate import DEFINITION
 PINNED = {
     "ARM_JOINT_STATE": (60200, 129, 222),
     "ARM_JOINT_SETPOINT": (60201, 107, 59),
-    "END_EFFECTOR_TARGET": (60202, 57, 239),
+    "END_EFFECTOR_TARGET": (60202, 61, 239),
     "BARRIER_MARGIN": (60203, 223, 183),
     "MPC_STATUS": (60204, 53, 216),
     "MPC_HORIZON": (60205, 237, 234),
@@ -20,9 +20,10 @@ PINNED = {
     "WORKSPACE_SPHERE": (60208, 18, 197),
     "SETPOINT_STATUS": (60209, 25, 131),
     "OBSTACLE_POINT": (60210, 20, 254),
-    "OBSTACLE_SHAPE": (60211, 94, 185),
+    "OBSTACLE_SHAPE": (60211, 114, 185),
     "JOINT_ENCODERS": (60212, 41, 156),
     "MPC_HORIZON_ARM": (60213, 222, 38),
+    "FORCE_TORQUE": (60214, 32, 198),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have
@@ -124,7 +125,7 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
         *("target_system", "target_component", "accepted", "refused", "numbers"),
-        *("breaches", "departures", "interventions", "steps", "refusals"),
+        *("breaches", "departures", "interventions", "steps", "refusals", "friction"),
         *("start", "inputs"),  # of several dimensions, each with its unit in the description
     }
     for message in ET.parse(DEFINITION).iter("message"):

@@ -27,6 +27,7 @@ _U16: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
 _HORIZON_STEPS, _HORIZON_JOINTS = 6, 2  # of an MPC_HORIZON
 _SHAPE_NUMBERS: Final = 16  # of an OBSTACLE_SHAPE
+_NOT_TOUCHED: Final = (0.0,) * 5  # its numbers of contact
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
 
@@ -55,12 +56,12 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
     asked = snapshot.offboard.motion
     if snapshot.offboard.kind is SetpointKind.END_EFFECTOR and asked is not None:
         numbers, mask = as_asked(asked)
-        return (0, *numbers, mask, 0, 0, _LOCAL_NED)
+        return (0, *numbers, mask, 0, 0, _LOCAL_NED, 0.0)
     target = snapshot.reference
     if target is None:
         return None
     motion = (*target.p_WE, *target.v_WE, *target.a_WE)
-    return (target.t_us, *motion, target.yaw, 0.0, 0, 0, 0, _LOCAL_NED)
+    return (target.t_us, *motion, target.yaw, 0.0, 0, 0, 0, _LOCAL_NED, 0.0)
 
 
 def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
@@ -149,7 +150,7 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
     """OBSTACLE_SHAPE of the safe set in force: all, or the one of number ``which`` [1], from 1."""
     zones = snapshot.safe_set.zones
     if not zones:
-        nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0)
+        nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0, *_NOT_TOUCHED)
         return [Outgoing(message_ids.OBSTACLE_SHAPE, nothing, message_ids.PANDION)]
     every = not which >= 1.0  # NaN and 0 ask for all
     return [
@@ -159,6 +160,7 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
                 *(zone.t_us, zone.clearance, *zone.velocity),
                 *padded(zone.shape.numbers, _SHAPE_NUMBERS),
                 *(0, 0, index, len(zones), kind_of(zone.shape).number, int(zone.keep_in)),
+                *_NOT_TOUCHED,
             ),
             message_ids.PANDION,
         )
