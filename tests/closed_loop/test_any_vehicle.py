@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
@@ -27,8 +28,8 @@ def flown(one: Scenario) -> FlightResult:
     return simulate(one, 0, flight_config(body=one.body, vehicle=vehicle_of(one)))
 
 
-@pytest.mark.parametrize("suite", [None, "mocap"])
-@pytest.mark.parametrize("vehicle", OTHERS)
+@pytest.mark.drawn(2)
+@pytest.mark.parametrize(("vehicle", "suite"), list(product(OTHERS, (None, "mocap"))))
 def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | None) -> None:
     truth = flown(scenario("walls", vehicle, 25.0, suite)).truth
     assert truth.completed, truth.end_reason

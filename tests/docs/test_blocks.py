@@ -122,7 +122,7 @@ def answer(command: str, workplace: Path) -> tuple[int, str]:
     would cost a second.
     """
     words = shlex.split(command)
-    quick = ("replay", "export", "param", "dialect", "--version", "--help")
+    quick = ("replay", "export", "param", "dialect", "vehicle", "faults", "--version", "--help")
     if words[0] == "pandion" and words[1] in quick and not set(words) & {"|", ">", "&&"}:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
