@@ -11,14 +11,14 @@ from command_line.parser import Parser
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import TickInputs, TickOutputs
 from sitl.scenario_file import load_scenario
 from sitl.simulation import STEP_US, Simulation
-from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
+from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.result import processor_time_us
 
 SCENARIO: Final = "walls"
@@ -36,30 +36,20 @@ class _Flight:
         autopilot.warm_up()
         self.times_us: list[float] = []
         self.samples: list[tuple[Sample, ...]] = []
-        self._planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
         self._loop = ClosedLoop(
             Simulation(load_scenario(SCENARIO, suite), 0),
             self._timed(autopilot.tick),
-            FlightState(),
-            self._planner,
+            first_state(config.airframe),
+            InlinePlanner(Planner(config.planner, config.airframe, processor_time_us)),
             config.airframe,
         )
 
     def step(self) -> None:
         """One tick."""
-        loop, step = self._loop, self._loop.simulation.step
+        loop = self._loop
         sensors, samples = loop.observe()
         self.samples.append(samples)
-        loop.step(
-            TickInputs(
-                sensors=sensors,
-                plan=self._planner.take(sensors.t_us),
-                commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
-                targets=loop.targets(),
-                announced=loop.announced(),
-                samples=samples,
-            )
-        )
+        loop.step(loop.inputs(sensors, samples))
 
     def _timed(
         self, tick: Callable[[FlightState, TickInputs], tuple[FlightState, TickOutputs]]

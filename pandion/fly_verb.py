@@ -89,7 +89,7 @@ def main(argv: list[str]) -> int:
         return COULD_NOT_START
     display = Display(sys.stderr if options.json == "-" else sys.stdout)
     _banner(flight, display)
-    view = ViewBeside(display, flight.out)
+    view = ViewBeside(display, flight.out, flight.believed)
     try:
         places = ANYWHERE if options.realtime else lockstep_places()
         found = view.start if options.view else None

@@ -33,6 +33,12 @@ class ViewOptions:
         "of a running vehicle: udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD",
         default=VEHICLE,
     )
+    airframe: str = option(
+        "--airframe NAME",
+        "what a running vehicle or that of a .tlog is, which messages do not tell: a vehicle that "
+        "comes with Pandion, or a .toml file",
+        default="paper",
+    )
     port: int = option(
         "--port N", "of the page; 0: any that is free", whole(0, 65535), default=PORT
     )
@@ -56,11 +62,12 @@ def main(argv: list[str]) -> int:
 
 
 def _show_log(options: ViewOptions, log: Path) -> int:
+    from vehicles.vehicle_file import VehicleError
     from view.flight_data import UlogError
 
     try:
-        flight = _opened(log)
-    except UlogError as error:
+        flight = _opened(log, options.airframe)
+    except (UlogError, VehicleError) as error:
         print_error("pandion view", error)
         return COULD_NOT_START
     from view.log_page import LogPage
@@ -84,16 +91,19 @@ def _show_log(options: ViewOptions, log: Path) -> int:
 
 
 def _show_live(options: ViewOptions) -> int:
+    from fsw.autopilot.model.airframe import airframe_of
     from messages.addresses import LinkError, parse_link_address
+    from vehicles.vehicle_file import VehicleError, load_vehicle
     from view.live_link import VehicleLink
     from view.live_page import LivePage
     from view.page import LOCAL, PageError, address, open_server
 
     try:
         commands = options.host in LOCAL or options.allow_commands
-        link = VehicleLink(parse_link_address(options.vehicle), commands=commands)
+        where, airframe = parse_link_address(options.vehicle), load_vehicle(options.airframe)
+        link = VehicleLink(where, commands=commands, airframe=airframe_of(airframe))
         server = open_server(options.host, options.port, f"vehicle at {options.vehicle}")
-    except (LinkError, PageError) as error:
+    except (LinkError, PageError, VehicleError) as error:
         print_error("pandion view", error)
         return COULD_NOT_START
     link.start()
@@ -115,7 +125,7 @@ def _wait() -> None:
         threading.Event().wait()
 
 
-def _opened(path: Path) -> Flight:
+def _opened(path: Path, airframe: str) -> Flight:
     """By what it begins with: ground stations name their logs .tlog, .TLOG, .raw and otherwise."""
     from messages.ulog_reader import is_ulog
 
@@ -123,6 +133,8 @@ def _opened(path: Path) -> Flight:
         from view.log_flight import LogFlight
 
         return LogFlight(path)
+    from fsw.autopilot.model.airframe import airframe_of
+    from vehicles.vehicle_file import load_vehicle
     from view.tlog_flight import TlogFlight
 
-    return TlogFlight(path)
+    return TlogFlight(path, airframe_of(load_vehicle(airframe)))

@@ -23,9 +23,12 @@ _GRACE_S: Final = 3.0
 class ViewBeside:
     """Started when the vehicle can be reached, ended with the flight."""
 
-    def __init__(self, display: Display, out: Path) -> None:
-        """Prepare for a flight whose files are in ``out``; ``display`` is told the address."""
-        self._display, self._out = display, out
+    def __init__(self, display: Display, out: Path, airframe: str) -> None:
+        """Prepare for a flight whose files are in ``out``; ``display`` is told the address.
+
+        It is one of a vehicle by the name or path ``airframe``.
+        """
+        self._display, self._out, self._airframe = display, out, airframe
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self, vehicle_port: int) -> None:
@@ -36,6 +39,7 @@ class ViewBeside:
                 [
                     *(sys.executable, "-P", "-m", "pandion", "view"),
                     *("--vehicle", f"udp:127.0.0.1:{vehicle_port}", "--port", str(page)),
+                    *("--airframe", self._airframe),
                 ],
                 stdin=subprocess.DEVNULL,
                 stdout=log,

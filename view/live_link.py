@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.signals import SafeSet, Vec3
 from fsw.link.endpoints import open_endpoint
 from fsw.link.wire import message_ids as ids
@@ -46,17 +47,20 @@ OFFBOARD: Final = (1.0, 6.0, 0.0)
 class VehicleLink(threading.Thread):
     """Speaks to one vehicle until it is closed. A vehicle that is not there yet may come."""
 
-    def __init__(self, vehicle: LinkAddress, *, commands: bool) -> None:
+    def __init__(
+        self, vehicle: LinkAddress, *, commands: bool, airframe: Airframe = AIRFRAME
+    ) -> None:
         """Open a link of its own towards ``vehicle``; without ``commands`` it only looks.
 
         One that only looks is no ground station to the vehicle: it must not hide that the link to
-        the one that commands is lost.
+        the one that commands is lost. The vehicle is such an ``airframe``: telemetry does not say.
         """
         super().__init__(daemon=True)
         self.commands = commands
         self.watched = False  # whether a person sees the page
         self.where = address_text(vehicle)
-        self._telemetry = Telemetry()
+        self.airframe = airframe
+        self._telemetry = Telemetry(airframe)
         self._writer = FrameWriter(SYSTEM, COMPONENT)
         self._heard = threading.Condition()
         self._setpoint: Vec3 | None = None

@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import Vec3
 from view import live_link, panels
 from view.flight import Trail
@@ -56,7 +55,8 @@ class LivePage:
         self._undrawn = ""  # why a frame was not drawn, as it was said last
         self._frames = 0
         self._due = {"text": 0.0, "plot": 0.0, "kept": 0.0, "trail": 0.0}
-        self.stage = Stage(server, AIRFRAME)
+        self._airframe = link.airframe
+        self.stage = Stage(server, self._airframe)
         self.stage.frame(server, ((-_REACH,) * 3, (_REACH, _REACH, 0.0)))
         self._build()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -78,7 +78,7 @@ class LivePage:
             self._build_commands()
         with tabs.add_tab("Curves"):
             blank = [Scene(t=0.0), Scene(t=1.0)]
-            self._plots = [Plot(gui, c, 0.0, 170) for c in curves_of(blank, AIRFRAME)]
+            self._plots = [Plot(gui, c, 0.0, 170) for c in curves_of(blank, self._airframe)]
         with tabs.add_tab("Events"):
             self._events = gui.add_html("")
         with tabs.add_tab("Messages"):
@@ -156,7 +156,7 @@ class LivePage:
         if now.estimate is None:
             self._drag.value = False
             return
-        tip = tip_of(now.estimate, AIRFRAME)
+        tip = tip_of(now.estimate, self._airframe)
         self._gizmo = self._server.scene.add_transform_controls(
             "/end-effector target", scale=0.35, disable_rotations=True, position=tip,
             depth_test=False,
@@ -214,7 +214,7 @@ class LivePage:
         if self._is_due("text", now_s, _TEXT_S):
             self._write(scene)
         if self._is_due("plot", now_s, _PLOT_S) and len(self._recent) > 1:
-            curves = curves_of(list(self._recent), AIRFRAME)
+            curves = curves_of(list(self._recent), self._airframe)
             for plot, curve in zip(self._plots, curves, strict=True):
                 plot.replace(curve)
 
@@ -238,7 +238,7 @@ class LivePage:
         if self._is_due("kept", now_s, _KEPT_S):
             self._recent.append(scene)
         if self._is_due("trail", now_s, _TRAIL_S):
-            self._trail.append((tip_of(scene.estimate, AIRFRAME), scene.minimum))
+            self._trail.append((tip_of(scene.estimate, self._airframe), scene.minimum))
             if len(self._trail) >= _PIECE:
                 points, margins = zip(*self._trail, strict=True)
                 trail = Trail(np.array(points), np.array(margins))
@@ -253,7 +253,7 @@ class LivePage:
         self.stage.frame(self._server, (low, (p[0] + _REACH, p[1] + _REACH, 0.0)))
 
     def _write(self, scene: Scene) -> None:
-        self._now.content = panels.now_html(scene, AIRFRAME, 0.0)
+        self._now.content = panels.now_html(scene, self._airframe, 0.0)
         events = self._link.read(lambda telemetry: tuple(telemetry.events))
         self._events.content = panels.events_html(events, math.inf, 0.0)
         now_s = time.monotonic()

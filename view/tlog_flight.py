@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import Vec3
 from fsw.link.wire.message_ids import ATTITUDE, LOCAL_POSITION_NED, SYSTEM_ID
@@ -42,8 +42,8 @@ class _Recording:
     the next one begins.
     """
 
-    def __init__(self, path: Path, frames: TlogFrames) -> None:
-        self.telemetry = Telemetry()
+    def __init__(self, path: Path, frames: TlogFrames, airframe: Airframe) -> None:
+        self.telemetry = Telemetry(airframe)
         self.scenes: list[Scene] = []
         self.events: deque[Event] = deque(maxlen=_MAX_EVENTS)
         self._path = path
@@ -103,18 +103,18 @@ class _Recording:
 class TlogFlight:
     """See :class:`view.flight.Flight`."""
 
-    def __init__(self, path: Path) -> None:
-        """Read a log.
+    def __init__(self, path: Path, airframe: Airframe = AIRFRAME) -> None:
+        """Read a log of such an ``airframe``, which the messages do not tell.
 
         Raises:
             UlogError: It is no telemetry log, or says nothing about where the vehicle was.
         """
-        self.airframe = AIRFRAME
+        self.airframe = airframe
         try:
             log = read_bounded(path, _MAX_BYTES)
         except OSError as error:
             raise UlogError(f"cannot read {path}: {error.strerror}") from None
-        recording = _Recording(path, TlogFrames(log))
+        recording = _Recording(path, TlogFrames(log), airframe)
         self._scenes = recording.scenes
         if not self._scenes:
             raise UlogError(f"{path} {recording.missing()}")

@@ -30,7 +30,7 @@ from view.scene import Horizon, Posture
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 
 
-def chain(posture: Posture, airframe: Airframe = AIRFRAME) -> list[Vec3]:
+def chain(posture: Posture, airframe: Airframe) -> list[Vec3]:
     """Each joint's origin and the end-effector [m, NED] of a ``posture`` [m, rad, NED]."""
     R, b, m = matrix_from_quaternion(posture.q), airframe.bodies, Multibody()
     place_links(m, b, posture.q_arm)
@@ -39,12 +39,12 @@ def chain(posture: Posture, airframe: Airframe = AIRFRAME) -> list[Vec3]:
     return [add(posture.p, rotate(R, (x, y, z))) for x, y, z in (*origins, tip)]
 
 
-def tip_of(posture: Posture, airframe: Airframe = AIRFRAME) -> Vec3:
+def tip_of(posture: Posture, airframe: Airframe) -> Vec3:
     """The end-effector of a ``posture`` [m, NED]."""
     return chain(posture, airframe)[-1]
 
 
-def rotor_hubs(airframe: Airframe = AIRFRAME) -> tuple[Vec3, ...]:
+def rotor_hubs(airframe: Airframe) -> tuple[Vec3, ...]:
     """The hubs in the body frame [m, FRD], as far as the torques of the rotors tell."""
     rows = [airframe.wrench[6 * i : 6 * i + 6] for i in range(airframe.rotors)]
     return tuple((row[4] / -row[2], -row[3] / -row[2], 0.0) for row in rows)
@@ -92,7 +92,7 @@ def horizon(
     start: PredictionState,
     inputs: tuple[PlanInput, ...],
     period: float,
-    airframe: Airframe = AIRFRAME,
+    airframe: Airframe,
 ) -> Horizon:
     """Where a plan leads: the base and the end-effector at each node [m, NED].
 

@@ -58,6 +58,8 @@ def _value(fact: Fact) -> str:
     """Type, if it is INT32, value and unit."""
     if fact.repeats:
         return f"`{fact.repeats}`"
+    if callable(fact.value):
+        return "the vehicle's"
     return f"{_type(fact.value)}{as_text(fact.value)} {fact.unit}".rstrip()
 
 

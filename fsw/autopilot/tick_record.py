@@ -169,10 +169,12 @@ _Sums = Annotated[Floats, 21 * JOINTS]
 
 
 class Multibody(Record):
-    """The vehicle in one pose and motion, in B about its origin; made anew wherever it is needed.
+    """The vehicle in one pose and motion, in B about its origin; made anew where that is another.
 
     The mass matrix's blocks are named by their rows and columns: v, w and q.
     """
+
+    of: Annotated[Floats, 3 + 2 * JOINTS]  # the base's rate, the joints' angles and their rates
 
     rotation: _Rotations  # from the link's frame to B
     origin: _Vectors  # m, of the joint

@@ -61,7 +61,6 @@ _SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
 _ACCEPTED: Final = 0  # MAV_RESULT
 _REPORT_US: Final = 1_000_000  # the mode is reported when it changes, and this often
-_QUADROTOR: Final = 2  # MAV_TYPE
 _PX4: Final = 12  # MAV_AUTOPILOT
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG
 _ARMED: Final = 128
@@ -130,7 +129,7 @@ class SimLink:
 
     def announce(self) -> None:
         """Send a heartbeat, until the simulator sends steps."""
-        values = (0, _QUADROTOR, _PX4, 0, _STANDBY, 3)
+        values = (0, self._airframe.mav_type, _PX4, 0, _STANDBY, 3)
         self._endpoint.send(self._writer.frame(message_ids.HEARTBEAT, *values))
 
     def wait_for_step(self) -> SensorFrame | None:
@@ -360,7 +359,8 @@ class SimLink:
         self._reported_us, self._reported_mode = t_us, outputs.mode
         base_mode = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
         status = _ACTIVE if outputs.armed else _STANDBY
-        values = (custom_mode(outputs.mode), _QUADROTOR, _PX4, base_mode, status, 3)
+        kind = self._airframe.mav_type
+        values = (custom_mode(outputs.mode), kind, _PX4, base_mode, status, 3)
         return self._writer.frame(message_ids.HEARTBEAT, *values)
 
     def _ack_frame(self, ack: CommandAck) -> bytes:

@@ -147,7 +147,7 @@ def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> byt
     """Everything before the first record, with the shape of the inputs, to read them back."""
     exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
     # Those that only state what is so are for PX4's tools: Flight Review shows MAV_TYPE.
-    stated = {fact.name: fact.value for fact in FACTS if not fact.repeats}
+    stated = {fact.name: fact.read({}, subject.airframe) for fact in FACTS if not fact.repeats}
     named = {**stated, **subject.numbers, **subject.parameters}
     facts: dict[str, str | int] = {
         "sys_name": "Pandion",

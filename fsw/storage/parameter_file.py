@@ -150,8 +150,9 @@ def _entry(words: list[str]) -> dict[str, float]:
     if parameter is None:
         assert fact is not None
         # A file that a ground station saved holds them as well, and they say nothing new.
-        if nearest_decimal(value) != nearest_decimal(fact.value):
-            raise ValueError(f"{name} is read only and {as_text(fact.value)} here")
+        stated = value if callable(fact.value) else fact.value
+        if nearest_decimal(value) != nearest_decimal(stated):
+            raise ValueError(f"{name} is read only and {as_text(stated)} here")
         return {}
     refusal = parameter.refusal(value)
     if refusal is not None:

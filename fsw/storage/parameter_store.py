@@ -55,6 +55,7 @@ class ParameterStore:
 
     def __init__(self, config: FlightConfig, prepare: Prepare) -> None:
         """Start with the values of a configuration; prepare is called in the executor's thread."""
+        self.airframe: Final = config.airframe
         self.defaults: Final[Mapping[str, float]] = {p.name: p.read(config) for p in PARAMETERS}
         self._values = dict(self.defaults)
         self._prepare = prepare

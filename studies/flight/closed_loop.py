@@ -84,13 +84,17 @@ class ClosedLoop(Generic[State]):
         """See :func:`readings`."""
         return readings(self.simulation)
 
-    def sense(self) -> SensorFrame:
-        """The first part of :meth:`observe`."""
-        return self.observe()[0]
-
-    def samples(self) -> tuple[Sample, ...]:
-        """The second part of :meth:`observe`."""
-        return self.observe()[1]
+    def inputs(self, sensors: SensorFrame, samples: tuple[Sample, ...] = ()) -> TickInputs:
+        """What a tick with these readings is given beside them: a plan, and what a pilot sends."""
+        step = self.simulation.step
+        return TickInputs(
+            sensors=sensors,
+            plan=self.planner.take(sensors.t_us),
+            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
+            targets=self.targets(),
+            announced=self.announced(),
+            samples=samples,
+        )
 
     def battery(self) -> BatteryReading | None:
         """What the battery says in this step, if anything."""
@@ -249,7 +253,6 @@ class ScenarioFlight:
         """
         check_body(simulation.scenario, config)
         self.recorder = FlightRecorder()
-        self.planner = InlinePlanner(planner_of(config, parts))
         self.autopilot = Autopilot(config)
         law = parts.law(self.autopilot, simulation.clock, self.recorder)
         tick = self.autopilot.tick if law is None else law.tick
@@ -257,7 +260,7 @@ class ScenarioFlight:
             simulation,
             tick,
             first_state(config.airframe),
-            self.planner,
+            InlinePlanner(planner_of(config, parts)),
             config.airframe,
         )
         # Somebody looks at each tick, or has a part in it; a fault of a sensor may be in each.
@@ -276,7 +279,6 @@ class ScenarioFlight:
     def respond(self) -> TickOutputs:
         """Sense, tick and plan."""
         loop, recorder, simulation = self.loop, self.recorder, self.loop.simulation
-        step = simulation.step
         sensors, samples = loop.observe()
         if self._fault is not None:
             samples = self._faulty.samples(samples)
@@ -288,18 +290,10 @@ class ScenarioFlight:
                 else only_the_time(sensors.t_us, samples, joints)
             )
         self._stamp_us = sensors.t_us
-        answer = self.planner.take(sensors.t_us)
-        if answer is not None:
-            recorder.planned(answer)
-        inputs = TickInputs(
-            sensors=sensors,
-            plan=answer,
-            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
-            targets=loop.targets(),
-            announced=loop.announced(),
-            samples=samples,
-        )
-        if self._traced and step % TRACE_STEPS == 0:
+        inputs = loop.inputs(sensors, samples)
+        if inputs.plan is not None:
+            recorder.planned(inputs.plan)
+        if self._traced and simulation.step % TRACE_STEPS == 0:
             recorder.trace.append(_trace_point(simulation))
         outputs = loop.respond(inputs)
         if self._seen is not None:

@@ -172,7 +172,7 @@ class Search:
         self.evaluations = 0
         self._flight = TrackedFlight(scenario, config, flown)
         self._amplitude = amplitude
-        last = len(flown.rows) - STRETCH_TICKS - 1
+        last = len(flown.states) - STRETCH_TICKS - 1
         usable = [start for start in flown.starts if start.row <= max(last, 0)]
         usable = [start for start in usable if start.row >= SETTLED_TICKS] or usable[-1:]
         chosen = np.linspace(0, len(usable) - 1, min(_STARTS, len(usable))).astype(int)

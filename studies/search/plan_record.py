@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +20,14 @@ from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES, moving_zones
-from fsw.autopilot.signals import PlanInput, PredictionState, TickInputs, TickOutputs
-from fsw.autopilot.tick_record import Tick
+from fsw.autopilot.signals import TickOutputs
+from fsw.autopilot.tick_record import Accelerations, PlanState, Tick
 from sitl.disturbances.items import Push
 from sitl.scenario import Scenario
 from sitl.simulation import Simulation
-from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
+from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.own_parts import planner_of
 
-STATE, INPUT = 19, 6  # numbers of a plan's state and input in a row
 EVERY = 50  # ticks between two starts
 _WARN = 1  # of SAFE_BREACH_ACT
 _Seen = Callable[[Simulation, FlightState, TickOutputs], None]
@@ -37,7 +37,7 @@ _Seen = Callable[[Simulation, FlightState, TickOutputs], None]
 class Start:
     """Where a stretch can begin."""
 
-    row: int  # of the plan
+    row: int  # tick of the plan
     step: int  # of the simulation
     state: Array  # (17 + 2j,) [SI] of the plant
     memory: Tick
@@ -48,7 +48,8 @@ class Start:
 class PlanRecord:
     """The plan of a calm flight."""
 
-    rows: Array  # (ticks, STATE + INPUT) [SI]
+    states: NDArray[Any]  # (ticks,) of ``PlanState``
+    inputs: NDArray[Any]  # (ticks,) of ``Accelerations``
     zones: Array  # (rows, columns) [SI] of the safety filter, all that it had in the flight
     spans: NDArray[np.int64]  # (ticks, 2) which of them it had: first, and one after the last
     starts: tuple[Start, ...]
@@ -58,30 +59,36 @@ def record(
     scenario: Scenario, config: FlightConfig, report: Callable[[float, float], None]
 ) -> PlanRecord:
     """Fly a scenario without its disturbances; ``report`` receives seconds flown and in all."""
-    rows: list[tuple[float, ...]] = []
+    states: list[bytes] = []
+    inputs: list[bytes] = []
     zones = _ZonesSeen()
     starts: list[Start] = []
     before: list[tuple[Array, Tick]] = []
 
     def sense(simulation: Simulation, state: FlightState) -> None:
-        if len(rows) % EVERY == 0:
+        if len(states) % EVERY == 0:
             now = np.frombuffer(simulation.state_bytes()).copy()
             before[:] = [(now, state.cascade)]
 
     def see(simulation: Simulation, state: FlightState, outputs: TickOutputs) -> None:
-        plan, u = outputs.snapshot.plan_state, outputs.snapshot.plan_input
-        if plan is None or u is None:
+        if outputs.snapshot.plan_state is None:
             return
-        if len(rows) % EVERY == 0:
+        if len(states) % EVERY == 0:
             margin = min(simulation.truth().margins_m, default=math.inf)
-            starts.append(Start(len(rows), simulation.step - 1, *before[0], margin))
-        rows.append(row(plan, u))
+            starts.append(Start(len(states), simulation.step - 1, *before[0], margin))
+        states.append(state.cascade.plan.numbers.tobytes())
+        inputs.append(state.cascade.u.numbers.tobytes())
         zones.add(state)
-        if len(rows) % 500 == 0:
+        if len(states) % 500 == 0:
             report(simulation.time_s, scenario.duration_s)
 
     fly(replace(scenario, disturbances=()), config, (), see, sense=sense)
-    return PlanRecord(np.array(rows), *zones.arrays(), tuple(starts))
+    return PlanRecord(
+        np.frombuffer(bytearray().join(states), PlanState.dtype),
+        np.frombuffer(bytearray().join(inputs), Accelerations.dtype),
+        *zones.arrays(),
+        tuple(starts),
+    )
 
 
 class _ZonesSeen:
@@ -109,13 +116,6 @@ class _ZonesSeen:
         return np.concatenate(self._kept), np.array(self._spans, dtype=np.int64)
 
 
-def row(plan: PredictionState, u: PlanInput) -> tuple[float, ...]:
-    """A plan's state and input as one row."""
-    heading = (plan.yaw, plan.yaw_rate)
-    state = (*plan.p, *plan.v, *plan.a, *plan.j, *plan.s, *heading, *plan.q_arm, *plan.qd_arm)
-    return (*state, *u.a, u.yaw_acc, *u.qdd_arm)
-
-
 def fly(
     scenario: Scenario,
     config: FlightConfig,
@@ -141,16 +141,8 @@ def fly(
         config.airframe,
     )
     while simulation.ended is None and (last_step is None or simulation.step <= last_step):
-        step, sensors = simulation.step, loop.sense()
         if sense is not None:
             sense(simulation, loop.state)
-        inputs = TickInputs(
-            sensors=sensors,
-            plan=planner.take(sensors.t_us),
-            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
-            targets=loop.targets(),
-            announced=loop.announced(),
-        )
-        outputs = loop.step(inputs)
+        outputs = loop.step(loop.inputs(*loop.observe()))
         see(simulation, loop.state, outputs)
     return simulation

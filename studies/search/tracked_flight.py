@@ -19,16 +19,16 @@ from fsw.autopilot.estimation.estimator import READINGS, read_into
 from fsw.autopilot.flight.autopilot import keep_clear
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.tick_record import FILTER_ACTED, Accelerations, PlanState, Tick
+from fsw.autopilot.tick_record import FILTER_ACTED, Tick
 from fsw.compiled import compilable, packed
 from sitl.body import Parts
 from sitl.mission_clock import MissionClock
 from sitl.plant.aerial_manipulator import Inputs, Plant
 from sitl.plant.integrator import STEP_S, Held, held, integrate
 from sitl.plant.parameters import GRAVITY, plant
-from sitl.plant.state import JOINTS_MAX, ROTORS_MAX
+from sitl.plant.state import JOINTS_MAX, ROTORS_MAX, THRUST
 from sitl.scenario import Scenario
-from sitl.simulation import START_US, STEP_US, SUBSTEPS
+from sitl.simulation import START_US, STEP_US, SUBSTEPS, Simulation
 from sitl.start import effects, flown_vehicle
 from sitl.trajectory import place_on_curve
 from sitl.world import Headroom, World, ZoneTable, fill_margins, headroom, record_if_clear
@@ -67,16 +67,16 @@ class TrackedFlight:
         self._world, clock = World(scenario), MissionClock(scenario)
         assert clock.starts_s is not None  # it starts in the air
         self._aim = (clock.curve if self._world.follows else _NO_CURVE, clock.starts_s)
-        self._axes = 3 if scenario.body == "full" else 0
+        self._rows = len(Simulation(scenario, 0).places())
 
     def fly(self, start: Start, ticks: int, disturbance: Disturbance) -> tuple[Array, float]:
         """What is kept of each tick, (ticks, KEPT) [SI], and the smallest margin [m].
 
         Fewer ticks where the flight diverged; an infinite margin without zones.
         """
-        rows = self._record.rows[start.row : start.row + ticks + 1]
-        kept = np.zeros((len(rows) - 1, KEPT))
-        places = np.empty((SUBSTEPS, 4 + self._axes, 3))
+        states = self._record.states[start.row : start.row + ticks + 1]
+        kept = np.zeros((len(states) - 1, KEPT))
+        places = np.empty((SUBSTEPS, self._rows, 3))
         lowest = np.full(len(self._world.keys), np.inf)
         flown = _track(
             self._plants,
@@ -84,7 +84,8 @@ class TrackedFlight:
             self._probes,
             start.state.copy(),
             start.memory.copy().array,
-            rows,
+            states,
+            self._record.inputs[start.row :],
             self._record.zones,
             self._record.spans[start.row :],
             start.step,
@@ -116,7 +117,8 @@ def _track(
     probes: Array,
     x: Array,
     ticks: NDArray[Any],
-    rows: Array,
+    plans: NDArray[Any],
+    planned_inputs: NDArray[Any],
     zones: Array,
     spans: NDArray[np.int64],
     first_step: int,
@@ -142,22 +144,27 @@ def _track(
     reading = np.zeros(READINGS)
     reading[6], reading[15] = 1.0, -GRAVITY
     r: Tick = ticks[0]
+    rotors, joints = int(law.airframe.rotors), int(law.airframe.bodies.joints)
+    angles = THRUST + rotors
+    at, rates_at = THRUST + 3, THRUST + 3 + JOINTS_MAX
     top, drive = law.airframe.rotor_thrust_max, law.airframe.joint_torque_max
     thrust, torque = np.zeros(ROTORS_MAX), np.zeros(JOINTS_MAX)
     for k in range(kept.shape[0]):
-        planned, ahead = rows[k], rows[k + 1]
-        _take_plan(planned, r.plan, r.u)
-        reading[:13], reading[16:] = x[:13], x[17:21]
+        planned, ahead = plans[k], plans[k + 1]
+        r.plan, r.u = planned, planned_inputs[k]
+        reading[:THRUST] = x[:THRUST]
+        reading[at : at + joints] = x[angles : angles + joints]
+        reading[rates_at : rates_at + joints] = x[angles + joints :]
         step = first_step + k
         read_into(r.estimate, reading, START_US + STEP_US * step)
         close_loops(r, law, 1, zones[spans[k, 0] : spans[k, 1]], probes)
-        for i in range(int(law.airframe.rotors)):
+        for i in range(rotors):
             thrust[i] = r.sent.rotor_thrust[i] = min(max(r.sent.rotor_thrust[i], 0.0), top[i])
-        for i in range(int(law.airframe.bodies.joints)):
+        for i in range(joints):
             most = drive[i]
             torque[i] = r.sent.joint_torque[i] = min(max(r.sent.joint_torque[i], -most), most)
         if k % every == 0:
-            lift = (x[13] + x[14] + x[15] + x[16]) / mass
+            lift = x[THRUST:angles].sum() / mass
             R = r.estimate.R_WB
             a = (-lift * R[2], -lift * R[5], GRAVITY - lift * R[8])
             for axis in range(3):
@@ -165,9 +172,9 @@ def _track(
                     push[axis] = amplitude * table[min(k // every, table.shape[0] - 1), axis]
                 else:
                     chased = (
-                        weights[axis, 0] * (x[axis] - planned[axis])
-                        + weights[axis, 1] * (x[3 + axis] - planned[3 + axis])
-                        + weights[axis, 2] * (a[axis] - planned[6 + axis])
+                        weights[axis, 0] * (x[axis] - planned.p[axis])
+                        + weights[axis, 1] * (x[3 + axis] - planned.v[axis])
+                        + weights[axis, 2] * (a[axis] - planned.a[axis])
                     )
                     idle = not weights[axis].any()
                     push[axis] = 0.0 if idle else amplitude * (1.0 if chased >= 0.0 else -1.0)
@@ -177,23 +184,12 @@ def _track(
         before_s = 1e-6 * STEP_US * step
         _judge(table_of_zones, parts, aim, places, before_s, lowest, when_s, margins, room)
         for axis in range(3):
-            kept[k, OFF + axis] = x[axis] - ahead[axis]
+            kept[k, OFF + axis] = x[axis] - ahead.p[axis]
             kept[k, PUSH + axis] = push[axis]
         kept[k, FILTERED] = 1.0 if r.flags & FILTER_ACTED else 0.0
         if not (abs(kept[k, OFF]) + abs(kept[k, OFF + 1]) + abs(kept[k, OFF + 2]) < 10.0):
             return k + 1
     return len(kept)
-
-
-@compilable
-def _take_plan(row: Array, x: PlanState, u: Accelerations) -> None:
-    """The plan's state and input of a row (STATE + INPUT,) [SI]."""
-    for i in range(3):
-        x.p[i], x.v[i], x.a[i], u.a[i] = row[i], row[3 + i], row[6 + i], row[19 + i]
-    for i in range(2):
-        x.j[i], x.s[i] = row[9 + i], row[11 + i]
-        x.q_arm[i], x.qd_arm[i], u.qdd_arm[i] = row[15 + i], row[17 + i], row[23 + i]
-    x.yaw, x.yaw_rate, u.yaw_acc = row[13], row[14], row[22]
 
 
 @compilable

@@ -21,12 +21,12 @@ from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import Mode, PredictionState, TickInputs, TickOutputs
+from fsw.autopilot.signals import Mode, PredictionState, TickOutputs
 from sitl.disturbances.sequence import Steered
 from sitl.result import EndKind
 from sitl.scenario import V3, Scenario
 from sitl.simulation import STEP_US, Simulation, Truth
-from studies.flight.closed_loop import FIRST_COMMANDS, ClosedLoop, InlinePlanner
+from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.own_parts import planner_of
 from studies.search.tracked_flight import Disturbance
 
@@ -52,13 +52,11 @@ class WholeFlight:
         self._push = Steered()
         calm = replace(scenario, disturbances=())
         self._simulation = Simulation(calm, 0, (self._push,))
-        self._planner = InlinePlanner(planner_of(config))
-        tick = Autopilot(config).tick
         self._loop = ClosedLoop(
             self._simulation,
-            tick,
+            Autopilot(config).tick,
             first_state(config.airframe),
-            self._planner,
+            InlinePlanner(planner_of(config)),
             config.airframe,
         )
 
@@ -76,15 +74,8 @@ class WholeFlight:
         return flown
 
     def _step(self, before_advancing: Callable[[TickOutputs], None] | None = None) -> TickOutputs:
-        loop, step, sensors = self._loop, self._simulation.step, self._loop.sense()
-        inputs = TickInputs(
-            sensors=sensors,
-            plan=self._planner.take(sensors.t_us),
-            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
-            targets=loop.targets(),
-            announced=loop.announced(),
-        )
-        return loop.step(inputs, before_advancing)
+        loop = self._loop
+        return loop.step(loop.inputs(*loop.observe()), before_advancing)
 
     def _disturbed(self, ticks: int, disturbance: Disturbance) -> Flown:
         simulation = self._simulation

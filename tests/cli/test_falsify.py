@@ -70,7 +70,7 @@ def test_a_missing_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_a_flight_that_ends_before_there_is_a_plan_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    nothing = PlanRecord(np.zeros((0, 25)), np.zeros((0, 1)), np.zeros((0, 2), dtype=np.int64), ())
+    nothing = PlanRecord(*np.zeros((3, 0)), np.zeros((0, 2), dtype=np.int64), ())
     monkeypatch.setattr("studies.search.falsify.record", lambda *_: nothing)
     assert main(["workspace", f"--out={tmp_path}", "--evaluations=20"]) == 2
     assert "before the vehicle has a plan" in capsys.readouterr().err

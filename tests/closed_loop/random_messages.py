@@ -20,7 +20,7 @@ from functools import partial
 from typing import Any, Final
 
 from docs.pages.messages import heard
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.mpc.planner import Planner
@@ -143,7 +143,11 @@ class Talkers:
         ]  # fmt: skip
         planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
         self.loop = ClosedLoop(
-            self.simulation, self.flight.tick, FlightState(), planner, config.airframe
+            self.simulation,
+            self.flight.tick,
+            first_state(config.airframe),
+            planner,
+            config.airframe,
         )
         self.outcome = Outcome()
         self.writers = {sender: FrameWriter(*_ids(sender)) for sender in SENDERS}

@@ -13,7 +13,7 @@ import pytest
 from fsw.autopilot.estimation.fusion_memory import Trail
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.failsafe.conditions import Condition
-from fsw.autopilot.flight.state import AIDED, FlightState
+from fsw.autopilot.flight.state import AIDED, FlightState, first_state
 from fsw.autopilot.model.actuator_health import ActuatorHealth
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -53,7 +53,11 @@ class Flight:
         self.plain.calm.fly = lambda *_: None  # type: ignore[method-assign]
         self.planner = InlinePlanner(Planner(config.planner, config.airframe, lambda: 0.0))
         self.loop = ClosedLoop(
-            Simulation(scenario, 7), self.tick, FlightState(), self.planner, config.airframe
+            Simulation(scenario, 7),
+            self.tick,
+            first_state(config.airframe),
+            self.planner,
+            config.airframe,
         )
         self.calm = 0
 
@@ -163,7 +167,7 @@ def calm() -> tuple[Flight, FlightState, SensorFrame]:
     """A flight, a state of it that is calm, and the next frame; nothing changes them."""
     flight = Flight("walls-calm")
     flight.fly(61)
-    return flight, flight.loop.state, flight.loop.sense()
+    return flight, flight.loop.state, flight.loop.observe()[0]
 
 
 CHANGES: dict[str, Callable[[FlightState], FlightState]] = {

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.model.nominal import NominalModel
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -43,7 +43,7 @@ def target(t_us: int) -> EndEffectorTarget:
 
 def fly(lost: set[int], ticks: int) -> tuple[FlightState, list[PlanRequest]]:
     """Ticks of a loop that never hears the lost ones; plans arrive when they are due."""
-    loop, state = Autopilot(CONFIG), FlightState()
+    loop, state = Autopilot(CONFIG), first_state(CONFIG.airframe)
     planner = Planner(CONFIG.planner, CONFIG.airframe, lambda: 0.0)
     waiting: Plan | None = None
     asked = []

@@ -13,32 +13,42 @@ from gymnasium.utils.env_checker import check_env
 
 import pandion
 from pandion.environments import EFFORT, PENALTY, PandionEnv
+from sitl.scenario import vehicle_of
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Controls, Simulation
+from vehicles.vehicle_file import vehicle_names
 
 IDS = ("pandion/Walls-v0", "pandion/Workspace-v0")
 each = pytest.mark.parametrize("name", IDS)
+each_vehicle = pytest.mark.parametrize("vehicle", vehicle_names())
 NOTHING = np.zeros(6, dtype=np.float32)
 
 
 def hover(env: PandionEnv) -> np.ndarray:
-    thrust, torque = pandion.Simulator(env._scenario).hover
-    return np.array([*(2.0 * thrust / 17.1675 - 1.0), *(torque / 2.0)], dtype=np.float32)
+    """The action that holds the vehicle as it starts, by the vehicle's file."""
+    flown, (thrust, torque) = vehicle_of(env._scenario), pandion.Simulator(env._scenario).hover
+    most = np.array([rotor.thrust_max for rotor in flown.rotors])
+    h, share = flown.mass * 9.81 / most.sum(), thrust / most
+    lift = np.where(share > h, (share - h) / (1.0 - h), share / h - 1.0)
+    drive = torque / [joint.torque_max for joint in flown.joints]
+    return np.array([*lift, *drive], dtype=np.float32)
 
 
 @each
-def test_gymnasiums_own_checker_finds_nothing(name: str) -> None:
+@each_vehicle
+def test_gymnasiums_own_checker_finds_nothing(name: str, vehicle: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
-        check_env(gymnasium.make(name).unwrapped)
+        check_env(gymnasium.make(name, vehicle=vehicle).unwrapped)
 
 
 @each
-def test_stable_baselines3s_checker_finds_nothing(name: str) -> None:
+@each_vehicle
+def test_stable_baselines3s_checker_finds_nothing(name: str, vehicle: str) -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
-        checker.check_env(gymnasium.make(name).unwrapped)
+        checker.check_env(gymnasium.make(name, vehicle=vehicle).unwrapped)
 
 
 def test_vectors_step_together() -> None:
@@ -64,13 +74,16 @@ def test_a_seed_repeats_an_episode_and_another_does_not(name: str) -> None:
     assert not np.array_equal(ends[0], ends[2])
 
 
-def test_an_observation_is_the_truth_in_the_units_of_its_docs() -> None:
-    env = PandionEnv("walls")
+@each_vehicle
+def test_an_observation_is_the_truth_in_the_units_of_its_docs(vehicle: str) -> None:
+    env = PandionEnv("walls", vehicle=vehicle)
+    joints = len(vehicle_of(env._scenario).joints)
     env.reset(seed=3)
     action = hover(env) + np.float32(0.01)
     for _ in range(15):
         seen, reward, failed, over, info = env.step(action)
     truth = env._simulation.truth()
+    assert seen.shape == env.observation_space.shape == (21 + 2 * joints + 3,)
     expected = [
         *np.subtract(truth.target.p, truth.p_WE),
         *truth.v_WB,

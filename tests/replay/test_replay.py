@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.signals import TickInputs, TickOutputs
@@ -67,7 +67,7 @@ def test_one_gain_changed_is_found_at_the_tick_at_which_it_first_matters(
 ) -> None:
     path = written(tmp_path / "flight.ulg", flown)
     config = with_another_gain()
-    loop, state, right = Autopilot(config), FlightState(), -1
+    loop, state, right = Autopilot(config), first_state(AIRFRAME), -1
     for k, (inputs, outputs) in enumerate(flown):
         state, now = loop.tick(state, inputs)
         if now.actuators != outputs.actuators:

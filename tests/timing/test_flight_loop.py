@@ -16,7 +16,8 @@ import pytest
 from command_line.process import StopRequest
 from fsw.autopilot.control.control_metrics import ControlMetrics
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.registry import ACCEL_RANGE
 from fsw.autopilot.ports import LinkLosses, LoopHealth
@@ -365,7 +366,7 @@ def test_what_the_simulator_answers_is_published_as_it_is_and_logged() -> None:
 @pytest.mark.requirement("REQ-MODE-6")
 @pytest.mark.parametrize("moment_us", [100, 900, 1_700])
 def test_a_command_acts_on_the_actuators_within_one_tick_of_its_arrival(moment_us: int) -> None:
-    bench = Bench(Autopilot(flight_config(body="points")).tick, FlightState())
+    bench = Bench(Autopilot(flight_config(body="points")).tick, first_state(AIRFRAME))
     bench.command(*ARM)
     arrived: list[int] = []
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from scipy.spatial import QhullError
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from tests.processes.both_processes import free_port
 from view import panels
 from view.live_page import LivePage
@@ -22,6 +23,7 @@ _PATIENCE_S = 20.0
 class MovingLink:
     """A link to a vehicle of which every frame is another."""
 
+    airframe = AIRFRAME
     commands = False
     watched = False
     _t = 0.0

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from docs.figures.browser import Page, page
+from fsw.autopilot.model.airframe import AIRFRAME
 from tests.interop.vehicle import standing_vehicle
 from tests.processes.both_processes import free_port
 from tests.view.browsing import (
@@ -72,7 +73,7 @@ def test_dragging_the_gizmo_moves_the_target(live: tuple[Page, Server, VehicleLi
     before = eventually(lambda: link.scene().target)
     posture = link.scene().estimate
     assert posture is not None
-    tip = np.array(tip_of(posture))
+    tip = np.array(tip_of(posture, AIRFRAME))
     (client,) = server.get_clients().values()
     begin, end = (seen(browser, client.camera, tip + along) for along in ARROW)
     browser.drag(begin, end)

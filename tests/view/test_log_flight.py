@@ -105,7 +105,7 @@ def test_a_log_without_places_is_refused(tmp_path: Path) -> None:
 def test_the_arm_hangs_where_the_model_has_it() -> None:
     quarter = np.sqrt(0.5)
     east = Posture((1.0, 2.0, -3.0), (quarter, 0.0, 0.0, quarter), (np.pi / 2, -np.pi / 2))
-    joint2, tip = chain(east)[1:]
+    joint2, tip = chain(east, AIRFRAME)[1:]
     assert joint2 == pytest.approx((1.0, 2.15, -3.0))
     assert tip == pytest.approx((1.0, 2.15, -2.85))
 
@@ -116,7 +116,7 @@ def test_a_plan_leads_to_where_its_inputs_push() -> None:
         (0.0,) * 2, (0.0,) * 2,
     )  # fmt: skip
     idle = PlanInput((0.0, 0.0, 0.0), 0.0, (0.0, 0.0))
-    drift = horizon(rest, (idle,) * 4, 0.1)
+    drift = horizon(rest, (idle,) * 4, 0.1, AIRFRAME)
     assert drift.base[-1] == pytest.approx((0.04, 0.0, -1.0))
     assert drift.tip[-1] == pytest.approx((0.04, 0.0, -0.7))
 

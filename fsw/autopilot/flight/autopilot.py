@@ -417,7 +417,7 @@ class Autopilot:
             state = replace(state, vehicle=with_range(state.vehicle, ranges[-1]))
         if inputs.battery is not None:
             levels = self._battery_levels
-            battery = corrected(self.config.battery, levels, state.battery, inputs.battery)
+            battery = corrected(self.config.airframe.battery, levels, state.battery, inputs.battery)
             state = replace(state, battery=battery)
         if inputs.host is not None:
             state = replace(state, host=inputs.host)
@@ -611,7 +611,7 @@ class Autopilot:
         thrust = state.cascade.commanded.rotor_thrust
         period = 1e-6 * self.config.mpc_period_us
         levels = self._battery_levels
-        return drained(self.config.battery, levels, state.battery, thrust, period)
+        return drained(self.config.airframe, levels, state.battery, thrust, period)
 
     @property
     def _battery_levels(self) -> Levels:

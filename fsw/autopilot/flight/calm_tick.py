@@ -30,7 +30,7 @@ from fsw.autopilot.flight.failsafe.table import SLOW_US
 from fsw.autopilot.flight.plan_exchange import planned_input
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
-from fsw.autopilot.flight.state import AIDED, FlightState
+from fsw.autopilot.flight.state import AIDED, FlightState, first_state
 from fsw.autopilot.measurements import RangeSample, Sample
 from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.model.nominal import NominalModel, move_plan
@@ -79,7 +79,7 @@ class CalmTick:
         example = model.packed, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0, 1.0
         self._sense = machine_code(_sense, *example)
         # What was found out about the newest state; another one is looked at anew.
-        self._state = FlightState()
+        self._state = first_state(config.airframe)
         self._until_us, self._zones, self._tube = -1, NO_ZONES, watch.tube(self._state)
 
     def fly(

@@ -17,7 +17,7 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceStat
 from fsw.autopilot.flight.setpoints.offboard import Tilt
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import (
     ActuatorReport,
     ArmingReport,
@@ -254,19 +254,15 @@ AIDED: Final = Aiding()
 COMPLETE: Final = Dropout()
 
 
-def _of_paper() -> Tick:
-    return new_tick(AIRFRAME.mass, AIRFRAME.rotors, AIRFRAME.bodies.joints)
-
-
 @dataclass(frozen=True, slots=True)
 class FlightState:
     """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
 
+    cascade: Tick
     index: int = -1  # of the last tick on the absolute grid, missed ones counted
     t_us: int = 0  # of the last tick
     invalid_ticks: int = 0
     output_replaced: bool = False
-    cascade: Tick = field(default_factory=_of_paper)
 
     vehicle: VehicleMemory = field(default_factory=VehicleMemory)
     mission: MissionMemory = field(default_factory=MissionMemory)

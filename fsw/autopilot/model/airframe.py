@@ -11,10 +11,12 @@ from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.model.parts import Part, parts_of, points_of
 from fsw.autopilot.signals import ActuatorCommand, Vec2
 from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS, padded, padded_rows
-from vehicles.description import Rotor, Vehicle
+from vehicles.description import Battery, Rotor, Vehicle
 from vehicles.vehicle_file import load_vehicle
 
 GRAVITY = 9.81  # m/s^2, along +z of the world
+_MAV_TYPES = {4: 2, 6: 13, 8: 14}
+_MULTIROTOR = 43  # MAV_TYPE of any number of rotors
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,7 @@ class Airframe:
     rotor_lever: float  # m, of roll and pitch, the root of the mean square over rotors
     rotor_thrust_max: Several  # (ROTORS,) N
     rotor_lag: float  # s, of the slowest
+    rotor_radius: Several  # (ROTORS,) m
     joint_torque_max: Several  # (JOINTS,) N m
     joint_rate_max: Several  # (JOINTS,) rad/s
     angle_limits: AngleLimits
@@ -59,6 +62,7 @@ class Airframe:
     tilt_max: float  # rad, of the body's z axis against the vertical
     body_rate_max: Vec2  # rad/s, of roll and pitch together, and of yaw
     leg_length: float  # m, body origin above ground when standing
+    battery: Battery
     # kg m^2 of each joint's motor, times the square of its gear's ratio; beside the vehicle's own.
     joint_armature: float = 0.0
     attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
@@ -77,6 +81,11 @@ class Airframe:
     def full_thrust(self) -> float:
         """What all rotors give together [N]."""
         return sum(self.rotor_thrust_max[: self.rotors])
+
+    @property
+    def mav_type(self) -> int:
+        """Its MAV_TYPE: by the number of rotors, where there is one."""
+        return _MAV_TYPES.get(self.rotors, _MULTIROTOR)
 
     def shares(self, command: ActuatorCommand) -> ActuatorCommand:
         """The command with each thrust and torque as a share [1] of the largest."""
@@ -102,6 +111,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         rotor_lever=math.sqrt(sum(row[3] ** 2 + row[4] ** 2 for row in rows) / len(rows)),
         rotor_thrust_max=padded(tuple([rotor.thrust_max for rotor in rotors]), ROTORS),
         rotor_lag=max(rotor.lag for rotor in rotors),
+        rotor_radius=padded(tuple([rotor.radius for rotor in rotors]), ROTORS),
         joint_torque_max=padded(tuple([joint.torque_max for joint in vehicle.joints]), JOINTS),
         joint_rate_max=padded(tuple([joint.rate_max for joint in vehicle.joints]), JOINTS),
         angle_limits=_angle_limits(vehicle),
@@ -111,6 +121,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         tilt_max=vehicle.limits.tilt,
         body_rate_max=(vehicle.limits.roll_pitch_rate, vehicle.limits.yaw_rate),
         leg_length=max(z for _, _, z in vehicle.feet.positions),
+        battery=vehicle.battery,
     )
 
 

@@ -10,9 +10,11 @@ and the voltage is a straight line over the charge, less the drop at the inner r
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import BatteryReading, BatteryState, BatteryWarning, RotorVector
+from vehicles.description import Battery
 
 _AIR_DENSITY = 1.225  # kg/m^3
 _AS_PER_AH = 3600.0
@@ -42,28 +44,15 @@ def _level(before: BatteryWarning, remaining: float, levels: Levels) -> BatteryW
     return now if now >= before else min(before, charge_of(remaining - _ROSE, levels))
 
 
-@dataclass(frozen=True, slots=True)
-class BatteryModel:
-    """Four lithium-polymer cells of 10 A h: about a quarter of an hour of hover."""
-
-    capacity: float = 10.0  # A h
-    full: float = 16.8  # V
-    empty: float = 13.6  # V
-    resistance: float = 0.02  # ohm
-    disc_area: float = 0.0507  # m^2, a rotor of 10 inches
-    efficiency: float = 0.55  # figure of merit, motor and controller
-    idle_power: float = 8.0  # W, electronics and arm
-
-
 def drained(
-    model: BatteryModel, levels: Levels, state: BatteryState, thrust: RotorVector, dt: float
+    airframe: Airframe, levels: Levels, state: BatteryState, thrust: RotorVector, dt: float
 ) -> BatteryState:
     """The battery after ``dt`` [s] of ``thrust`` [N] of each rotor."""
+    model = airframe.battery
     power = model.idle_power
-    for f in thrust:
-        power += (
-            f * math.sqrt(max(f, 0.0) / (2.0 * _AIR_DENSITY * model.disc_area)) / (model.efficiency)
-        )
+    for f, radius in zip(thrust, airframe.rotor_radius, strict=False):
+        disc = math.pi * radius * radius
+        power += f * math.sqrt(max(f, 0.0) / (2.0 * _AIR_DENSITY * disc)) / model.efficiency
     current = power / max(state.voltage, 1.0)
     share = min(dt / _USUAL_TIME, 1.0)
     usual = state.usual_current or current
@@ -83,7 +72,7 @@ def drained(
 
 
 def corrected(
-    model: BatteryModel, levels: Levels, state: BatteryState, reading: BatteryReading
+    model: Battery, levels: Levels, state: BatteryState, reading: BatteryReading
 ) -> BatteryState:
     """The battery as it has been measured; the model goes on from there.
 
@@ -101,7 +90,7 @@ def corrected(
     )
 
 
-def _voltage(model: BatteryModel, remaining: float, current: float) -> float:
+def _voltage(model: Battery, remaining: float, current: float) -> float:
     """Voltage [V] at a ``remaining`` share [1] and a ``current`` [A]."""
     at_rest = model.empty + (model.full - model.empty) * remaining
     return at_rest - model.resistance * current

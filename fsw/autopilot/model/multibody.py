@@ -180,11 +180,27 @@ def move_bodies(
 
     Every joint has an ``armature`` [kg m^2] beside its own.
     """
+    if not _are_others(m, b, estimate):
+        return
     place_links(m, b, estimate.q_arm)
     rate = estimate.w_WB_B
     _move_links(m, b, estimate.qd_arm, (rate[0], rate[1], rate[2]))
     _sum_up(m, b, armature, estimate.qd_arm, (rate[0], rate[1], rate[2]))
     _eliminate(m, b)
+
+
+@compilable
+def _are_others(m: Multibody, b: Bodies, estimate: StateEstimate | Estimate) -> bool:
+    """Whether a pose and motion are others than those of ``m``. Writes of."""
+    changed = not m.inertia[0] > 0.0  # nothing was found yet
+    for i in range(3):
+        changed = changed or m.of[i] != estimate.w_WB_B[i]
+        m.of[i] = estimate.w_WB_B[i]
+    for k in range(int(b.joints)):
+        i = 3 + 2 * k
+        changed = changed or m.of[i] != estimate.q_arm[k] or m.of[i + 1] != estimate.qd_arm[k]
+        m.of[i], m.of[i + 1] = estimate.q_arm[k], estimate.qd_arm[k]
+    return changed
 
 
 @lru_cache(maxsize=64)

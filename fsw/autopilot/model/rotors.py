@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import base_acceleration, posture
-from fsw.autopilot.signals import Vec2, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, RotorVector, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
 from fsw.record import Floats
@@ -62,7 +62,11 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
 
 @compilable
 def estimate_mass(
-    airframe: Airframe, mass: float, rotors: Vec4 | Floats, specific_force: float, seconds: float
+    airframe: Airframe,
+    mass: float,
+    rotors: RotorVector | Floats,
+    specific_force: float,
+    seconds: float,
 ) -> float:
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
 
@@ -80,7 +84,7 @@ def estimate_mass(
 
 
 @compilable
-def rotor_wrench(airframe: Airframe, thrust: Vec4 | Floats) -> tuple[Vec3, Vec3]:
+def rotor_wrench(airframe: Airframe, thrust: RotorVector | Floats) -> tuple[Vec3, Vec3]:
     """Force [N, B] and torque [N m, B] about B's origin of rotors that give ``thrust`` [N] each."""
     w, fx, fy, fz, tx, ty, tz = airframe.wrench, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(int(airframe.rotors)):
@@ -92,7 +96,7 @@ def rotor_wrench(airframe: Airframe, thrust: Vec4 | Floats) -> tuple[Vec3, Vec3]
 
 @compilable
 def motion_state(
-    airframe: Airframe, r: Tick, rotors: Vec4 | Floats, torque: Vec2 | Floats
+    airframe: Airframe, r: Tick, rotors: RotorVector | Floats, torque: JointVector | Floats
 ) -> MotionState:
     """Acceleration, jerk and snap of the body origin from the rotor model.
 

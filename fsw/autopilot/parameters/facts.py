@@ -10,11 +10,11 @@ As everywhere, a value that is an ``int`` is an INT32, and each has PX4's type.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from fsw.autopilot.model.battery import BatteryModel
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.parameters.registry import BY_NAME, Choices
 
 GROUP: Final = "Read only"
@@ -27,19 +27,32 @@ class Fact:
     name: str  # at most 16 characters
     label: str  # what a ground station writes beside the value
     meaning: str  # why it is so
-    value: float = 0
+    value: float | Callable[[Airframe], float] = 0  # of every vehicle, or of one
     unit: str = ""
     choices: Choices = ()
     repeats: str = ""  # the parameter of ours whose value it has
 
-    def read(self, values: Mapping[str, float]) -> float:
-        """Its value beside those of the parameters."""
-        return values[self.repeats] if self.repeats else self.value
+    def read(self, values: Mapping[str, float], airframe: Airframe) -> float:
+        """Its value beside those of the parameters, of a vehicle."""
+        if self.repeats:
+            return values[self.repeats]
+        return self.value(airframe) if callable(self.value) else self.value
 
 
 _NO_RADIO: Final[Choices] = ((0, "No radio"),)
-_BATTERY: Final = BatteryModel()
-_CELLS: Final = 4
+
+
+def _cells(airframe: Airframe) -> int:
+    """Lithium-polymer cells that have the battery's voltage when they are full."""
+    return round(airframe.battery.full / 4.2)
+
+
+def _per_cell(name: str) -> Callable[[Airframe], float]:
+    return lambda airframe: getattr(airframe.battery, name) / _cells(airframe)
+
+
+def _milliampere_hours(airframe: Airframe) -> float:
+    return 1000.0 * airframe.battery.capacity
 
 
 def _all(
@@ -70,14 +83,14 @@ _FACTS: Final = [
     Fact(
         "SYS_AUTOSTART",
         "Airframe",
-        "a quadrotor, by PX4's number; PX4 has no number of one with an arm",
+        "a multirotor, by PX4's number; PX4 has no number of one with an arm",
         4001,
     ),
     Fact("SYS_AUTOCONFIG", "Reset to the airframe's defaults", "nothing is to be reset"),
     Fact("SYS_HAS_MAG", "Magnetometers", "none: the heading is measured from outside"),
     Fact("MAV_SYS_ID", "MAVLink system ID", "of the vehicle", 1),
     Fact("MAV_COMP_ID", "MAVLink component ID", "of the autopilot", 1),
-    Fact("MAV_TYPE", "MAVLink type", "of the airframe", 2, choices=((2, "Quadrotor"),)),
+    Fact("MAV_TYPE", "MAVLink type", "of the airframe", lambda v: v.mav_type),
     Fact("COM_ARM_WO_GPS", "Arming without GNSS", _ANY_POSITION, 1, choices=((1, "Allowed"),)),
     Fact("COM_RC_OVERRIDE", "Takeover by sticks", _NO_RC),
     Fact("COM_DISARM_PRFLT", "Time to disarm before takeoff", "it stays armed", -1.0, "s"),
@@ -143,9 +156,21 @@ _FACTS: Final = [
         ((-1, "Unassigned: no radio"),),
     ),
     Fact("BAT1_SOURCE", "Battery source", "without a sensor", choices=((0, "Battery model"),)),
-    Fact("BAT1_N_CELLS", "Cells in series", "of the model", _CELLS),
-    Fact("BAT1_V_CHARGED", "Full cell voltage", "of the model", _BATTERY.full / _CELLS, "V"),
-    Fact("BAT1_V_EMPTY", "Empty cell voltage", "of the model", _BATTERY.empty / _CELLS, "V"),
+    Fact("BAT1_N_CELLS", "Cells in series", "of the model", _cells),
+    Fact(
+        "BAT1_V_CHARGED",
+        "Full cell voltage",
+        "of the model",
+        lambda v: v.battery.full / _cells(v),
+        "V",
+    ),
+    Fact(
+        "BAT1_V_EMPTY",
+        "Empty cell voltage",
+        "of the model",
+        lambda v: v.battery.empty / _cells(v),
+        "V",
+    ),
     Fact(
         "BAT1_V_LOAD_DROP",
         "Voltage drop of a cell under load",
@@ -153,7 +178,13 @@ _FACTS: Final = [
         0.0,
         "V",
     ),
-    Fact("BAT1_CAPACITY", "Battery capacity", "of the model", 1000.0 * _BATTERY.capacity, "mAh"),
+    Fact(
+        "BAT1_CAPACITY",
+        "Battery capacity",
+        "of the model",
+        lambda v: 1000.0 * v.battery.capacity,
+        "mAh",
+    ),
     Fact("GF_MAX_HOR_DIST", "Geofence radius", "no fence but the uploaded one", 0.0, "m"),
     Fact("GF_MAX_VER_DIST", "Geofence height", "no fence but the uploaded one", 0.0, "m"),
     Fact(

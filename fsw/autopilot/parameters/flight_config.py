@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 from fsw.autopilot.control.cascade import Inner
@@ -12,7 +12,6 @@ from fsw.autopilot.control.safety_filter import FilterTuning
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
-from fsw.autopilot.model.battery import BatteryModel
 from fsw.autopilot.model.body import BODIES, BodyName
 from fsw.autopilot.model.multibody import posture, tip_in_body
 from fsw.autopilot.mpc.planner_config import PlannerConfig
@@ -141,7 +140,6 @@ class FlightConfig:
     steering: SetpointLimits = field(default_factory=SetpointLimits)
     safety_filter: FilterTuning = field(default_factory=FilterTuning)
     estimator: EstimatorTuning = field(default_factory=EstimatorTuning)
-    battery: BatteryModel = field(default_factory=BatteryModel)
     origin: Origin = DEFAULT_ORIGIN
     soft: bool = False  # fly an inconsistent configuration all the same, with a warning
     tick_period_us: int = TICK_US
@@ -225,5 +223,4 @@ def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:
         airframe=airframe,
         tuning=replace(config.tuning, tracking=tracking),
         surroundings=replace(config.surroundings, hanging=hanging),
-        battery=replace(config.battery, **asdict(vehicle.battery)),
     )

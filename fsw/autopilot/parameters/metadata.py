@@ -12,6 +12,7 @@ import json
 import zlib
 from typing import Any, Final
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.facts import FACTS, GROUP, Fact
 from fsw.autopilot.parameters.registry import BY_NAME, PARAMETERS, Choices, Parameter
 
@@ -78,19 +79,20 @@ def _told(fact: Fact) -> dict[str, Any]:
             "name": fact.name,
             "longDesc": f"Another name: {fact.meaning}",
         }
-    return {
+    value = fact.read({}, AIRFRAME)
+    found = {
         "name": fact.name,
-        "type": _type(fact.value),
+        "type": _type(value),
         "shortDesc": fact.label,
         "longDesc": f"Read only: {fact.meaning}",
         "group": GROUP,
         "category": "Standard",
         "units": fact.unit,
-        "default": fact.value,
-        "min": fact.value,
-        "max": fact.value,
-        **_form(fact.choices, _decimals(fact.value, at_least=0)),
+        **_form(fact.choices, _decimals(value, at_least=0)),
     }
+    return (
+        found if callable(fact.value) else found | dict.fromkeys(("default", "min", "max"), value)
+    )
 
 
 def _type(value: float) -> str:

@@ -155,10 +155,10 @@ class ParameterService:
 
     def _set_fact(self, name: str, value: float | None, asker: _Peer) -> Sequence[ServiceOutput]:
         """Agree with who sets what is so, and tell anybody else why it is."""
-        fact, kept = FACT_BY_NAME[name], self._value(_INDEX[name])
-        if value == nearest_decimal(fact.value):
+        kept = self._value(_INDEX[name])
+        if value == nearest_decimal(self._read_value(name)):
             return (kept,)
-        why = f"{name} is read only: {fact.meaning}"
+        why = f"{name} is read only: {FACT_BY_NAME[name].meaning}"
         error = _error(_INDEX[name], name, _READ_ONLY, asker)
         return (StatusText(Severity.WARNING, why), kept, error)
 
@@ -168,8 +168,8 @@ class ParameterService:
         return Outgoing(ids.PARAM_VALUE, (field, _COUNT, index, name.encode(), type_))
 
     def _read_value(self, name: str) -> float:
-        fact, values = FACT_BY_NAME.get(name), self._store.values
-        return values[name] if fact is None else fact.read(values)
+        fact, store = FACT_BY_NAME.get(name), self._store
+        return store.values[name] if fact is None else fact.read(store.values, store.airframe)
 
     def _hash(self) -> Outgoing:
         """CRC-32 over names and values in order, nothing inverted; its bits in place of a float."""

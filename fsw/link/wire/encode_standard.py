@@ -17,7 +17,6 @@ from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
 from fsw.link.wire.telemetry_context import TelemetryContext
 
-_QUADROTOR: Final = 2  # MAV_TYPE
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1
 _AUTO, _GUIDED, _STABILISED, _MANUAL_INPUT = 4, 8, 16, 64
@@ -57,7 +56,7 @@ def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues
         status = _UNINIT if snapshot.arming_refusal or snapshot.failures else _STANDBY
     return (
         custom_mode(shown),
-        _QUADROTOR,
+        context.facts.airframe.mav_type,
         context.autopilot,
         base_mode,
         status,

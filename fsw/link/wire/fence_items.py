@@ -3,7 +3,7 @@
 ===========================  ==================================================================
 item                         here
 ===========================  ==================================================================
-polygon, inclusion           one wall an edge, upright, kept by base, second joint, end-effector
+polygon, inclusion           one wall an edge, upright, kept by all that is to keep clear
 circle, inclusion            eight walls, the regular octagon inside the circle
 polygon, exclusion           upright cylinders that cover it, as wide as it needs
 circle, exclusion            an upright cylinder

@@ -11,9 +11,10 @@ from fsw.autopilot.flight.estimate.estimator_report import AIDS_PLACE
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.modes.offboard import report
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, PlanMemory
 from fsw.autopilot.signals import (
     ArmingReport,
+    ConstraintReport,
     FailsafeEvent,
     FlightSnapshot,
     StateEstimate,
@@ -86,7 +87,6 @@ def nothing_known(
 
     Telemetry goes on, and shows what is known all the same.
     """
-    empty = FlightState()
     snapshot = FlightSnapshot(
         t_us=t_us,
         mode=so_far.mode,
@@ -97,9 +97,9 @@ def nothing_known(
         plan_input=None,
         actuators=so_far.actuators,
         plan=None,
-        plan_status=empty.plan.status,
+        plan_status=PlanMemory().status,
         counters=state.plan.counters,
-        constraints=empty.constraints,
+        constraints=ConstraintReport(),
         failures=(Condition.ESTIMATE_INVALID.value,),
         battery=state.battery,
         offboard=report(state, t_us),

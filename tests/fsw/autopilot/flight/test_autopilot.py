@@ -18,7 +18,7 @@ from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.safety.safe_set import joined
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
-from fsw.autopilot.flight.state import FlightState, MissionMemory
+from fsw.autopilot.flight.state import FlightState, MissionMemory, first_state
 from fsw.autopilot.measurements import ImuSample, JointSample, Sample
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.shapes.half_space import wall
@@ -75,7 +75,7 @@ def tick(state: FlightState, t_us: int, **inputs: Any) -> tuple[FlightState, Tic
 def test_before_the_first_estimate_nothing_moves_and_commands_are_put_off() -> None:
     blind = frame(5000, p_WB=(math.nan, 0.0, 0.0))
     asked = (command(ARM, 1.0),)
-    state, outputs = tick(FlightState(), 5000, sensors=blind, commands=asked)
+    state, outputs = tick(first_state(CONFIG.airframe), 5000, sensors=blind, commands=asked)
     assert outputs.actuators == outputs.snapshot.actuators == stopped(AIRFRAME)
     assert [ack.result for ack in outputs.acks] == [CommandResult.TEMPORARILY_REJECTED]
     assert outputs.texts[-1].text == "not armed: the state estimate is invalid"
@@ -116,7 +116,7 @@ INJECT, RUN_CHECKS, SET_HOME, UNKNOWN = 420, 401, 179, 2000
 def test_before_the_first_estimate_what_needs_none_is_answered_as_always(
     number: int, params: tuple[float, ...], result: int, text: str | None
 ) -> None:
-    blind, state = frame(5000, p_WB=(math.nan, 0.0, 0.0)), FlightState()
+    blind, state = frame(5000, p_WB=(math.nan, 0.0, 0.0)), first_state(CONFIG.airframe)
     allowed = replace(CONFIG, limits=replace(CONFIG.limits, failure_injection=1))
     asked = (command(number, *params),)
     state, outputs = Autopilot(allowed).tick(state, TickInputs(blind, commands=asked))
@@ -130,7 +130,7 @@ def started_blind(
     samples: Callable[[float], tuple[Sample, ...]], seconds: float = 3.0
 ) -> tuple[list[StatusText], list[TickOutputs]]:
     """What a vehicle says whose sensors give ``samples`` of a time [s] from its start on."""
-    state, texts, outputs = FlightState(), [], []
+    state, texts, outputs = first_state(CONFIG.airframe), [], []
     for t_us in range(TICK_US, round(1e6 * seconds), TICK_US):
         state, last = tick(state, t_us, samples=samples(1e-6 * t_us))
         texts += last.texts
@@ -176,7 +176,7 @@ def test_without_a_first_estimate_the_sensors_that_never_came_are_named_once(
 
 @pytest.mark.requirement("REQ-ARM-1")
 def test_without_one_valid_frame_of_exact_states_that_is_told_once() -> None:
-    state, texts = FlightState(), []
+    state, texts = first_state(CONFIG.airframe), []
     for t_us in range(TICK_US, 3_000_000, TICK_US):
         state, outputs = tick(state, t_us, sensors=frame(t_us, p_WB=(math.nan, 0.0, 0.0)))
         texts += [text.text for text in outputs.texts]
@@ -189,7 +189,7 @@ def test_sensors_that_fall_silent_before_the_first_estimate_are_told_once() -> N
 
 
 def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
-    state, _ = tick(FlightState(), 100_000)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000)
     seen = state.estimate
     assert seen is not None
     blind = frame(102_000, q_WB=(0.0, 0.0, 0.0, math.nan))
@@ -202,14 +202,14 @@ def test_an_invalid_frame_leaves_the_last_estimate_and_is_counted() -> None:
 
 @pytest.mark.parametrize("ticks", [1, 2, 7, 24, 25, 26, 1000])
 def test_missed_ticks_are_counted_as_far_as_they_are_made_up_for(ticks: int) -> None:
-    state, _ = tick(FlightState(), 100_000)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000)
     assert state.index == 0
     after, _ = tick(state, 100_000 + ticks * TICK_US)
     assert after.index == min(ticks, CONFIG.catch_up_ticks)
 
 
 def test_a_first_tick_is_the_first_however_late_and_time_that_stands_still_is_a_tick() -> None:
-    state, _ = tick(FlightState(), 10**9)
+    state, _ = tick(first_state(CONFIG.airframe), 10**9)
     assert state.index == 0
     again, _ = tick(state, 10**9)
     assert again.index == 1
@@ -220,9 +220,9 @@ def test_a_frame_that_was_late_is_moved_on_to_now() -> None:
     moving = frame(100_000, p_WB=(0.0, 0.0, -3.0), v_WB=(1.0, 2.0, 0.5), gyro_B=(0.1, 0.0, 0.2))
     measured = estimate_state(moving)
     assert measured is not None
-    state, _ = tick(FlightState(), 100_000, sensors=moving, stale_us=4000)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000, sensors=moving, stale_us=4000)
     assert state.estimate == moved_on(measured, 0.004)
-    fresh, _ = tick(FlightState(), 100_000, sensors=moving)
+    fresh, _ = tick(first_state(CONFIG.airframe), 100_000, sensors=moving)
     assert fresh.estimate == measured
 
 
@@ -231,7 +231,7 @@ def test_a_frame_that_was_late_is_moved_on_to_now() -> None:
 def test_a_vehicle_that_lies_on_its_side_or_its_back_is_not_armed(degrees: float) -> None:
     half = 0.5 * math.radians(degrees)
     tilted = frame(100_000, q_WB=(math.cos(half), math.sin(half), 0.0, 0.0))
-    state, _ = tick(FlightState(), 100_000, sensors=tilted)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000, sensors=tilted)
     tilted = replace(tilted, t_us=200_000)
     state, outputs = tick(state, 200_000, sensors=tilted, commands=(command(ARM, 1.0),))
     assert outputs.acks[0].result == CommandResult.TEMPORARILY_REJECTED
@@ -243,7 +243,9 @@ def test_a_vehicle_that_lies_on_its_side_or_its_back_is_not_armed(degrees: float
 
 @pytest.mark.requirement("REQ-BAT-5")
 def test_an_empty_battery_is_not_armed() -> None:
-    empty = replace(FlightState(), battery=BatteryState(consumed=10.0, remaining=0.0))
+    empty = replace(
+        first_state(CONFIG.airframe), battery=BatteryState(consumed=10.0, remaining=0.0)
+    )
     state, _ = tick(empty, 100_000)
     _, outputs = tick(state, 102_000, commands=(command(ARM, 1.0),))
     assert outputs.acks[0].result == CommandResult.TEMPORARILY_REJECTED
@@ -280,7 +282,7 @@ def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_u
 @pytest.mark.requirement("REQ-LOG-1")
 def test_a_log_that_fails_is_told_once_shown_and_arms_nothing() -> None:
     full = HostHealth(log_failure="flight.ulg ends early: No space left on device")
-    state, _ = tick(FlightState(), 100_000)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000)
     state, outputs = tick(state, 102_000, host=full)
     told = [text.text for text in outputs.texts]
     for t_us in range(104_000, 400_000, 2_000):
@@ -294,7 +296,7 @@ def test_a_log_that_fails_is_told_once_shown_and_arms_nothing() -> None:
 
 
 def test_armed_on_the_ground_the_rotors_idle_and_the_arm_is_let_down() -> None:
-    state, _ = tick(FlightState(), 100_000)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000)
     armed, outputs = tick(state, 102_000, commands=(command(ARM, 1.0),))
     assert outputs.acks[0].result == CommandResult.ACCEPTED
     swinging = frame(104_000, qd_arm=(0.5, -1.0))
@@ -308,19 +310,19 @@ def test_armed_on_the_ground_the_rotors_idle_and_the_arm_is_let_down() -> None:
 
 @pytest.mark.parametrize("silent_s", [9.9, 10.1])
 def test_a_station_that_is_silent_is_counted_from_when_it_was_last_heard(silent_s: float) -> None:
-    state, _ = tick(FlightState(), 1_000_000, ground_station_heard=True)
+    state, _ = tick(first_state(CONFIG.airframe), 1_000_000, ground_station_heard=True)
     assert state.vehicle.gcs_heard_us == 1_000_000
     _, outputs = tick(state, 1_000_000 + round(1e6 * silent_s))
     assert outputs.snapshot.failures == ()
     state, _ = tick(state, 1_000_000 + round(1e6 * silent_s))
     lost = [one.value for one in state.vehicle.conditions if one is not Condition.TIME_JUMPED]
     assert lost == (["no ground station"] if silent_s > 10.0 else [])
-    never, _ = tick(FlightState(), 10**9)
+    never, _ = tick(first_state(CONFIG.airframe), 10**9)
     assert never.vehicle.conditions == ()
 
 
 def test_home_is_where_it_was_seen_first_until_it_is_armed() -> None:
-    state, _ = tick(FlightState(), 100_000)
+    state, _ = tick(first_state(CONFIG.airframe), 100_000)
     assert state.vehicle.home is not None
     assert state.vehicle.home.p == (0.0, 0.0, GROUND_Z)
     carried = frame(102_000, p_WB=(3.0, 1.0, GROUND_Z))
@@ -335,7 +337,9 @@ def test_home_is_where_it_was_seen_first_until_it_is_armed() -> None:
 def test_disarming_opens_the_safe_set_to_another_owner() -> None:
     ours, theirs = (MessageSource(1, 195, link) for link in ("simulator", "gcs"))
     walls = SafeSet((wall((-1.0, 0.0, 0.0), -5.0, 0.1),))
-    state, _ = tick(FlightState(), 100_000, announced=(SafeSetAnnouncement(ours, walls),))
+    state, _ = tick(
+        first_state(CONFIG.airframe), 100_000, announced=(SafeSetAnnouncement(ours, walls),)
+    )
     state, _ = tick(state, 102_000, commands=(command(ARM, 1.0),))
     kept, _ = tick(state, 104_000, announced=(SafeSetAnnouncement(theirs, SafeSet()),))
     assert (kept.mission.owner, kept.mission.safe_set) == (ours, walls)
@@ -349,7 +353,7 @@ def test_disarming_opens_the_safe_set_to_another_owner() -> None:
 def test_what_is_refused_is_told_and_counted_whoever_refuses_it() -> None:
     """By the link, a target by the tick, and a mission, of which nothing is kept."""
     loop = Autopilot(CONFIG)
-    state, _ = loop.tick(FlightState(), TickInputs(frame(1_000_000)))
+    state, _ = loop.tick(first_state(CONFIG.airframe), TickInputs(frame(1_000_000)))
     far = EndEffectorTarget(1_100_000, (0.0, 0.0, -2e3), (0.0,) * 3, (0.0,) * 3)
     near = replace(far, p_WE=(0.0, 0.0, -1.0))
     bad = MissionStep(MissionAction.GO, (0.0, math.nan, -1.0))

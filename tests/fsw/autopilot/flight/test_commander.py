@@ -14,7 +14,13 @@ from fsw.autopilot.flight.commands.arming import CHECKS, Subject
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.modes.land import Land
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
-from fsw.autopilot.flight.state import FlightState, PlanMemory, SafetyMemory, SetpointMemory
+from fsw.autopilot.flight.state import (
+    FlightState,
+    PlanMemory,
+    SafetyMemory,
+    SetpointMemory,
+    first_state,
+)
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.signals import (
@@ -54,7 +60,9 @@ NOW_US = 7_000_000
 HERE: Vec3 = (1.0, 2.0, -3.0)
 HOVERING = vehicle_at(HERE, t_us=NOW_US)._replace(yaw=0.5, q_arm=(0.2, -0.1))
 STANDING = vehicle_at((1.0, 2.0, GROUND_Z), t_us=NOW_US)
-DISARMED = replace(FlightState(), vehicle=replace(flying(Mode.DISARMED).vehicle, landed=True))
+DISARMED = replace(
+    first_state(CONFIG.airframe), vehicle=replace(flying(Mode.DISARMED).vehicle, landed=True)
+)
 UNDER_WAY = ReferenceState(False, (1.2, 2.0, -3.0), (0.3, 0.0, 0.0), 0.7, 0.1, (0.2, -0.1))
 
 
@@ -540,7 +548,7 @@ def test_a_mode_that_lifts_off_flies_with_a_plan_that_begins_where_the_vehicle_s
 
 
 def test_the_first_estimate_is_home() -> None:
-    state, texts = completed(FlightState())
+    state, texts = completed(first_state(CONFIG.airframe))
     assert (state.vehicle.home, texts) == (Home(HERE, 0.5), [])
 
 

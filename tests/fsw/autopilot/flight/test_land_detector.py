@@ -17,7 +17,7 @@ from fsw.autopilot.flight.land_detector import (
     stands,
     with_range,
 )
-from fsw.autopilot.flight.state import AIDED, Aiding, FlightState
+from fsw.autopilot.flight.state import AIDED, Aiding, first_state
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.signals import Mode, Vec3
 from tests.fsw.autopilot.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
@@ -30,7 +30,7 @@ STILL: Vec3 = (0.0, 0.0, 0.0)
 def at(height: float, v: Vec3 = STILL) -> tuple[bool, bool, bool]:
     estimate = vehicle_at((5.0, -7.0, GROUND_Z - height), v)
     assert height_above_ground(CONFIG, estimate) == pytest.approx(height)
-    low = may_be_low(CONFIG, FlightState(), estimate)
+    low = may_be_low(CONFIG, first_state(CONFIG.airframe), estimate)
     return low, stands(CONFIG, estimate), standing_unclear(CONFIG, estimate)
 
 
@@ -63,7 +63,7 @@ def test_low_and_moving_is_unclear_whatever_the_direction(v: Vec3) -> None:
 def test_at_a_limit_itself_it_is_not_low_and_no_longer_unclear() -> None:
     coarse = limits(landed_height=0.25, airborne_height=0.5, landed_speed=0.5)
     coarse = replace(coarse, airframe=replace(coarse.airframe, leg_length=0.5))
-    assert not may_be_low(coarse, FlightState(), vehicle_at((0.0, 0.0, -0.75)))
+    assert not may_be_low(coarse, first_state(CONFIG.airframe), vehicle_at((0.0, 0.0, -0.75)))
     assert not standing_unclear(coarse, vehicle_at((0.0, 0.0, -1.0)))
     assert not stands(coarse, vehicle_at((0.0, 0.0, -0.5), (0.0, 0.5, 0.0)))
 

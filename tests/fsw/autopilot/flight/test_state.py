@@ -8,10 +8,10 @@ from fsw.autopilot.control.safety_gate import stopped
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.state import (
     Aiding,
-    FlightState,
     LostSensor,
     OffboardMemory,
     VehicleMemory,
+    first_state,
     is_young,
 )
 from fsw.autopilot.model.airframe import AIRFRAME
@@ -72,7 +72,7 @@ def test_a_stream_of_setpoints_is_as_fresh_as_its_newest_of_any_kind() -> None:
 
 
 def test_a_vehicle_that_was_switched_on_stands_disarmed_and_has_heard_and_done_nothing() -> None:
-    state = FlightState()
+    state = first_state(AIRFRAME)
     vehicle, plan, offboard = state.vehicle, state.plan, state.offboard
     assert (vehicle.mode, vehicle.landed, vehicle.intended_mode) == (
         Mode.DISARMED,

@@ -352,7 +352,7 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
         state = 0
         for name in NAMES:
             fact = FACT_BY_NAME.get(name)
-            value = store.values[name] if fact is None else fact.read(store.values)
+            value = store.values[name] if fact is None else fact.read(store.values, store.airframe)
             code = "<i" if isinstance(value, int) else "<f"
             for byte in name.encode() + struct.pack(code, value):
                 state ^= byte

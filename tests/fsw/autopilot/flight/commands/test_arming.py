@@ -14,7 +14,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.arming import Subject
 from fsw.autopilot.flight.commands.arming_health import ArmingHealth, arming_health
-from fsw.autopilot.flight.state import Aiding, Damage, FlightState, LostSensor
+from fsw.autopilot.flight.state import Aiding, Damage, LostSensor, first_state
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import BatteryState, ConstraintReport, HostHealth, Mode, SensorReport
 from tests.fsw.autopilot.flight.contexts import STANDING
@@ -111,7 +111,7 @@ def test_only_a_configuration_is_a_reason_that_waiting_does_not_change() -> None
 
 
 def healthy(config: FlightConfig = CONFIG, estimate: Any = LEVEL, **state: Any) -> ArmingHealth:
-    return arming_health(config, replace(FlightState(), **state), estimate, "")
+    return arming_health(config, replace(first_state(CONFIG.airframe), **state), estimate, "")
 
 
 @pytest.mark.requirement("REQ-ARM-3")

@@ -13,7 +13,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.autopilot import keep_clear
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
-from fsw.autopilot.flight.state import AIDED, COMPLETE, FlightState
+from fsw.autopilot.flight.state import AIDED, COMPLETE, FlightState, first_state
 from fsw.autopilot.signals import SensorFrame, StateEstimate, StatusText, TickInputs
 from fsw.frozen import replace
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
@@ -108,9 +108,9 @@ def test_a_sensor_that_every_tick_needs_is_lost_for_as_long_as_it_is_missing(
 def test_on_the_ground_a_frame_is_taken_whole_or_not_at_all(value: float) -> None:
     bad = frame(1, gyro_B=(value, 0.0, 0.0))
     for stale_us in (0, TICK_US):
-        state, texts = seen(FlightState(), bad, stale_us)
+        state, texts = seen(first_state(CONFIG.airframe), bad, stale_us)
         assert (state.estimate, state.invalid_ticks, texts) == (None, 1, [])
     dropped, _ = seen(hovering(), bad)
-    landed, _ = seen(replace(dropped, vehicle=FlightState().vehicle), frame(2))
+    landed, _ = seen(replace(dropped, vehicle=first_state(CONFIG.airframe).vehicle), frame(2))
     assert (landed.dropout, landed.aiding) == (COMPLETE, AIDED)
     assert landed.estimate == estimate_state(frame(2))

@@ -11,8 +11,9 @@ import pytest
 
 from fsw.autopilot.estimation.error_state import LOST, RATE, TIME
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.wire.encode_health import estimator_status
 from messages.frames import wire_fields
@@ -23,7 +24,7 @@ from tests.fsw.link.snapshots import CONTEXT
 
 def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
     """The link forgets it; the filter, whose newest readings are of that time, starts anew."""
-    state, flown = FlightState(), run(MOCAP, 1, 0.3)
+    state, flown = first_state(AIRFRAME), run(MOCAP, 1, 0.3)
     ahead_s = 100.0
     for k, (now, samples) in enumerate(flown):
         if k == 0:
@@ -42,7 +43,7 @@ def test_a_first_stamp_ahead_of_all_others_leaves_no_sensor_unused() -> None:
 @pytest.mark.parametrize("every", [8, 16, 50])
 def test_a_unit_that_is_slow_is_used_whenever_it_says_something(every: int) -> None:
     """Of one at 32 Hz no reading was, and a vehicle with satellites fell from 1.5 m."""
-    state, read, flown = FlightState(), 0, run(MOCAP, 1, 1.2)
+    state, read, flown = first_state(AIRFRAME), 0, run(MOCAP, 1, 1.2)
     for k, (now, samples) in enumerate(flown):
         heard = [one for one in samples if k < 300 or k % every == 0 or type(one) is not ImuSample]
         state, _ = tick(state, round(1e6 * now), samples=tuple(heard))
@@ -61,7 +62,7 @@ def test_a_unit_that_is_slow_is_used_whenever_it_says_something(every: int) -> N
 @pytest.mark.parametrize("back", [0.0034, 0.017, 0.05])
 def test_a_clock_that_is_set_back_by_little_loses_nothing_of_what_was_known(back: float) -> None:
     """With the poses gone there would be nothing to start anew from."""
-    state, flown = FlightState(), run(MOCAP, 1, 1.2)
+    state, flown = first_state(AIRFRAME), run(MOCAP, 1, 1.2)
     for k, (now, samples) in enumerate(flown):
         if k >= 300:
             now -= back
@@ -82,7 +83,7 @@ def test_a_clock_that_is_set_back_by_little_loses_nothing_of_what_was_known(back
 
 def test_before_the_first_estimate_looks_at_sensors_are_as_rare_as_after_it() -> None:
     """Without encoders there is none; the pose comes for a while, and then no more."""
-    state, told = FlightState(), []
+    state, told = first_state(AIRFRAME), []
     for now, samples in run(MOCAP, 1, 2.5):
         heard = [
             one
@@ -99,7 +100,7 @@ def test_before_the_first_estimate_looks_at_sensors_are_as_rare_as_after_it() ->
 
 def test_an_estimate_that_is_lost_is_reported_as_one() -> None:
     """The filter is no number, and there is no pose from which it could start anew."""
-    state, outputs = FlightState(), None
+    state, outputs = first_state(AIRFRAME), None
     for k, (now, samples) in enumerate(run(MOCAP, 1, 1.2)):
         heard = [one for one in samples if k < 300 or not isinstance(one, PoseSample)]
         if k == 300:
@@ -130,7 +131,7 @@ def wire_values(snapshot: FlightSnapshot) -> dict[str, Any]:
 def test_what_lasts_of_a_sensors_error_is_reported_and_no_reason_to_come_down() -> None:
     """Satellites whose errors wander by more than a metre: the filter is surer than any fix."""
     stated = (1.6, 1.7, 4.0)  # m^2
-    state = FlightState()
+    state = first_state(AIRFRAME)
     for now, samples in run(RTK, 1, 3.0):
         told = tuple(
             replace(one, position_variance=stated) if isinstance(one, GnssSample) else one
@@ -147,7 +148,7 @@ def test_what_lasts_of_a_sensors_error_is_reported_and_no_reason_to_come_down() 
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("noise", [0.0, 0.006])
 def test_poses_that_scatter_more_than_they_state_are_told(noise: float) -> None:
-    state, random, told = FlightState(), np.random.default_rng(2), []
+    state, random, told = first_state(AIRFRAME), np.random.default_rng(2), []
     for now, samples in run(MOCAP, 1, 2.5):
         spoilt = []
         for one in samples:

@@ -13,7 +13,7 @@ from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes.ball import ball
@@ -88,6 +88,6 @@ def test_there_nothing_of_the_vehicle_is_too_close(
     found = CHECK.margins(InflatedSafeSet().of(SafeSet(zones)), there, None)
     margins = found.margins
     assert min(margins) >= ROOM - 2e-3
-    assert FlightState().safety == SafetyWatch(CONFIG, CHECK.loop_tube).breach(
-        FlightState().safety, there, found, len(zones), flies=True
+    assert first_state(CONFIG.airframe).safety == SafetyWatch(CONFIG, CHECK.loop_tube).breach(
+        first_state(CONFIG.airframe).safety, there, found, len(zones), flies=True
     )
