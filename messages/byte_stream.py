@@ -22,7 +22,6 @@ _ACCEPT_US: Final = 100_000
 _UNSENT: Final = 4096  # bytes that wait for a line; more are dropped, whole datagrams at a time
 _DIAL_US: Final = 5_000_000  # after which a call that nobody answers is made again
 _DEAD_MS: Final = 10_000  # after which a connection whose bytes nobody acknowledges is over
-_GONE: Final = select.POLLHUP | select.POLLERR | select.POLLNVAL
 
 
 class _Port(Protocol):

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from fsw.autopilot.model.multibody import bodies_of, posture, tip_in_body
+from fsw.autopilot.model.multibody import bodies_of, place_of_tip, posture
 from vehicles.description import V3, Vehicle
 
 _WIDTH, _HEIGHT = 49, 17  # characters, of which one is twice as high as wide
@@ -28,7 +28,7 @@ def _marks(vehicle: Vehicle) -> Iterable[tuple[V3, str]]:
     bodies = bodies_of(vehicle)
     m = posture(bodies, vehicle.rest_posture)
     origins = np.array(m.origin).reshape(-1, 3)[: bodies.joints]
-    tip = np.array(tip_in_body(m, bodies)[0])
+    tip = np.array(place_of_tip(m, bodies))
     chain = [*origins, tip]
     for foot in vehicle.feet.positions:
         yield foot, "'"

@@ -17,7 +17,6 @@ from view.scene import Event, Margin, Scene, Timing, Worst
 from view.vehicle import tilt
 
 PLANNING_LIMIT: Final = 1e-6 * PLANNING_US  # s, a planning cycle must be over by then
-_SOON: Final = 0.05  # m; a margin below it is shown as close
 _INKS: Final = {"fault": colours.RED, "warning": colours.ORANGE, "text": colours.GREY}
 _BOX: Final = "font:12px/1.45 ui-sans-serif,system-ui,sans-serif;padding:0 0.9em 0.3em"
 _NUMBER: Final = "font-variant-numeric:tabular-nums;white-space:nowrap;text-align:right"

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 from fsw.autopilot.signals import JointVector, RotorVector, SafeSet, Vec3, Vec4
 
-NOWHERE: Vec3 = (math.nan, math.nan, math.nan)
-
 
 class Posture(NamedTuple):
     """A vehicle with an arm in space."""

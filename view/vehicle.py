@@ -19,7 +19,7 @@ from fsw.autopilot.model.airframe import airframe_of as model_of
 from fsw.autopilot.model.kinematics import (
     predicted_end_effector,
 )
-from fsw.autopilot.model.multibody import place_links, tip_in_body
+from fsw.autopilot.model.multibody import place_links, place_of_tip
 from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.model.prediction import P, condense, to_vector
 from fsw.autopilot.signals import PlanInput, PredictionState, Vec3
@@ -35,7 +35,7 @@ def chain(posture: Posture, airframe: Airframe) -> list[Vec3]:
     R, b, m = matrix_from_quaternion(posture.q), airframe.bodies, Multibody()
     place_links(m, b, posture.q_arm)
     origins = m.origin.reshape(-1, 3)[: b.joints].tolist()
-    tip, _ = tip_in_body(m, b)
+    tip = place_of_tip(m, b)
     return [add(posture.p, rotate(R, (x, y, z))) for x, y, z in (*origins, tip)]
 
 

@@ -26,7 +26,6 @@ from sitl.simulation import STEP_US, Controls, Simulation
 from sitl.start import effects
 from vehicles.description import Vehicle
 
-RATES_HZ: Final = (250, 500)  # of the exchange
 STALL_S: Final = 5.0  # PX4's scripts and logger take their time
 _SLICE_S: Final = 0.1  # after which a request to stop is seen
 _READ: Final = 4096

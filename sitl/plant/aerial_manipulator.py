@@ -184,13 +184,6 @@ def place_bodies(plant: Plant, state: Array, work: Workspace) -> None:
 
 
 @kernel
-def acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """``placed_acceleration_into`` for any state (n,) [SI]."""
-    place_bodies(plant, state, work)
-    placed_acceleration_into(plant, state, inputs, work)
-
-
-@kernel
 def placed_acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """Solve M x = load − bias into ``work.load``: base linear and angular, joint accelerations.
 

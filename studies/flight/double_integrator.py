@@ -15,9 +15,9 @@ import numpy as np
 
 from fsw.autopilot.control.braking import Brake
 from fsw.autopilot.flight.plan_exchange import plan_input
-from fsw.autopilot.geometry.vectors import add, subtract
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.geometry.vectors import add, subtract, three
 from fsw.autopilot.model.kinematics import level_frame, position
+from fsw.autopilot.model.multibody import Bodies, bodies_of
 from fsw.autopilot.model.nominal import rest_state
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Plan, PlanInput, PlanRequest, PredictionState
@@ -26,7 +26,7 @@ from sitl.flight_evaluator import FlightEvaluator
 from sitl.mission_clock import MissionClock
 from sitl.plant.vector import Array
 from sitl.result import EndReason, TruthResult
-from sitl.scenario import V3, Scenario, start_angles
+from sitl.scenario import V3, Scenario, start_angles, vehicle_of
 from sitl.scenario_validation import check
 from sitl.simulation import SAMPLE_STEPS, START_US, STEP_US
 from studies.flight.collector import collector_off
@@ -51,7 +51,7 @@ def after(state: PredictionState, u: PlanInput, push_W: V3, dt: float) -> Predic
     """
     a = (u.a[0] + push_W[0], u.a[1] + push_W[1], u.a[2] + push_W[2])
     p, v, half = state.p, state.v, 0.5 * dt * dt
-    (q1, q2), (qd1, qd2), (qdd1, qdd2) = state.q_arm, state.qd_arm, u.qdd_arm
+    arm = zip(state.q_arm, state.qd_arm, u.qdd_arm, strict=True)
     return state._replace(
         p=(
             p[0] + dt * v[0] + half * a[0],
@@ -61,21 +61,16 @@ def after(state: PredictionState, u: PlanInput, push_W: V3, dt: float) -> Predic
         v=(v[0] + dt * a[0], v[1] + dt * a[1], v[2] + dt * a[2]),
         yaw=state.yaw + dt * state.yaw_rate + half * u.yaw_acc,
         yaw_rate=state.yaw_rate + dt * u.yaw_acc,
-        q_arm=(q1 + dt * qd1 + half * qdd1, q2 + dt * qd2 + half * qdd2),
-        qd_arm=(qd1 + dt * qdd1, qd2 + dt * qdd2),
+        q_arm=tuple(q + dt * qd + half * qdd for q, qd, qdd in arm),
+        qd_arm=tuple(qd + dt * qdd for qd, qdd in zip(state.qd_arm, u.qdd_arm, strict=True)),
     )
 
 
-Points = tuple[V3, V3, V3]  # base, joint 2, end-effector [m, NED]
-
-
-def points(state: PredictionState) -> Points:
-    """Base, joint 2 and end-effector of the level body [m, NED]."""
-    frame = level_frame(AIRFRAME.bodies, state.q_arm, state.yaw)
-    base, joint2, end_effector = (
-        add(state.p, position(frame, point.on, point.begin)) for point in AIRFRAME.points
-    )
-    return base, joint2, end_effector
+def places(bodies: Bodies, state: PredictionState) -> Array:
+    """Base, joints, end-effector of the level body (2 + j, 3) [m, NED], as the plant has them."""
+    frame, n = level_frame(bodies, state.q_arm, state.yaw), bodies.joints
+    local = [position(frame, k, (0.0, 0.0, 0.0)) for k in range(n + 1)]
+    return np.array([add(state.p, one) for one in (*local, position(frame, n, bodies.tip))])
 
 
 class DoubleIntegrator:
@@ -89,10 +84,16 @@ class DoubleIntegrator:
         check(scenario)
         self.clock = MissionClock(scenario)
         self.step = 0
-        self.state = _first_state(scenario, self.clock.target_at(0.0).p)
+        self._bodies = bodies_of(vehicle_of(scenario))
+        self.state = _first_state(self._bodies, scenario, self.clock.target_at(0.0).p)
         self._pushes = [push(item, seed, _STEP_S) for item in scenario.disturbances]
         scenario = replace(scenario, body="points")  # there is no attitude that a body could have
-        self.evaluator = FlightEvaluator(scenario, self.clock, _places(points(self.state)))
+        self.evaluator = FlightEvaluator(scenario, self.clock, self.places)
+
+    @property
+    def places(self) -> Array:
+        """See :func:`places`."""
+        return places(self._bodies, self.state)
 
     @property
     def time_s(self) -> float:
@@ -114,10 +115,10 @@ class DoubleIntegrator:
         push_W = self._push()
         self.state = after(self.state, u, push_W, _STEP_S)
         self.step += 1
-        now = points(self.state)
-        self.evaluator.judge(_places(now), self.time_s, _STEP_S)
+        now = self.places
+        self.evaluator.judge(now, self.time_s, _STEP_S)
         if self.step % SAMPLE_STEPS == 0:
-            self.evaluator.sample_error(_places(now), self.time_s)
+            self.evaluator.sample_error(now, self.time_s)
         self.evaluator.judge_time(self.time_s)
 
     def result(self) -> TruthResult:
@@ -177,20 +178,14 @@ def simulate(
     return FlightResult(plant.result(), recorder, touched(plant.ended))
 
 
-def _first_state(scenario: Scenario, p_target: V3) -> PredictionState:
-    th1, th2 = start_angles(scenario)
-    at_origin = rest_state(2)._replace(yaw=math.radians(scenario.start.yaw_deg), q_arm=(th1, th2))
-    return at_origin._replace(p=subtract(p_target, points(at_origin)[2]))
-
-
-def _places(now: Points) -> Array:
-    """Base, joint 1 at its origin, joint 2 and end-effector, as the full plant places them."""
-    base, joint2, end_effector = now
-    return np.array((base, base, joint2, end_effector))
+def _first_state(bodies: Bodies, scenario: Scenario, p_target: V3) -> PredictionState:
+    yaw, angles = math.radians(scenario.start.yaw_deg), start_angles(scenario)
+    at_origin = rest_state(bodies.joints)._replace(yaw=yaw, q_arm=angles)
+    return at_origin._replace(p=subtract(p_target, places(bodies, at_origin)[-1]))
 
 
 def _trace_point(plant: DoubleIntegrator) -> TracePoint:
-    p_WB, joint2, p_WE = points(plant.state)
-    margins = plant.evaluator.margins(_places((p_WB, joint2, p_WE)), plant.time_s)
-    aim = plant.clock.target_at(plant.time_s).p
+    now, p_WB = plant.places, plant.state.p
+    margins = plant.evaluator.margins(now, plant.time_s)
+    aim, p_WE = plant.clock.target_at(plant.time_s).p, three(now[-1], 0)
     return TracePoint(t_s=plant.time_s, p_WB=p_WB, p_WE=p_WE, p_target=aim, margin_m=min(margins))

@@ -61,8 +61,13 @@ def _spelt_out(node: ast.BinOp | ast.Assign) -> Iterator[tuple[int, str]]:
         sides = [one for one in (node.left, node.right) if isinstance(one, ast.Subscript)]
         if len(sides) == 2 and all(map(_is_entry, sides)):
             yield node.lineno, ast.unparse(node)
-    elif isinstance(node.targets[0], ast.Tuple) and _name(node.value) in LISTS - {"q"}:
-        yield node.lineno, ast.unparse(node)
+    else:
+        several = isinstance(node.value, ast.Tuple)
+        values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
+        targets = getattr(node.targets[0], "elts", []) if several else node.targets
+        for target, value in zip(targets, values, strict=False):
+            if isinstance(target, ast.Tuple) and _name(value) in LISTS - {"q"}:
+                yield node.lineno, ast.unparse(node)
 
 
 def _name(node: ast.expr) -> str:
@@ -93,6 +98,7 @@ def test_no_list_of_joints_or_rotors_is_written_out() -> None:
         "def law(q_arm: Vec2) -> None: ...",
         "def law(rotors: Vec4 | Floats) -> None: ...",
         "f1, f2, f3, f4 = command.rotor_thrust",
+        "(q1, q2), dt = state.q_arm, 0.1",
         "class A:\n    joint_torque: Vec2",
     ],
 )

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import pandion
 from tests.fsw.paper_arm import LENGTHS
-from tests.paper_vehicle import ROTOR_ARM, YAW_PER_THRUST
+from tests.paper_vehicle import PAPER, ROTOR_ARM, YAW_PER_THRUST
 
 MIRROR = np.diag([1.0, -1.0, -1.0])  # NED to north, west, up; FRD to forward, left, up
 
@@ -30,9 +30,9 @@ class RotorPySE3:
         params: dict[str, Any] = dict.fromkeys(unused, 0.0)
         params |= {
             "mass": a.mass,
-            "Ixx": a.inertia[0],
-            "Iyy": a.inertia[1],
-            "Izz": a.inertia[2],
+            "Ixx": PAPER.base.inertia[0],
+            "Iyy": PAPER.base.inertia[1],
+            "Izz": PAPER.base.inertia[2],
             "num_rotors": 4,
             "rotor_pos": {k: ROTOR_ARM * np.array([*p, 0.0]) for k, p in places.items()},
             "rotor_directions": np.array([-1, 1, -1, 1]),

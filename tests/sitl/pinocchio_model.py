@@ -10,6 +10,7 @@ import pinocchio as pin
 from sitl.plant.parameters import GRAVITY
 from sitl.plant.vector import Array
 from vehicles.description import Base, Link, Vehicle
+from vehicles.urdf import urdf_text
 
 
 def _inertia(body: Base | Link) -> Any:
@@ -36,6 +37,25 @@ def pinocchio_model(vehicle: Vehicle, gravity: float = GRAVITY, motor: float = 0
     tool = pin.SE3(np.eye(3), np.array(vehicle.end_effector.position))
     model.addFrame(pin.Frame("tool", parent, tool, pin.FrameType.OP_FRAME))
     return model
+
+
+def exported_model(vehicle: Vehicle, gravity: float = GRAVITY) -> Any:
+    """As Pinocchio reads the URDF of the vehicle, which knows no armature."""
+    model = pin.buildModelFromXML(urdf_text(vehicle), pin.JointModelFreeFlyer())
+    model.gravity.linear = np.array([0.0, 0.0, gravity])
+    for joint, one in zip(list(model.joints)[2:], vehicle.joints, strict=True):
+        model.armature[joint.idx_v] = one.armature
+    return model
+
+
+def configuration_of(model: Any, state_p: Array, state_q: Array, q_arm: Array) -> Array:
+    """``configuration``; of a joint without limits an exported model has cosine and sine."""
+    q = np.zeros(model.nq)
+    q[:7] = configuration(state_p, state_q, np.zeros(0))
+    for joint, angle in zip(list(model.joints)[2:], q_arm, strict=True):
+        turn = (angle,) if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+        q[joint.idx_q : joint.idx_q + joint.nq] = turn
+    return q
 
 
 def configuration(state_p: Array, state_q: Array, q_arm: Array) -> Array:

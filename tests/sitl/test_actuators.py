@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl.plant.actuators import joint_torque, thrust_rate
-from sitl.plant.aerial_manipulator import acceleration_into
+from sitl.plant.aerial_manipulator import place_bodies, placed_acceleration_into
 from sitl.plant.integrator import held, integrate
 from sitl.plant.parameters import plant
 from sitl.plant.state import at_rest
@@ -60,7 +60,8 @@ def test_trim_is_an_equilibrium_at_any_arm_posture(first: float, second: float) 
     view.p_WB[2] = -5.0
     view.q_arm[:] = (first, second)
     view.thrust[:] = trim.thrust
-    acceleration_into(plant(vehicle), state, inputs(trim.thrust, trim.torque), work)
+    place_bodies(plant(vehicle), state, work)
+    placed_acceleration_into(plant(vehicle), state, inputs(trim.thrust, trim.torque), work)
     assert np.abs(work.load[:8]).max() <= 1e-10
 
 

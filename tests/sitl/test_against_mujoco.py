@@ -14,6 +14,7 @@ from tests.sitl.free_motion import flown, tumbling
 from tests.sitl.state_view import StateView
 from tests.sitl.vehicles import PAPER, frictionless, random_vehicle
 from vehicles.description import Base, Link, Vehicle
+from vehicles.vehicle_file import load_vehicle
 
 SECONDS = 2.0
 # Both integrate with RK4, but MuJoCo advances the attitude on the sphere and we renormalise, so
@@ -55,8 +56,8 @@ def _mjcf(vehicle: Vehicle, motor: float) -> str:
 @pytest.mark.parametrize(
     ("vehicle", "motor"),
     [(PAPER, 0.0), (PAPER, 0.0025), (random_vehicle(4, 4, np.random.default_rng(3)), 0.0),
-     (random_vehicle(6, 8, np.random.default_rng(6)), 0.0)],
-    ids=["paper", "motors", "four joints", "six joints"],
+     (random_vehicle(6, 8, np.random.default_rng(6)), 0.0), (load_vehicle("octo-4r"), 0.0)],
+    ids=["paper", "motors", "four joints", "six joints", "octo-4r"],
 )  # fmt: skip
 def test_two_seconds_of_free_motion_agree(vehicle: Vehicle, motor: float) -> None:
     vehicle = frictionless(vehicle)

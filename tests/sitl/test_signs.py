@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sitl.plant.aerial_manipulator import acceleration_into
+from sitl.plant.aerial_manipulator import place_bodies, placed_acceleration_into
 from sitl.plant.parameters import GRAVITY, plant
 from sitl.plant.state import at_rest
 from sitl.plant.trim import end_effector, level_hover
@@ -31,7 +31,8 @@ def _acceleration(
     view.thrust[:] = thrust
     work = workspace()
     given = inputs(torque=torque, force_W=force_W, torque_B=torque_B)
-    acceleration_into(plant(PAPER), state, given, work)
+    place_bodies(plant(PAPER), state, work)
+    placed_acceleration_into(plant(PAPER), state, given, work)
     return work.load[:8].copy()
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fsw.autopilot.flight.autopilot import Autopilot, Controlled
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.parameters.consistency import Finding, refusals
+from fsw.autopilot.parameters.consistency import refusals
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
@@ -89,7 +89,8 @@ class TunedAutopilot:
         """Take a tuning into use; in the air none that breaks an inequality which holds now."""
         mission = state.mission
         findings = self._made(wanted).analyse(mission.safe_set)
-        broken = _broken(self._loop(state.tuning).analyse(mission.safe_set))
+        now = self._loop(state.tuning).analyse(mission.safe_set)
+        broken = {finding.name for finding in now if not finding.holds}
         newly = [f for f in findings if not f.holds and f.name not in broken]
         against = refusals(tuple(newly))
         if against and state.vehicle.armed and not self._config.soft:
@@ -112,7 +113,3 @@ class TunedAutopilot:
             if known == tuning:
                 return loop
         return Autopilot(tuned(self._config, tuning))
-
-
-def _broken(findings: tuple[Finding, ...]) -> set[str]:
-    return {finding.name for finding in findings if not finding.holds}

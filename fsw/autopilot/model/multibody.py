@@ -485,12 +485,3 @@ def place_of_tip(m: Multibody | ArmTask, b: Bodies) -> Vec3:
     last = int(b.joints) - 1
     tip = (b.tip[0], b.tip[1], b.tip[2])
     return add(three(m.origin, 3 * last), rotate(nine(m.rotation, 9 * last), tip))
-
-
-@compilable
-def tip_in_body(m: Multibody, b: Bodies) -> tuple[Vec3, Vec3]:
-    """Position [m, B] of the end-effector, and its velocity beside the base's own [m/s, B]."""
-    last = int(b.joints) - 1
-    arm = rotate(nine(m.rotation, 9 * last), (b.tip[0], b.tip[1], b.tip[2]))
-    v = add(three(m.speed, 3 * last), cross(three(m.rate, 3 * last), arm))
-    return add(three(m.origin, 3 * last), arm), v

@@ -13,7 +13,7 @@ from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
 from fsw.autopilot.model.body import BODIES, BodyName
-from fsw.autopilot.model.multibody import posture, tip_in_body
+from fsw.autopilot.model.multibody import place_of_tip, posture
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.solvers import SOLVERS
 from fsw.autopilot.mpc.variants import VARIANTS
@@ -215,8 +215,7 @@ def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:
     """The configuration for another vehicle."""
     airframe = airframe_of(vehicle)
     b = airframe.bodies
-    tip, _ = tip_in_body(posture(b, airframe.home_posture), b)
-    hanging = round(tip[2], 6)
+    hanging = round(place_of_tip(posture(b, airframe.home_posture), b)[2], 6)
     tracking = replace(config.tuning.tracking, point_below_base=0.5 * hanging)
     return replace(
         config,

@@ -14,7 +14,7 @@ from fsw.autopilot.model.nominal import rest_state
 from fsw.autopilot.model.prediction import discretise, to_vector
 from fsw.autopilot.signals import PlanInput
 from sitl.scenario import Uniform, Wind
-from studies.flight.double_integrator import DoubleIntegrator, after, points
+from studies.flight.double_integrator import DoubleIntegrator, after, places
 from studies.paper.cases import scenario
 from tests.fsw.autopilot.model.geometry_by_rotation import tips
 from tests.fsw.paper_arm import LENGTHS
@@ -42,8 +42,8 @@ def test_a_period_in_ticks_is_the_planners_period() -> None:
 
 def test_its_points_are_the_planners_points() -> None:
     expected = tips(np.array(MOVING.p), Rotation.from_euler("z", MOVING.yaw), (-0.6, 1.1), LENGTHS)
-    base, joint2, end_effector = points(MOVING)
-    assert base == MOVING.p
+    base, joint1, joint2, end_effector = places(AIRFRAME.bodies, MOVING)
+    assert tuple(base) == tuple(joint1) == MOVING.p
     np.testing.assert_allclose([joint2, end_effector], expected, atol=1e-14)
 
 
@@ -63,7 +63,7 @@ def test_wind_moves_it_by_half_a_t_squared() -> None:
 def test_it_starts_with_the_end_effector_on_its_reference_and_the_base_in_the_centre() -> None:
     for case in ("I", "II"):
         plant = DoubleIntegrator(scenario(case, disturbed=False), seed=0)
-        base, _, end_effector = points(plant.state)
+        base, *_, end_effector = plant.places
         target = plant.clock.target_at(0.0).p
         np.testing.assert_allclose(end_effector, target, atol=1e-12)
         if case == "II":

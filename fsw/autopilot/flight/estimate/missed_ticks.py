@@ -20,7 +20,6 @@ from fsw.autopilot.flight.plan_exchange import (
     without_plan,
 )
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.rotors import MotionState
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import StateEstimate, TickInputs
@@ -42,14 +41,10 @@ def missed_inputs(last_us: int, inputs: TickInputs) -> Iterator[TickInputs]:
         for t_us in range(last_us + _STEP_US, now_us - _STEP_US, _STEP_US):
             due = tuple([one for one in samples if one.time <= 1e-6 * t_us])
             if due:
-                samples = _without(samples, t_us)
+                samples = tuple([one for one in samples if not one.time <= 1e-6 * t_us])
                 yield TickInputs(replace(inputs.sensors, t_us=t_us), samples=due)
         inputs = replace(inputs, samples=samples)
     yield inputs
-
-
-def _without(samples: tuple[Sample, ...], t_us: int) -> tuple[Sample, ...]:
-    return tuple([one for one in samples if not one.time <= 1e-6 * t_us])
 
 
 def loops_resumed(config: FlightConfig, before: Tick, estimate: StateEstimate) -> Tick:
