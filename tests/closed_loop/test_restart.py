@@ -20,6 +20,7 @@ from fsw.autopilot.flight.state import (
     first_state,
 )
 from fsw.autopilot.measurements import PoseSample, Sample
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
     CommandResult,
@@ -202,7 +203,8 @@ def test_an_estimate_that_is_not_to_be_relied_upon_says_nothing_of_rest(
     known: dict[str, Any], from_us: int
 ) -> None:
     begun_us = 5_000_000
-    state = FlightState(vehicle=VehicleMemory(mode=Mode.FAULT, mode_begin_us=begun_us), **known)
+    vehicle = VehicleMemory(mode=Mode.FAULT, mode_begin_us=begun_us)
+    state = replace(first_state(AIRFRAME), vehicle=vehicle, **known)
     for after_us in range(0, 12_000_000, 200_000):
         expected = after_us >= from_us
         assert rests(state, nowhere(begun_us + after_us, 2), 400_000) is expected, after_us

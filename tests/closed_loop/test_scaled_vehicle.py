@@ -99,5 +99,6 @@ def test_margins_are_those_of_its_true_points(tmp_path: Path) -> None:
     result = simulate(scenario, 0, flight_config(body=scenario.body, vehicle=vehicle), seen=look)
     assert result.truth.completed, result.truth.end_reason
     assert len(worst) == pytest.approx(SECONDS / 0.002, abs=5)
-    assert result.truth.min_margin_m == pytest.approx(min(worst), abs=1e-4)
-    assert min(worst) > 0.0
+    # The referee looks twice as often.
+    assert result.truth.min_margin_m is not None
+    assert 0.0 < result.truth.min_margin_m <= min(worst) < result.truth.min_margin_m + 5e-4

@@ -32,7 +32,7 @@ assert MODES[Mode.STOW].__module__ == "fsw.autopilot.flight.modes.stow"
 NEW_CONDITION = """
 from dataclasses import replace
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.state import FlightState, VehicleMemory
+from fsw.autopilot.flight.state import VehicleMemory, first_state
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Mode
 from tests.fsw.random_states import random_estimate
@@ -40,7 +40,7 @@ import numpy
 level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 estimate = random_estimate(numpy.random.default_rng(1))._replace(R_WB=level)
 vehicle = VehicleMemory(mode=Mode.TRAJECTORY, landed=False)
-state = FlightState(vehicle=vehicle, t_us=estimate.t_us)
+state = replace(first_state(flight_config().airframe), vehicle=vehicle, t_us=estimate.t_us)
 state = replace(state, plan=replace(state.plan, since_us=estimate.t_us))
 commander = Commander(flight_config())
 for rate, mode in ((5.9, Mode.TRAJECTORY), (-6.1, Mode.HOLD)):

@@ -8,7 +8,7 @@ from typing import Any
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.flight.modes.base import Handover
-from fsw.autopilot.flight.state import FlightState, VehicleMemory
+from fsw.autopilot.flight.state import FlightState, VehicleMemory, first_state
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.signals import Home, Mode, StateEstimate, Vec3
@@ -31,4 +31,5 @@ def vehicle_at(p: Vec3, v: Vec3 = (0.0, 0.0, 0.0), t_us: int = 0) -> StateEstima
 
 def flying(mode: Mode = Mode.HOLD, **changes: Any) -> FlightState:
     """In the air, with a home; ``changes`` are of the vehicle's memory."""
-    return FlightState(vehicle=VehicleMemory(mode=mode, landed=False, home=HOME, **changes))
+    vehicle = VehicleMemory(mode=mode, landed=False, home=HOME, **changes)
+    return replace(first_state(CONFIG.airframe), vehicle=vehicle)

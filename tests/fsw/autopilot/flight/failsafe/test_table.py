@@ -19,13 +19,13 @@ from fsw.autopilot.flight.state import (
     AIDED,
     Aiding,
     Damage,
-    FlightState,
     LostSensor,
     MissionMemory,
     OffboardMemory,
     PlanMemory,
     SafetyMemory,
     VehicleMemory,
+    first_state,
 )
 from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME
@@ -75,7 +75,8 @@ class Evidence:
 
     def context(self) -> FailsafeContext:
         last_received_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
-        state = FlightState(
+        state = replace(
+            first_state(self.config.airframe),
             invalid_ticks=self.invalid_ticks,
             output_replaced=self.output_replaced,
             vehicle=VehicleMemory(
