@@ -11,7 +11,7 @@ from command_line.parser import Parser
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState, first_state
+from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -36,13 +36,12 @@ class _Flight:
         autopilot.warm_up()
         self.times_us: list[float] = []
         self.samples: list[tuple[Sample, ...]] = []
-        self._loop = ClosedLoop(
+        planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
+        simulation, tick = (
             Simulation(load_scenario(SCENARIO, suite), 0),
             self._timed(autopilot.tick),
-            first_state(config.airframe),
-            InlinePlanner(Planner(config.planner, config.airframe, processor_time_us)),
-            config.airframe,
         )
+        self._loop = ClosedLoop(simulation, tick, planner, config.airframe)
 
     def step(self) -> None:
         """One tick."""

@@ -69,7 +69,6 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
     },
 }
 VERBS: Final = {name: verb for group in GROUPS.values() for name, verb in group.items()}
-_MOVED: Final = {"bench": "pandion.moved_bench"}  # which is a verb no more
 
 
 def _listed() -> str:
@@ -148,12 +147,12 @@ def _run(words: list[str]) -> int:
         print(f"pandion {version()}")
         return 0
     name, *options = words
-    if name not in VERBS and name not in _MOVED:
+    if name not in VERBS:
         what = "option" if name.startswith("-") else "verb"
         known = ("--help", "--version") if what == "option" else VERBS
         print_error("pandion", unknown_name(what, name, known))
         return COULD_NOT_START
-    module = VERBS[name][0] if name in VERBS else _MOVED[name]
+    module = VERBS[name][0]
     entry = import_module(module).main
     # The two processes have programs of their own, which call themselves by another name.
     return int(

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.ports import PlanService
@@ -352,13 +351,7 @@ def fly(
     config = replace(config, limits=limits)
     planner: PlanService = _Planner(config, simulation)
     autopilot = Autopilot(config)
-    loop = ClosedLoop(
-        simulation,
-        autopilot.tick,
-        first_state(config.airframe),
-        planner,
-        config.airframe,
-    )
+    loop = ClosedLoop(simulation, autopilot.tick, planner, config.airframe)
     seen = Observer(situation)
     steps = round(1e6 * situation.ends_s / STEP_US)
     started_m = simulation.truth().p_WB
@@ -374,7 +367,7 @@ def fly(
     return _judged(simulation, seen, away_m)
 
 
-def _inputs(situation: Situation, loop: ClosedLoop[FlightState]) -> TickInputs:
+def _inputs(situation: Situation, loop: ClosedLoop) -> TickInputs:
     """What sensors, planner, scenario and ground station bring to one tick."""
     simulation = loop.simulation
     step = simulation.step

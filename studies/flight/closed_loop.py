@@ -9,8 +9,8 @@ mode commands of the scenario's pilot come on the first two ticks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeAlias, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -65,20 +65,22 @@ _FOLLOW = Command(
 )
 FIRST_COMMANDS = ((_ARM,), (_FOLLOW,))  # of the first ticks
 
-State = TypeVar("State")
 Seen: TypeAlias = Callable[[Simulation, TickInputs, TickOutputs], None]
 """Looks at a tick before the plant moves on."""
 
 
 @dataclass
-class ClosedLoop(Generic[State]):
+class ClosedLoop:
     """Plant, tick and planner in one loop; the caller gives the inputs of each step."""
 
     simulation: Simulation
-    tick: Callable[[State, TickInputs], tuple[State, TickOutputs]]
-    state: State
+    tick: Callable[[FlightState, TickInputs], tuple[FlightState, TickOutputs]]
     planner: PlanService
     airframe: Airframe
+    state: FlightState = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.state = first_state(self.airframe)
 
     def observe(self) -> tuple[SensorFrame, tuple[Sample, ...]]:
         """See :func:`readings`."""
@@ -174,7 +176,7 @@ class CalmStretch:
     For studies of exact states: see ``fsw.autopilot.flight.calm_tick``.
     """
 
-    def __init__(self, loop: ClosedLoop[FlightState], calm: CalmTick, *, allowed: bool) -> None:
+    def __init__(self, loop: ClosedLoop, calm: CalmTick, *, allowed: bool) -> None:
         """Fly none unless it is ``allowed``."""
         self._loop, self._calm = loop, calm
         self._allowed = allowed and loop.simulation.tells_its_state
@@ -256,13 +258,8 @@ class ScenarioFlight:
         self.autopilot = Autopilot(config)
         law = parts.law(self.autopilot, simulation.clock, self.recorder)
         tick = self.autopilot.tick if law is None else law.tick
-        self.loop = ClosedLoop(
-            simulation,
-            tick,
-            first_state(config.airframe),
-            InlinePlanner(planner_of(config, parts)),
-            config.airframe,
-        )
+        planner = InlinePlanner(planner_of(config, parts))
+        self.loop = ClosedLoop(simulation, tick, planner, config.airframe)
         # Somebody looks at each tick, or has a part in it; a fault of a sensor may be in each.
         self.may_be_calm = law is None and seen is None and fault is None and not traced
         self._steps_per_plan = config.mpc_period_us // config.tick_period_us

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import FlightState, first_state
+from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES, moving_zones
@@ -133,13 +133,7 @@ def fly(
     config = replace(config, limits=replace(config.limits, breach_action=_WARN))
     simulation = Simulation(scenario, 0, more)
     planner = InlinePlanner(planner_of(config))
-    loop = ClosedLoop(
-        simulation,
-        Autopilot(config).tick,
-        first_state(config.airframe),
-        planner,
-        config.airframe,
-    )
+    loop = ClosedLoop(simulation, Autopilot(config).tick, planner, config.airframe)
     while simulation.ended is None and (last_step is None or simulation.step <= last_step):
         if sense is not None:
             sense(simulation, loop.state)

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Mode, PredictionState, TickOutputs
@@ -52,13 +51,8 @@ class WholeFlight:
         self._push = Steered()
         calm = replace(scenario, disturbances=())
         self._simulation = Simulation(calm, 0, (self._push,))
-        self._loop = ClosedLoop(
-            self._simulation,
-            Autopilot(config).tick,
-            first_state(config.airframe),
-            InlinePlanner(planner_of(config)),
-            config.airframe,
-        )
+        planner, tick = InlinePlanner(planner_of(config)), Autopilot(config).tick
+        self._loop = ClosedLoop(self._simulation, tick, planner, config.airframe)
 
     def go_to(self, step: int, report: Callable[[float, float], None]) -> None:
         """Fly on, calm, up to a step of the simulation; ``report`` receives seconds."""

@@ -122,13 +122,13 @@ class Flight:
         self.loop = TunedAutopilot(self.config)
         self.state = first_state(self.config.airframe)
         self.planner = self.planner or real_planner(self.config)
-        self.closed = ClosedLoop(self.sim, self._tick, None, Late(self), self.config.airframe)
+        self.closed = ClosedLoop(self.sim, self._tick, Late(self), self.config.airframe)
         self.inputs: TickInputs | None = None  # of the last tick
         self._outputs: TickOutputs | None = None
 
-    def _tick(self, _: None, inputs: TickInputs) -> tuple[None, TickOutputs]:
+    def _tick(self, first: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         self.state, outputs = self.loop.tick(self.state, inputs)
-        return None, outputs
+        return first, outputs
 
     @property
     def outputs(self) -> TickOutputs:

@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, field, replace
 
 from fsw.autopilot.flight.autopilot import Autopilot
-from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -71,9 +70,7 @@ def fly_paused(
     start_us = simulation.t_us
     stands = (begin * STEP_US + start_us, (end if planner_only else begin) * STEP_US + start_us)
     planner, autopilot = StandingPlanner(inner, *stands), Autopilot(config)
-    loop = ClosedLoop(
-        simulation, autopilot.tick, first_state(config.airframe), planner, config.airframe
-    )
+    loop = ClosedLoop(simulation, autopilot.tick, planner, config.airframe)
     drives, outcome = StandIn(simulation.vehicle), Outcome()
     sent = Controls((0.0,) * 4, (0.0, 0.0), armed=False)
     targets: tuple[EndEffectorTarget, ...] = ()

@@ -20,7 +20,6 @@ from functools import partial
 from typing import Any, Final
 
 from docs.pages.messages import heard
-from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.mpc.planner import Planner
@@ -142,13 +141,7 @@ class Talkers:
             MissionService(self.missions), ParameterService(parameters)
         ]  # fmt: skip
         planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
-        self.loop = ClosedLoop(
-            self.simulation,
-            self.flight.tick,
-            first_state(config.airframe),
-            planner,
-            config.airframe,
-        )
+        self.loop = ClosedLoop(self.simulation, self.flight.tick, planner, config.airframe)
         self.outcome = Outcome()
         self.writers = {sender: FrameWriter(*_ids(sender)) for sender in SENDERS}
         self.later: list[tuple[float, Callable[[], None]]] = []  # messages that follow others

@@ -13,7 +13,7 @@ import pytest
 from fsw.autopilot.estimation.fusion_memory import Trail
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.failsafe.conditions import Condition
-from fsw.autopilot.flight.state import AIDED, FlightState, first_state
+from fsw.autopilot.flight.state import AIDED, FlightState
 from fsw.autopilot.model.actuator_health import ActuatorHealth
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -52,13 +52,7 @@ class Flight:
         self.autopilot, self.plain = Autopilot(config), Autopilot(config)
         self.plain.calm.fly = lambda *_: None  # type: ignore[method-assign]
         self.planner = InlinePlanner(Planner(config.planner, config.airframe, lambda: 0.0))
-        self.loop = ClosedLoop(
-            Simulation(scenario, 7),
-            self.tick,
-            first_state(config.airframe),
-            self.planner,
-            config.airframe,
-        )
+        self.loop = ClosedLoop(Simulation(scenario, 7), self.tick, self.planner, config.airframe)
         self.calm = 0
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
