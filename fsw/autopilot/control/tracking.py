@@ -149,22 +149,23 @@ def wanted_accelerations(
     u: PlanInput | Accelerations,
 ) -> Vec3:
     """What ``follow_plan`` asks for on all axes [m/s^2, NED]."""
-    p, v, a, j, s = estimate.p_WB, observed.v, motion.a, motion.j, motion.s
-    x = wanted_acceleration(
-        law,
-        AxisState(p[0], v[0], a[0], j[0], s[0]),
-        observed.d[0],
-        observed.disturbance_bias[0],
-        AxisState(plan.p[0], plan.v[0], plan.a[0], plan.j[0], plan.s[0]),
+    p, v, d, bias = estimate.p_WB, observed.v, observed.d, observed.disturbance_bias
+    x, planned = _along(0, p[0], v[0], motion, plan)
+    north = wanted_acceleration(law, x, d[0], bias[0], planned)
+    y, planned = _along(1, p[1], v[1], motion, plan)
+    east = wanted_acceleration(law, y, d[1], bias[1], planned)
+    return north, east, vertical_acceleration(law, p, v, motion.a, d[2], plan, u)
+
+
+@compilable
+def _along(
+    axis: int, p: float, v: float, motion: MotionState, plan: PredictionState | PlanState
+) -> tuple[AxisState, AxisState]:
+    """The vehicle at ``p`` [m] with ``v`` [m/s] and the plan, along one horizontal axis."""
+    return (
+        AxisState(p, v, motion.a[axis], motion.j[axis], motion.s[axis]),
+        AxisState(plan.p[axis], plan.v[axis], plan.a[axis], plan.j[axis], plan.s[axis]),
     )
-    y = wanted_acceleration(
-        law,
-        AxisState(p[1], v[1], a[1], j[1], s[1]),
-        observed.d[1],
-        observed.disturbance_bias[1],
-        AxisState(plan.p[1], plan.v[1], plan.a[1], plan.j[1], plan.s[1]),
-    )
-    return x, y, vertical_acceleration(law, p, v, a, observed.d[2], plan, u)
 
 
 @compilable
@@ -240,10 +241,8 @@ def _horizontal_snap(
     off: float,
     going: float,
 ) -> float:
-    v, a, j, s = observed.v, motion.a, motion.j, motion.s
-    p = estimate.p_WB[axis] + off
-    vehicle = AxisState(p, v[axis] + going, a[axis], j[axis], s[axis])
-    planned = AxisState(plan.p[axis], plan.v[axis], plan.a[axis], plan.j[axis], plan.s[axis])
+    p, v = estimate.p_WB[axis] + off, observed.v[axis] + going
+    vehicle, planned = _along(axis, p, v, motion, plan)
     return snap_command(
         law, vehicle, observed.d[axis], observed.disturbance_bias[axis], planned, u.a[axis]
     )

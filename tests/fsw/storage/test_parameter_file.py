@@ -139,7 +139,7 @@ def test_a_link_stays_one_and_what_it_leads_to_is_written(there: bool, tmp_path:
         ("FD_FAIL_R 60.5", "FD_FAIL_R is an INT32 and must be a whole number"),
         ("SAFE_OWNER nan", "SAFE_OWNER is an INT32 and must be a whole number"),
         ("COM_OBL_RC_ACT 0", "COM_OBL_RC_ACT is to be one of 3 Return"),
-        ("MAV_TYPE 13", "MAV_TYPE is read only and 2 here"),
+        ("SYS_HAS_MAG 1", "SYS_HAS_MAG is read only and 0 here"),
         ("1\t1\tNOT_OURS\t1\t9", "NOT_OURS is unknown"),
         ("PID_YAW_P five", "five is not a number"),
         ("PID_YAW_P nan", "PID_YAW_P is to be 0..50, nan is refused"),

@@ -9,6 +9,7 @@ from operator import attrgetter
 import numpy as np
 import pytest
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.facts import FACTS
 from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
 from fsw.autopilot.parameters.float32 import as_text, nearest_decimal
@@ -131,7 +132,8 @@ def test_numbers_that_contradict_each_other_are_refused_by_their_dataclass() -> 
 
 def test_px4_s_names_have_px4_s_types() -> None:
     types = {name: parameter.default for name, parameter in BY_NAME.items()} | {
-        fact.name: BY_NAME[fact.repeats].default if fact.repeats else fact.value for fact in FACTS
+        fact.name: BY_NAME[fact.repeats].default if fact.repeats else fact.read({}, AIRFRAME)
+        for fact in FACTS
     }
     for names, kind in ((px4_types.INT32, int), (px4_types.FLOAT, float)):
         assert [name for name in names if type(types[name]) is not kind] == []

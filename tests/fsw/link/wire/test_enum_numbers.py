@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from dataclasses import replace
 from functools import reduce
 from operator import or_
 from types import ModuleType
@@ -13,6 +14,7 @@ import pytest
 
 from fsw.autopilot import measurements
 from fsw.autopilot.flight.estimate import estimator_report
+from fsw.autopilot.model import airframe
 from fsw.link.wire import (
     decode,
     decode_commands,
@@ -131,7 +133,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (encode_replies, "_ARMED", "MAV_MODE_FLAG", "SAFETY_ARMED"),
     (encode_replies, "_CUSTOM_MODE", "MAV_MODE_FLAG", "CUSTOM_MODE_ENABLED"),
     (encode_replies, "_LOCKSTEP", "HIL_ACTUATOR_CONTROLS_FLAGS", "LOCKSTEP"),
-    (encode_standard, "_QUADROTOR", "MAV_TYPE", "QUADROTOR"),
+    (airframe, "_MULTIROTOR", "MAV_TYPE", "GENERIC_MULTIROTOR"),
     (encode_standard, "_ARMED", "MAV_MODE_FLAG", "SAFETY_ARMED"),
     (encode_standard, "_CUSTOM_MODE", "MAV_MODE_FLAG", "CUSTOM_MODE_ENABLED"),
     (encode_standard, "_AUTO", "MAV_MODE_FLAG", "AUTO_ENABLED"),
@@ -305,3 +307,12 @@ def test_failures_have_mavlinks_numbers() -> None:
         assert number == entry("FAILURE_UNIT", _UNITS[unit])
     for number, kind in failures._KINDS.items():
         assert number == entry("FAILURE_TYPE", kind.upper())
+
+
+@pytest.mark.parametrize(
+    ("rotors", "name"),
+    [(4, "QUADROTOR"), (5, "GENERIC_MULTIROTOR"), (6, "HEXAROTOR"), (8, "OCTOROTOR")],
+)
+def test_the_type_of_a_vehicle_is_that_of_its_rotors(rotors: int, name: str) -> None:
+    vehicle = replace(airframe.AIRFRAME, rotors=rotors)
+    assert vehicle.mav_type == getattr(dialect, f"MAV_TYPE_{name}")
