@@ -35,13 +35,13 @@ def test_a_telemetry_log_is_known_by_its_content(name: str, tmp_path: Path) -> N
     stamps = (10**15 + 40_000 * k for k in range(4))
     log = b"".join(at.to_bytes(8, "big") + one for at in stamps for one in frames)
     (tmp_path / name).write_bytes(log)
-    assert isinstance(view._opened(tmp_path / name), TlogFlight)
+    assert isinstance(view._opened(tmp_path / name, "paper"), TlogFlight)
 
 
 def test_a_ulog_is_known_by_its_content(tmp_path: Path) -> None:
     (tmp_path / "flight.tlog").write_bytes(ulog.MAGIC + bytes(8))
     with pytest.raises(UlogError, match="ends before its data begin"):
-        view._opened(tmp_path / "flight.tlog")
+        view._opened(tmp_path / "flight.tlog", "paper")
 
 
 def test_an_address_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
