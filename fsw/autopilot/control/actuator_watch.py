@@ -35,7 +35,7 @@ from fsw.autopilot.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import Bodies, joint_drift, load_on_base, move_bodies
 from fsw.autopilot.model.rotors import lag_rotor, rotor_wrench
-from fsw.autopilot.signals import Vec3
+from fsw.autopilot.signals import JointVector, Vec3
 from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
 from fsw.record import Floats
@@ -398,6 +398,17 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
         odd *= min(felt, 1.0)  # what no joint does about an axis says nothing of joints
         odd2 += odd * odd
     s.odd2 += forget * (odd2 - s.odd2)
+
+
+def felt_by_base(s: Watched, airframe: Airframe) -> JointVector:
+    """How much of what undoes each joint's torque the base feels to act on it (j,) [1].
+
+    By mean squares of what turns the base beside the model, for drives that act on it as they are
+    asked, and as the arm is seen to move.
+    """
+    turned2 = airframe.rotor_lever**2 * float(s.products[0] + s.products[1])
+    unseen = float(s.odd2) - turned2
+    return tuple([unseen / max(u, ODD * ODD) for u in s.undone2[: airframe.bodies.joints].tolist()])
 
 
 @compilable

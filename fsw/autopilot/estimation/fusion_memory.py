@@ -22,6 +22,7 @@ _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for lon
 # N m of each joint. Friction and noise: 0.025 of the joint that has less, where both repeat
 # themselves; three times the friction holds 0.03. Stuck encoders: more within 0.1 to 0.4 s.
 _HELD: Final = 0.1
+_FELT: Final = 0.5  # of that; of joints that fail nothing is felt
 _REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 
@@ -48,31 +49,47 @@ class EncoderWatch(NamedTuple):
     """Whether the joints' encoders still follow the joints."""
 
     angles: JointVector = ()  # rad, the last reading
-    undone: JointVector = ()  # N m, of each joint when it came first
-    repeats: int = 0  # readings in a row that were the same
-    stuck: bool = False
+    # Of each: readings in a row that were the same, infinite of one that is stuck, and what undid
+    # the torques of all joints when they began [N m].
+    repeats: tuple[float, ...] = ()
+    first: tuple[JointVector, ...] = ()
 
     @property
     def repeating(self) -> bool:
-        """Whether they have said the same for long enough to ask whether they are stuck."""
-        return self.repeats >= _REPEATS
+        """Whether all have said the same for long enough to ask whether they are stuck."""
+        return min(self.repeats, default=0) >= _REPEATS
 
-    def after(self, angles: JointVector, undone: JointVector, *, judged: bool) -> EncoderWatch:
+    @property
+    def stuck(self) -> bool:
+        """Whether any of them is."""
+        return math.inf in self.repeats
+
+    def after(
+        self, angles: JointVector, undone: JointVector, felt: JointVector, *, judged: bool
+    ) -> EncoderWatch:
         """The watch after a reading of ``angles`` (j,) [rad].
 
-        Encoders are stuck when they say the same while no torque that a joint is given moves it:
-        ``undone`` (j,) [N m] is what the watch over the joints finds to act against it. A joint
-        that fails undoes its own torque and no other's, a load that is not known does so from the
-        start. So on the ground, and where a joint is known to have failed, they are not
-        ``judged``, and of one encoder alone nothing tells whether it or its joint is stuck.
+        An encoder is stuck that says the same while torque that its joint is given moves nothing,
+        and what carries the joint feels that it moves. ``undone`` (j,) [N m] is what the watch over
+        the joints finds to act against each torque, and ``felt`` (j,) [1] how much of that the base
+        feels (``actuator_watch.felt_by_base``); or a joint nearer to the base does. A joint that
+        fails is felt by none, a load that is not known acts from the start. On the ground, and
+        where a joint is known to have failed, they are not ``judged``.
         """
-        if angles != self.angles or not judged:
-            return EncoderWatch(angles, undone)
-        after = self._replace(repeats=self.repeats + 1)
-        if after.stuck or not after.repeating:
-            return after
-        grown = [abs(now - first) for now, first in zip(undone, self.undone, strict=True)]
-        return after._replace(stuck=min(grown) > _HELD)
+        n = len(angles)
+        repeats, first = [0.0] * n, [undone] * n
+        for k in range(n if judged and len(self.angles) == n else 0):
+            if angles[k] == self.angles[k]:
+                repeats[k], first[k] = self.repeats[k] + 1.0, self.first[k]
+                if repeats[k] >= _REPEATS and self._moves(k, undone, felt[k]):
+                    repeats[k] = math.inf
+        return EncoderWatch(angles, tuple(repeats), tuple(first))
+
+    def _moves(self, k: int, undone: JointVector, felt: float) -> bool:
+        """Whether joint ``k`` moves all the same: see ``after``."""
+        grown = [abs(now - then) for now, then in zip(undone, self.first[k], strict=True)]
+        inside = max(grown[:k], default=0.0)
+        return grown[k] > _HELD and (felt > _FELT or inside > _FELT * grown[k])
 
 
 TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4]

@@ -36,6 +36,10 @@ CELLS = [
     ("trajectory", "joint-off-1"),
     ("workspace", "joint-stuck-2"),
     ("return", "encoder-stuck-mocap"),
+    # One of two encoders was taken for its joint, or for nobody.
+    ("hold", "encoder-stuck-1-mocap"),
+    ("hold", "encoder-stuck-2-mocap"),
+    ("return", "encoder-stuck-1-mocap"),
 ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from fsw.autopilot.control.actuator_watch import felt_by_base
 from fsw.autopilot.control.cascade import Cascade, in_hover
 from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.correlated_error import correlated_error
@@ -35,6 +36,7 @@ from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import JointSample, Sample
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.rotors import agility
 from fsw.autopilot.signals import (
     EstimatorReport,
@@ -132,7 +134,8 @@ class SensedState:
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
         law = self._fusion.law
-        started, watch, samples = _without_stuck(state, before, inputs.samples, law)
+        airframe = self._cascade.law.airframe
+        started, watch, samples = _without_stuck(state, before, inputs.samples, law, airframe)
         memory, estimate = self._fusion.take_in(started, samples, now, pushed, watch, model)
         caught = None
         if estimate is None and not state.cascade.has_estimate:
@@ -316,15 +319,20 @@ def _report_noise(memory: FusionMemory, now: float, texts: list[StatusText]) -> 
 
 
 def _without_stuck(
-    state: FlightState, memory: FusionMemory, samples: tuple[Sample, ...], law: Law
+    state: FlightState,
+    memory: FusionMemory,
+    samples: tuple[Sample, ...],
+    law: Law,
+    airframe: Airframe,
 ) -> tuple[FusionMemory, EncoderWatch, tuple[Sample, ...]]:
     """The samples without those of encoders that are stuck: joints then follow from torques."""
     before = watch = memory.encoders
     for one in samples:
         if type(one) is JointSample:
-            undone = tuple(state.cascade.watch.undone[: len(one.angles)].tolist())
+            seen = state.cascade.watch
+            undone = tuple(seen.undone[: len(one.angles)].tolist())
             judged = state.vehicle.flies and not state.damage.joint
-            watch = watch.after(one.angles, undone, judged=judged)
+            watch = watch.after(one.angles, undone, felt_by_base(seen, airframe), judged=judged)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, law, one)
     if watch.stuck:

@@ -5,40 +5,73 @@ from __future__ import annotations
 import pytest
 
 from fsw.autopilot.estimation.fusion_memory import EncoderWatch
+from fsw.autopilot.signals import JointVector
 
 STANDS, MOVES = (0.7, -0.2), (0.7015, -0.2)  # rad
 LOAD, HELD = 0.3, 0.25  # N m
+FELT, UNFELT = (1.0, 1.0), (-1.0, 0.0)  # of it, by the base
 
 
-def watched(undone: list[tuple[float, float]], *, judged: bool = True) -> EncoderWatch:
+def watched(
+    undone: list[JointVector], felt: JointVector = FELT, *, judged: bool = True
+) -> EncoderWatch:
     """A watch after equal readings, while torques [N m] go nowhere."""
     watch = EncoderWatch()
     for one in undone:
-        watch = watch.after(STANDS, one, judged=judged)
+        watch = watch.after(STANDS, one, felt, judged=judged)
     return watch
 
 
-def rising(first: float, second: float) -> list[tuple[float, float]]:
+def rising(first: float, second: float) -> list[JointVector]:
     """What acts against two joints [N m], up to these values within 20 ms."""
     return [(first * k / 10, second * k / 10) for k in range(11)]
 
 
-def test_encoders_are_stuck_where_the_torque_of_every_joint_goes_nowhere() -> None:
-    watch = watched(rising(HELD, -HELD))
+@pytest.mark.parametrize(
+    ("undone", "felt"),
+    [
+        (rising(HELD, -HELD), (1.0, 0.0)),
+        (rising(HELD, 0.0), (1.0, 0.0)),
+        (rising(0.7 * HELD, HELD), UNFELT),
+    ],
+    ids=["both, the base feels it", "the first, the base feels it", "the first joint feels it"],
+)
+def test_an_encoder_is_stuck_where_its_joint_is_felt_to_move(
+    undone: list[JointVector], felt: JointVector
+) -> None:
+    watch = watched(undone, felt)
     assert watch.stuck
-    assert watch.after(STANDS, (0.0, 0.0), judged=True).stuck, "until they speak again"
-    assert not watch.after(MOVES, (HELD, HELD), judged=True).stuck
+    assert watch.after(STANDS, (0.0, 0.0), UNFELT, judged=True).stuck, "until it speaks again"
+    speaks = tuple(angle + 0.0015 for angle in STANDS)
+    assert not watch.after(speaks, (HELD, HELD), FELT, judged=True).stuck
+
+
+def test_one_that_is_stuck_stays_so_while_another_one_moves() -> None:
+    watch = watched(rising(0.7 * HELD, HELD), UNFELT)
+    assert watch.after(MOVES, (0.0, 0.0), UNFELT, judged=True).stuck
 
 
 @pytest.mark.parametrize(
-    "undone",
-    [rising(HELD, 0.0), rising(0.0, HELD), [(LOAD, LOAD)] * 11, rising(0.03, 0.03)],
-    ids=["joint 1 fails", "joint 2 fails", "a load that is not known", "friction"],
+    ("undone", "felt"),
+    [
+        (rising(HELD, 0.0), UNFELT),
+        (rising(0.0, HELD), UNFELT),
+        (rising(0.1 * HELD, HELD), (0.2, 0.2)),
+        ([(LOAD, LOAD)] * 11, FELT),
+        (rising(0.03, 0.03), FELT),
+    ],
+    ids=[
+        "joint 1 fails",
+        "joint 2 fails",
+        "joint 2 fails in gusts",
+        "a load that is not known",
+        "friction",
+    ],
 )
-def test_what_one_joint_undoes_or_was_there_before_is_none_of_the_encoders(
-    undone: list[tuple[float, float]],
+def test_what_is_not_felt_or_was_there_before_is_no_encoder_s_fault(
+    undone: list[JointVector], felt: JointVector
 ) -> None:
-    watch = watched(undone)
+    watch = watched(undone, felt)
     assert watch.repeating
     assert not watch.stuck
 
