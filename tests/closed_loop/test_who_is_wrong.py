@@ -86,18 +86,28 @@ def test_a_sound_gyro_is_not_tilted_by_what_it_is_suspected_for(
 @pytest.mark.long
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize(
-    ("mode", "suite", "faults"),
+    ("mode", "suite", "faults", "seed"),
     [
         # A comparison that fired by chance excused the tilt of a pose that had jumped 4 s before.
         (
             "trajectory",
             "mocap",
             [Fault("vio", "wrong", size=2.0), Fault("encoder", "delayed", start_s=0.5)],
+            0,
+        ),
+        # It held between walls, without a position, for two seconds longer than it had room for.
+        (
+            "trajectory",
+            "mocap",
+            [Fault("encoder", "delayed"), Fault("vio", "wrong", start_s=1.0, size=2.0)],
+            1,
         ),
         # Doubts ended where the ground was felt, and the wrong force lifted the vehicle again.
-        ("land", "gnss", [Fault("accel", "wrong")]),
+        ("land", "gnss", [Fault("accel", "wrong")], 0),
     ],
 )
-def test_flights_that_hit_a_wall_once_do_not(mode: str, suite: str, faults: list[Fault]) -> None:
-    flight = fly(mode, tuple(faults), suite, 0)
+def test_flights_that_hit_a_wall_once_do_not(
+    mode: str, suite: str, faults: list[Fault], seed: int
+) -> None:
+    flight = fly(mode, tuple(faults), suite, seed)
     assert flight.contact == "", flight.ended

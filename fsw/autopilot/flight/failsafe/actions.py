@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from fsw.autopilot.flight.failsafe.conditions import Action
-from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
+from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, position_is_off
 from fsw.autopilot.signals import BatteryWarning, Mode
 
 BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
@@ -66,6 +66,12 @@ def on_breach(context: FailsafeContext, number: int) -> Action:
     if config.controller != "blf" or config.soft:
         return Action.WARN
     return by_number(number)
+
+
+def on_lack_of_room(context: FailsafeContext) -> Action:
+    """Descend where no position is measured: what is lacking only grows."""
+    off = position_is_off(context, context.limits.position_low)
+    return Action.DESCEND if off else Action.WARN
 
 
 def on_far_outside(context: FailsafeContext) -> Action:

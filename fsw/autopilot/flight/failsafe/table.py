@@ -247,12 +247,12 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.ROOM_LACKING,
         evidence.lacks_room,
-        _always(Action.WARN),
+        actions.on_lack_of_room,
         Severity.CRITICAL,
         detail=lambda c: f": {1e3 * c.state.kept.shortfall:.0f} mm less than SAFE_SIGMAS asks for",
         slow=True,
         within_us=_TWICE,
-        parameters=("SAFE_SIGMAS",),
+        parameters=("SAFE_SIGMAS", "COM_AID_LOSS_T", "COM_POS_LOW_EPH"),
     ),
     Failsafe(
         Condition.TUBE_LEFT,

@@ -650,3 +650,16 @@ def test_room_is_lacking_in_flight_only_for_a_while_and_by_more_than_a_workspace
     severity, text = report(row, cramped.context(), Action.WARN)
     assert severity is Severity.CRITICAL
     assert text.endswith("23 mm less than SAFE_SIGMAS asks for")
+
+
+@pytest.mark.requirement("REQ-EST-5")
+def test_without_a_position_it_descends_where_clearances_lack_room() -> None:
+    for unaided_us, sigma, expected in (
+        (1_500_000, 0.11, Action.DESCEND),
+        (1_500_000, 0.09, Action.WARN),
+        (0, 0.11, Action.WARN),
+    ):
+        aiding = Aiding(unaided_us, Sensor.POSE, position_sigma=sigma)
+        context = replace(FINE, kept=CRAMPED, aiding=aiding).context()
+        (row,) = [one for one in active(context) if one.condition is Condition.ROOM_LACKING]
+        assert row.action(context) is expected
