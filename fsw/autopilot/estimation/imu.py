@@ -74,9 +74,10 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
     lost = (0 if of_force == _NONE else NO_FORCE) | (0 if of_rate == _NONE else NO_RATE)
     lost |= x.out
     modelled = flies and x.end > 0
-    # Of what may be wrong the reading is used, and the bias may be anything.
+    # Of what may be wrong the reading is used, and the bias may be anything: on the ground too it
+    # walks no faster than by what has shown.
     doubtful = lost | (x.suspect & NOTHING)
-    if modelled and doubtful:
+    if doubtful and (modelled or not lost):
         doubtful |= MODELLED | (FORCE_MADE if lost & NO_FORCE else 0)
     row[TIME], row[LOST] = time, float(doubtful)
     for i in range(3):

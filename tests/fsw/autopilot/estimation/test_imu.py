@@ -191,3 +191,17 @@ def test_a_half_that_is_out_is_replaced_and_of_a_suspect_only_the_bias_is_unknow
     assert unit.last[at] != (3.0 if half == NO_FORCE else 0.3)
     other = FORCE if half == NO_RATE else RATE
     assert unit.last[other] == (3.0 if half == NO_RATE else 0.3), "the other half is used"
+
+
+@pytest.mark.parametrize("half", [NO_FORCE, NO_RATE])
+def test_where_the_ground_is_felt_a_suspect_s_bias_walks_no_faster_than_in_flight(
+    half: int,
+) -> None:
+    """As that of a half of no use, it made the attitude unknown, and a landing a termination."""
+    unit = Unit()
+    unit.x.suspect = half
+    unit.read()
+    assert unit.last[LOST] == half | MODELLED
+    unit.x.suspect, unit.x.out = 0, half
+    unit.read()
+    assert unit.last[LOST] == half
