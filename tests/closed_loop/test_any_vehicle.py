@@ -24,8 +24,8 @@ def scenario(name: str, vehicle: str, duration_s: float, suite: str | None = Non
     return replace(load_scenario(name, suite, vehicle), duration_s=duration_s)
 
 
-def flown(one: Scenario) -> FlightResult:
-    return simulate(one, 0, flight_config(body=one.body, vehicle=vehicle_of(one)))
+def flown(one: Scenario, seed: int = 0) -> FlightResult:
+    return simulate(one, seed, flight_config(body=one.body, vehicle=vehicle_of(one)))
 
 
 @pytest.mark.drawn(2)
@@ -38,6 +38,13 @@ def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | Non
     assert truth.tracking_error_max_m is not None
     assert truth.tracking_error_max_m < 0.25
     assert [key for key, use in truth.limits.items() if not use.kept] == []
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_what_pushes_make_of_a_heavy_arm_is_no_gyro_s_fault() -> None:
+    """The flight held after 2.5 s: pushes had turned it by 1.6 rad/s in two seconds."""
+    truth = flown(scenario("walls", "hexa-3r", 4.0, "mocap"), seed=209).truth
+    assert truth.completed, truth.end_reason
 
 
 def test_a_second_vehicle_compiles_nothing() -> None:

@@ -89,7 +89,7 @@ FILTER: Final = np.dtype(
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle
-        ("agility", float),  # how much quicker rotors turn it than the paper's; 1 at least
+        ("turns", float, (4,)),  # by how much more than the paper's it turns: redundancy.py
         # Of each: angle [rad], rate [rad/s] and disturbance [rad/s^2].
         ("joints", float, (JOINTS, 3)),
         ("joint_variance", float, (3, 3)),  # [SI], of each

@@ -22,7 +22,9 @@ _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for lon
 # N m of each joint. Friction and noise: 0.025 of the joint that has less, where both repeat
 # themselves; three times the friction holds 0.03. Stuck encoders: more within 0.1 to 0.4 s.
 _HELD: Final = 0.1
-_FELT: Final = 0.5  # of that; of joints that fail nothing is felt
+_FELT: Final = (
+    0.5  # of that; 0.7 and more of joints that move unseen, less than 0 of ones that fail
+)
 _REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 
@@ -222,12 +224,13 @@ def copied(x: Filter) -> Filter:
     return np.ndarray(1, FILTER, bytearray(memory if type(memory) is bytearray else x.tobytes()))
 
 
-def at_start(joints: int, agility: float = 1.0) -> FusionMemory:
+def at_start(joints: int, turns: Sequence[float] = (1.0,) * 4) -> FusionMemory:
     """Memory before the first sample, of a vehicle of so many ``joints``.
 
-    Its rotors turn it ``agility`` times [1] as quickly as the paper's, and 1 at least.
+    What rotors do not explain ``turns`` it so much [1] more than the paper's
+    (``redundancy.scale_of_turns``).
     """
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
-    x["joint_count"], x["agility"] = joints, agility
+    x["joint_count"], x["turns"] = joints, turns
     x["model_walk"] = MIN_WALKS
     return FusionMemory(x)

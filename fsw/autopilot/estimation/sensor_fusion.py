@@ -498,7 +498,7 @@ def _anew(memory: FusionMemory) -> FusionMemory:
     """The memory with a filter that starts from the next samples, because it is no number."""
     x = memory.numbers[0]
     return memory._replace(
-        numbers=at_start(int(x["joint_count"]), float(x["agility"])).numbers,
+        numbers=at_start(int(x["joint_count"]), x["turns"]).numbers,
         joints_came=-1.0,
         imu_came=-1.0,
         started=False,

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from fsw.autopilot.geometry.vectors import clamp
+from fsw.autopilot.geometry.vectors import clamp, norm
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import base_acceleration, posture
 from fsw.autopilot.signals import JointVector, RotorVector, Vec2, Vec3
@@ -125,6 +125,17 @@ def agility(airframe: Airframe) -> float:
     """
     J = posture(airframe.bodies, airframe.home_posture).inertia
     return airframe.mass * GRAVITY * airframe.rotor_lever / float(min(J[0], J[4]))
+
+
+def swing(airframe: Airframe) -> float:
+    """Angular acceleration [rad/s^2] for each m/s^2 of a push at B's origin, the largest.
+
+    The centre of mass is elsewhere: a heavy arm under a light body makes of a push a torque.
+    """
+    m, b, push = posture(airframe.bodies, airframe.home_posture), airframe.bodies, airframe.mass
+    pushes = (push, 0.0, 0.0), (0.0, push, 0.0), (0.0, 0.0, push)
+    still, free = (0.0, 0.0, 0.0), (0.0,) * b.joints
+    return max(norm(base_acceleration(m, b, still, one, free)) for one in pushes)
 
 
 def rotor_names(airframe: Airframe) -> list[str]:

@@ -108,6 +108,11 @@ _BEND_SIGMAS: Final = 5.5  # the same of second differences of places: two in a 
 # The least thresholds, by window [SI]. A gust is a force of 1 to 2 m/s^2 and no turn.
 _TURN_OFF: Final = 0.2  # rad/s
 _TURN_OFF_AIDED: Final = 0.15  # rad/s
+# They are the paper's, whose rotors turn it with so much. Others turn more beside what the model
+# says: by what rotors are off by, and by pushes at their origin where a heavy arm has moved the
+# centre of mass. So many deviations of a walk of pushes of up to 0.8 m/s^2, each for 0.1 s.
+_AGILE: Final = 35.0  # rad/s^2
+_PUSHES: Final = 5.0 * 0.8 * math.sqrt(0.1 / 3.0)  # m/s^1.5
 _FORCE_OFF: Final = (2.5, 1.8, 1.5, 1.3)  # m/s^2
 _FORCE_OFF_AIDED: Final = 0.9  # m/s^2
 _GYRO_OFF: Final = 0.012  # rad/s: scale, axes and bias
@@ -154,7 +159,7 @@ EVIDENCE: Final = np.dtype(
         ("aid_first", np.int64, (3,)),
         ("waiting", float, (3, _AT + WITNESS)),
         ("waits", np.int64, (3,)),
-        ("agility", float),  # of the vehicle: what of a turn rotors do not explain grows with it
+        ("turns", float, (4,)),  # as of ``FILTER``
         ("squares", float, (COUNT, 4)),  # mean squares of residuals with the model, by window
         # Residual over threshold, by window, the long one last: at the last look, what both of the
         # last two looks have had, and the threshold [SI].
@@ -225,7 +230,9 @@ def look(
 ) -> None:
     """Take in the newest measurements at ``now`` [s], and compute all residuals."""
     s, x = e[0], numbers[0]
-    s.looked, s.agility = now, max(x.agility, 1.0)
+    s.looked = now
+    for k in range(4):
+        s.turns[k] = max(x.turns[k], 1.0)
     if _begins(x.witness):
         _begin_anew(s)
         return
@@ -255,7 +262,7 @@ def look(
         _note_largest(s, now, k)
     # How quickly the model has been off, which is what a filter without a half of the unit needs.
     x.model_walk[0] = MIN_WALKS[0]
-    x.model_walk[1] = max(s.agility * MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
+    x.model_walk[1] = max(s.turns[1] * MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
 
 
 @compilable
@@ -448,7 +455,7 @@ def _unit_and_model(s: Any, now: float, k: int, lasting: Vec3, learns: bool) -> 
     turn0, spun0 = _difference(d, c, 1 + TURN, first), _difference(d, c, 1 + SPUN2, first)
     spun = _difference(b, a, 1 + SPUN2, last)
     r = _turned_beside(turn, turn0, spun, spun0)
-    _note_model(s, now, GM, k, r, s.agility * _TURN_OFF, 0.0, learns)
+    _note_model(s, now, GM, k, r, s.turns[k] * _TURN_OFF, 0.0, learns)
     _note_model(s, now, AM, k, subtract(force, lasting), _FORCE_OFF[k], 0.0, learns)
 
 
@@ -515,7 +522,7 @@ def _unit_and_pose(
     turn0, turn = rotation_vector(_apart(a, b, _MEASURED + 3)), rotation_vector(seen)
     spun0, spun = _difference(b, a, _AT + SPUN2, before), _difference(c, b, _AT + SPUN2, over)
     r = _turned_beside(_over(turn, over), _over(turn0, before), spun, spun0)
-    least, noise = s.agility * _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning
+    least, noise = s.turns[k] * _TURN_OFF_AIDED, 2.0 * _NOISE_SIGMAS * turning
     _note_model(s, now, MP_TURN, k, r, least, noise, learns)
     bent = _bend(c, b, a, _MEASURED)
     felt, made = _bend(c, b, a, _AT + FELT2), _bend(c, b, a, _AT + MADE2)
@@ -594,7 +601,7 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
     r = _turned_beside(rate, rate0, spun, spun0)
     iron += _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
     room = (iron + 2.0 * noise) / over
-    across, least = _across(r, v, (0.0, 0.0, 0.0)), s.agility * _TURN_OFF_AIDED
+    across, least = _across(r, v, (0.0, 0.0, 0.0)), s.turns[k] * _TURN_OFF_AIDED
     _note_model(s, now, MB, k, across, least, room, learns)
 
 
@@ -804,6 +811,16 @@ def _not_shown(
     threshold = sizes[at_once] / ratios[at_once]
     unseen = max(max(fired) - sizes[at_once], 0.0)
     return min((unseen / threshold) ** 2, _MOST)
+
+
+def scale_of_turns(agility: float, swing: float) -> Vec4:
+    """How much more [1] a vehicle turns beside rotors than the paper's, by window; 1 at least.
+
+    Of its ``agility`` [rad/s^2] and its ``swing`` [rad/m] (``rotors.py``).
+    """
+    a, b, c, d = [_PUSHES * swing * math.sqrt(window) / _TURN_OFF for window in WINDOWS]
+    least = max(agility / _AGILE, 1.0)
+    return max(a, least), max(b, least), max(c, least), max(d, least)
 
 
 def at_start() -> Evidence:

@@ -11,7 +11,7 @@ from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
-from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names
+from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names, scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_checks import Health
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
@@ -37,7 +37,7 @@ from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import JointSample, Sample
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.rotors import agility
+from fsw.autopilot.model.rotors import agility, swing
 from fsw.autopilot.signals import (
     EstimatorReport,
     JointVector,
@@ -53,7 +53,6 @@ from fsw.record import padded
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
 _EVERY_TICK = (_IMU, Sensor.ENCODERS)
-_AGILE = 35.0  # rad/s^2, of the vehicle whose thresholds the estimator's are
 # The sensor is, all the same; of an IMU that disagrees the verdict tells.
 _IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
 _NOISY = 4.0  # times the stated variance
@@ -81,7 +80,8 @@ class SensedState:
 
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
         self._joints = cascade.law.airframe.bodies.joints
-        self._agility = max(agility(cascade.law.airframe) / _AGILE, 1.0)
+        airframe = cascade.law.airframe
+        self._turns = scale_of_turns(agility(airframe), swing(airframe))
         self._fusion = SensorFusion(tuning, self._joints)
         self._cascade = cascade
         self._tuning = tuning
@@ -101,7 +101,7 @@ class SensedState:
         """
         before = state.fusion
         return (
-            at_start(self._joints, self._agility)
+            at_start(self._joints, self._turns)
             if before is None or now < before.now - _SET_BACK
             else before
         )

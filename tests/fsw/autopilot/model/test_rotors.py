@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -17,12 +18,14 @@ from fsw.autopilot.model.rotors import (
     lag_rotor,
     rotor_decay,
     rotor_names,
+    swing,
 )
 from fsw.autopilot.signals import Vec3, Vec4
 from tests.fsw.random_states import estimate_of, vec3
 from tests.fsw.records import measured_motion
 from tests.paper_vehicle import ROTOR_ARM, YAW_PER_THRUST
-from vehicles.vehicle_file import load_vehicle
+from tests.sitl.pinocchio_model import configuration, pinocchio_model
+from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 MOMENT = 1e-3  # s
 
@@ -157,3 +160,17 @@ def test_a_rotor_is_named_by_its_side_where_that_tells_it_from_the_others() -> N
     assert rotor_names(airframe_of(load_vehicle("x500-2r")))[0] == "rotor 1 (front right)"
     eight = rotor_names(airframe_of(load_vehicle("octo-4r")))
     assert eight == [f"rotor {k}" for k in range(1, 9)], "two are on each side"
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_a_push_at_the_origin_turns_a_vehicle_as_pinocchio_says(name: str) -> None:
+    vehicle = load_vehicle(name)
+    airframe, model = airframe_of(vehicle), pinocchio_model(vehicle)
+    level = np.array([1.0, 0.0, 0.0, 0.0])
+    q = configuration(np.zeros(3), level, np.array(vehicle.home_posture))
+    mass = pin.crba(model, model.createData(), q)
+    mass = np.triu(mass) + np.triu(mass, 1).T
+    pushes = np.zeros((model.nv, 3))
+    pushes[:3] = airframe.mass * np.eye(3)
+    turns = np.linalg.solve(mass, pushes)[3:6]
+    assert swing(airframe) == pytest.approx(np.linalg.norm(turns, axis=0).max(), rel=1e-9)
