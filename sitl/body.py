@@ -15,12 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from sitl.plant.places import row_of, rows_of
+from sitl.plant.tool import is_tip, tip_radius
 from sitl.plant.vector import V3, Array
 from sitl.scenario import Body
 from vehicles.description import Vehicle
 
 BASE: Final = 0  # row of what the plant places
 BALL, CAPSULE, ROTOR = 0, 1, 2  # forms
+# What touches a zone that may be touched: no part of the tool, its tip, or all but a capsule's end.
+KEPT, TIP, SHAFT = 0, 1, 2
+_TIPS = 2.0  # of its tip's radius, by which a capsule that ends at the tip may touch with it
 _HERE: V3 = (0.0, 0.0, 0.0)
 
 
@@ -35,6 +39,8 @@ class Part:
     end: tuple[int, V3] | None = None  # of a capsule
     half_height: float = 0.0  # m, of a rotor, along its axis
     axis: V3 = _HERE  # of a rotor, against its thrust, in B
+    tool: int = KEPT
+    cut: float = 0.0  # share of a shaft's length, from its end on, that may touch
 
 
 class Parts(NamedTuple):
@@ -46,6 +52,8 @@ class Parts(NamedTuple):
     row: npt.NDArray[np.int64]  # (parts, 2) of begin and end
     local: Array  # (parts, 2, 3) m
     axis: Array  # (parts, 3) [1] of a rotor, in B
+    tool: npt.NDArray[np.int64]  # (parts,)
+    cut: Array  # (parts,) of a shaft's length
     rigid: npt.NDArray[np.bool_]  # (parts,) whether the base's axes are needed
     ground: npt.NDArray[np.int64]  # (points,) rows of the critical points, which may touch it
     axes: int  # first of three rows with the base's axes
@@ -57,7 +65,11 @@ def parts_of(body: Body, vehicle: Vehicle) -> tuple[Part, ...]:
     if body == "points":
         return tuple(
             Part(
-                one.name, BALL, 0.0, (row_of(vehicle, vehicle.places[one.on], one.position), _HERE)
+                one.name,
+                BALL,
+                0.0,
+                (row_of(vehicle, vehicle.places[one.on], one.position), _HERE),
+                tool=TIP if is_tip(vehicle, vehicle.places[one.on], one.position) else KEPT,
             )
             for one in vehicle.critical_points
         )
@@ -69,8 +81,19 @@ def parts_of(body: Body, vehicle: Vehicle) -> tuple[Part, ...]:
     parts = []
     for one in vehicle.parts:
         on = vehicle.places[one.on]
-        begin, end = place(on, one.position), None if one.end is None else place(on, one.end)
-        parts.append(Part(one.name, BALL if end is None else CAPSULE, one.radius, begin, end))
+        if one.end is None:
+            tool = TIP if is_tip(vehicle, on, one.position) else KEPT
+            parts.append(Part(one.name, BALL, one.radius, place(on, one.position), tool=tool))
+            continue
+        ends, length = (one.position, one.end), math.dist(one.position, one.end)
+        if is_tip(vehicle, on, ends[0]):
+            ends = (ends[1], ends[0])
+        begin, end = place(on, ends[0]), place(on, ends[1])
+        if is_tip(vehicle, on, ends[1]):
+            cut = min(_TIPS * tip_radius(vehicle) / length, 1.0) if length > 0.0 else 1.0
+            parts.append(Part(one.name, CAPSULE, one.radius, begin, end, tool=SHAFT, cut=cut))
+        else:
+            parts.append(Part(one.name, CAPSULE, one.radius, begin, end))
     for number, rotor in enumerate(vehicle.rotors, start=1):
         x, y, z = rotor.axis
         begin, name = (BASE, rotor.position), f"rotor{number}"
@@ -94,6 +117,8 @@ def as_arrays(parts: tuple[Part, ...], vehicle: Vehicle) -> Parts:
         row=np.array([[row for row, _ in pair] for pair in ends], dtype=np.int64),
         local=local,
         axis=np.array([part.axis for part in parts]),
+        tool=np.array([part.tool for part in parts], dtype=np.int64),
+        cut=np.array([part.cut for part in parts]),
         rigid=np.array(
             [
                 part.form == ROTOR or bool(places.any())

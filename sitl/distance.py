@@ -11,15 +11,11 @@ from __future__ import annotations
 
 import math
 
-from numba import literal_unroll
-
-from sitl.body import BALL, CAPSULE, Parts
+from sitl.body import BALL, CAPSULE, SHAFT, Parts
 from sitl.compiled import kernel
+from sitl.nearest import nearest
 from sitl.plant.vector import V3, Array, add, dot, row, scale, sub
-from sitl.shapes import KINDS
-from sitl.shapes.kind import Nearest
 
-_NEAREST = tuple(kind.nearest for kind in KINDS)
 _EXACT = 1e-6  # m, of a rotor's distance
 _STEPS = 40
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -27,15 +23,13 @@ _SAMPLES = 48  # of a rotor's rim
 
 
 @kernel
-def nearest(kind: int, numbers: Array, p: V3) -> Nearest:
-    """A point p [m, NED] against the shape of a kind with ``numbers`` (16,) [m, NED]."""
-    at = Nearest(math.inf, 0.0, 0.0, 1.0)
-    k = 0
-    for of_kind in literal_unroll(_NEAREST):
-        if k == kind:
-            at = of_kind(numbers, p[0], p[1], p[2])
-        k += 1  # noqa: SIM113 - numba unrolls no enumerate
-    return at
+def _end(parts: Parts, b: int, touch: bool, places: Array) -> V3:
+    """The end of capsule ``b``; of a shaft where it may ``touch``, that of the rest of it."""
+    end = _place(parts, b, 1, places)
+    if touch and parts.tool[b] == SHAFT:
+        begin = _place(parts, b, 0, places)
+        end = add(end, scale(parts.cut[b], sub(begin, end)))
+    return end
 
 
 @kernel
@@ -57,18 +51,26 @@ def _turned(parts: Parts, places: Array, v: V3) -> V3:
 
 @kernel
 def part_bound(
-    kind: int, numbers: Array, keep_in: bool, shift: V3, parts: Parts, b: int, places: Array
+    kind: int,
+    numbers: Array,
+    keep_in: bool,
+    shift: V3,
+    parts: Parts,
+    b: int,
+    places: Array,
+    touch: bool = False,
 ) -> float:
     """Below the distance [m] of part ``b`` to the surface; that distance itself for a ball.
 
     For places (rows, 3) [m, NED] and a shape of ``numbers`` (16,) [m, NED] that has moved by shift
-    [m, NED]; negative beyond the surface.
+    [m, NED]; negative beyond the surface. Of a zone that the tool may ``touch``, the end of its
+    shaft is left out.
     """
     begin = _place(parts, b, 0, places)
     reach = float(parts.radius[b])
     middle = begin
     if parts.form[b] == CAPSULE:
-        end = _place(parts, b, 1, places)
+        end = _end(parts, b, touch, places)
         middle = scale(0.5, add(begin, end))
         half = sub(end, middle)
         reach += math.sqrt(dot(half, half))
@@ -80,12 +82,19 @@ def part_bound(
 
 @kernel
 def part_distance(
-    kind: int, numbers: Array, keep_in: bool, shift: V3, parts: Parts, b: int, places: Array
+    kind: int,
+    numbers: Array,
+    keep_in: bool,
+    shift: V3,
+    parts: Parts,
+    b: int,
+    places: Array,
+    touch: bool = False,
 ) -> float:
     """Distance [m] of part ``b`` to the surface, negative beyond it.
 
     For places (rows, 3) [m, NED] and a shape of ``numbers`` (16,) [m, NED] that has moved by shift
-    [m, NED].
+    [m, NED], and may be touched or not, as for ``part_bound``.
     """
     form, radius = parts.form[b], float(parts.radius[b])
     begin = sub(_place(parts, b, 0, places), shift)
@@ -93,7 +102,7 @@ def part_distance(
         d = nearest(kind, numbers, begin).distance
         return (-d if keep_in else d) - radius
     if form == CAPSULE:
-        end = sub(_place(parts, b, 1, places), shift)
+        end = sub(_end(parts, b, touch, places), shift)
         if keep_in:
             d = max(nearest(kind, numbers, begin).distance, nearest(kind, numbers, end).distance)
             return -d - radius

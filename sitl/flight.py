@@ -22,6 +22,7 @@ from sitl.result import EndKind, TruthResult
 from sitl.scenario import Scenario
 from sitl.scenario_file import suite_of
 from sitl.simulation import Simulation
+from sitl.touch import touch_sentence
 from sitl.truth_log import TruthLog
 
 COMPLETED: Final = 0  # exit code
@@ -163,4 +164,7 @@ def _summary(result: TruthResult, timing: RunTiming) -> str:
     margin = ""
     if result.min_margin_m is not None:
         margin = f", smallest margin {1000.0 * result.min_margin_m:.1f} mm"
-    return f"{result.end_reason}{margin}, {timing.real_time_factor:.1f} times real time"
+    touched = "".join(f", {touch_sentence(*one)}" for one in result.touches.items())
+    if result.force_error_rms_n is not None:
+        touched += f", force error {result.force_error_rms_n:.2f} N rms"
+    return f"{result.end_reason}{margin}{touched}, {timing.real_time_factor:.1f} times real time"

@@ -17,6 +17,7 @@ from sitl.result import EndKind, EndReason, MarginRecord, TrackingError, TruthRe
 from sitl.scenario import V3, Scenario, vehicle_of
 from sitl.scenario_validation import check_start
 from sitl.start import flown_vehicle
+from sitl.touch import TouchRecord, touch_flaws
 from sitl.world import World, headroom
 
 TOUCH_DOWN_MAX = 2.0  # m/s; a drop from 0.2 m
@@ -176,13 +177,20 @@ class FlightEvaluator:
             (place, time_s), self._sample = self._sample, None
             self._error.add(place, self._clock.place_at(time_s))
 
-    def result(self, time_s: float) -> TruthResult:
-        """The score up to ``time_s``."""
+    def result(self, time_s: float, touch: TouchRecord) -> TruthResult:
+        """The score up to ``time_s``, with what the tool may ``touch``."""
         self.catch_up()
+        uses = touch.uses()
         flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
-        flaws += self.limits.flaws()
+        flaws += (*self.limits.flaws(), *touch_flaws(uses))
         truth = score(self.ended, time_s, self._error, self.record, self._whole, flaws)
-        return replace(truth, limits=self.limits.uses())
+        return replace(
+            truth,
+            limits=self.limits.uses(),
+            touches=uses,
+            force_error_rms_n=touch.error_rms(),
+            force_asked_rms_n=touch.asked_rms(),
+        )
 
 
 def _whole(scenario: Scenario) -> EndKind:

@@ -11,6 +11,7 @@ import numpy as np
 from sitl.limits import LimitUse
 from sitl.plant.vector import Array
 from sitl.scenario import V3
+from sitl.touch import TouchUse
 
 
 class EndKind(enum.Enum):
@@ -51,6 +52,9 @@ class TruthResult:
     min_margin_key: str | None
     min_margin_time_s: float | None
     limits: dict[str, LimitUse] = field(default_factory=dict)  # use of the vehicle's limits
+    touches: dict[str, TouchUse] = field(default_factory=dict)  # per zone that may be touched
+    force_error_rms_n: float | None = None  # while a force was asked for; None if none was
+    force_asked_rms_n: float | None = None  # over the same time
 
 
 class TrackingError:

@@ -102,7 +102,28 @@ class Polynomial:
     kind: Literal["polynomial"] = "polynomial"
 
 
-Trajectory: TypeAlias = Lissajous | Hold | Points | Circle | Polynomial
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Presses on a surface in one place after the other, and stands back between them.
+
+    To each place it goes from a stand-off in front of it, presses, slides if asked to, and retreats
+    the same way. It begins at the first stand-off and ends at the last.
+    """
+
+    normal: Annotated[V3, NORMAL]  # unit, NED, out of the surface
+    # Of the end-effector where its tip just touches: its radius in front of the surface.
+    position_m: tuple[Annotated[V3, Range(-WORLD_M, WORLD_M)], ...]
+    force_n: tuple[Annotated[float, Range(0.1, 200.0)], ...]  # along the normal, in each place
+    hold_s: tuple[Annotated[float, Range(0.0, 3600.0)], ...]  # with that force
+    slide_m: tuple[Annotated[V3, Range(-10.0, 10.0)], ...] = ()  # along the surface meanwhile
+    away_m: Annotated[float, Range(0.01, 10.0)] = 0.15  # of the stand-off
+    approach_s: Annotated[float, Range(0.1, 600.0)] = 3.0  # from the stand-off, and back to it
+    ramp_s: Annotated[float, Range(0.1, 60.0)] = 1.0  # from no force to all of it, and back
+    move_s: Annotated[float, Range(0.1, 600.0)] = 5.0  # from one stand-off to the next
+    kind: Literal["push"] = "push"
+
+
+Trajectory: TypeAlias = Lissajous | Hold | Points | Circle | Polynomial | Push
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +162,18 @@ class WayPoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Touch:
+    """What the tool meets that touches a zone; the law is in ``sitl.plant.contact``."""
+
+    stiffness_n_m: Annotated[float, Range(10.0, 100000.0)]
+    # Least and greatest, as the vehicle is told; the true one may lie outside.
+    stiffness_range_n_m: Annotated[V2, Range(10.0, 100000.0)]
+    force_max_n: Annotated[float, Range(0.1, 200.0)]  # that the normal force is not to exceed
+    dissipation_s_m: Annotated[float, Range(0.0, 100.0)] = 4.0
+    friction: Annotated[float, Range(0.0, 2.0)] = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioZone:
     """What all zones have; what a shape adds is in its file in ``sitl/shapes``."""
 
@@ -150,6 +183,7 @@ class ScenarioZone:
     velocity_m_s: Annotated[V3, Range(-20.0, 20.0)] = (0.0, 0.0, 0.0)
     starts_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # to move with that velocity
     way_points: tuple[WayPoint, ...] = ()  # in place of a velocity: straight from one to the next
+    touch: Touch | None = None  # the tool may touch it; every other part keeps clear
 
     def numbers(self, moved: V3) -> tuple[float, ...]:
         """The numbers of PANDION_SHAPE for a zone that has ``moved`` [m, NED]."""

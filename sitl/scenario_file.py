@@ -19,6 +19,7 @@ from sitl.scenario import (
     ScenarioWall,
     ScenarioZone,
     Sensors,
+    Trajectory,
     start_angles,
     vehicle_of,
 )
@@ -35,7 +36,7 @@ PERFECT = "perfect"
 SUITE_NAMES: tuple[str, ...] = get_args(SuiteName)
 
 
-Plane = TypeVar("Plane", ScenarioWall, ScenarioZone)
+Plane = TypeVar("Plane", ScenarioWall, ScenarioZone, Trajectory)
 
 
 class ScenarioError(ValueError):
@@ -189,6 +190,7 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
         _check_vehicle(scenario)
     return dataclasses.replace(
         scenario,
+        trajectory=_with_unit_normal(scenario.trajectory),
         walls=tuple(map(_with_unit_normal, scenario.walls)),
         zones=tuple(map(_with_unit_normal, scenario.zones)),
     )
@@ -258,7 +260,7 @@ def read_points(path: Path) -> tuple[dict[str, list[Any]], bytes]:
 
 
 def _with_unit_normal(zone: Plane) -> Plane:
-    """A plane whose normal was written with a few digits, with it as a unit vector [1]."""
+    """What has a normal that was written with a few digits, with it as a unit vector [1]."""
     normal: V3 | None = getattr(zone, "normal", None)
     if normal is None:
         return zone
@@ -266,7 +268,7 @@ def _with_unit_normal(zone: Plane) -> Plane:
     # Nearer to 1 it is a unit vector as it is written; further off it is some other vector.
     if abs(length - 1.0) <= _UNIT or abs(length - 1.0) > ROUNDED:
         return zone
-    changed: Any = zone  # whichever of the two it is
+    changed: Any = zone  # whichever of them it is
     unit = tuple(part / length for part in normal)
     return dataclasses.replace(changed, normal=unit)  # type: ignore[no-any-return]
 

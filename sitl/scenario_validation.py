@@ -6,13 +6,16 @@ import itertools
 import math
 
 from sitl.faults.keys import EXACT, Fault, problem
+from sitl.plant.state import SURFACES_MAX
 from sitl.scenario import (
     ActuatorKeys,
     Circle,
     Lissajous,
     Points,
     Polynomial,
+    Push,
     Scenario,
+    ScenarioZone,
     Start,
     Trajectory,
     start_angles,
@@ -23,6 +26,8 @@ from sitl.sensors.keys import MeasuredSensors
 from vehicles.vehicle_file import VehicleError, posture_problem
 
 MAX_POINTS = 20_000  # of a trajectory
+MAX_PLACES = 50  # that one presses on
+_OFF_SURFACE_M = 0.001
 _MIN_APART_S = 0.002  # two points of a trajectory
 _MAX_POWERS = 12  # coefficients of a polynomial
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
@@ -71,6 +76,30 @@ def check_trajectory(curve: Trajectory) -> None:
                 )
     if isinstance(curve, Points):
         _check_points(curve)
+    if isinstance(curve, Push):
+        _check_push(curve)
+
+
+def _check_push(curve: Push) -> None:
+    count = len(curve.position_m)
+    if not 1 <= count <= MAX_PLACES:
+        raise ScenarioError(f"trajectory.position_m: must have 1 to {MAX_PLACES}, has {count}")
+    for name in ("force_n", "hold_s", "slide_m"):
+        given = len(getattr(curve, name))
+        if given != count and not (name == "slide_m" and given == 0):
+            raise ScenarioError(f"trajectory.{name}: {given} entries for {count} places")
+    length = math.hypot(*curve.normal)
+    if not abs(length - 1.0) <= 1e-6:
+        raise ScenarioError(
+            f"trajectory.normal = {list(curve.normal)}: must have length 1, has {length:.6g}"
+        )
+    for k, slide in enumerate(curve.slide_m):
+        off = sum(n * d for n, d in zip(curve.normal, slide, strict=True))
+        if not abs(off) <= _OFF_SURFACE_M:
+            raise ScenarioError(
+                f"trajectory.slide_m[{k}] = {list(slide)}: must be along the surface, is "
+                f"{1000.0 * off:.1f} mm along the normal"
+            )
 
 
 def _check_points(curve: Points) -> None:
@@ -132,7 +161,7 @@ def _check_walls(scenario: Scenario) -> None:
 
 def _check_zones(scenario: Scenario) -> None:
     for i, zone in enumerate(scenario.zones):
-        problem = zone.problem()
+        problem = zone.problem() or _touch_problem(zone)
         if problem is not None:
             raise ScenarioError(f"zones[{i}].{problem}")
         times = [point.time_s for point in zone.way_points]
@@ -146,12 +175,28 @@ def _check_zones(scenario: Scenario) -> None:
                     f"zones[{i}].way_points[{k}].time_s = {next_s:g}: must be after {time_s:g}, "
                     "the one before"
                 )
+    touched = sum(zone.touch is not None for zone in scenario.zones)
+    if touched > SURFACES_MAX:
+        raise ScenarioError(f"zones: {touched} have touch, must be at most {SURFACES_MAX}")
     count = len(scenario.walls) + len(scenario.obstacles) + len(scenario.zones)
     count += scenario.workspace is not None
     if count > ZONES_MAX:
         raise ScenarioError(
             f"walls, obstacles, zones and workspace are {count}: must be at most {ZONES_MAX}"
         )
+
+
+def _touch_problem(zone: ScenarioZone) -> str | None:
+    """Key, value and what is allowed, where a zone cannot be touched as it says."""
+    touch = zone.touch
+    if touch is None:
+        return None
+    if zone.keep_in:
+        return "touch: only of a zone to stay out of, without keep_in"
+    low, high = touch.stiffness_range_n_m
+    if not low <= high:
+        return f"touch.stiffness_range_n_m = [{low:g}, {high:g}]: must be the least, then the most"
+    return None
 
 
 def _check_names(scenario: Scenario) -> None:

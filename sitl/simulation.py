@@ -40,6 +40,7 @@ from sitl.sensors.keys import MeasuredSensors
 from sitl.sensors.measurements import Measurement
 from sitl.sensors.suite import SensorSuite
 from sitl.start import effects, first_state, flown_vehicle
+from sitl.touch import TouchRecord
 from sitl.trajectory import TrajectoryPoint
 from sitl.world import World
 from vehicles.description import Vehicle
@@ -86,6 +87,8 @@ class Truth:
     p_WE: V3  # m, NED, end-effector
     target: TrajectoryPoint  # its reference
     margins_m: tuple[float, ...]  # m, in the order of ``World.keys``
+    tip_force: V3 = _NONE  # N, NED, of what the tool touches on its tip
+    tip_normal: float = 0.0  # N, part of it along the normals
 
 
 class Simulation:
@@ -112,13 +115,14 @@ class Simulation:
         self.vehicle = flown_vehicle(scenario)
         self.clock = MissionClock(scenario)
         self.step = 0
-        met = effects(scenario)
         try:
+            met = effects(scenario)
             check_stiffness(self.vehicle, met)
         except TooStiffError as error:
             raise ScenarioError(str(error)) from error
         self._plant = plant(self.vehicle, met)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
+        self._touch = TouchRecord(scenario, cast(Array, self._plants))
         self._mass = self.vehicle.mass
         self._rotors, self._joints = len(self.vehicle.rotors), len(self.vehicle.joints)
         self._full = tuple(rotor.thrust_max for rotor in self.vehicle.rotors)  # N
@@ -338,6 +342,8 @@ class Simulation:
             moving[0], moving[1], moving[2] = field.step()
         if self.step >= self._pushed_until:
             self._push()
+        if self._touch:
+            self._touch.place(before_s)
         places, states = self._places, self._states
         speed, self._felt, clear = self._step(*self._arguments(places, states))
         self.step += 1
@@ -346,6 +352,8 @@ class Simulation:
         flown = Flown(places, states, wanted, torques, armed, before_s, STEP_S)
         evaluator.judge_flown(flown, clear)
         time_s = self.time_s
+        if self._touch:
+            self._touch.add(self.asked_force(), 1e-6 * STEP_US)
         if self.step % SAMPLE_STEPS == 0:
             evaluator.sample_error(self._places[-1], time_s)
         evaluator.judge_landing(speed, time_s)
@@ -361,8 +369,12 @@ class Simulation:
         Raises:
             ValueError: A control is not finite or their number is wrong, or it is no such vehicle.
         """
-        if not (self.tells_its_state and self._drives is None and self._wind is None):
-            raise ValueError("only with exact sensors and actuators, in still air, without faults")
+        plain = self._drives is None and self._wind is None and not self._touch
+        if not (self.tells_its_state and plain):
+            raise ValueError(
+                "only with exact sensors and actuators, in still air, without faults or zones that "
+                "may be touched"
+            )
         evaluator, left = self._evaluator, steps
         now: Array = self._places[-1]
         self._command(controls)
@@ -423,7 +435,24 @@ class Simulation:
             p_WE=row_of_three(places, 1 + self._joints),
             target=self.clock.target_at(self.time_s),
             margins_m=self._evaluator.margins(places, self.time_s),
+            tip_force=self.tip_force,
+            tip_normal=self._touch.normal(),
         )
+
+    @property
+    def tip_force(self) -> V3:
+        """Of what the tool touches on its tip now [N, NED]."""
+        return self._touch.force()
+
+    @property
+    def touch(self) -> TouchRecord:
+        """What the tool may touch, and how it has."""
+        return self._touch
+
+    def asked_force(self) -> float:
+        """Normal force that the reference asks for now [N]."""
+        counts = self.clock.counts(self.time_s)
+        return self.clock.target_at(self.time_s).force if counts else 0.0
 
     @property
     def state(self) -> Array:
@@ -445,7 +474,7 @@ class Simulation:
 
     def result(self) -> TruthResult:
         """The score so far, or of the whole run once ``ended`` is set."""
-        return self._evaluator.result(self.time_s)
+        return self._evaluator.result(self.time_s, self._touch)
 
     def _exact_reading(self) -> tuple[SensorReadings, tuple[float, ...]]:
         """The true state as readings, and the rotors' thrusts [N]."""

@@ -13,6 +13,7 @@ from sitl.plant.trim import NoTrimError, Trim, end_effector, level_hover, standi
 from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario, Start, start_angles, vehicle_of
 from sitl.scenario_file import ScenarioError
+from sitl.touch import surface_effects
 from vehicles.description import V6, Vehicle
 
 
@@ -46,9 +47,14 @@ def flown_vehicle(scenario: Scenario) -> Vehicle:
 
 
 def effects(scenario: Scenario) -> Effects:
-    """What the vehicle meets in a scenario beside what its file says."""
+    """What the vehicle meets in a scenario beside what its file says.
+
+    Raises:
+        TooStiffError: What the tool may touch is too stiff for the plant.
+    """
     actuators = scenario.actuators
     return Effects(
+        **surface_effects(scenario, flown_vehicle(scenario), actuators.motor_inertia_kg_m2),
         air=air_model(scenario),
         motor_inertia=actuators.motor_inertia_kg_m2,
         backlash=math.radians(actuators.backlash_deg),

@@ -11,7 +11,7 @@ import numpy as np
 
 from sitl.compiled import compilable
 from sitl.plant.vector import Array
-from sitl.scenario import V3, Circle, Hold, Lissajous, Points, Trajectory
+from sitl.scenario import V3, Circle, Hold, Lissajous, Points, Push, Trajectory
 
 _LISSAJOUS: Final = 14  # numbers of a curve of sinusoids; polynomials have others
 
@@ -22,6 +22,7 @@ class TrajectoryPoint(NamedTuple):
     p: V3  # m, NED
     v: V3  # m/s
     a: V3  # m/s²
+    force: float = 0.0  # N, to press with
 
 
 @compilable
@@ -95,9 +96,27 @@ class PiecewiseReference(Reference):
         return TrajectoryPoint(p, v, a)
 
 
+@dataclass(frozen=True, slots=True)
+class PressingReference(PiecewiseReference):
+    """The same with a force to press with [N], the first coordinate of a curve of its own."""
+
+    force_row: tuple[float, ...]
+
+    def at(self, t: float) -> TrajectoryPoint:
+        """The reference at time t [s] after the start, with its force."""
+        p, v, a = _on_pieces(self.row, t)
+        return TrajectoryPoint(p, v, a, self.force(t))
+
+    def force(self, t: float) -> float:
+        """The force alone [N]; t [s]."""
+        return _on_pieces(self.force_row, t)[0][0]
+
+
 def reference(trajectory: Trajectory) -> Reference:
     """The reference that a scenario describes."""
     row = curve_row(trajectory)
+    if isinstance(trajectory, Push):
+        return PressingReference(row, _smooth_row(_press_legs(trajectory), of_force=True))
     return Reference(row) if len(row) == _LISSAJOUS else PiecewiseReference(row)
 
 
@@ -122,6 +141,8 @@ def curve_row(trajectory: Trajectory) -> tuple[float, ...]:
         return (*shape, curve.ramp_s, curve.duration_s)
     if isinstance(curve, Points):
         return _spline_row(curve)
+    if isinstance(curve, Push):
+        return _smooth_row(_press_legs(curve), of_force=False)
     order = max(len(curve.north), len(curve.east), len(curve.down))
     axes = (curve.north, curve.east, curve.down)
     rows = [part for axis in axes for part in (*(0.0,) * (order - len(axis)), *reversed(axis))]
@@ -137,6 +158,57 @@ def _spline_row(curve: Points) -> tuple[float, ...]:
     found = CubicSpline(times, places, axis=0, bc_type=ends).c  # (4, pieces, 3)
     pieces = found.transpose(1, 2, 0).reshape(-1)
     return (float(len(times) - 1), 4.0, *curve.time_s, *pieces.tolist())
+
+
+class _Leg(NamedTuple):
+    """From one place and force to another, by smooth steps."""
+
+    takes_s: float
+    begin: V3  # m, NED
+    end: V3
+    force: tuple[float, float]  # N, at both ends
+
+
+def _press_legs(curve: Push) -> list[_Leg]:
+    """All legs, the ones that take no time left out."""
+
+    def ahead(place: V3, by: V3, share: float = 1.0) -> V3:
+        x, y, z = (p + share * d for p, d in zip(place, by, strict=True))
+        return (x, y, z)
+
+    legs: list[_Leg] = []
+    still, slides = (0.0, 0.0), curve.slide_m or ((0.0, 0.0, 0.0),) * len(curve.position_m)
+    for place, force, hold_s, slide in zip(
+        curve.position_m, curve.force_n, curve.hold_s, slides, strict=True
+    ):
+        left, off = ahead(place, slide), ahead(place, curve.normal, curve.away_m)
+        if legs:
+            legs.append(_Leg(curve.move_s, legs[-1].end, off, still))
+        legs += [
+            _Leg(curve.approach_s, off, place, still),
+            _Leg(curve.ramp_s, place, place, (0.0, force)),
+            _Leg(hold_s, place, left, (force, force)),
+            _Leg(curve.ramp_s, left, left, (force, 0.0)),
+            _Leg(curve.approach_s, left, ahead(left, curve.normal, curve.away_m), still),
+        ]
+    return [leg for leg in legs if leg.takes_s > 0.0]
+
+
+def _smooth_row(legs: list[_Leg], *, of_force: bool) -> tuple[float, ...]:
+    """Quintic smooth steps, at rest at both ends of each leg."""
+    times, pieces = [0.0], list[float]()
+    for leg in legs:
+        ends = (
+            (leg.force, (0.0, 0.0), (0.0, 0.0))
+            if of_force
+            else tuple(zip(leg.begin, leg.end, strict=True))
+        )
+        t = leg.takes_s
+        for begin, end in ends:
+            by = end - begin
+            pieces += [6.0 * by / t**5, -15.0 * by / t**4, 10.0 * by / t**3, 0.0, 0.0, begin]
+        times.append(times[-1] + t)
+    return (float(len(legs)), 6.0, *times, *pieces)
 
 
 @compilable

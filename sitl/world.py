@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sitl.body import BALL, Parts, as_arrays, parts_of, spoken
+from sitl.body import BALL, SHAFT, TIP, Parts, as_arrays, parts_of, spoken
 from sitl.compiled import compiled, kernel
-from sitl.distance import nearest, part_bound, part_distance
+from sitl.distance import part_bound, part_distance
+from sitl.nearest import nearest
 from sitl.plant.vector import V3, Array, dot, put_row, row, sub
 from sitl.scenario import Scenario, vehicle_of
 from sitl.shapes import KINDS
@@ -34,6 +35,7 @@ class ZoneTable(NamedTuple):
     numbers: Array  # (zones, 16), where each zone begins
     keep_in: npt.NDArray[np.bool_]  # (zones,)
     clearance: Array  # (zones,) m
+    touch: npt.NDArray[np.bool_]  # (zones,) the tool may touch it
     follows: npt.NDArray[np.bool_]  # (zones,) rides on the target and holds the base's origin alone
     legs: Array  # (legs, 7): begin [s], moved until then [m, NED], velocity from then on [m/s, NED]
     first_leg: npt.NDArray[np.int64]  # (zones + 1,)
@@ -48,14 +50,20 @@ class World:
         self.table, self.parts = zone_table(self.zones), as_arrays(parts, vehicle)
         self.follows = bool(self.table.follows.any())
         kept = [
-            (zone, part.name)
+            (zone, part)
             for zone in self.zones
             for part in (parts[:1] if zone.kind.follows_target else parts)
+            if zone.table.touch is None or part.tool != TIP
         ]
-        self.keys = tuple(f"{zone.table.name}/{part}" for zone, part in kept)
-        self._kept = kept
+        self.keys = tuple(f"{zone.table.name}/{part.name}" for zone, part in kept)
+        self._kept = [(zone, part.name) for zone, part in kept]
         self._points = [one.name for one in vehicle.critical_points]
-        self.clearances = np.array([zone.table.clearance_m for zone, _ in kept])
+        self.clearances = np.array(
+            [
+                0.0 if zone.table.touch and part.tool == SHAFT else zone.table.clearance_m
+                for zone, part in kept
+            ]
+        )
 
     def margins(self, places: Array, time_s: float, target: V3 | None) -> tuple[float, ...]:
         """Margins [m] as ``keys``, of places (rows, 3) [m, NED]; negative means violated.
@@ -75,8 +83,10 @@ class World:
         The ground is touched by the critical points of places (rows, 3) [m, NED]. To leave a zone
         that is to be kept in is a violation, not a collision.
         """
-        for (zone, part), margin in zip(self._kept, margins, strict=True):
-            if not zone.table.keep_in and not (margin + zone.table.clearance_m > 0.0):
+        for (zone, part), margin, clearance in zip(
+            self._kept, margins, self.clearances, strict=True
+        ):
+            if not zone.table.keep_in and not (margin + clearance > 0.0):
                 return f"{spoken(part)} hit the {zone.table.name}{zone.kind.noun}"
         for name, k in zip(self._points, self.parts.ground, strict=True):
             if not (places[k, 2] < 0.0):
@@ -96,6 +106,7 @@ def zone_table(zones: tuple[Zone, ...]) -> ZoneTable:
         numbers=numbers,
         keep_in=np.array([zone.table.keep_in for zone in zones], dtype=np.bool_),
         clearance=np.array([zone.table.clearance_m for zone in zones], dtype=np.float64),
+        touch=np.array([zone.table.touch is not None for zone in zones], dtype=np.bool_),
         follows=np.array([zone.kind.follows_target for zone in zones], dtype=np.bool_),
         legs=np.array(legs).reshape(-1, 7),
         first_leg=np.cumsum([0, *(len(zone.legs) for zone in zones)]).astype(np.int64),
@@ -131,9 +142,23 @@ def fill_margins(
             i += 1
             continue
         for b in range(len(parts.form)):
+            if not _is_kept(table, z, parts, b):
+                continue
             how = (table.kind[z], table.numbers[z], table.keep_in[z], shift, parts, b, places)
-            out[i] = part_distance(*how) - table.clearance[z]
+            out[i] = part_distance(*how, table.touch[z]) - _clearance(table, z, parts, b)
             i += 1
+
+
+@kernel
+def _is_kept(table: ZoneTable, z: int, parts: Parts, b: int) -> bool:
+    """Whether part ``b`` has a margin of a zone: all have, but for a tip that may touch it."""
+    return not (table.touch[z] and parts.tool[b] == TIP)
+
+
+@kernel
+def _clearance(table: ZoneTable, z: int, parts: Parts, b: int) -> float:
+    """What part ``b`` keeps of a zone [m]: of the tool, nothing where that may touch it."""
+    return 0.0 if table.touch[z] and parts.tool[b] == SHAFT else float(table.clearance[z])
 
 
 @compiled
@@ -238,6 +263,8 @@ def _is_clear(
         put_row(room.shift, z, shift)
         away = path + math.sqrt(dot(by, by))
         for b in range(1 if table.follows[z] else len(parts.form)):
+            if not _is_kept(table, z, parts, b):
+                continue
             room.left[i] -= away
             if not room.left[i] > 0.0:
                 room.left[i] = _look(table, z, shift, parts, b, places, lowest[i], margins, i)
@@ -298,12 +325,13 @@ def _look(
         margins[i] = _origin_margin(table, z, shift, places)
         return _left(margins[i], lowest)
     how = (table.kind[z], table.numbers[z], table.keep_in[z], shift, parts, b, places)
-    lower = part_bound(*how) - table.clearance[z]
+    clearance = _clearance(table, z, parts, b)
+    lower = part_bound(*how, table.touch[z]) - clearance
     left = _left(lower, lowest)
     if parts.form[b] == BALL:  # whose bound is the distance
         margins[i] = lower
     elif not left > _WORTH:
-        margin = part_distance(*how) - table.clearance[z]
+        margin = part_distance(*how, table.touch[z]) - clearance
         left = _left(margin, lowest)
         if not (lower > 0.0 and lowest <= lower):
             margins[i] = margin

@@ -19,6 +19,7 @@ from sitl.link.pilot_messages import (
     SendCommand,
     SendTarget,
 )
+from sitl.scenario import Touch
 from sitl.sensors.exact import SensorReadings
 from sitl.sensors.measurements import Measurement
 from sitl.shapes.kind import NUMBERS
@@ -45,7 +46,7 @@ _ODOMETRY_TAIL: Final = (
     *(_LOCAL_NED, _LOCAL_NED, 0, _MOTION_CAPTURE, 100),
 )
 _HIL_TAIL: Final = (*(0.0,) * 7, _ACCEL_AND_GYRO, 0)
-_NOT_TOUCHED: Final = (0.0,) * 5  # what OBSTACLE_SHAPE says of contact
+_KEEP_IN, _TOUCH = 1, 2  # PANDION_SHAPE_FLAGS
 _ARM_TAIL: Final = (0.0,) * 6  # the end-effector's place and velocity: not measured
 
 
@@ -150,16 +151,29 @@ class StepEncoder:
         return b"".join(self._pilot.frame(*_wire(message)) for message in messages)
 
 
+def _contact(touch: Touch | None) -> tuple[float, ...]:
+    """What OBSTACLE_SHAPE says of contact."""
+    if touch is None:
+        return (0.0,) * 5
+    return (
+        touch.force_max_n,
+        *touch.stiffness_range_n_m,
+        touch.dissipation_s_m,
+        touch.friction,
+    )
+
+
 def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
     """Message id and wire values."""
     if isinstance(message, SendTarget):
         motion = (*message.point.p, *message.point.v, *message.point.a)
-        about = (message.yaw, 0.0, 0, SYSTEM_ID, 1, _LOCAL_NED, 0.0)
+        about = (message.yaw, 0.0, 0, SYSTEM_ID, 1, _LOCAL_NED, message.point.force)
         return (message_ids.END_EFFECTOR_TARGET, message.t_us, *motion, *about)
     if isinstance(message, SendCommand):
         return (message_ids.COMMAND_LONG, *message.params, message.command, SYSTEM_ID, 1, 0)
     one, rest = message, (0.0,) * (NUMBERS - len(message.numbers))
     begin = (one.t_us, one.clearance_m, *one.velocity)
-    tail = (SYSTEM_ID, 1, one.index, one.count, one.number, int(one.keep_in))
-    values: WireValues = (*begin, *one.numbers, *rest, *tail, *_NOT_TOUCHED)
+    flags = (_KEEP_IN if one.keep_in else 0) | (_TOUCH if one.touch is not None else 0)
+    tail = (SYSTEM_ID, 1, one.index, one.count, one.number, flags)
+    values: WireValues = (*begin, *one.numbers, *rest, *tail, *_contact(one.touch))
     return (message_ids.OBSTACLE_SHAPE, *values)

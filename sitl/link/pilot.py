@@ -197,6 +197,7 @@ def _announcements(plan: FlightPlan, state: PilotState) -> list[PilotMessage]:
                 t_us=state.round_us,
                 index=index,
                 count=len(plan.zones),
+                touch=zone.table.touch,
             )
         )
     return messages

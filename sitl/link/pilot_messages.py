@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
-from sitl.scenario import V3
+from sitl.scenario import V3, Touch
 from sitl.trajectory import TrajectoryPoint
 
 Params: TypeAlias = tuple[float, float, float, float, float, float, float]
@@ -23,6 +23,7 @@ class Announce:
     t_us: int  # when it is there
     index: int
     count: int
+    touch: Touch | None = None  # what the tool meets there, if it may touch it
 
 
 @dataclass(frozen=True, slots=True)

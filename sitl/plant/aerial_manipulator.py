@@ -13,7 +13,7 @@ from sitl.air.load import Air, drag_force, rotor_gain, wall_force
 from sitl.compiled import kernel
 from sitl.plant.actuators import joint_torque, stop_torque, thrust_rate
 from sitl.plant.bodies import Chain, Points, Posture, empty_posture, posture_into
-from sitl.plant.contact import Feet, ground_wrench
+from sitl.plant.contact import Balls, Feet, Surfaces, ground_wrench, touch_into
 from sitl.plant.gears import Gears
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.newton_euler import wrench_needed_into
@@ -76,6 +76,8 @@ class Plant(NamedTuple):
     gears: Gears
     air: Air
     points: Points
+    balls: Balls
+    surfaces: Surfaces
     locked: Array  # (6,) 1 for a joint that cannot move, which is then at rest; else 0
     gravity: float  # m/s²
 
@@ -127,7 +129,7 @@ def gravity_in_body(rotation: Array, g: float) -> V3:
 
 @kernel
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
-    """Forces of rotors, drives, ground, disturbance at a state (n,) [SI], into work.load."""
+    """All that acts but gravity at a state (n,) [SI], whose bodies ``work`` has placed, into it."""
     load, rotation, rotors, air = work.load, work.rotation, plant.rotors, plant.air
     p = triple(state, P_WB)
     force, moment = ground_wrench(
@@ -174,6 +176,9 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
             push = stop_torque(beyond, rate, stops.stiffness, stops.damping)
             for i in range(joints):
                 load[6 + i] += stops.share[k, i] * push
+    touch_into(
+        plant.chain, plant.balls, plant.surfaces, work.posture, rotation, state, angles, load
+    )
 
 
 @kernel

@@ -19,11 +19,12 @@ from sitl.plant.aerial_manipulator import (
     place_bodies,
     placed_acceleration_into,
 )
+from sitl.plant.contact import record_touch, steps_within
 from sitl.plant.gears import move_free, part_teeth, servo_rates_into
 from sitl.plant.kinematics import places_of_bodies, touch_down_speed
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
 from sitl.plant.packing import pack_params
-from sitl.plant.state import JOINTS_MAX, Q_WB, ROTORS_MAX, STATE_MAX, V_WB, W_WB_B
+from sitl.plant.state import JOINTS_MAX, P_WB, Q_WB, ROTORS_MAX, STATE_MAX, V_WB, W_WB_B
 from sitl.plant.vector import V3, V6, V8, Array, add, put, sub, times, triple
 
 STEP_S = 0.001  # 1e-9 error after a second of tumbling (tests/sitl/test_conservation.py)
@@ -81,11 +82,15 @@ def rk4_step(
     one, total, middle = slopes.one, slopes.total, slopes.middle
     for i in range(n):
         middle[i] = state[i]
+    begun = plant.surfaces.clock[1]
     for stage in range(4):
         if stage > 0:
             place_bodies(plant, middle, work)
         derivative_into(plant, middle, inputs, work, one)
+        if stage == 0:
+            record_touch(plant.surfaces, step)
         ahead = step if stage == 2 else 0.5 * step
+        plant.surfaces.clock[1] = begun + (ahead if stage < 3 else step)
         for i in range(n):
             if stage == 0:
                 total[i] = one[i]
@@ -96,6 +101,12 @@ def rk4_step(
             middle[i] = state[i] + ahead * one[i]
     for i in range(n):
         state[i] += step / 6.0 * total[i]
+    normalise_attitude(state)
+
+
+@kernel
+def normalise_attitude(state: Array) -> None:
+    """Give the attitude in a state (n,) [SI] unit length."""
     length = 0.0
     for i in range(Q_WB, Q_WB + 4):
         length += state[i] * state[i]
@@ -169,11 +180,17 @@ def run_steps(
         now[i] = state[i]
     place_bodies(plant, now, work)
     for k in range(places.shape[0]):
-        loose = plant.gears.gap > 0.0
-        if loose:
-            geared_step(plant, now, inputs, step, work, memory.slopes, moved)
-        else:
-            rk4_step(plant, now, inputs, step, work, memory.slopes)
+        loose, parts = plant.gears.gap > 0.0, 1
+        if plant.surfaces.number > 0:
+            how = (plant.balls, plant.surfaces, work.posture, work.rotation)
+            parts = steps_within(*how, triple(now, P_WB), step)
+        for part in range(parts):
+            if part > 0:
+                place_bodies(plant, now, work)
+            if loose:
+                geared_step(plant, now, inputs, step / parts, work, memory.slopes, moved)
+            else:
+                rk4_step(plant, now, inputs, step / parts, work, memory.slopes)
         place_bodies(plant, now, work)
         places_of_bodies(plant, now, work, k, places)
         for i in range(n):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +14,14 @@ import numpy as np
 from sitl.air.load import SURFACES, Air
 from sitl.plant.aerial_manipulator import Drives, Plant, Rotors, Stops
 from sitl.plant.bodies import Chain, Points
-from sitl.plant.contact import Feet
+from sitl.plant.contact import Balls, Feet, Law, Surfaces
 from sitl.plant.gears import gears
 from sitl.plant.packing import pack_params
 from sitl.plant.places import own_points
-from sitl.plant.state import JOINTS_MAX, PARTS_MAX, ROTORS_MAX
+from sitl.plant.state import JOINTS_MAX, PARTS_MAX, ROTORS_MAX, SURFACES_MAX
+from sitl.plant.tool import balls_of
 from sitl.plant.vector import V3, Array
+from sitl.shapes.kind import NUMBERS
 from vehicles.description import Base, Link, Vehicle
 from vehicles.vehicle_file import inertia_matrix
 
@@ -45,6 +48,17 @@ class AirModel:
 
 
 @dataclass(frozen=True, slots=True)
+class Surface:
+    """What can be touched: its shape where it begins, and what it does to what touches it."""
+
+    kind: int  # which of sitl.shapes
+    numbers: tuple[float, ...]  # of the shape, m, NED
+    stiffness: float  # N/m
+    dissipation: float  # s/m
+    friction: float
+
+
+@dataclass(frozen=True, slots=True)
 class Effects:
     """What a vehicle meets in a flight and its file does not say; nothing by default."""
 
@@ -53,6 +67,8 @@ class Effects:
     backlash: float = 0.0  # rad, from one tooth to the other; needs an inertia
     quadratic_thrust: bool = False  # the rotors' speed lags, not their thrust
     gravity: float = GRAVITY
+    surfaces: tuple[Surface, ...] = ()
+    finer: int = 1  # steps into which one is divided where the tip may touch one
 
 
 def plant(vehicle: Vehicle, effects: Effects = Effects()) -> Plant:
@@ -72,10 +88,7 @@ def _packed(vehicle: Vehicle, effects: Effects) -> Plant:
             number=len(feet.positions),
             points=_with_room(PARTS_MAX, feet.positions),
             reach=max(math.hypot(*foot) for foot in feet.positions),
-            stiffness=feet.stiffness,
-            dissipation=feet.dissipation,
-            friction=feet.friction,
-            slip_rate=feet.slip_rate,
+            law=Law(feet.stiffness, feet.dissipation, feet.friction, feet.slip_rate),
         ),
         rotors=rotors(vehicle, quadratic=effects.quadratic_thrust),
         drives=Drives(
@@ -87,6 +100,8 @@ def _packed(vehicle: Vehicle, effects: Effects) -> Plant:
         gears=gears(inertia, effects.backlash),
         air=_air(vehicle, effects.air),
         points=_points(vehicle),
+        balls=_balls(vehicle),
+        surfaces=_surfaces(effects),
         locked=np.zeros(JOINTS_MAX),
         gravity=effects.gravity,
     )
@@ -213,6 +228,47 @@ def _points(vehicle: Vehicle) -> Points:
         number=len(points),
         body=_with_room(3 * PARTS_MAX, [body for body, _ in points]),
         place=_with_room(3 * PARTS_MAX, np.reshape(places, (-1, 3))),
+    )
+
+
+def _balls(vehicle: Vehicle) -> Balls:
+    balls, frames, room = balls_of(vehicle), joint_axes(vehicle), 2 * PARTS_MAX
+    behind = [0.0, *itertools.accumulate(math.hypot(*joint.xyz) for joint in vehicle.joints)]
+    return Balls(
+        number=len(balls),
+        body=_with_room(room, [body for body, _, _ in balls]),
+        place=_with_room(room, [frames[body].T @ place for body, place, _ in balls]),
+        radius=_with_room(room, [radius for _, _, radius in balls]),
+        reach=max(behind[body] + math.hypot(*place) + radius for body, place, radius in balls),
+    )
+
+
+def _surfaces(effects: Effects) -> Surfaces:
+    given, n = effects.surfaces, SURFACES_MAX
+    numbers = np.zeros((n, NUMBERS))
+    for place, one in zip(numbers, given, strict=False):
+        place[: len(one.numbers)] = one.numbers
+    none, nowhere = np.zeros(n), np.zeros((n, 3))
+    return Surfaces(
+        number=len(given),
+        finer=effects.finer,
+        kind=_with_room(n, [one.kind for one in given]),
+        numbers=numbers,
+        velocity=nowhere,
+        stiffness=_with_room(n, [one.stiffness for one in given]),
+        dissipation=_with_room(n, [one.dissipation for one in given]),
+        friction=_with_room(n, [one.friction for one in given]),
+        clock=np.zeros(2),
+        force=nowhere,
+        normal=none,
+        depth=none,
+        slip=none,
+        touching=none,
+        most=none,
+        most_s=none,
+        contacts=none,
+        contact_s=none,
+        path=none,
     )
 
 

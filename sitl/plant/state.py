@@ -14,6 +14,7 @@ from sitl.plant.vector import V3, V4, Array
 from vehicles.description import JOINTS_MAX as JOINTS_MAX
 from vehicles.description import ROTORS_MAX as ROTORS_MAX
 
+SURFACES_MAX: Final = 8  # of a scenario that the tool may touch
 PARTS_MAX: Final = 64  # that a vehicle has of feet, critical points, parts, and coupled limits each
 
 # First entry of each part; compiled kernels use these too (numba freezes them as constants).

@@ -1,4 +1,4 @@
-"""How fast friction and end stops can move the arm, beside what a step of the plant can follow."""
+"""How fast friction, end stops and surfaces can move a vehicle, beside what a step can follow."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from functools import lru_cache
 import numpy as np
 
 from sitl.plant.actuators import SLOW
-from sitl.plant.aerial_manipulator import empty_workspace, place_bodies
+from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace, place_bodies
+from sitl.plant.contact import SLIP_RATE
 from sitl.plant.mass_matrix import mass_matrix_into
-from sitl.plant.parameters import GRAVITY, Effects, plant
+from sitl.plant.parameters import GRAVITY, Effects, Surface, plant
 from sitl.plant.state import THRUST, at_rest
 from sitl.plant.vector import Array
 from vehicles.description import Vehicle
 
 FASTEST = 2500.0  # 1/s; at 2785 a step of 1 ms is no longer stable
+STEPS_MAX = 20  # of 50 µs
 _POSTURES = 64
 _REMEDIES = (
     (
@@ -69,22 +71,74 @@ def fastest_rates(vehicle: Vehicle, motor_inertia: float = 0.0) -> tuple[float, 
     friction = viscous + np.diag([one.coulomb / SLOW for one in vehicle.joints])
     damping = viscous + stops.damping * touched.T @ touched
     stiffness = stops.stiffness * touched.T @ touched
-    least = np.array([max(one.position_min, -math.pi) for one in vehicle.joints])
-    most = np.array([min(one.position_max, math.pi) for one in vehicle.joints])
-    shares = np.random.default_rng(0).uniform(size=(_POSTURES, joints))
     worst, mobility = [0.0, 0.0], np.eye(6 + joints)
-    for angles in (*(least + shares * (most - least)), vehicle.home_posture, vehicle.rest_posture):
+    for angles in _postures(vehicle):
         state[arm : arm + joints] = angles
-        place_bodies(numbers, state, work)
-        mass_matrix_into(numbers.chain, work.posture, work.mass)
-        lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
-        mass = lower + np.tril(lower, -1).T
-        mass[6:, 6:] += np.diag(numbers.gears.inertia[:joints])
-        mobility[:] = np.linalg.inv(mass)
+        mobility[:] = _mobility(vehicle, numbers, state, work)
         of_joints = mobility[6:, 6:]
         worst[0] = max(worst[0], _fastest(of_joints, friction, np.zeros_like(friction)))
         worst[1] = max(worst[1], _fastest(of_joints, damping, stiffness))
     return worst[0], worst[1], _fastest(mobility[:6, :6], *_of_feet(vehicle))
+
+
+@lru_cache(maxsize=16)
+def steps_of_touch(
+    vehicle: Vehicle, surfaces: tuple[Surface, ...], force: float, motor_inertia: float = 0.0
+) -> int:
+    """Into how many steps one of the plant is divided where the tip touches one of the surfaces.
+
+    They press on it with up to ``force`` [N]; joints carry a ``motor_inertia`` [kg·m²].
+
+    Raises:
+        TooStiffError: Into more than the plant has time for.
+    """
+    numbers, work = plant(vehicle, Effects(motor_inertia=motor_inertia)), empty_workspace()
+    state, last = at_rest(len(vehicle.rotors), len(vehicle.joints)), len(vehicle.joints)
+    arm, fastest = THRUST + len(vehicle.rotors), 0.0
+    for angles in _postures(vehicle):
+        state[arm : arm + last] = angles
+        mobility = _mobility(vehicle, numbers, state, work)
+        x, y, z = work.posture.origin[last + 1]
+        to_tip = np.zeros((3, 6 + last))
+        to_tip[:, :6] = [[1, 0, 0, 0, z, -y], [0, 1, 0, -z, 0, x], [0, 0, 1, y, -x, 0]]
+        for i in range(1, last + 1):
+            lever = work.posture.origin[last + 1] - work.posture.origin[i]
+            to_tip[:, 5 + i] = np.cross(work.posture.axes[i, :, 2], lever)
+        of_tip = float(np.linalg.eigvalsh(to_tip @ mobility @ to_tip.T)[-1])
+        for one in surfaces:
+            braked = max(one.friction / SLIP_RATE, one.dissipation) * force
+            rates = np.array([[of_tip]]), np.array([[braked]]), np.array([[one.stiffness]])
+            fastest = max(fastest, _fastest(*rates))
+    steps = math.ceil(fastest / FASTEST)
+    if steps > STEPS_MAX:
+        raise TooStiffError(
+            f"vehicle {vehicle.name}: surfaces would move its tip at {fastest:.0f} 1/s, the plant "
+            f"follows {STEPS_MAX * FASTEST:.0f}; lower stiffness, friction or force_max of "
+            "zones.touch, or give the joints more armature"
+        )
+    return max(steps, 1)
+
+
+def _postures(vehicle: Vehicle) -> list[Array]:
+    """Angles (j,) [rad] all over the limits, the posture of rest last."""
+    joints = len(vehicle.joints)
+    least = np.array([max(one.position_min, -math.pi) for one in vehicle.joints])
+    most = np.array([min(one.position_max, math.pi) for one in vehicle.joints])
+    shares = np.random.default_rng(0).uniform(size=(_POSTURES, joints))
+    ends = [np.array(vehicle.home_posture), np.array(vehicle.rest_posture)]
+    return [*(least + shares * (most - least)), *ends]
+
+
+def _mobility(vehicle: Vehicle, numbers: Plant, state: Array, work: Workspace) -> Array:
+    """Inverse of the mass matrix (6 + j, 6 + j) [SI] at a state (n,) [SI], which it places."""
+    joints = len(vehicle.joints)
+    place_bodies(numbers, state, work)
+    mass_matrix_into(numbers.chain, work.posture, work.mass)
+    lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
+    mass = lower + np.tril(lower, -1).T
+    mass[6:, 6:] += np.diag(numbers.gears.inertia[:joints])
+    inverse: Array = np.linalg.inv(mass)
+    return inverse
 
 
 def _of_feet(vehicle: Vehicle) -> tuple[Array, Array]:

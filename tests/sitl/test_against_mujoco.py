@@ -23,7 +23,7 @@ SECONDS = 2.0
 TOLERANCE = 1e-8  # m, rad, m/s and rad/s
 
 
-def _mjcf(vehicle: Vehicle, motor: float) -> str:
+def mjcf(vehicle: Vehicle, motor: float) -> str:
     """A free base and a chain of hinges in MuJoCo's own terms."""
 
     def numbers(values: object) -> str:
@@ -61,7 +61,7 @@ def _mjcf(vehicle: Vehicle, motor: float) -> str:
 )  # fmt: skip
 def test_two_seconds_of_free_motion_agree(vehicle: Vehicle, motor: float) -> None:
     vehicle = frictionless(vehicle)
-    model = mujoco.MjModel.from_xml_string(_mjcf(vehicle, motor))
+    model = mujoco.MjModel.from_xml_string(mjcf(vehicle, motor))
     data, joints = mujoco.MjData(model), len(vehicle.joints)
     begin = tumbling(vehicle)
     start = StateView(begin, joints)

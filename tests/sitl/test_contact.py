@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.plant.contact import foot_force, ground_wrench
+from sitl.plant.contact import contact_force, ground_wrench
 from sitl.plant.parameters import plant
 from sitl.plant.vector import Array
 from tests.sitl.vehicles import PAPER
@@ -17,20 +17,21 @@ FEET = plant(PAPER).feet
 LENGTH = PAPER.feet.positions[0][2]  # m, of the legs
 SPEED = st.floats(-3.0, 3.0)
 LEVEL: Array = np.eye(3)
+UP = (0.0, 0.0, -1.0)
 
 
 @given(st.floats(1e-6, 0.05), SPEED, SPEED, SPEED)
 def test_the_reaction_lies_in_the_friction_cone_and_opposes_slip(
     depth: float, vx: float, vy: float, vz: float
 ) -> None:
-    fx, fy, fz = foot_force(FEET, depth, (vx, vy, vz))
+    fx, fy, fz = contact_force(FEET.law, depth, UP, (vx, vy, vz))
     assert fz <= 0.0  # up, in NED
-    assert math.hypot(fx, fy) <= FEET.friction * -fz * (1.0 + 1e-12)
+    assert math.hypot(fx, fy) <= FEET.law.friction * -fz * (1.0 + 1e-12)
     assert fx * vx + fy * vy <= 0.0
 
 
 def test_the_reaction_begins_without_a_jump() -> None:
-    assert abs(foot_force(FEET, 1e-9, (0.0, 0.0, 2.0))[2]) < 1e-3
+    assert abs(contact_force(FEET.law, 1e-9, UP, (0.0, 0.0, 2.0))[2]) < 1e-3
 
 
 def test_a_vehicle_in_the_air_feels_no_ground() -> None:

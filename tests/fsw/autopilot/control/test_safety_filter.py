@@ -33,7 +33,8 @@ from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.shapes.zones import NO_ZONES, moving_zones
 from fsw.autopilot.signals import EndEffectorTarget, SafeSet, Shape, StateEstimate, Vec3, Zone
-from sitl.distance import along_segment, farthest_of_rotor, nearest, of_rotor
+from sitl.distance import along_segment, farthest_of_rotor, of_rotor
+from sitl.nearest import nearest
 from sitl.shapes import KINDS as REFEREE_KINDS
 from tests.fsw.autopilot.shapes import by_coal
 from tests.fsw.random_states import estimate_of, random_estimate, vec3
