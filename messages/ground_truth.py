@@ -59,11 +59,24 @@ POSITION_TRUTH: Final = Topic(
         *(Field(name, "float", note="m/s, NED") for name in ("vx", "vy", "vz")),
     ),
 )
+SIM_CONTACT: Final = Topic(
+    "sim_contact",
+    "What the tool touches and holds",
+    "every tick, where a zone may be touched or there is a payload",
+    (
+        doubles("tip_force", 3, "N, NED, on the tip"),
+        doubles("normal", 0, "N, along the normals of what it touches"),
+        doubles("depth", 0, "m, of the tip below a surface"),
+        doubles("asked", 0, "N, normal force that the reference asks for"),
+        doubles("payload", 0, "kg, that the tool holds"),
+    ),
+)
 TRUTH_TOPICS: Final = (
     SIM_GROUND_TRUTH,
     SIM_TRACKING,
     ATTITUDE_TRUTH,
     RATES_TRUTH,
     POSITION_TRUTH,
+    SIM_CONTACT,
 )
 FIRST_NUMBER: Final = 1000  # of their subscriptions, out of the way of the flight software's

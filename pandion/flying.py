@@ -33,6 +33,7 @@ from sitl.result import TruthResult
 from sitl.scenario import Points, vehicle_of
 from sitl.scenario_file import ScenarioError, scenario_digest, suite_of
 from sitl.simulation import STEP_US, Simulation
+from sitl.touch import TouchUse
 from sitl.truth_log import TruthLog
 from studies.flight.closed_loop import simulate
 from studies.flight.fly_again import changed_parameters, fly_words
@@ -307,6 +308,7 @@ def _in_two_processes(
     found = json.loads((out / "sitl.json").read_text(encoding="utf-8"))
     known = TruthResult.__dataclass_fields__
     found["limits"] = {key: LimitUse(**use) for key, use in found["limits"].items()}
+    found["touches"] = {name: TouchUse(**use) for name, use in found["touches"].items()}
     truth = TruthResult(**{key: value for key, value in found.items() if key in known})
     truth = replace(truth, completed=metrics["completed"], end_reason=metrics["end_reason"])
     result = Result(Verdict(job.scenario, job.seed, truth, metrics), folder)

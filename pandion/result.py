@@ -57,6 +57,9 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "margins_m": truth.get("margins_m", {}),
         "min_margin_m": truth.get("min_margin_m"),
         "limits": truth.get("limits", {}),
+        "touches": truth.get("touches", {}),
+        "force_error_rms_n": truth.get("force_error_rms_n"),
+        "force_asked_rms_n": truth.get("force_asked_rms_n"),
         "surfaces_m": truth.get("surfaces_m", {}),
         "beyond_s": truth.get("beyond_s", {}),
         "safety": {key: vehicle.get("safety", {}).get(key) for key in _SAFETY_KEYS},
@@ -82,6 +85,8 @@ def first_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
     of = f", {min(margins, key=margins.__getitem__)}" if margins else ""
     return [
         ("minimum margin", f"{_mm(result['min_margin_m'])}{of}"),
+        *[(f"force on {name}", _pressed(use)) for name, use in result["touches"].items()],
+        *_asked_row(result["force_error_rms_n"], result["force_asked_rms_n"]),
         ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
     ]
 
@@ -101,6 +106,23 @@ def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
         *_timing_rows(result["mpc"], result["inner"]),
         ("real-time factor", f"{result['real_time_factor']:.1f}"),
     ]
+
+
+def _pressed(use: dict[str, Any]) -> str:
+    """How hard, how long and how far the tool has rubbed on a zone."""
+    most, bound = use["force_max_n"], use["force_bound_n"]
+    beyond = "" if use["force_margin_n"] >= 0.0 else ": too hard"
+    if not use["contacts"]:
+        return "not touched"
+    slip = f"{1000.0 * use['slip_m']:.0f} mm slip"
+    return f"up to {most:.2f} N of {bound:g} N{beyond}, {use['contact_s']:.2f} s, {slip}"
+
+
+def _asked_row(error: float | None, asked: float | None) -> Rows:
+    """The force's error against what was asked for, where anything was."""
+    if error is None or asked is None:
+        return []
+    return [("force error / asked, RMS", f"{error:.2f} / {asked:.2f} N")]
 
 
 def _shown(margins: dict[str, float]) -> dict[str, float]:

@@ -177,10 +177,10 @@ class FlightEvaluator:
             (place, time_s), self._sample = self._sample, None
             self._error.add(place, self._clock.place_at(time_s))
 
-    def result(self, time_s: float, touch: TouchRecord) -> TruthResult:
-        """The score up to ``time_s``, with what the tool may ``touch``."""
+    def result(self, time_s: float, touch: TouchRecord | None = None) -> TruthResult:
+        """The score up to ``time_s``, with what the tool may ``touch`` if there is anything."""
         self.catch_up()
-        uses = touch.uses()
+        uses = {} if touch is None else touch.uses()
         flaws = tuple(flaw for flaw in (self.left, self.silent) if flaw is not None)
         flaws += (*self.limits.flaws(), *touch_flaws(uses))
         truth = score(self.ended, time_s, self._error, self.record, self._whole, flaws)
@@ -188,8 +188,8 @@ class FlightEvaluator:
             truth,
             limits=self.limits.uses(),
             touches=uses,
-            force_error_rms_n=touch.error_rms(),
-            force_asked_rms_n=touch.asked_rms(),
+            force_error_rms_n=None if touch is None else touch.error_rms(),
+            force_asked_rms_n=None if touch is None else touch.asked_rms(),
         )
 
 

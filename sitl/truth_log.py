@@ -17,6 +17,7 @@ from messages.ground_truth import (
     FIRST_NUMBER,
     POSITION_TRUTH,
     RATES_TRUTH,
+    SIM_CONTACT,
     SIM_TRACKING,
     TRUTH_TOPICS,
     state_topic,
@@ -30,6 +31,8 @@ from vehicles.vehicle_file import vehicle_text
 _FLUSH_BYTES: Final = 1 << 16
 _TRACKING_HEAD: Final = ulog.data_head(FIRST_NUMBER + 1, SIM_TRACKING)
 _TRACKING: Final = unpacker(SIM_TRACKING)
+_CONTACT_HEAD: Final = ulog.data_head(FIRST_NUMBER + TRUTH_TOPICS.index(SIM_CONTACT), SIM_CONTACT)
+_CONTACT: Final = unpacker(SIM_CONTACT)
 _PX4_TOPICS: Final = (ATTITUDE_TRUTH, RATES_TRUTH, POSITION_TRUTH)
 _PX4: Final = Struct("<" + "".join("5s" + topic.codes for topic in _PX4_TOPICS))
 _PX4_HEADS: Final = tuple(
@@ -62,6 +65,8 @@ class TruthLog:
         t_us = simulation.t_us
         # The state vector lies in memory as the record's fields follow each other.
         self._records += self._state_head + t_us.to_bytes(8, "little") + simulation.state_bytes()
+        if simulation.touch:
+            self._records += _CONTACT_HEAD + _CONTACT.pack(t_us, *contact(simulation))
         if simulation.step % SAMPLE_STEPS == 0:
             truth = simulation.truth()
             self._records += _TRACKING_HEAD + _TRACKING.pack(t_us, *truth.p_WE, *truth.target.p)
@@ -85,6 +90,13 @@ class TruthLog:
         self._records = bytearray()
         if self._file.failure is not None and not failed_before:
             self._warn(f"truth.ulg ends early: {self._file.failure}")
+
+
+def contact(simulation: Simulation) -> tuple[float, ...]:
+    """The numbers of ``sim_contact`` now [SI]."""
+    touch = simulation.touch
+    felt = (*touch.force(), touch.normal(), touch.depth())
+    return (*felt, simulation.asked_force(), 0.0)
 
 
 def _definitions(scenario: Scenario, seed: int, state: Topic) -> bytes:

@@ -51,7 +51,11 @@ def trimmed(simulation: Simulation) -> Controls:
         t / rotor.thrust_max
         for t, rotor in zip(simulation.trim.thrust, simulation.vehicle.rotors, strict=True)
     ]
-    return Controls(tuple(thrust), (0.0, 0.0), armed=True)
+    torque = [
+        t / joint.torque_max
+        for t, joint in zip(simulation.trim.torque, simulation.vehicle.joints, strict=True)
+    ]
+    return Controls(tuple(thrust), tuple(torque), armed=True)
 
 
 def flown(scenario: Scenario, seconds: float) -> Simulation:
@@ -65,7 +69,7 @@ def flown(scenario: Scenario, seconds: float) -> Simulation:
 def test_the_tip_may_touch_and_what_it_feels_is_in_the_truth() -> None:
     simulation = Simulation(sinking(), 1)
     controls, largest = trimmed(simulation), 0.0
-    while simulation.time_s < 0.5:
+    while simulation.time_s < 0.6:
         simulation.advance(controls)
         truth = simulation.truth()
         largest = max(largest, truth.tip_normal)
@@ -78,7 +82,7 @@ def test_the_tip_may_touch_and_what_it_feels_is_in_the_truth() -> None:
     assert use.force_max_n == pytest.approx(largest, rel=0.02)
     assert use.force_margin_n == 10.0 - use.force_max_n
     assert use.contacts >= 1
-    assert 0.0 < use.contact_s < 0.5
+    assert 0.0 < use.contact_s < 0.6
     assert "knob/end_effector" not in simulation.world.keys
     assert simulation.world.clearances[simulation.world.keys.index("knob/link2")] == 0.0
 
@@ -92,12 +96,13 @@ def test_a_zone_without_touch_ends_the_flight() -> None:
 
 
 def test_another_part_that_touches_ends_the_flight() -> None:
-    wide = replace(KNOB, centre_m=(0.25, 0.0, -1.0), radius_m=0.04)
-    simulation = Simulation(sinking(wide), 1)
-    simulation.state[3] = 2.0  # m/s north: the foreleg's way
+    ahead = replace(KNOB, centre_m=(0.6, 0.2, -1.13))
+    simulation = Simulation(sinking(ahead), 1)
+    simulation.state[3] = 2.0  # m/s north, a foreleg on its way
     while simulation.ended is None:
         simulation.advance(trimmed(simulation))
     assert simulation.ended.kind is EndKind.COLLISION
+    assert simulation.ended.sentence.startswith("leg 1 hit the knob")
 
 
 def test_a_force_beyond_its_bound_is_a_flaw() -> None:
