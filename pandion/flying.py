@@ -28,6 +28,7 @@ from pandion.join_truth import join_truth
 from pandion.references import AnyReference, trajectory
 from pandion.result import FlightReports, as_json
 from pandion.scenarios import AnyScenario, load_scenario, save_scenario
+from sitl.gripped import PayloadUse
 from sitl.limits import LimitUse
 from sitl.result import TruthResult
 from sitl.scenario import Points, vehicle_of
@@ -309,6 +310,8 @@ def _in_two_processes(
     known = TruthResult.__dataclass_fields__
     found["limits"] = {key: LimitUse(**use) for key, use in found["limits"].items()}
     found["touches"] = {name: TouchUse(**use) for name, use in found["touches"].items()}
+    held = found["payload"]
+    found["payload"] = None if held is None else PayloadUse(**held)
     truth = TruthResult(**{key: value for key, value in found.items() if key in known})
     truth = replace(truth, completed=metrics["completed"], end_reason=metrics["end_reason"])
     result = Result(Verdict(job.scenario, job.seed, truth, metrics), folder)

@@ -60,6 +60,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "touches": truth.get("touches", {}),
         "force_error_rms_n": truth.get("force_error_rms_n"),
         "force_asked_rms_n": truth.get("force_asked_rms_n"),
+        "payload": truth.get("payload"),
         "surfaces_m": truth.get("surfaces_m", {}),
         "beyond_s": truth.get("beyond_s", {}),
         "safety": {key: vehicle.get("safety", {}).get(key) for key in _SAFETY_KEYS},
@@ -86,6 +87,7 @@ def first_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
     return [
         ("minimum margin", f"{_mm(result['min_margin_m'])}{of}"),
         *[(f"force on {name}", _pressed(use)) for name, use in result["touches"].items()],
+        *_payload_row(result["payload"]),
         *_asked_row(result["force_error_rms_n"], result["force_asked_rms_n"]),
         ("tracking RMS / max", f"{_mm(result['tracking_error_rms_m'])} / {_mm(tracking_max_m)}"),
     ]
@@ -116,6 +118,16 @@ def _pressed(use: dict[str, Any]) -> str:
         return "not touched"
     slip = f"{1000.0 * use['slip_m']:.0f} mm slip"
     return f"up to {most:.2f} N of {bound:g} N{beyond}, {use['contact_s']:.2f} s, {slip}"
+
+
+def _payload_row(use: dict[str, Any] | None) -> Rows:
+    """When the payload was taken up and let go of, where there is one."""
+    if use is None:
+        return []
+    taken, released = use["taken_s"], use["released_s"]
+    when = "not taken up" if taken is None else f"taken up at {taken:.2f} s"
+    when += "" if released is None else f", released at {released:.2f} s"
+    return [(f"payload of {use['mass_kg']:g} kg", when)]
 
 
 def _asked_row(error: float | None, asked: float | None) -> Rows:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sitl.gripped import PayloadUse
 from sitl.limits import LimitUse
 from sitl.plant.vector import Array
 from sitl.scenario import V3
@@ -55,6 +56,7 @@ class TruthResult:
     touches: dict[str, TouchUse] = field(default_factory=dict)  # per zone that may be touched
     force_error_rms_n: float | None = None  # while a force was asked for; None if none was
     force_asked_rms_n: float | None = None  # over the same time
+    payload: PayloadUse | None = None
 
 
 class TrackingError:

@@ -194,6 +194,22 @@ class ScenarioZone:
         raise NotImplementedError
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Payload:
+    """A rigid body that the tool takes up and lets go of, by time or by the gripper."""
+
+    mass_kg: Annotated[float, Range(0.001, 0.5)]
+    # Principal, about its centre and the axes of the last link as the vehicle's file has them.
+    inertia_kg_m2: Annotated[V3, Range(0.0, 0.1)] = (0.0, 0.0, 0.0)
+    offset_m: Annotated[V3, Range(-1.0, 1.0)] = (0.0, 0.0, 0.0)  # from the end-effector, likewise
+    attach_at_s: Annotated[float, Range(0.0, 86400.0)] = 0.0  # since the simulation's start
+    release_at_s: Annotated[float, Range(0.0, 86400.0, or_inf=True)] = math.inf
+    gripper: bool = False  # in place of both times: when it is told to close, and to open
+    # Where it lies: taken up only by an end-effector within reach of it. None: wherever that is.
+    position_m: Annotated[V3, Range(-WORLD_M, WORLD_M)] | None = None
+    reach_m: Annotated[float, Range(0.001, 1.0)] = 0.03
+
+
 Body: TypeAlias = Literal["points", "full"]
 
 
@@ -344,6 +360,7 @@ class Scenario:
     obstacles: tuple[Obstacle, ...] = ()
     workspace: Workspace | None = None
     zones: tuple[ScenarioZone, ...] = ()
+    payload: Payload | None = None
     disturbances: tuple[Disturbance, ...] = ()
     sensors: Sensors | MeasuredSensors = Sensors()
     vehicle_scale: VehicleScale = VehicleScale()

@@ -11,6 +11,7 @@ from sitl.scenario import (
     ActuatorKeys,
     Circle,
     Lissajous,
+    Payload,
     Points,
     Polynomial,
     Push,
@@ -28,6 +29,7 @@ from vehicles.vehicle_file import VehicleError, posture_problem
 MAX_POINTS = 20_000  # of a trajectory
 MAX_PLACES = 50  # that one presses on
 _OFF_SURFACE_M = 0.001
+_ROUNDING = 1e-12  # kg·m²
 _MIN_APART_S = 0.002  # two points of a trajectory
 _MAX_POWERS = 12  # coefficients of a polynomial
 ZONES_MAX = 64  # in a set of OBSTACLE_SHAPE
@@ -46,6 +48,7 @@ def check(scenario: Scenario) -> None:
     _check_zones(scenario)
     _check_names(scenario)
     _check_gears(scenario.actuators)
+    _check_payload(scenario.payload)
     _check_faults(scenario)
     check_trajectory(scenario.trajectory)
     hop, ground = scenario.pilot.plan == "hop", scenario.start.kind == "ground"
@@ -147,6 +150,24 @@ def _check_gears(keys: ActuatorKeys) -> None:
         raise ScenarioError(
             f"actuators.backlash_deg = {keys.backlash_deg:g}: needs the inertia of a motor that "
             f"crosses the gap, actuators.motor_inertia_kg_m2 of at least {_MIN_INERTIA:g}"
+        )
+
+
+def _check_payload(keys: Payload | None) -> None:
+    if keys is None:
+        return
+    if not keys.attach_at_s < keys.release_at_s:
+        raise ScenarioError(
+            f"payload.release_at_s = {keys.release_at_s:g}: must be after attach_at_s = "
+            f"{keys.attach_at_s:g}"
+        )
+    if keys.gripper and (keys.attach_at_s > 0.0 or keys.release_at_s < math.inf):
+        raise ScenarioError("payload.gripper: in place of attach_at_s and release_at_s")
+    a, b, c = sorted(keys.inertia_kg_m2)
+    if not c <= a + b + _ROUNDING:
+        raise ScenarioError(
+            f"payload.inertia_kg_m2 = {list(keys.inertia_kg_m2)}: none of a rigid body is more "
+            "than the other two together"
         )
 
 

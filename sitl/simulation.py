@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -18,6 +18,7 @@ from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.faults.active import Faults
 from sitl.faults.keys import Fault
 from sitl.flight_evaluator import FlightEvaluator, Flown, row_of_three
+from sitl.gripped import Gripped
 from sitl.judged_step import watched_step
 from sitl.mission_clock import MissionClock
 from sitl.periods import STEP_US as STEP_US
@@ -65,6 +66,7 @@ class Controls(NamedTuple):
     thrust: tuple[float, ...]  # (r,) fraction of full thrust 0…1
     torque: tuple[float, ...]  # (j,) fraction of the torque limit −1…1
     armed: bool  # disarmed: rotors and joint drives are off, whatever the fractions
+    gripper: float = 0.0  # 1 to close, -1 to open, 0 where it was never told
 
     @classmethod
     def off(cls, vehicle: Vehicle) -> Controls:
@@ -122,7 +124,8 @@ class Simulation:
             raise ScenarioError(str(error)) from error
         self._plant = plant(self.vehicle, met)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
-        self._touch = TouchRecord(scenario, cast(Array, self._plants))
+        self._touch = TouchRecord(scenario, self._plants)
+        self.payload = Gripped(scenario, self.vehicle, self._plant, self._plants)
         self._mass = self.vehicle.mass
         self._rotors, self._joints = len(self.vehicle.rotors), len(self.vehicle.joints)
         self._full = tuple(rotor.thrust_max for rotor in self.vehicle.rotors)  # N
@@ -332,6 +335,7 @@ class Simulation:
         evaluator, before_s = self._evaluator, self.time_s
         evaluator.catch_up()
         self._command(controls)
+        wanted, torques, armed, gripper = controls
         fails = self.faults.at(self.step)
         if self._drives is not None:
             self._drive(self._drives)
@@ -344,11 +348,12 @@ class Simulation:
             self._push()
         if self._touch:
             self._touch.place(before_s)
+        if self.payload:
+            self.payload.update(before_s, gripper, self._tip(), self._held, self._state)
         places, states = self._places, self._states
         speed, self._felt, clear = self._step(*self._arguments(places, states))
         self.step += 1
         self._reading = None
-        wanted, torques, armed = controls
         flown = Flown(places, states, wanted, torques, armed, before_s, STEP_S)
         evaluator.judge_flown(flown, clear)
         time_s = self.time_s
@@ -369,15 +374,16 @@ class Simulation:
         Raises:
             ValueError: A control is not finite or their number is wrong, or it is no such vehicle.
         """
-        plain = self._drives is None and self._wind is None and not self._touch
+        plain = not (self._drives or self._wind or self._touch or self.payload)
         if not (self.tells_its_state and plain):
             raise ValueError(
-                "only with exact sensors and actuators, in still air, without faults or zones that "
-                "may be touched"
+                "only with exact sensors and actuators, in still air, without faults, a payload or "
+                "zones that may be touched"
             )
         evaluator, left = self._evaluator, steps
         now: Array = self._places[-1]
         self._command(controls)
+        wanted, torques, armed, _ = controls
         while left and evaluator.ended is None:
             evaluator.catch_up()
             before_s = self.time_s
@@ -394,7 +400,7 @@ class Simulation:
             )
             self.step += n
             self._reading = None
-            flown = Flown(places, states, *controls, before_s, plant_s)
+            flown = Flown(places, states, wanted, torques, armed, before_s, plant_s)
             evaluator.judge_flown(flown, clear)
             if self.step % SAMPLE_STEPS == 0:
                 evaluator.sample_error(places[-1], self.time_s)
@@ -449,6 +455,10 @@ class Simulation:
         """What the tool may touch, and how it has."""
         return self._touch
 
+    def _tip(self) -> V3:
+        """Where the end-effector is now [m, NED]."""
+        return row_of_three(self._places_now(), 1 + self._joints)
+
     def asked_force(self) -> float:
         """Normal force that the reference asks for now [N]."""
         counts = self.clock.counts(self.time_s)
@@ -474,7 +484,8 @@ class Simulation:
 
     def result(self) -> TruthResult:
         """The score so far, or of the whole run once ``ended`` is set."""
-        return self._evaluator.result(self.time_s, self._touch)
+        found = self._evaluator.result(self.time_s, self._touch)
+        return replace(found, payload=self.payload.use())
 
     def _exact_reading(self) -> tuple[SensorReadings, tuple[float, ...]]:
         """The true state as readings, and the rotors' thrusts [N]."""
@@ -484,7 +495,7 @@ class Simulation:
         return SensorReadings(self.t_us, p, v, q, w, w, felt, angles, rates, torque), thrust
 
     def _command(self, controls: Controls) -> None:
-        wanted, torques, armed = controls
+        wanted, torques, armed, _ = controls
         if len(wanted) != self._rotors or len(torques) != self._joints:
             raise ValueError(
                 f"{controls} at step {self.step}: expected {self._rotors} rotors, "

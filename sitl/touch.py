@@ -10,7 +10,6 @@ import numpy as np
 
 from sitl.plant.parameters import Effects, Surface
 from sitl.plant.stiffness import steps_of_touch
-from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
 from sitl.shapes import KINDS
 from sitl.zones import Zone, zones_of
@@ -60,7 +59,7 @@ def surface_effects(scenario: Scenario, vehicle: Vehicle, motor_inertia: float) 
 class TouchRecord:
     """The surfaces in a plant's record of numbers, for as long as a flight lasts."""
 
-    def __init__(self, scenario: Scenario, plants: Array) -> None:
+    def __init__(self, scenario: Scenario, plants: Any) -> None:
         """Of the scenario, in ``plants`` (1,), the records that the kernels write to."""
         self._zones = touched_zones(scenario)
         self._held: Any = plants["surfaces"]
@@ -114,11 +113,11 @@ class TouchRecord:
         for s, zone in enumerate(self._zones):
             touch = zone.table.touch
             assert touch is not None
-            most = float(held["most"][0, s])
+            most = float(held["force_max"][0, s])
             found[zone.table.name] = TouchUse(
                 force_bound_n=touch.force_max_n,
                 force_max_n=most,
-                force_max_time_s=float(held["most_s"][0, s]),
+                force_max_time_s=float(held["when_s"][0, s]),
                 force_margin_n=touch.force_max_n - most,
                 contacts=round(float(held["contacts"][0, s])),
                 contact_s=float(held["contact_s"][0, s]),

@@ -65,7 +65,7 @@ class TruthLog:
         t_us = simulation.t_us
         # The state vector lies in memory as the record's fields follow each other.
         self._records += self._state_head + t_us.to_bytes(8, "little") + simulation.state_bytes()
-        if simulation.touch:
+        if simulation.touch or simulation.payload:
             self._records += _CONTACT_HEAD + _CONTACT.pack(t_us, *contact(simulation))
         if simulation.step % SAMPLE_STEPS == 0:
             truth = simulation.truth()
@@ -96,7 +96,7 @@ def contact(simulation: Simulation) -> tuple[float, ...]:
     """The numbers of ``sim_contact`` now [SI]."""
     touch = simulation.touch
     felt = (*touch.force(), touch.normal(), touch.depth())
-    return (*felt, simulation.asked_force(), 0.0)
+    return (*felt, simulation.asked_force(), simulation.payload.held_kg)
 
 
 def _definitions(scenario: Scenario, seed: int, state: Topic) -> bytes:

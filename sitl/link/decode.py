@@ -15,6 +15,7 @@ from sitl.simulation import Controls
 from vehicles.description import Vehicle
 
 _ARMED: Final = 128  # MAV_MODE_FLAG in the mode of HIL_ACTUATOR_CONTROLS
+_GRIPPER: Final = 15  # of the controls: behind every rotor and joint
 _WHOLE: Final = range(256)  # numbers of units, kinds and instances
 _CONTROLS_ALONE: Final = LockstepReader((message_ids.HIL_ACTUATOR_CONTROLS, 19))
 
@@ -61,7 +62,8 @@ def _controls(values: tuple[float, ...], vehicle: Vehicle) -> Controls:
     _, _, *shares, mode = values
     rotors = len(vehicle.rotors)
     torques = shares[rotors : rotors + len(vehicle.joints)]
-    return Controls(tuple(shares[:rotors]), tuple(torques), bool(int(mode) & _ARMED))
+    armed = bool(int(mode) & _ARMED)
+    return Controls(tuple(shares[:rotors]), tuple(torques), armed, shares[_GRIPPER])
 
 
 def acknowledgements(frames: list[Frame]) -> tuple[Ack, ...]:

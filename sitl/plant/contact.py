@@ -93,8 +93,8 @@ class Surfaces(NamedTuple):
     normal: Array  # (8,) N, part of it along the normal
     depth: Array  # (8,) m, of the tip
     slip: Array  # (8,) m/s, of the tip along the surface
-    most: Array  # (8,) N, largest normal force so far
-    most_s: Array  # (8,) s, when that was
+    force_max: Array  # (8,) N, largest normal force so far
+    when_s: Array  # (8,) s, when that was
     touching: Array  # (8,) 1 where the tip does now
     contacts: Array  # (8,) how often it began to
     contact_s: Array  # (8,) s, for how long
@@ -103,9 +103,9 @@ class Surfaces(NamedTuple):
 
 @kernel
 def contact_force(law: Law, depth: float, n: V3, v: V3) -> V3:
-    """Force [N] on a body that is a ``depth`` [m] below a surface with the outward normal n [1].
+    """Force [N] on a body that is a ``depth`` [m] below a surface, and moves against it.
 
-    It moves against the surface with v [m/s]; all in the same frame.
+    The outward normal is n [1, any frame], the velocity v [m/s, same frame], as the force is.
     """
     along = dot(n, v)
     normal = max(law.stiffness * depth * (1.0 - law.dissipation * along), 0.0)
@@ -234,9 +234,9 @@ def record_touch(surfaces: Surfaces, step: float) -> None:
     """Count what ``touch_into`` has last found, for a ``step`` [s] that begins with it."""
     for s in range(surfaces.number):
         normal = surfaces.normal[s]
-        if normal > surfaces.most[s]:
-            surfaces.most[s] = normal
-            surfaces.most_s[s] = surfaces.clock[0] + surfaces.clock[1]
+        if normal > surfaces.force_max[s]:
+            surfaces.force_max[s] = normal
+            surfaces.when_s[s] = surfaces.clock[0] + surfaces.clock[1]
         touching = 1.0 if surfaces.depth[s] > 0.0 else 0.0
         surfaces.contacts[s] += max(touching - surfaces.touching[s], 0.0)
         surfaces.touching[s] = touching

@@ -14,7 +14,7 @@ _SAME: float = 1e-9  # m
 
 
 def is_tip(vehicle: Vehicle, on: int, place: V3) -> bool:
-    """Whether a place [m] on a body, 0 the base, is that of the end-effector."""
+    """Whether a ``place`` [m, link] on a body, 0 the base, is that of the end-effector."""
     there = math.dist(place, vehicle.end_effector.position) <= _SAME
     return on == len(vehicle.joints) and there
 

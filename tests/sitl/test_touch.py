@@ -146,7 +146,7 @@ def test_a_stiff_impact_lasts_half_a_period_of_its_effective_mass(vehicle: Vehic
     assert surfaces.contacts[0] == 1.0
     assert surfaces.contact_s[0] == pytest.approx(lasts, rel=0.03)
     hardest = SPEED * math.sqrt(effective * stiffness)  # N
-    assert surfaces.most[0] == pytest.approx(hardest, rel=0.02)
+    assert surfaces.force_max[0] == pytest.approx(hardest, rel=0.02)
 
 
 @BOTH
@@ -157,7 +157,7 @@ def test_a_wall_that_comes_strikes_like_one_that_waits(vehicle: Vehicle) -> None
     slower = start.copy()
     StateView(slower, len(vehicle.joints)).v_WB[:] += coming
     met = _strike(vehicle, surface, 0.1, start=slower, velocity=coming)
-    assert met.surfaces.most[0] == pytest.approx(waiting.surfaces.most[0], rel=1e-6)
+    assert met.surfaces.force_max[0] == pytest.approx(waiting.surfaces.force_max[0], rel=1e-6)
     assert met.surfaces.path[0] == pytest.approx(waiting.surfaces.path[0], rel=1e-6)
     ours = StateView(met.states[-1], len(vehicle.joints))
     theirs = StateView(waiting.states[-1], len(vehicle.joints))
