@@ -33,6 +33,7 @@ _UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
+EXTRA = "force_torque"  # a sensor that any suite but that may have beside its own
 SUITE_NAMES: tuple[str, ...] = get_args(SuiteName)
 
 
@@ -283,6 +284,8 @@ def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
         exact: Sensors = build_table(Sensors, own, path)
         return exact
     tables = tomllib.loads((SUITES / f"{suite}.toml").read_text(encoding="utf-8"))
+    if EXTRA in own:
+        tables[EXTRA] = {}
     for key, part in own.items():
         if key not in tables:
             raise ScenarioError(

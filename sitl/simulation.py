@@ -22,12 +22,12 @@ from sitl.gripped import Gripped
 from sitl.judged_step import watched_step
 from sitl.mission_clock import MissionClock
 from sitl.periods import STEP_US as STEP_US
-from sitl.plant.aerial_manipulator import Plant
+from sitl.plant.aerial_manipulator import Plant, place_bodies
 from sitl.plant.battery import open_circuit
 from sitl.plant.integrator import STEP_S, held
 from sitl.plant.integrator import places as places_into
 from sitl.plant.lock import seize
-from sitl.plant.parameters import GRAVITY, plant
+from sitl.plant.parameters import GRAVITY, joint_axes, plant
 from sitl.plant.places import rows_of
 from sitl.plant.state import JOINTS_MAX, ROTORS_MAX, THRUST, taken_apart
 from sitl.plant.stiffness import TooStiffError, check_stiffness
@@ -124,12 +124,15 @@ class Simulation:
             raise ScenarioError(str(error)) from error
         self._plant = plant(self.vehicle, met)
         self._plants = cast(Sequence[Plant], np.array([self._plant]))  # cheaper to hand over
-        self._touch = TouchRecord(scenario, self._plants)
+        self._touch = TouchRecord(scenario, self.vehicle, self._plants)
         self.payload = Gripped(scenario, self.vehicle, self._plant, self._plants)
         self._mass = self.vehicle.mass
         self._rotors, self._joints = len(self.vehicle.rotors), len(self.vehicle.joints)
         self._full = tuple(rotor.thrust_max for rotor in self.vehicle.rotors)  # N
         self._full_torque = tuple(joint.torque_max for joint in self.vehicle.joints)  # N·m
+        aboard = scenario.sensors
+        measured = isinstance(aboard, MeasuredSensors)
+        self._feels = measured and aboard.force_torque is not None  # forces on the tool
         self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more
@@ -455,6 +458,13 @@ class Simulation:
         """What the tool may touch, and how it has."""
         return self._touch
 
+    def _tool_axes(self) -> Array:
+        """Axes (3, 3) [1, NED] of the last link, as the vehicle's file has them."""
+        work = self._held[0].memory.work
+        place_bodies(self._plant, self._state, work)
+        turned: Array = work.rotation @ work.posture.axes[self._joints]
+        return turned @ joint_axes(self.vehicle)[-1].T
+
     def _tip(self) -> V3:
         """Where the end-effector is now [m, NED]."""
         return row_of_three(self._places_now(), 1 + self._joints)
@@ -492,7 +502,8 @@ class Simulation:
         p, v, q, w, thrust, angles, rates = taken_apart(self._state, self._rotors)
         # By position: keywords would take as long again. Gyro and accelerometer are w and felt.
         felt, torque = self._felt, self._torque
-        return SensorReadings(self.t_us, p, v, q, w, w, felt, angles, rates, torque), thrust
+        wrench = self._touch.wrench(self._tool_axes()) if self._feels else ()
+        return SensorReadings(self.t_us, p, v, q, w, w, felt, angles, rates, torque, wrench), thrust
 
     def _command(self, controls: Controls) -> None:
         wanted, torques, armed, _ = controls

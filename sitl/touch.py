@@ -10,6 +10,8 @@ import numpy as np
 
 from sitl.plant.parameters import Effects, Surface
 from sitl.plant.stiffness import steps_of_touch
+from sitl.plant.tool import tip_radius
+from sitl.plant.vector import Array
 from sitl.scenario import V3, Scenario
 from sitl.shapes import KINDS
 from sitl.zones import Zone, zones_of
@@ -59,8 +61,9 @@ def surface_effects(scenario: Scenario, vehicle: Vehicle, motor_inertia: float) 
 class TouchRecord:
     """The surfaces in a plant's record of numbers, for as long as a flight lasts."""
 
-    def __init__(self, scenario: Scenario, plants: Any) -> None:
-        """Of the scenario, in ``plants`` (1,), the records that the kernels write to."""
+    def __init__(self, scenario: Scenario, vehicle: Vehicle, plants: Any) -> None:
+        """Of a ``vehicle`` in the scenario, in ``plants`` (1,), records that the kernels write."""
+        self._radius = tip_radius(vehicle)
         self._zones = touched_zones(scenario)
         self._held: Any = plants["surfaces"]
         self._squares = self._asked_squares = self._asked_s = 0.0
@@ -87,6 +90,17 @@ class TouchRecord:
     def normal(self) -> float:
         """Along the normals of what it touches [N]."""
         return float(self._held["normal"][0].sum())
+
+    def wrench(self, axes: Array) -> tuple[float, ...]:
+        """On the tip about its centre (6,) [N, N·m] now, along the tool's axes (3, 3) [1, NED]."""
+        held = self._held
+        force, out = held["force"][0], held["outward"][0]
+        away = np.where(held["depth"][0] > 0.0, self._radius - held["depth"][0], 0.0)
+        torque = np.cross(-away[:, None] * out, force)
+        of_tool: list[float] = (
+            (np.stack([force.sum(axis=0), torque.sum(axis=0)]) @ axes).reshape(-1).tolist()
+        )
+        return tuple(of_tool)
 
     def depth(self) -> float:
         """Largest of the tip below a surface [m]; 0 where it touches none."""

@@ -23,6 +23,7 @@ TABLES: Final[dict[str, type[keys.Timing]]] = {
     "magnetometer": keys.Magnetometer,
     "rangefinder": keys.Rangefinder,
     "encoders": keys.Encoders,
+    "force_torque": keys.ForceTorque,
 }
 
 _POSE: Final = {
@@ -117,6 +118,15 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "noise_rad": "white noise of each joint",
         "offset_rad": "error of each zero, drawn once a flight",
         "outlier_rad": "an outlier of the first joint is off by so much",
+    },
+    "force_torque": {
+        "force_n": "white noise of each axis; default 0.05",
+        "torque_n_m": "the same; default 0.002",
+        "force_bias_n": "of each axis, drawn once a flight; default 0.2",
+        "torque_bias_n_m": "the same; default 0.005",
+        "force_resolution_n": "step of the digits, 0: none; default 0.0125",
+        "torque_resolution_n_m": "the same; default 0.0005",
+        "outlier_n": "an outlier adds so much, in any direction",
     },
 }
 

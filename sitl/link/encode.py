@@ -73,7 +73,7 @@ class StepEncoder:
 
     def datagram(self, readings: SensorReadings, messages: tuple[PilotMessage, ...]) -> bytes:
         """Pilot's messages, pose, arm, and HIL_SENSOR last, as the barrier."""
-        t_us, p, v, q, w, gyro, accel, angles, rates, torques = readings
+        t_us, p, v, q, w, gyro, accel, angles, rates, torques, _ = readings
         step = (
             self._odometry(t_us, *p, *q, *v, *w)
             + self._arm(t_us, angles, rates, torques)

@@ -24,6 +24,7 @@ from sitl.sensors.measurements import (
     PoseMeasurement,
     PressureMeasurement,
     RangeMeasurement,
+    WrenchMeasurement,
 )
 
 # HIL_SENSOR_UPDATED_FLAGS
@@ -94,6 +95,9 @@ class SensorEncoder:
             case GnssMeasurement():
                 gps = gps_values(self._origin, one)
                 return self._writer.frame(message_ids.HIL_GPS, t_us, *gps)
+            case WrenchMeasurement():
+                values = (*one.force, *one.torque)
+                return self._writer.frame(message_ids.FORCE_TORQUE, t_us, *values)
             case RangeMeasurement():
                 return self._writer.frame(message_ids.DISTANCE_SENSOR, *distance_values(one))
             case PressureMeasurement():

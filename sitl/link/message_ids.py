@@ -16,6 +16,7 @@ ARM_JOINT_STATE: Final = 60200
 END_EFFECTOR_TARGET: Final = 60202
 OBSTACLE_SHAPE: Final = 60211
 JOINT_ENCODERS: Final = 60212
+FORCE_TORQUE: Final = 60214
 
 SYSTEM_ID: Final = 1  # the vehicle that is simulated
 SENSORS: Final = 200  # component of the simulated sensors

@@ -90,6 +90,7 @@ class Surfaces(NamedTuple):
     friction: Array  # (8,)
     clock: Array  # (2,) s, of the beginning of the exchange, and passed since
     force: Array  # (8, 3) N, NED, on the tip
+    outward: Array  # (8, 3) [1], NED, the normal there
     normal: Array  # (8,) N, part of it along the normal
     depth: Array  # (8,) m, of the tip
     slip: Array  # (8,) m/s, of the tip along the surface
@@ -224,6 +225,7 @@ def touch_into(
             if b == TIP:
                 across = sub(moving, scale(dot(n, moving), n))
                 put_row(surfaces.force, s, f)
+                put_row(surfaces.outward, s, n)
                 surfaces.normal[s] = dot(n, f)
                 surfaces.depth[s] = depth
                 surfaces.slip[s] = np.sqrt(dot(across, across))

@@ -260,6 +260,7 @@ def _surfaces(effects: Effects) -> Surfaces:
         friction=_with_room(n, [one.friction for one in given]),
         clock=np.zeros(2),
         force=nowhere,
+        outward=nowhere,
         normal=none,
         depth=none,
         slip=none,

@@ -27,6 +27,9 @@ class SensorReadings(NamedTuple):
     q_arm: tuple[float, ...]  # (j,) rad
     qd_arm: tuple[float, ...]  # (j,) rad/s
     tau_arm: tuple[float, ...]  # (j,) N·m, at the drives, before friction
+    # (6,) N and N·m, on the tool from outside, about the end-effector, in the axes of the last
+    # link; of a vehicle with a sensor for it.
+    wrench: tuple[float, ...] = ()
 
 
 class DelayLine(Generic[T]):

@@ -158,6 +158,24 @@ class Encoders(Timing):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ForceTorque(Timing):
+    """What acts on the tool from outside, in the axes of the last link, tared.
+
+    The defaults are our choice, typical of a small sensor of six axes.
+    """
+
+    rate_hz: Annotated[float, Range(0.1, 500.0)] = 500.0
+    latency_ms: Annotated[float, _MS] = 2.0
+    force_n: Annotated[float, Range(0.0, 100.0)] = 0.05
+    torque_n_m: Annotated[float, Range(0.0, 10.0)] = 0.002
+    force_bias_n: Annotated[float, Range(0.0, 100.0)] = 0.2  # of each axis, drawn once a flight
+    torque_bias_n_m: Annotated[float, Range(0.0, 10.0)] = 0.005
+    force_resolution_n: Annotated[float, Range(0.0, 10.0)] = 0.0125
+    torque_resolution_n_m: Annotated[float, Range(0.0, 1.0)] = 0.0005
+    outlier_n: Annotated[float, Range(0.0, 1000.0)] = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredSensors:
     """A suite of sensors; what is None is not on board."""
 
@@ -170,3 +188,4 @@ class MeasuredSensors:
     barometer: Barometer | None = None
     magnetometer: Magnetometer | None = None
     rangefinder: Rangefinder | None = None
+    force_torque: ForceTorque | None = None  # of no suite: where the scenario has its table

@@ -79,6 +79,14 @@ class JointMeasurement(NamedTuple):
     angles: tuple[float, ...]  # (j,) rad
 
 
+class WrenchMeasurement(NamedTuple):
+    """What acts on the tool from outside, about the end-effector, in the axes of the last link."""
+
+    t_us: int
+    force: V3  # N
+    torque: V3  # N·m
+
+
 Measurement: TypeAlias = (
     ImuMeasurement
     | PoseMeasurement
@@ -87,4 +95,5 @@ Measurement: TypeAlias = (
     | MagneticMeasurement
     | RangeMeasurement
     | JointMeasurement
+    | WrenchMeasurement
 )

@@ -8,6 +8,7 @@ from sitl.sensors.barometer import BarometerSensor
 from sitl.sensors.channel import Channel, Sensor
 from sitl.sensors.encoders import EncoderSensor
 from sitl.sensors.exact import SensorReadings, Thrusts
+from sitl.sensors.force_torque import ForceTorqueSensor
 from sitl.sensors.gnss import GnssSensor
 from sitl.sensors.imu import ImuSensor
 from sitl.sensors.keys import MeasuredSensors, Timing
@@ -66,6 +67,9 @@ class SensorSuite:
         if one.rangefinder is not None:
             name, ray = "rangefinder", one.rangefinder
             add(name, ray, RangefinderSensor(ray, stream(seed, "sensor", name)))
+        if one.force_torque is not None:
+            name, touch = "force torque", one.force_torque
+            add(name, touch, ForceTorqueSensor(touch, stream(seed, "sensor", name)))
         name = "encoders"
         encoders = EncoderSensor(one.encoders, stream(seed, "sensor", name), len(vehicle.joints))
         add(name, one.encoders, encoders)

@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from messages import dialect
 from messages.frames import split
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import Announce
@@ -18,11 +20,13 @@ from sitl.scenario import Hold, Pilot, Push, Scenario, Start, Touch, WayPoint, W
 from sitl.scenario_file import ScenarioError, parse_scenario
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
+from sitl.sensors.measurements import WrenchMeasurement
 from sitl.shapes.ball import Ball
 from sitl.shapes.half_space import HalfSpace
 from sitl.simulation import Controls, Simulation
 from sitl.trajectory import PressingReference, reference
 from sitl.world import World
+from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from tests.sitl.vehicles import PAPER
 
 RADIUS = 0.1  # m, of a ball under the vehicle, between its legs
@@ -281,3 +285,86 @@ def test_the_end_effector_is_where_the_tip_is() -> None:
     simulation = Simulation(sinking(), 1)
     assert simulation.truth().p_WE == pytest.approx(PLACE)
     assert end_effector(PAPER, PAPER.home_posture)[2] == pytest.approx(0.225)
+
+
+FELT = """
+[sensors]
+suite = "mocap"
+[sensors.force_torque]
+"""
+
+
+def _wrenches(text: str, seconds: float = 0.6) -> tuple[Simulation, list[WrenchMeasurement]]:
+    scenario = parse_scenario(scenario_text(sinking()) + text, "knob")
+    simulation, said = Simulation(scenario, 1), list[WrenchMeasurement]()
+    controls = trimmed(simulation)
+    while simulation.time_s < seconds:
+        said += [one for one in simulation.measurements() or () if type(one) is WrenchMeasurement]
+        simulation.advance(controls)
+    return simulation, said
+
+
+def test_a_force_sensor_says_what_acts_on_the_tool_in_the_axes_of_its_link() -> None:
+    exact = "latency_ms = 0.0\nforce_n = 0.0\ntorque_n_m = 0.0\nforce_bias_n = 0.0\n"
+    exact += "torque_bias_n_m = 0.0\nforce_resolution_n = 0.0\ntorque_resolution_n_m = 0.0\n"
+    scenario = parse_scenario(scenario_text(sinking()) + FELT + exact, "knob")
+    simulation = Simulation(scenario, 1)
+    controls, pressed = trimmed(simulation), 0
+    model = pinocchio_model(PAPER)
+    data, link = model.createData(), model.getFrameId("tool")
+    while simulation.time_s < 0.6:
+        arrived = simulation.measurements() or ()
+        said = [one for one in arrived if type(one) is WrenchMeasurement][-1]
+        truth = simulation.truth()
+        q = configuration(np.array(truth.p_WB), np.array(truth.q_WB), np.array(truth.q_arm))
+        pin.forwardKinematics(model, data, q)
+        place = pin.updateFramePlacement(model, data, link)
+        np.testing.assert_allclose(place.rotation @ said.force, truth.tip_force, atol=1e-9)
+        # The force acts where the ball touches the knob.
+        away = np.array(KNOB.centre_m) - place.translation
+        away *= 1.0 - RADIUS / np.linalg.norm(away)
+        torque = np.cross(away, truth.tip_force)
+        np.testing.assert_allclose(place.rotation @ said.torque, torque, atol=1e-9)
+        pressed += truth.tip_normal > 0.0
+        simulation.advance(controls)
+    assert pressed > 10
+
+
+def test_a_force_sensor_has_noise_and_a_bias_of_its_flight() -> None:
+    simulation, said = _wrenches(FELT, 0.1)  # before it touches
+    assert simulation.result().touches["knob"].contacts == 0
+    forces = np.array([one.force for one in said])
+    torques = np.array([one.torque for one in said])
+    assert len(said) >= 50
+    assert 0.01 < np.abs(forces.mean(axis=0)).max() < 0.8
+    assert forces.std(axis=0) == pytest.approx(np.full(3, 0.05), rel=0.5)
+    assert torques.std(axis=0) == pytest.approx(np.full(3, 0.002), rel=0.5)
+    grid = forces / 0.0125
+    np.testing.assert_allclose(grid, np.round(grid), atol=1e-6)
+
+
+def test_a_force_sensor_changes_nothing_that_others_say() -> None:
+    plain = 'suite = "mocap"\n'
+    both = [
+        parse_scenario(scenario_text(sinking()) + text, "knob")
+        for text in (f"[sensors]\n{plain}", FELT)
+    ]
+    first, second = (Simulation(one, 1) for one in both)
+    for _ in range(20):
+        ours = [one for one in second.measurements() or () if type(one) is not WrenchMeasurement]
+        assert list(first.measurements() or ()) == ours
+        for simulation in (first, second):
+            simulation.advance(trimmed(simulation))
+
+
+def test_a_force_sensor_is_on_the_wire() -> None:
+    one = WrenchMeasurement(5000, (1.0, -2.0, 3.0), (0.25, 0.5, -0.75))
+    _, datagram = StepEncoder(lockstep=True, measured=True).measured_datagrams(6000, (one,), ())
+    first = next(iter(split(datagram)))
+    assert first.message_id == dialect.MAVLINK_MSG_ID_FORCE_TORQUE
+    assert first.payload_values == (5000, *one.force, *one.torque)
+
+
+def test_the_exact_suite_has_no_force_sensor() -> None:
+    with pytest.raises(ScenarioError, match=r'unknown key "sensors\.force_torque"'):
+        parse_scenario(scenario_text(sinking()) + "[sensors.force_torque]\n", "knob")
