@@ -163,7 +163,18 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
             drives.viscous[i],
             drives.coulomb[i],
         )
-    stops = plant.stops
+    stops_into(plant.stops, state, angles, joints, load)
+    if plant.surfaces.number > 0:
+        how = (plant.chain, plant.balls, plant.surfaces, work.posture, rotation)
+        touch_into(*how, state, angles, load)
+
+
+@kernel
+def stops_into(stops: Stops, state: Array, angles: int, joints: int, load: Array) -> None:
+    """Add the torques of all end stops that are touched to load (6 + j,) [SI].
+
+    Of so many ``joints``, the first one's angle in entry ``angles`` of a state (n,) [SI].
+    """
     for k in range(stops.number):
         angle = 0.0
         for i in range(joints):
@@ -176,9 +187,6 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
             push = stop_torque(beyond, rate, stops.stiffness, stops.damping)
             for i in range(joints):
                 load[6 + i] += stops.share[k, i] * push
-    touch_into(
-        plant.chain, plant.balls, plant.surfaces, work.posture, rotation, state, angles, load
-    )
 
 
 @kernel

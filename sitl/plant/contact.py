@@ -232,13 +232,18 @@ def touch_into(
 
 
 @kernel
-def record_touch(surfaces: Surfaces, step: float) -> None:
-    """Count what ``touch_into`` has last found, for a ``step`` [s] that begins with it."""
-    for s in range(surfaces.number):
+def pass_stage(surfaces: Surfaces, stage: int, step: float, until: float) -> None:
+    """After a stage of Runge and Kutta: let time pass ``until`` [s] that of the next.
+
+    The first one begins a ``step`` [s], for which what it has found is counted.
+    """
+    now_s = surfaces.clock[0] + surfaces.clock[1]
+    surfaces.clock[1] = until
+    for s in range(surfaces.number if stage == 0 else 0):
         normal = surfaces.normal[s]
         if normal > surfaces.force_max[s]:
             surfaces.force_max[s] = normal
-            surfaces.when_s[s] = surfaces.clock[0] + surfaces.clock[1]
+            surfaces.when_s[s] = now_s
         touching = 1.0 if surfaces.depth[s] > 0.0 else 0.0
         surfaces.contacts[s] += max(touching - surfaces.touching[s], 0.0)
         surfaces.touching[s] = touching

@@ -19,7 +19,7 @@ from sitl.plant.aerial_manipulator import (
     place_bodies,
     placed_acceleration_into,
 )
-from sitl.plant.contact import record_touch, steps_within
+from sitl.plant.contact import pass_stage, steps_within
 from sitl.plant.gears import move_free, part_teeth, servo_rates_into
 from sitl.plant.kinematics import places_of_bodies, touch_down_speed
 from sitl.plant.mass_matrix import mass_matrix_into, solve_in_place
@@ -82,15 +82,15 @@ def rk4_step(
     one, total, middle = slopes.one, slopes.total, slopes.middle
     for i in range(n):
         middle[i] = state[i]
-    begun = plant.surfaces.clock[1]
+    surfaces = plant.surfaces
+    begun = surfaces.clock[1]
     for stage in range(4):
         if stage > 0:
             place_bodies(plant, middle, work)
         derivative_into(plant, middle, inputs, work, one)
-        if stage == 0:
-            record_touch(plant.surfaces, step)
         ahead = step if stage == 2 else 0.5 * step
-        plant.surfaces.clock[1] = begun + (ahead if stage < 3 else step)
+        if surfaces.number > 0:
+            pass_stage(surfaces, stage, step, begun + (ahead if stage < 3 else step))
         for i in range(n):
             if stage == 0:
                 total[i] = one[i]
