@@ -43,7 +43,10 @@ def _with_tip(vehicle: Vehicle) -> Vehicle:
 
 SMOOTH = _with_tip(frictionless())
 SPATIAL = _with_tip(frictionless(random_vehicle(6, 8, np.random.default_rng(6))))
-BOTH = pytest.mark.parametrize("vehicle", [SMOOTH, SPATIAL], ids=["paper", "six joints"])
+ONE = _with_tip(frictionless(random_vehicle(1, 4, np.random.default_rng(1))))
+ALL = pytest.mark.parametrize(
+    "vehicle", [SMOOTH, SPATIAL, ONE], ids=["paper", "six joints", "one joint"]
+)
 
 
 class Struck(NamedTuple):
@@ -110,7 +113,7 @@ def _strike(
     return Struck(states, numbers.surfaces, tip_radius(vehicle) - ((tips - PLACE) @ N - moved))
 
 
-@BOTH
+@ALL
 def test_without_dissipation_and_friction_an_impact_keeps_the_energy(vehicle: Vehicle) -> None:
     surface = _wall(4000.0, 0.0, 0.0)
     struck = _strike(vehicle, surface, 0.3)
@@ -121,7 +124,7 @@ def test_without_dissipation_and_friction_an_impact_keeps_the_energy(vehicle: Ve
         assert weigh(vehicle, state, 0.0)[0] + stored == pytest.approx(before, rel=1e-5)
 
 
-@BOTH
+@ALL
 def test_an_impact_never_gains_energy(vehicle: Vehicle) -> None:
     surface = _wall(4000.0, 4.0, 0.5)
     struck = _strike(vehicle, surface, 0.3)
@@ -133,7 +136,7 @@ def test_an_impact_never_gains_energy(vehicle: Vehicle) -> None:
     assert energy[-1] < 0.99 * before
 
 
-@BOTH
+@ALL
 def test_a_stiff_impact_lasts_half_a_period_of_its_effective_mass(vehicle: Vehicle) -> None:
     stiffness, start = 40_000.0, _before(vehicle)
     jacobian = N @ _tool(vehicle, start)[1]
@@ -149,7 +152,7 @@ def test_a_stiff_impact_lasts_half_a_period_of_its_effective_mass(vehicle: Vehic
     assert surfaces.force_max[0] == pytest.approx(hardest, rel=0.02)
 
 
-@BOTH
+@ALL
 def test_a_wall_that_comes_strikes_like_one_that_waits(vehicle: Vehicle) -> None:
     surface, start = _wall(4000.0, 4.0, 0.5), _before(vehicle)
     coming = np.array([-0.2, 0.1, 0.15])
@@ -165,7 +168,7 @@ def test_a_wall_that_comes_strikes_like_one_that_waits(vehicle: Vehicle) -> None
     np.testing.assert_allclose(ours.qd_arm, theirs.qd_arm, atol=1e-5)
 
 
-@BOTH
+@ALL
 def test_the_motion_after_an_impact_is_that_of_mujoco(vehicle: Vehicle) -> None:
     surface, seconds = _wall(4000.0, 4.0, 0.5), 0.1
     struck = _strike(vehicle, surface, seconds)
