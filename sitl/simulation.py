@@ -131,8 +131,8 @@ class Simulation:
         self._full = tuple(rotor.thrust_max for rotor in self.vehicle.rotors)  # N
         self._full_torque = tuple(joint.torque_max for joint in self.vehicle.joints)  # N·m
         aboard = scenario.sensors
-        measured = isinstance(aboard, MeasuredSensors)
-        self._feels = measured and aboard.force_torque is not None  # forces on the tool
+        # Whether anything aboard feels forces on the tool.
+        self._feels = isinstance(aboard, MeasuredSensors) and aboard.force_torque is not None
         self._exact_sensors, self._suite = _sensors(scenario, self.vehicle, seed, origin)
         self._pushes = [push(item, seed, 1e-6 * STEP_US) for item in scenario.disturbances]
         self._pushes += more

@@ -145,7 +145,8 @@ def serve_px4(
     step_s = 1e-6 * STEP_US
     vehicle, angles = simulation.vehicle, simulation.healthy().q_arm
     servos = PositionServos(vehicle, effects(simulation.scenario), angles, step_s)
-    answer = Px4Answer(0, *Controls.off(vehicle))
+    off = Controls.off(vehicle)
+    answer = Px4Answer(0, off.thrust, off.torque, off.armed)
     arrived: list[Measurement] = []
     begin_s = reported_s = time.perf_counter()
 

@@ -45,7 +45,8 @@ def with_payload(
     whole = link.mass + mass
     com = (link.mass * link.com + mass * centre) / whole
     parts = ((link.mass, link.com, link.inertia), (mass, centre, own))
-    return LinkBody(whole, com, sum(i + m * _about(c - com) for m, c, i in parts))
+    about = np.sum([i + m * _about(c - com) for m, c, i in parts], axis=0)
+    return LinkBody(whole, com, about)
 
 
 def _about(r: Array) -> Array:

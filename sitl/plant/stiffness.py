@@ -107,8 +107,8 @@ def steps_of_touch(
         of_tip = float(np.linalg.eigvalsh(to_tip @ mobility @ to_tip.T)[-1])
         for one in surfaces:
             braked = max(one.friction / SLIP_RATE, one.dissipation) * force
-            rates = np.array([[of_tip]]), np.array([[braked]]), np.array([[one.stiffness]])
-            fastest = max(fastest, _fastest(*rates))
+            row = np.array([[of_tip]]), np.array([[braked]]), np.array([[one.stiffness]])
+            fastest = max(fastest, _fastest(*row))
     steps = math.ceil(fastest / FASTEST)
     if steps > STEPS_MAX:
         raise TooStiffError(
@@ -137,7 +137,8 @@ def _mobility(vehicle: Vehicle, numbers: Plant, state: Array, work: Workspace) -
     lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
     mass = lower + np.tril(lower, -1).T
     mass[6:, 6:] += np.diag(numbers.gears.inertia[:joints])
-    inverse: Array = np.linalg.inv(mass)
+    inverse = np.empty((6 + joints, 6 + joints))
+    inverse[:] = np.linalg.inv(mass)
     return inverse
 
 

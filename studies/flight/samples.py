@@ -29,6 +29,7 @@ from sitl.sensors.measurements import (
     Measurement,
     PoseMeasurement,
     PressureMeasurement,
+    RangeMeasurement,
 )
 
 _NOT_STATED: Final = 0.0  # a variance that the message has no field for
@@ -69,7 +70,9 @@ def sample(said: Measurement) -> Sample:
             return PressureSample(time, standard_altitude(said.pressure_pa), _NOT_STATED)
         case MagneticMeasurement():
             return MagneticSample(time, said.field_B)
-    return RangeSample(time, said.distance, said.variance)
+        case RangeMeasurement():
+            return RangeSample(time, said.distance, said.variance)
+    raise TypeError(f"{said} is nothing that the flight software takes in")
 
 
 def only_the_time(t_us: int, samples: tuple[Sample, ...], joints: int) -> SensorFrame:
