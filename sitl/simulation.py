@@ -89,8 +89,6 @@ class Truth:
     p_WE: V3  # m, NED, end-effector
     target: TrajectoryPoint  # its reference
     margins_m: tuple[float, ...]  # m, in the order of ``World.keys``
-    tip_force: V3 = _NONE  # N, NED, of what the tool touches on its tip
-    tip_normal: float = 0.0  # N, part of it along the normals
 
 
 class Simulation:
@@ -444,8 +442,6 @@ class Simulation:
             p_WE=row_of_three(places, 1 + self._joints),
             target=self.clock.target_at(self.time_s),
             margins_m=self._evaluator.margins(places, self.time_s),
-            tip_force=self.tip_force,
-            tip_normal=self._touch.normal(),
         )
 
     @property
