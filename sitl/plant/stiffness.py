@@ -77,8 +77,7 @@ def soften(vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
         stops = replace(stops, stiffness=_LESS * stops.stiffness, damping=_LESS * stops.damping)
         vehicle = replace(vehicle, end_stops=stops)
     while fastest_rates(vehicle)[2] > FASTEST and feet.slip_rate < _SLIP_MOST:
-        softer = {"stiffness": _LESS * feet.stiffness, "slip_rate": feet.slip_rate / _LESS}
-        feet = replace(feet, **softer)
+        feet = replace(feet, stiffness=_LESS * feet.stiffness, slip_rate=feet.slip_rate / _LESS)
         vehicle = replace(vehicle, feet=feet)
     return vehicle, told
 
