@@ -12,6 +12,7 @@ import pytest
 from pandion.vehicle import main
 from pandion.vehicle_figures import figures, warnings
 from tests.vehicles.test_urdf import EXPORTED, PARAMS, ROBOT
+from vehicles.description import EndEffector
 from vehicles.vehicle_file import load_vehicle, vehicle_names, vehicle_text
 
 PAPER = load_vehicle("paper")
@@ -97,16 +98,17 @@ def test_what_the_simulator_or_the_flight_software_refuse_is_said(
     path = tmp_path / "stiff.toml"
     path.write_text(vehicle_text(stiff), encoding="utf-8")
     code, out, err = run(capsys, "check", str(path))
-    assert (code, err.count("\n")) == (0, 1)
-    assert "no flight of it begins: vehicle stiff: end_stops would move it at" in err
+    assert code == 0
+    said = " ".join(err.split())
+    assert "no flight of it begins: vehicle stiff: end_stops would move it at" in said
     assert "1 warning" in out
-    # Between the branches of its scenario there is no room for an arm that long.
-    first, second = PAPER.joints
-    long = replace(PAPER, joints=(first, replace(second, xyz=(0.0, 0.0, 0.5))))
-    path.write_text(vehicle_text(long), encoding="utf-8")
+    # With its end-effector aside, the sphere of `workspace` is not where it begins.
+    aside = replace(PAPER, end_effector=EndEffector(position=(0.2, 0.0, 0.15)))
+    path.write_text(vehicle_text(aside), encoding="utf-8")
     _, _, err = run(capsys, "check", str(path))
-    assert "it does not fly " in err
-    assert "branches" in err
+    assert "it does not fly workspace: the scenario starts outside its safe set" in " ".join(
+        err.split()
+    )
 
 
 def test_weak_joints_and_tilted_rotors_are_said(
@@ -126,7 +128,8 @@ def test_weak_joints_and_tilted_rotors_are_said(
     assert "joint joint1 cannot hold its own arm" in err
     assert "torque_max is 0.3 N m" in err
     assert "lateral thrust of tilted rotors is not used: 2" in err
-    assert "2 warnings" in out
+    assert "it does not fly walls, workspace, branches: start.arm_deg" in " ".join(err.split())
+    assert "3 warnings" in out
 
 
 def test_what_cannot_be_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
