@@ -138,11 +138,14 @@ def _rows(vehicle: Vehicle, found: Figures) -> list[tuple[str, str]]:
 
 def _check(options: _Check) -> int:
     from pandion.vehicle_figures import figures, warnings
+    from pandion.vehicle_trial import refusals
     from vehicles.vehicle_file import load_vehicle
 
     vehicle = load_vehicle(options.vehicle)
     found = figures(vehicle)
     told = warnings(vehicle, found)
+    if found.hover_throttle <= 1.0:
+        told += refusals(options.vehicle)
     for warning in told:
         print_error("pandion vehicle", f"{vehicle.name}: {warning}")
     if found.hover_throttle > 1.0:
@@ -157,6 +160,7 @@ def _check(options: _Check) -> int:
 
 def _import(options: _Import) -> int:
     from command_line.bounded_file import read_bounded
+    from sitl.plant.stiffness import soften
     from vehicles.rotor_files import read_rotors
     from vehicles.urdf_reader import MAX_BYTES, vehicle_from_urdf
     from vehicles.vehicle_file import VehicleError, parse_vehicle, vehicle_text
@@ -169,7 +173,9 @@ def _import(options: _Import) -> int:
     except UnicodeDecodeError:
         raise VehicleError(f"{options.urdf} is not UTF-8") from None
     name = options.out.stem if options.out is not None else options.urdf.stem
-    vehicle, notes = vehicle_from_urdf(robot, name, rotors, options.tip, frd=options.frd)
+    read, notes = vehicle_from_urdf(robot, name, rotors, options.tip, frd=options.frd)
+    vehicle, softer = soften(read)
+    notes += softer
     comment = f"From {options.urdf.name} and {options.rotors.name}, by pandion vehicle import."
     text = vehicle_text(vehicle, comment)
     parse_vehicle(text, name)  # every number within its range

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import islice, pairwise, takewhile
 from typing import Final
 
 import numpy as np
@@ -39,6 +39,8 @@ _MOST: Final = 1e6  # of any number, whatever its unit
 _HALF_TURN: Final = np.diag([1.0, -1.0, -1.0])  # about x, from FLU to FRD and back
 _MOVE: Final = ("revolute", "continuous")
 _RATE, _TORQUE = 5.0, 2.0  # rad/s, N m; of a joint that does not say
+_NONE: Final = 1e-9  # m^2, inertia over mass
+_GYRATION: Final = 0.02  # m, of a link that has a mass and no inertia
 _CLEAR: Final = 0.02  # m, of the feet below the arm
 
 
@@ -109,9 +111,15 @@ def vehicle_from_urdf(
     root = _root(links, edges)
     joints = []
     for edge in chain:
-        body, (R, p) = bodies[edge.child], places[edge.name]
+        body, (R, p) = _with_inertia(bodies[edge.child], edge.child, notes), places[edge.name]
         joints.append(_joint(edge, body, turn @ R @ turn, turn @ p, turn, notes))
-    mass, com, inertia = _turned(bodies[root], turn).numbers(f'link "{root}"')
+    still = [edge for edge in edges.values() if edge.kind != "fixed" and edge not in chain]
+    if still:
+        notes.append(
+            f"{len(still)} joints beside the arm stay at zero: {_listed(one.name for one in still)}"
+        )
+    base = _with_inertia(bodies[root], root, notes)
+    mass, com, inertia = _turned(base, turn).numbers(f'link "{root}"')
     p_tip = _place_in(edges, chain[-1].child, tip)
     vehicle = Vehicle(
         name=name,
@@ -136,6 +144,10 @@ def vehicle_from_urdf(
 
 def _elements(text: str) -> tuple[dict[str, _Body], dict[str, _Edge]]:
     """Links and joints by name."""
+    if "<xacro:" in text:
+        raise VehicleError(
+            "this is xacro, not URDF: expand it first, with: xacro robot.urdf.xacro > robot.urdf"
+        )
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise VehicleError("the URDF defines entities, which a robot does not need: remove them")
     try:
@@ -254,14 +266,15 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     if tip and tip not in links:
         raise VehicleError(f"there is no link {shown(tip)}{nearest(tip, links)}")
     moving = {link: [edge for edge in _path(edges, link) if edge.kind != "fixed"] for link in links}
-    most = max(map(len, moving.values()))
     if not tip:
+        most = max(map(len, moving.values()))
         parents = {edge.parent for edge in edges.values()}
         ends = [one for one in links if len(moving[one]) == most and one not in parents]
+        ends = list(dict.fromkeys(_before_fingers(edges, one) for one in ends))
         if len(ends) > 1:
             raise VehicleError(
                 f"{len(ends)} links are behind {most} joints each: name the one that the arm ends "
-                f"with: --tip {ends[0]}, or {', '.join(ends[1:4])}"
+                f"with: --tip {ends[0]}, or {_listed(ends[1:])}"
             )
         (tip,) = ends
     if not moving[tip]:
@@ -270,9 +283,45 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
         if edge.kind not in _MOVE:
             raise VehicleError(
                 f'joint "{edge.name}" is {shown(edge.kind)}: joints of an arm must be revolute, '
-                "continuous or fixed"
+                "continuous or fixed; name a link before it by --tip"
+            )
+        if not _of_arm(edge):
+            raise VehicleError(
+                f'joint "{edge.name}" follows another one (mimic): each joint of an arm must have '
+                "a drive of its own; name a link before it by --tip"
             )
     return moving[tip], tip
+
+
+def _before_fingers(edges: dict[str, _Edge], link: str) -> str:
+    """The last link of an arm with a gripper, whose fingers slide or follow each other."""
+    path = _path(edges, link)
+    arm = list(takewhile(lambda edge: edge.kind == "fixed" or _of_arm(edge), path))
+    return arm[-1].child if arm else path[0].parent if path else link
+
+
+def _of_arm(edge: _Edge) -> bool:
+    """Whether it turns, by a drive of its own."""
+    return edge.kind in _MOVE and edge.element.find("mimic") is None
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Up to three names."""
+    first = list(islice(names, 4))
+    return ", ".join(first if len(first) < 4 else [*first[:3], "..."])
+
+
+def _with_inertia(body: _Body, link: str, notes: list[str]) -> _Body:
+    """The body; one without any size about some axis, as placeholders have none, with a ball's."""
+    if not body.mass > 0.0:
+        return body
+    c = body.moment / body.mass
+    about_centre = body.inertia - body.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    if abs(np.linalg.eigvalsh(about_centre)[0]) > _NONE * body.mass:
+        return body
+    notes.append(f"link {link}: no inertia: {1e3 * _GYRATION:.0f} mm of gyration are assumed")
+    ball = body.mass * _GYRATION**2 * np.eye(3)
+    return _Body(body.mass, body.moment, body.inertia + ball)
 
 
 def _put_together(
@@ -318,6 +367,9 @@ def _joint(edge: _Edge, body: _Body, R: Array, p: Array, turn: Array, notes: lis
     low, high = -math.inf, math.inf
     if edge.kind == "revolute":
         low, high = _number(limit, "lower", 0.0), _number(limit, "upper", 0.0)
+        if low == high:  # as exporters write what they do not know
+            notes.append(f"joint {edge.name}: {low:g} to {high:g} is no limit: it turns freely")
+            low, high = -math.inf, math.inf
     size = float(np.linalg.norm(edge.axis))
     mass, com, inertia = _turned(body, turn).numbers(f'link "{edge.child}"')
     return Joint(

@@ -120,6 +120,7 @@ class Watched(Record):
     thrust: PerRotor  # N, of rotors that give what is commanded
     rate: Three  # rad/s, of the last tick
     torque: Two  # N m about x and y, observed beside the model
+    turned: Two  # N m, the same as quickly as rotors of this vehicle are watched
     lift: float  # N, observed the same, beside what lasts
     lasting: float  # share of the thrust that lasts along z
     # Means of products of what is observed, in newtons of a rotor: xx yy zz xy xz yz.

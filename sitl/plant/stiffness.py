@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
@@ -19,6 +21,9 @@ from vehicles.description import Vehicle
 FASTEST = 2500.0  # 1/s; at 2785 a step of 1 ms is no longer stable
 STEPS_MAX = 20  # of 50 µs
 _POSTURES = 64
+_LEAST_ARMATURE: Final = 1e-5  # kg m^2, that a joint is given
+_LESS: Final = 0.8  # of a stiffness, at each try
+_SLIP_MOST: Final = 0.5  # m/s
 _REMEDIES = (
     (
         "the joints' friction",
@@ -50,6 +55,33 @@ def check_stiffness(vehicle: Vehicle, effects: Effects) -> None:
                 f"vehicle {vehicle.name}: {what} would move it at {rate:.0f} 1/s, a step of the "
                 f"plant follows {FASTEST:.0f}; {remedy.format(rate / FASTEST)}"
             )
+
+
+def soften(vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
+    """The vehicle as a step of the plant can follow it, and what that takes, a sentence each.
+
+    For files that say nothing of what is stiff: a URDF knows no inertia of motors, which is what
+    slows a small link down, and neither end stops nor feet.
+    """
+    told: list[str] = []
+    armature = 0.0
+    while fastest_rates(vehicle, armature)[0] > FASTEST:
+        armature = max(2.0 * armature, _LEAST_ARMATURE)
+    if armature > 0.0:
+        joints = tuple(replace(one, armature=one.armature + armature) for one in vehicle.joints)
+        vehicle = replace(vehicle, joints=joints)
+        told.append(
+            f"each joint's motor is given an armature of {armature:.2g} kg m^2, or friction would "
+            "stop it quicker than a step of the simulator: put in the real one"
+        )
+    stops, feet = vehicle.end_stops, vehicle.feet
+    while fastest_rates(vehicle)[1] > FASTEST:
+        stops = replace(stops, stiffness=_LESS * stops.stiffness, damping=_LESS * stops.damping)
+        vehicle = replace(vehicle, end_stops=stops)
+    while fastest_rates(vehicle)[2] > FASTEST and feet.slip_rate < _SLIP_MOST:
+        feet = replace(feet, stiffness=_LESS * feet.stiffness, slip_rate=feet.slip_rate / _LESS)
+        vehicle = replace(vehicle, feet=feet)
+    return vehicle, told
 
 
 @lru_cache(maxsize=16)

@@ -11,7 +11,8 @@ import pytest
 
 from pandion.vehicle import main
 from pandion.vehicle_figures import figures, warnings
-from tests.vehicles.test_urdf import PARAMS, ROBOT
+from tests.vehicles.test_urdf import EXPORTED, PARAMS, ROBOT
+from vehicles.description import EndEffector
 from vehicles.vehicle_file import load_vehicle, vehicle_names, vehicle_text
 
 PAPER = load_vehicle("paper")
@@ -90,6 +91,26 @@ def test_too_little_thrust_is_said(
     assert words in err
 
 
+def test_what_the_simulator_or_the_flight_software_refuse_is_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    stiff = replace(PAPER, end_stops=replace(PAPER.end_stops, stiffness=1e5))
+    path = tmp_path / "stiff.toml"
+    path.write_text(vehicle_text(stiff), encoding="utf-8")
+    code, out, err = run(capsys, "check", str(path))
+    assert code == 0
+    said = " ".join(err.split())
+    assert "no flight of it begins: vehicle stiff: end_stops would move it at" in said
+    assert "1 warning" in out
+    # With its end-effector aside, the sphere of `workspace` is not where it begins.
+    aside = replace(PAPER, end_effector=EndEffector(position=(0.2, 0.0, 0.15)))
+    path.write_text(vehicle_text(aside), encoding="utf-8")
+    _, _, err = run(capsys, "check", str(path))
+    assert "it does not fly workspace: the scenario starts outside its safe set" in " ".join(
+        err.split()
+    )
+
+
 def test_weak_joints_and_tilted_rotors_are_said(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -107,7 +128,8 @@ def test_weak_joints_and_tilted_rotors_are_said(
     assert "joint joint1 cannot hold its own arm" in err
     assert "torque_max is 0.3 N m" in err
     assert "lateral thrust of tilted rotors is not used: 2" in err
-    assert "2 warnings" in out
+    assert "it does not fly walls, workspace, branches: start.arm_deg" in " ".join(err.split())
+    assert "3 warnings" in out
 
 
 def test_what_cannot_be_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -136,6 +158,23 @@ def test_a_urdf_and_px4s_rotors_become_a_file_and_a_urdf_again(
     assert "<robot" in (tmp_path / "again.urdf").read_text()
     code, _, err = run(capsys, "export", "paper", "--urdf", str(tmp_path / "no" / "where.urdf"))
     assert (code, "cannot write" in err) == (2, True)
+
+
+def test_what_is_imported_flies_as_it_is(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """It was refused: a URDF knows no armature, and stops and feet were too stiff for its links."""
+    (tmp_path / "robot.urdf").write_text(EXPORTED, encoding="utf-8")
+    (tmp_path / "rotors.toml").write_text(vehicle_text(PAPER), encoding="utf-8")
+    read, out = str(tmp_path / "robot.urdf"), str(tmp_path / "mine.toml")
+    code, _, err = run(
+        capsys, "import", read, "--rotors", str(tmp_path / "rotors.toml"), "--out", out
+    )
+    assert code == 0
+    assert "armature of" in err
+    code, _, err = run(capsys, "check", out)
+    assert code == 0
+    assert "begins" not in err
 
 
 def test_numbers_of_a_urdf_are_kept_in_their_ranges(

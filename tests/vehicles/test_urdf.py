@@ -112,8 +112,7 @@ def test_a_vehicle_is_the_same_when_its_text_has_been_read() -> None:
         ("<robot", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot", "defines entities"),
         ("</robot>", "", "not XML"),
         ('<robot name="r">', '<robot name="r"></robot><robot>', "not XML"),
-        ('type="continuous"><parent link="upper"', 'type="prismatic"><parent link="upper"',
-         "joint \"elbow\" is 'prismatic': joints of an arm must be revolute"),
+        ("<robot", "<robot><xacro:include filename='a'/>", "expand it first"),
         ('child link="lower"', 'child link="nowhere"', "there is no link 'nowhere'"),
         ('mass value="1.5"', 'mass value="x"', "value = 'x': must be a number of at most"),
         ('mass value="1.5"', 'mass value="nan"', "value = 'nan': must be a number of at most"),
@@ -147,6 +146,77 @@ def test_of_several_arms_one_is_named() -> None:
         vehicle_from_urdf(ROBOT, "mine", PAPER.rotors, "griper")
     with pytest.raises(VehicleError, match="no joint moves"):
         vehicle_from_urdf(ROBOT, "mine", PAPER.rotors, "battery")
+
+
+# What exporters write: a dummy root, a frame without a body at the tip, limits nobody filled in, a
+# link without an inertia, meshes that are not here, tags of others, and a gripper's two fingers.
+EXPORTED = """<?xml version="1.0"?>
+<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <link name="world_frame"/>
+  <link name="base"><inertial><mass value="2.0"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial>
+    <visual><geometry><mesh filename="package://nowhere/meshes/base.dae"/></geometry></visual>
+    <collision><geometry><mesh filename="package://nowhere/meshes/base.stl"/></geometry></collision>
+  </link>
+  <joint name="root" type="fixed"><parent link="world_frame"/><child link="base"/></joint>
+  <link name="upper"><inertial><origin xyz="0 0 -0.06"/><mass value="0.15"/>
+    <inertia ixx="2e-4" iyy="2e-4" izz="2e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="arm/1" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 -0.05"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="0" effort="0" velocity="0"/></joint>
+  <link name="lower"><inertial><origin xyz="0 0 -0.05"/><mass value="0.08"/>
+    <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="arm/2" type="continuous"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0 0 -0.12"/><axis xyz="0 1 0"/><limit effort="1.5" velocity="5"/>
+    <dynamics damping="0.01" friction="0.05"/></joint>
+  <link name="hand"><inertial><mass value="0.0"/>
+    <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="tool" type="fixed"><parent link="lower"/><child link="hand"/>
+    <origin xyz="0 0 -0.1"/></joint>
+  <link name="left"><inertial><mass value="0.01"/>
+    <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="finger_left" type="prismatic"><parent link="hand"/><child link="left"/>
+    <axis xyz="0 1 0"/><limit lower="0" upper="0.03" effort="5" velocity="1"/></joint>
+  <link name="right"><inertial><mass value="0.01"/>
+    <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="finger_right" type="prismatic"><parent link="hand"/><child link="right"/>
+    <mimic joint="finger_left" multiplier="-1"/>
+    <axis xyz="0 1 0"/><limit lower="-0.03" upper="0" effort="5" velocity="1"/></joint>
+  <transmission name="t1"><type>a</type><joint name="arm/1"/></transmission>
+  <gazebo reference="base"><mu1>0.2</mu1></gazebo>
+</robot>
+"""
+
+
+def test_what_exporters_write_is_read_and_what_was_assumed_is_said() -> None:
+    vehicle, notes = vehicle_from_urdf(EXPORTED, "mine", PAPER.rotors)
+    assert vehicle.mass == pytest.approx(2.0 + 0.15 + 0.08 + 0.02), "fingers are part of the hand"
+    shoulder, elbow = vehicle.joints
+    assert (shoulder.name, elbow.name) == ("arm_1", "arm_2")
+    assert vehicle.end_effector.position == pytest.approx((0.0, 0.0, 0.1))
+    assert (shoulder.position_min, shoulder.position_max) == (-math.inf, math.inf)
+    assert any("joint arm/1: 0 to 0 is no limit" in note for note in notes)
+    assert any("link lower: no inertia: 20 mm of gyration" in note for note in notes)
+    assert any(
+        "2 joints beside the arm stay at zero: finger_left, finger_right" in n for n in notes
+    )
+    assert min(elbow.link.inertia[:3]) == pytest.approx(0.1 * 0.02**2), "of hand and fingers"
+
+
+@pytest.mark.parametrize(
+    ("tip", "words"),
+    [
+        ("left", "joint \"finger_left\" is 'prismatic': joints of an arm must be revolute"),
+        ("right", "joint \"finger_right\" is 'prismatic'"),
+    ],
+)
+def test_an_arm_that_is_named_further_than_it_turns_is_refused(tip: str, words: str) -> None:
+    with pytest.raises(VehicleError) as error:
+        vehicle_from_urdf(EXPORTED, "mine", PAPER.rotors, tip)
+    assert words in str(error.value)
+    followed = EXPORTED.replace('type="prismatic"', 'type="revolute"')
+    with pytest.raises(VehicleError, match="follows another one"):
+        vehicle_from_urdf(followed, "mine", PAPER.rotors, "right")
 
 
 PARAMS = "\n".join(

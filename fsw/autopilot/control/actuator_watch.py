@@ -26,19 +26,28 @@ ICRA 2003, for the joints; docs/decisions/0033-actuators-that-fail.md.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, Final
 
 from numpy.typing import NDArray
 
+from fsw.autopilot.control.rotor_loss import flies_without
 from fsw.autopilot.geometry.vectors import clamp, dot, subtract
 from fsw.autopilot.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.multibody import Bodies, joint_drift, load_on_base, move_bodies
+from fsw.autopilot.model.multibody import (
+    Bodies,
+    Several,
+    joint_drift,
+    load_on_base,
+    move_bodies,
+    posture,
+)
 from fsw.autopilot.model.rotors import lag_rotor, rotor_wrench
 from fsw.autopilot.signals import JointVector, Vec3
 from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
-from fsw.record import Floats
+from fsw.record import ROTORS, Floats, padded
 
 OBSERVER: Final = 30.0  # 1/s; the gyro's noise in a laboratory's suite is 0.5 N of a rotor then
 MEMORY: Final = 0.1  # s, of mean squares
@@ -99,6 +108,39 @@ _OF_FAILED: Final = (
     "stood_at",
 )
 
+# What the numbers above were measured with, of rotors and of a vehicle that one of them turns.
+_HOVER: Final = 8.584  # N
+_TURNING: Final = 8.584  # rad/s^2, that the loss of a rotor in hover turns it by
+_INERTIA: Final = 1.02  # kg m, over the rotors' lever: the gyro's noise in newtons of a rotor
+_QUICKEST: Final = 0.35  # of those times; rotors and observer have lags of their own
+
+
+@dataclass(frozen=True, slots=True)
+class WatchLaw:
+    """What of the vehicle the watch needs; thrusts and times scale the numbers above."""
+
+    airframe: Airframe
+    thrusts: float  # with the thrust of a rotor in hover, or with the gyro's noise
+    times: float  # with the time in which a vehicle tilts that has lost a rotor
+    spares: Several  # (ROTORS,) 1 for a rotor without which the others fly, else 0
+
+
+def watch_law(airframe: Airframe) -> WatchLaw:
+    """The law of a vehicle in its home posture."""
+    J = posture(airframe.bodies, airframe.home_posture).inertia
+    hover, lever = airframe.mass * GRAVITY / airframe.rotors, airframe.rotor_lever
+    turning = hover * lever / float(min(J[0], J[4]))
+    noise = float(max(J[0], J[4])) / lever
+    return WatchLaw(
+        airframe,
+        thrusts=round(max(hover / _HOVER, noise / _INERTIA), 3),
+        times=round(max(math.sqrt(_TURNING / turning), _QUICKEST), 3),
+        spares=padded(
+            tuple([float(flies_without(airframe, k)) for k in range(airframe.rotors)]), ROTORS
+        ),
+    )
+
+
 Law = NDArray[Any]
 
 
@@ -126,14 +168,15 @@ def watch(
     ``after`` (1,) [SI], whose watch it writes. A rotor's error shrinks by ``decay`` [1]. Where the
     joints' angles are not known by encoders only rotors are judged.
     """
-    airframe, sent, r = laws[0], before[0].sent, after[0]
+    law, sent, r = laws[0], before[0].sent, after[0]
+    airframe = law.airframe
     s, x = r.watch, r.estimate
     joints, rotors = int(airframe.bodies.joints), int(airframe.rotors)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, x)
     if s.running == 0.0:
         for i in range(rotors):
             s.thrust[i] = s.slow[i] = sent.rotor_thrust[i]
-    _observe_base(r, airframe, decay, dt, sent)
+    _observe_base(r, law, decay, dt, sent)
     if angles_known:
         _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
@@ -144,7 +187,7 @@ def watch(
         s.running = 0.0  # on the ground, or about to be
     s.running += dt
     settled = s.running > SETTLING
-    _judge_rotors(r, airframe, dt, settled)
+    _judge_rotors(r, law, dt, settled)
     found = s.failed >= 0
     for k in range(joints):
         _judge_joint(s, k, dt, settled and s.arm_seen > SETTLING, x.q_arm[k])
@@ -160,8 +203,9 @@ def pattern_of(airframe: Airframe, rotor: int) -> Vec3:
 
 
 @compilable
-def _observe_base(r: Tick, airframe: Airframe, decay: float, dt: float, sent: Sent) -> None:
+def _observe_base(r: Tick, law: WatchLaw, decay: float, dt: float, sent: Sent) -> None:
     """What turns and lifts the base beside the model, and the means of its products."""
+    airframe, observer = law.airframe, OBSERVER / law.times
     s, rate, J, rotors = r.watch, r.estimate.w_WB_B, r.bodies.inertia, int(airframe.rotors)
     for i in range(rotors):
         before = s.thrust[i]
@@ -176,17 +220,18 @@ def _observe_base(r: Tick, airframe: Airframe, decay: float, dt: float, sent: Se
         if s.running == 0.0:
             gained = dt * modelled[i]
         s.torque[i] += OBSERVER * (gained - dt * (modelled[i] + s.torque[i]))
-    share, total = min(OBSERVER * dt, 1.0), -force[2]
+        s.turned[i] += observer * (gained - dt * (modelled[i] + s.turned[i]))
+    share, total = min(observer * dt, 1.0), -force[2]
     lift = airframe.mass * r.estimate.specific_force - (1.0 + s.lasting) * total
     s.lift += share * (lift - s.lift)
-    seen = s.torque[0] / airframe.rotor_lever, s.torque[1] / airframe.rotor_lever, s.lift
+    seen = s.turned[0] / airframe.rotor_lever, s.turned[1] / airframe.rotor_lever, s.lift
     x, y, z = seen
     # What the ground carries does not last.
     flies = total > AIRBORNE * airframe.mass * GRAVITY and z <= CONTACT * airframe.mass
-    if flies and s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW:
+    if flies and s.failed < 0 and max(abs(x), abs(y)) < LEARNING_BELOW * law.thrusts:
         s.lasting += dt / LEARNING * lift / total
-    forget = min(dt / MEMORY, 1.0)
-    _observe_slow(r, airframe, dt, decay, sent, seen)
+    forget = min(dt / (MEMORY * law.times), 1.0)
+    _observe_slow(r, law, dt, decay, sent, seen)
     products = (x * x, y * y, z * z, x * y, x * z, y * z)
     for i in range(s.products.size):
         s.products[i] += forget * (products[i] - s.products[i])
@@ -198,21 +243,22 @@ def _observe_base(r: Tick, airframe: Airframe, decay: float, dt: float, sent: Se
     for i in range(3):
         s.rate[i] = rate[i]
     if s.failed >= 0:
-        _observe_failed(s, airframe, dt, seen)
+        _observe_failed(s, law, dt, seen)
 
 
 @compilable
-def _observe_failed(s: Watched, airframe: Airframe, dt: float, seen: Vec3) -> None:
+def _observe_failed(s: Watched, law: WatchLaw, dt: float, seen: Vec3) -> None:
     """What the failed rotor gives, which is known, and whether another one is lost as well."""
     # What turns the base says how much, and pushes do not.
-    k, forget = s.failed, min(dt / MEMORY, 1.0)
+    airframe, k, forget = law.airframe, s.failed, min(dt / (MEMORY * law.times), 1.0)
+    lost_from = LOST_FROM * law.thrusts
     own = pattern_of(airframe, k)
     x, y, z = seen
     off, thrust = _about(own, x, y), s.thrust[k]
     # Of both about that axis: with what is lacking along z the opposite one turns the base.
     lacking = min(0.5 * (z - off), 0.0)
     more = max(off, 0.0) if lacking > -UNLIKE * off else 0.0
-    s.gives += min(dt / SMOOTHED, 1.0) * (thrust + off - s.gives)
+    s.gives += min(dt / (SMOOTHED * law.times), 1.0) * (thrust + off - s.gives)
     s.failed2 += forget * (off * off - s.failed2)
     s.failed_by_thrust += forget * (off * thrust - s.failed_by_thrust)
     s.failed_thrust2 += forget * (thrust * thrust - s.failed_thrust2)
@@ -220,7 +266,7 @@ def _observe_failed(s: Watched, airframe: Airframe, dt: float, seen: Vec3) -> No
     # What turns beside what the failed one lacks: a battery that sags lowers all rotors alike,
     # and looks along z like an opposite rotor that is gone.
     turned = (s.effect - 1.0) * thrust - off
-    gives_nothing = thrust > LOST_FROM and off < (LOST - 1.0) * thrust
+    gives_nothing = thrust > lost_from and off < (LOST - 1.0) * thrust
     s.lost_for = s.lost_for + dt if gives_nothing else 0.0
     for i in range(int(airframe.rotors)):
         g, pattern = s.thrust[i], pattern_of(airframe, i)
@@ -233,7 +279,7 @@ def _observe_failed(s: Watched, airframe: Airframe, dt: float, seen: Vec3) -> No
         if not opposite:
             other = (own[0] * y - own[1] * x) / across
             unlike = abs(z - (x * pattern[1] - y * pattern[0]) / across - other)
-        gone = g > LOST_FROM and other < (LOST - 1.0) * g and unlike < -UNLIKE * other
+        gone = g > lost_from and other < (LOST - 1.0) * g and unlike < -UNLIKE * other
         gone = gone and (not opposite or turned < UNLIKE * (LOST - 1.0) * g)
         known = i == k or (opposite and along > 0.0)  # or beside it: both leave the same
         s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and not known else 0.0
@@ -247,17 +293,15 @@ def _about(pattern: Vec3, x: float, y: float) -> float:
 
 
 @compilable
-def _observe_slow(
-    r: Tick, airframe: Airframe, dt: float, decay: float, sent: Sent, seen: Vec3
-) -> None:
+def _observe_slow(r: Tick, law: WatchLaw, dt: float, decay: float, sent: Sent, seen: Vec3) -> None:
     """What rotors twice as slow would leave, as what is ``seen`` [N], and how alike both are."""
-    s, lever = r.watch, airframe.rotor_lever
+    airframe, s, lever = law.airframe, r.watch, law.airframe.rotor_lever
     for i in range(int(airframe.rotors)):
         before = s.slow[i]
         s.slow[i] = lag_rotor(before, sent.rotor_thrust[i], math.sqrt(decay))
         r.mixer.off[i] = 0.5 * (before + s.slow[i]) - r.mixer.mean[i]
     force, turn = rotor_wrench(airframe, r.mixer.off)
-    share, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
+    share, forget = min(OBSERVER / law.times * dt, 1.0), min(dt / (MEMORY * law.times), 1.0)
     s.slow_torque[0] += share * (turn[0] - s.slow_torque[0])
     s.slow_torque[1] += share * (turn[1] - s.slow_torque[1])
     s.slow_lift += share * (-force[2] - s.slow_lift)
@@ -277,12 +321,12 @@ def mean_square(s: Watched, airframe: Airframe, rotor: int) -> float:
 
 
 @compilable
-def _judge_rotors(r: Tick, airframe: Airframe, dt: float, settled: bool) -> None:
-    s = r.watch
+def _judge_rotors(r: Tick, law: WatchLaw, dt: float, settled: bool) -> None:
+    s, airframe, weak = r.watch, law.airframe, WEAK * law.thrusts
     if s.failed >= 0:
-        _follow_failed(s, dt)
+        _follow_failed(s, law, dt)
         if settled and not s.lost:
-            _judge_others(s, airframe)
+            _judge_others(s, law)
         return
     found, most = NO_ROTOR, 0.0
     for i in range(int(airframe.rotors)):
@@ -294,7 +338,7 @@ def _judge_rotors(r: Tick, airframe: Airframe, dt: float, settled: bool) -> None
     if found >= 0:
         pattern = pattern_of(airframe, found)
         explained = dot(pattern, pattern) * most
-        alike = most > WEAK * WEAK and explained > EXPLAINED * observed
+        alike = most > weak * weak and explained > EXPLAINED * observed
         mistaken = _a_drive_does_this(r, airframe, pattern)
     slow = s.slow_by * s.slow_by > SLOW_SHARE * observed * s.slow2
     if slow and 0.0 < s.slow_by < SLOW * s.slow2:
@@ -304,7 +348,9 @@ def _judge_rotors(r: Tick, airframe: Airframe, dt: float, settled: bool) -> None
         return
     s.suspected = s.suspected + dt if found == s.suspect else 0.0
     s.suspect = found
-    if s.suspected >= (STRONG_TIME if most > STRONG * STRONG else WEAK_TIME):
+    strong = STRONG * law.thrusts
+    enough = STRONG_TIME if most > strong * strong else WEAK_TIME
+    if s.suspected >= enough * law.times:
         _name(s, found, most)
 
 
@@ -332,12 +378,12 @@ def _name(s: Watched, found: int, size: float) -> None:
 
 
 @compilable
-def _judge_others(s: Watched, airframe: Airframe) -> None:
+def _judge_others(s: Watched, law: WatchLaw) -> None:
     """Whether a second rotor is lost; then it is the failed one."""
-    for i in range(int(airframe.rotors)):
-        if s.others_lost_for[i] > LOST_TIME:
+    for i in range(int(law.airframe.rotors)):
+        if s.others_lost_for[i] > LOST_TIME * law.times:
             s.suspect, s.suspected = i, s.others_lost_for[i]
-            _name(s, i, mean_square(s, airframe, i))
+            _name(s, i, mean_square(s, law.airframe, i))
             s.lost, s.disobeys = 1, 0
             return
 
@@ -349,20 +395,24 @@ def effect_seen(s: Watched) -> float:
 
 
 @compilable
-def _follow_failed(s: Watched, dt: float) -> None:
+def _follow_failed(s: Watched, law: WatchLaw, dt: float) -> None:
     """What of the failed rotor is left, and whether it is back."""
+    astray, quiet_below = ASTRAY * law.thrusts, QUIET * law.thrusts
     by_effect = s.failed_by_thrust * s.failed_by_thrust / max(s.failed_thrust2, 1e-6)
-    explained = s.failed2 - by_effect < ASTRAY * ASTRAY
+    explained = s.failed2 - by_effect < astray * astray
     # A rotor that comes and goes is no weak one, and flies better as a sound one. One that gives
     # too much at times does not obey.
     if explained and not s.disobeys:
         towards = max(effect_seen(s), LEAST_EFFECTIVE) - s.effect
-        s.effect += clamp(towards, -EFFECT_RATE * dt, EFFECT_RATE * dt)
-    if s.lost_for > LOST_TIME:
+        most = EFFECT_RATE / law.times * dt
+        s.effect += clamp(towards, -most, most)
+    # Without one that others fly without it is safe to be quick; else it ends the flight.
+    sure = STRONG_TIME if law.spares[s.failed] > 0.0 else LOST_TIME
+    if s.lost_for > sure * law.times:
         s.lost = 1
-    if not explained and s.failed_more2 > ASTRAY * ASTRAY:
+    if not explained and s.failed_more2 > astray * astray:
         s.disobeys = 1
-    quiet = s.failed2 < QUIET * QUIET and not s.lost and not s.disobeys
+    quiet = s.failed2 < quiet_below * quiet_below and not s.lost and not s.disobeys
     s.quiet_for = s.quiet_for + dt if quiet else 0.0
     if s.quiet_for > QUIET_TIME:
         s.failed, s.effect, s.suspect, s.suspected = NO_ROTOR, 1.0, NO_ROTOR, 0.0

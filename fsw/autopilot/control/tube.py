@@ -31,7 +31,7 @@ Source: docs/equations.md T4.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -39,7 +39,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from fsw.autopilot.control.allocation import AXES, PITCH, ROLL
-from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
+from fsw.autopilot.control.gains import TrackingGains, TrackingTuning, tracking_gains
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.prediction import Array
@@ -51,6 +51,8 @@ _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
 # What the plan's own motion and the arm's move the height by, 0.7 mm measured in calm flights.
 CALM_HEIGHT = 1e-3  # m
 RARE = 3.7  # standard deviations
+_LEAST_WEIGHT: Final = 5e-8  # on snap; below it little is won, and the estimate's noise is felt
+_MOST_USED: Final = 0.95  # of any limit
 # m/s^2 an axis of the memory of wind that a plan's stand-off covers. For what is beyond it
 # clearances grow while it is in force.
 WIND_COVERED = 0.05
@@ -208,6 +210,29 @@ def limits_used(
         ),
         "jerk": _share(disturbance * loop.jerk, min(tuning.jerk_limit, math.sqrt(stopping))),
     }
+
+
+def closest_tracking(
+    airframe: Airframe,
+    tuning: TrackingTuning,
+    hanging: float,
+    hold_s: float,
+    disturbance: float,
+    dt: float,
+) -> TrackingTuning:
+    """The tuning whose loop follows the plan as closely as this vehicle's rotors allow.
+
+    Of the tuning's weight on snap, halved as long as the worst ``disturbance`` [m/s^2] of one axis
+    leaves some of each limit; other arguments are those of ``tube``.
+    """
+    while tuning.input_weight > _LEAST_WEIGHT:
+        closer = replace(tuning, input_weight=max(0.5 * tuning.input_weight, _LEAST_WEIGHT))
+        gains = tracking_gains(closer, airframe.rotor_lag, dt)
+        loop = tube(airframe, closer, gains, hanging, hold_s, dt)
+        if max(limits_used(airframe, closer, loop, disturbance).values()) > _MOST_USED:
+            break
+        tuning = closer
+    return tuning
 
 
 def _share(used: float, limit: float) -> float:

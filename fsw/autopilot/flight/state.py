@@ -29,6 +29,7 @@ from fsw.autopilot.signals import (
     Home,
     HostHealth,
     JointSetpoint,
+    JointVector,
     MessageSource,
     Mode,
     MotionSetpoint,
@@ -201,10 +202,14 @@ class Damage(NamedTuple):
     joint_us: int = 0
     report: ActuatorReport = ActuatorReport()
     health: ActuatorHealth = HEALTHY  # what loops reckon with
+    spared: bool = False  # the rotor is lost, and the others fly without it
+    balance: JointVector | None = None  # rad, joints with which they hold the heading; None: any
 
     @property
     def severe(self) -> bool:
-        """Whether the rotor that has failed leaves no control of the heading."""
+        """Whether the heading is not controlled any more, or in one posture of the arm alone."""
+        if self.spared and self.balance is None:
+            return self.report.disobeys
         return self.report.disobeys or self.report.effect < _HEADING_KEPT
 
 

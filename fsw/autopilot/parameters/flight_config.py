@@ -9,6 +9,7 @@ from typing import cast
 from fsw.autopilot.control.cascade import Inner
 from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.safety_filter import FilterTuning
+from fsw.autopilot.control.tube import closest_tracking
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
@@ -216,10 +217,18 @@ def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:
     airframe = airframe_of(vehicle)
     b = airframe.bodies
     hanging = round(place_of_tip(posture(b, airframe.home_posture), b)[2], 6)
-    tracking = replace(config.tuning.tracking, point_below_base=0.5 * hanging)
+    surroundings = replace(config.surroundings, hanging=hanging)
+    tracking = closest_tracking(
+        airframe,
+        replace(config.tuning.tracking, point_below_base=0.5 * hanging),
+        hanging,
+        surroundings.disturbance_hold,
+        surroundings.disturbance,
+        config.tick_period_us * 1e-6,
+    )
     return replace(
         config,
         airframe=airframe,
         tuning=replace(config.tuning, tracking=tracking),
-        surroundings=replace(config.surroundings, hanging=hanging),
+        surroundings=surroundings,
     )

@@ -87,7 +87,9 @@ def on_tilt_lost(context: FailsafeContext) -> Action:
 
 
 def on_rotor_lost(context: FailsafeContext) -> Action:
-    """Terminate, or land where CBRK_FLIGHTTERM is set."""
+    """Terminate, or land where CBRK_FLIGHTTERM is set; what others fly without is a failed one."""
+    if context.state.damage.spared:
+        return on_rotor_failed(context)
     broken = context.limits.termination_breaker == BREAKER
     return Action.LAND if broken else Action.TERMINATE
 

@@ -166,7 +166,9 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.ROTOR_FAILED,
-        lambda c: bool(c.state.damage.rotor) and c.state.vehicle.flies,
+        lambda c: (
+            bool(c.state.damage.rotor) and not c.state.damage.spared and c.state.vehicle.flies
+        ),
         actions.on_rotor_failed,
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.control.actuator_watch import watch
+from fsw.autopilot.control.actuator_watch import watch, watch_law
+from fsw.autopilot.control.rotor_loss import balancing_posture
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
@@ -30,12 +31,18 @@ class DamageWatch:
 
     def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
         """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
-        self._law = packed(airframe)
+        law = watch_law(airframe)
+        self._law = packed(law)
         self._tops, self._names = airframe.rotor_thrust_max, rotor_names(airframe)
         self._hover = airframe.mass * GRAVITY / airframe.rotors
         self._tick = tick
         self._decay = rotor_decay(airframe, tick)
         self._reallocates = reallocates
+        self._postures = [
+            balancing_posture(airframe, k) if law.spares[k] > 0.0 else None
+            for k in range(airframe.rotors)
+        ]
+        self._spares = law.spares
         example = Tick().array
         self._watch = machine_code(watch, example, example, self._law, 1.0, 1.0, True)
 
@@ -80,10 +87,15 @@ class DamageWatch:
             health = ActuatorHealth(joints=joints) if any(joints) else HEALTHY
             report = known._replace(rotor=0, effect=1.0)
             return before._replace(rotor="", report=report, health=health)
+        lost = bool(s.lost)
+        same = known.rotor == k + 1 and (before.spared or not known.lost)
+        # Not a second one as well.
+        spared = lost and self._reallocates and self._spares[k] > 0.0
+        spared = spared and (same or not known.rotor)
         found = known._replace(
             rotor=k + 1,
-            effect=s.effect,
-            lost=bool(s.lost),
+            effect=0.0 if spared and not s.disobeys else s.effect,
+            lost=lost,
             disobeys=bool(s.disobeys),
         )
         after, health = before, before.health
@@ -94,12 +106,16 @@ class DamageWatch:
             after = before._replace(rotor=_sentence(s, found, self._names[k]), rotor_us=since_us)
         if self._reallocates:
             health = self._health(s, k, found, before.health.joints)
-        return after._replace(report=found, health=health)
+        balance = self._postures[k] if spared else None
+        return after._replace(report=found, health=health, spared=spared, balance=balance)
 
     def _health(
         self, s: Watched, k: int, found: ActuatorReport, joints: JointVector
     ) -> ActuatorHealth:
         """What loops reckon with for rotor ``k`` (from 0)."""
+        if found.effect == 0.0:  # the others fly without it
+            most = (math.inf,) * k + (0.0,)
+            return ActuatorHealth((1.0,) * (k + 1), (0.0,) * (k + 1), most, joints)
         if not found.disobeys:
             return ActuatorHealth((1.0,) * k + (found.effect,), joints=joints)
         # It is commanded what it gives in hover, and reckoned with as what it really gives.

@@ -57,6 +57,9 @@ class ReferenceHorizon:
             nodes, period_us = self._config.planner.horizon + 1, self._config.mpc_period_us
             targets = tuple(mode.target(state, t_us + node * period_us) for node in range(nodes))
             joints = ()
+        balance = state.damage.balance
+        if balance is not None:
+            joints = (balance,) * len(targets)
         p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         if not mode.external_reference and (reference is None or goal is None):
             targets = _led_aside(targets, p_WE, v_WE, self._config.steering.speed)

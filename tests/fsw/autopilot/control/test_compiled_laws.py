@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fsw.autopilot.control.actuator_watch import watch
+from fsw.autopilot.control.actuator_watch import watch, watch_law
 from fsw.autopilot.control.cascade import Cascade, Inner, close_loops, compare_with_plan, in_hover
 from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.tube import TubeAround
@@ -153,7 +153,7 @@ def test_the_estimate_is_the_one_of_python() -> None:
 def test_the_watch_over_actuators_is_the_one_of_python() -> None:
     random = np.random.default_rng(11)
     watcher = DamageWatch(AIRFRAME, 0.002, reallocates=True)
-    in_python = getattr(watch, "py_func", watch)
+    in_python, law = getattr(watch, "py_func", watch), watch_law(AIRFRAME)
     ours = memory(random)
     plain, found = ours.copy(), 0
     for k in range(STATES):
@@ -167,7 +167,7 @@ def test_the_watch_over_actuators_is_the_one_of_python() -> None:
                 r.watch.failed, r.watch.effect = 2, 0.5
         failed = watcher.finds(sent, ours)
         decay = rotor_decay(AIRFRAME, 0.002)
-        assert in_python(sent, plain, (AIRFRAME,), decay, 0.002, True) == failed
+        assert in_python(sent, plain, (law,), decay, 0.002, True) == failed
         np.testing.assert_allclose(ours.numbers, plain.numbers, rtol=1e-9, atol=1e-9)
         found += failed
     assert 0 < found < STATES

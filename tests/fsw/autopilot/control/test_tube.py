@@ -34,8 +34,10 @@ from fsw.autopilot.model.multibody import posture
 from fsw.autopilot.model.nominal import rest_input, rest_state
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.model.rotors import estimate_mass
+from fsw.autopilot.parameters.flight_config import flight_config
 from tests.fsw.records import allocated, observe, observed
 from tests.paper_vehicle import ROTOR_ARM
+from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 DT = 0.002
 # Without limits, so that the loop under test is the linear one the bound is about.
@@ -117,6 +119,34 @@ def test_a_cheaper_effort_narrows_the_tube_and_needs_more_snap(cheaper: float) -
 
 HANGING = 0.3
 QUICK = replace(TUNING, observer_bandwidth=60.0, wind_limit=0.2)
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_a_vehicle_follows_its_plan_as_closely_as_its_rotors_allow(name: str) -> None:
+    config = flight_config(vehicle=load_vehicle(name))
+    tracking, surroundings, airframe = (
+        config.tuning.tracking,
+        config.surroundings,
+        config.airframe,
+    )
+
+    def loop_of(tuning: TrackingTuning) -> tuple[Tube, float]:
+        gains = tracking_gains(tuning, airframe.rotor_lag, DT)
+        loop = tube(
+            airframe, tuning, gains, surroundings.hanging, surroundings.disturbance_hold, DT
+        )
+        used = limits_used(airframe, tuning, loop, surroundings.disturbance)
+        return loop, max(used.values())
+
+    chosen, most = loop_of(tracking)
+    usual, _ = loop_of(replace(tracking, input_weight=TUNING.input_weight))
+    _, more = loop_of(replace(tracking, input_weight=0.5 * tracking.input_weight))
+    assert most < 0.95
+    if name == "paper":  # whose rotors the weight was chosen for
+        assert tracking.input_weight == TUNING.input_weight
+        assert more > 1.0
+    else:
+        assert chosen.base < 0.75 * usual.base
 
 
 def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.actuator_watch import watch
+from fsw.autopilot.control.actuator_watch import watch, watch_law
 from fsw.autopilot.model.airframe import GRAVITY, Airframe, airframe_of
 from fsw.autopilot.model.multibody import base_acceleration, move_bodies
 from fsw.autopilot.model.rotors import rotor_decay, rotor_wrench
@@ -35,7 +35,7 @@ def watched(airframe: Airframe, share: Any, seconds: float) -> Tick:
     r = placed(airframe, estimate_of(Rotation.identity())._replace(specific_force=GRAVITY))
     r.sent.rotor_thrust[:n] = allocated(airframe, (0.0, 0.0, 0.0), hover, 1.0)
     thrust, rate = np.array(r.sent.rotor_thrust[:n]), np.zeros(3)
-    decay = rotor_decay(airframe, DT)
+    decay, law = rotor_decay(airframe, DT), watch_law(airframe)
     for k in range(round(seconds / DT)):
         given = np.array(r.sent.rotor_thrust[:n]) * (share if k * DT > 1.2 else 1.0)
         thrust = given + (thrust - given) * decay
@@ -46,7 +46,7 @@ def watched(airframe: Airframe, share: Any, seconds: float) -> Tick:
         )
         r.estimate.w_WB_B[:] = vec3(rate)
         r.estimate.specific_force = -force[2] / airframe.mass
-        WATCH([r], [r], [airframe], decay, DT, False)
+        WATCH([r], [r], [law], decay, DT, False)
         if r.watch.failed != NO_ROTOR:
             break
     return r

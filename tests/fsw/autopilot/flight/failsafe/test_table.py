@@ -404,6 +404,28 @@ def test_a_lost_rotor_terminates_and_with_the_circuit_breaker_the_vehicle_lands(
         assert ROWS[Condition.ROTOR_LOST].action(context) is expected
 
 
+@pytest.mark.parametrize(
+    ("number", "held", "bent"),
+    [
+        (0, Action.WARN, Action.WARN),
+        (2, Action.LAND, Action.LAND),
+        (3, Action.RETURN, Action.LAND),
+        (4, Action.TERMINATE, Action.TERMINATE),
+    ],
+)
+def test_a_lost_rotor_that_others_fly_without_is_one_that_failed(
+    number: int, held: Action, bent: Action
+) -> None:
+    """Where they hold the heading in one posture alone, the vehicle lands at least."""
+    limits = FlightLimits(actuator_failure_action=number)
+    for balance, expected in ((None, held), ((0.5, 0.5), bent)):
+        report = ActuatorReport(rotor=1, effect=0.0, lost=True)
+        damage = Damage("rotor 1", report=report, spared=True, balance=balance)
+        flown = replace(FINE, damage=damage, limits=limits)
+        assert conditions(flown) == (Condition.ROTOR_LOST,), "which is told once"
+        assert ROWS[Condition.ROTOR_LOST].action(flown.context()) is expected
+
+
 @pytest.mark.parametrize("report", [ActuatorReport(1, 0.49), ActuatorReport(1, disobeys=True)])
 @pytest.mark.parametrize(
     ("number", "expected"),
