@@ -21,7 +21,7 @@ from vehicles.description import Vehicle
 FASTEST = 2500.0  # 1/s; at 2785 a step of 1 ms is no longer stable
 STEPS_MAX = 20  # of 50 µs
 _POSTURES = 64
-_LEAST_ARMATURE: Final = 1e-5  # kg m^2, that a joint is given
+_MIN_ARMATURE: Final = 1e-5  # kg m^2, that a joint is given
 _LESS: Final = 0.8  # of a stiffness, at each try
 _SLIP_MOST: Final = 0.5  # m/s
 _REMEDIES = (
@@ -66,7 +66,7 @@ def soften(vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
     told: list[str] = []
     armature = 0.0
     while fastest_rates(vehicle, armature)[0] > FASTEST:
-        armature = max(2.0 * armature, _LEAST_ARMATURE)
+        armature = max(2.0 * armature, _MIN_ARMATURE)
     if armature > 0.0:
         joints = tuple(replace(one, armature=one.armature + armature) for one in vehicle.joints)
         vehicle = replace(vehicle, joints=joints)

@@ -223,7 +223,8 @@ def closest_tracking(
     """The tuning whose loop follows the plan as closely as this vehicle's rotors allow.
 
     Of the tuning's weight on snap, halved as long as the worst ``disturbance`` [m/s^2] of one axis
-    leaves some of each limit; other arguments are those of ``tube``.
+    leaves some of each limit; other arguments are those of ``tube``: the arm's parts are
+    ``hanging`` [m] below the base, and the loop runs every ``dt`` [s].
     """
     while tuning.input_weight > _LEAST_WEIGHT:
         closer = replace(tuning, input_weight=max(0.5 * tuning.input_weight, _LEAST_WEIGHT))
