@@ -23,7 +23,7 @@ STEPS_MAX = 20  # of 50 µs
 _POSTURES = 64
 _MIN_ARMATURE: Final = 1e-5  # kg m^2, that a joint is given
 _LESS: Final = 0.8  # of a stiffness, at each try
-_SLIP_MOST: Final = 0.5  # m/s
+_MAX_SLIP: Final = 0.5  # m/s
 _REMEDIES = (
     (
         "the joints' friction",
@@ -78,7 +78,7 @@ def soften(vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
     while fastest_rates(vehicle)[1] > FASTEST:
         stops = replace(stops, stiffness=_LESS * stops.stiffness, damping=_LESS * stops.damping)
         vehicle = replace(vehicle, end_stops=stops)
-    while fastest_rates(vehicle)[2] > FASTEST and feet.slip_rate < _SLIP_MOST:
+    while fastest_rates(vehicle)[2] > FASTEST and feet.slip_rate < _MAX_SLIP:
         feet = replace(feet, stiffness=_LESS * feet.stiffness, slip_rate=feet.slip_rate / _LESS)
         vehicle = replace(vehicle, feet=feet)
     return vehicle, told

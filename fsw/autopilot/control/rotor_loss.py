@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 _DIRECTIONS: Final = 32
 # Of what all rotors have. Between walls a hexarotor and an octorotor stay off them with half of it;
 # of a quadrotor's rotors, those that are left have next to nothing.
-_LEAST_SHARE: Final = 0.25
+_MIN_SHARE: Final = 0.25
 _POSTURES: Final = 100  # that are looked at
 _INSIDE: Final = 0.1  # rad, of the joints' limits
 _NONE: Final = 1e-9
@@ -42,7 +42,7 @@ _ROLL, _PITCH, _THRUST, _YAW = 0, 1, 2, 3
 def flies_without(airframe: Airframe, rotor: int) -> bool:
     """Whether roll, pitch and thrust are controlled without a ``rotor`` (from 0)."""
     left = tilting_authority(airframe, without=(rotor,))
-    return left >= _LEAST_SHARE * tilting_authority(airframe)
+    return left >= _MIN_SHARE * tilting_authority(airframe)
 
 
 def tilting_authority(airframe: Airframe, without: tuple[int, ...] = ()) -> float:

@@ -51,8 +51,8 @@ _SETTLED_S = 6.0  # the slowest mode has decayed by e^-16 then
 # What the plan's own motion and the arm's move the height by, 0.7 mm measured in calm flights.
 CALM_HEIGHT = 1e-3  # m
 RARE = 3.7  # standard deviations
-_LEAST_WEIGHT: Final = 5e-8  # on snap; below it little is won, and the estimate's noise is felt
-_MOST_USED: Final = 0.95  # of any limit
+_MIN_WEIGHT: Final = 5e-8  # on snap; below it little is won, and the estimate's noise is felt
+_MAX_USED: Final = 0.95  # of any limit
 # m/s^2 an axis of the memory of wind that a plan's stand-off covers. For what is beyond it
 # clearances grow while it is in force.
 WIND_COVERED = 0.05
@@ -223,14 +223,14 @@ def closest_tracking(
     """The tuning whose loop follows the plan as closely as this vehicle's rotors allow.
 
     Of the tuning's weight on snap, halved as long as the worst ``disturbance`` [m/s^2] of one axis
-    leaves some of each limit; other arguments are those of ``tube``: the arm's parts are
-    ``hanging`` [m] below the base, and the loop runs every ``dt`` [s].
+    leaves some of each limit. As of ``tube``: the end-effector is ``hanging`` [m] below the base, a
+    disturbance keeps its value for ``hold_s`` [s], and a tick takes ``dt`` [s].
     """
-    while tuning.input_weight > _LEAST_WEIGHT:
-        closer = replace(tuning, input_weight=max(0.5 * tuning.input_weight, _LEAST_WEIGHT))
+    while tuning.input_weight > _MIN_WEIGHT:
+        closer = replace(tuning, input_weight=max(0.5 * tuning.input_weight, _MIN_WEIGHT))
         gains = tracking_gains(closer, airframe.rotor_lag, dt)
         loop = tube(airframe, closer, gains, hanging, hold_s, dt)
-        if max(limits_used(airframe, closer, loop, disturbance).values()) > _MOST_USED:
+        if max(limits_used(airframe, closer, loop, disturbance).values()) > _MAX_USED:
             break
         tuning = closer
     return tuning
