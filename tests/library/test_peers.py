@@ -146,7 +146,7 @@ class DoMpcPlanner:
 
 @pytest.mark.long
 def test_an_mpc_of_do_mpc_flies_the_workspace() -> None:
-    # Between walls it leaves its path after 10.7 s, 10 mm within their clearance.
+    # Between walls it leaves its path after 10.2 s, 2.5 mm beyond their clearance.
     result = pandion.fly(
         "workspace-calm", duration_s=20.0, planner=DoMpcPlanner(), log=False, allow_slow=True
     )

@@ -10,6 +10,7 @@ import pytest
 
 from fsw.autopilot.control.tube import WIND_COVERED
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from sitl.scenario import vehicle_of
 from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.scenario_text import scenario_text
 from studies.flight.closed_loop import simulate
@@ -139,10 +140,13 @@ def test_what_was_found_is_a_scenario_that_reproduces_the_margin() -> None:
     assert truth.min_margin_m < calm.min_margin_m - 0.01
 
 
-@pytest.mark.parametrize("name", ["shelf", "crossing"])
-def test_the_margins_of_a_full_body_are_those_of_the_referee(name: str) -> None:
-    scenario = replace(load_scenario(name), duration_s=7.0)
-    config = _of_one_plan(flight_config(body=scenario.body))
+@pytest.mark.parametrize(
+    ("name", "vehicle"), [("shelf", None), ("crossing", None), ("workspace", "hexa-3r")]
+)
+def test_the_margins_are_those_of_the_referee(name: str, vehicle: str | None) -> None:
+    """Of a full body, and of another vehicle."""
+    scenario = replace(load_scenario(name, None, vehicle), duration_s=7.0)
+    config = _of_one_plan(flight_config(body=scenario.body, vehicle=vehicle_of(scenario)))
     worst = search(scenario, config, 0.8, 8, 1, _silent).min_margin
     flown = replay(scenario, config, worst.start.step, worst.pushes, _silent)
     assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
