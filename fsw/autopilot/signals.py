@@ -112,6 +112,7 @@ class EndEffectorTarget:
     v_WE: Vec3  # m/s
     a_WE: Vec3  # m/s^2
     yaw: float = 0.0  # rad
+    force: float = 0.0  # N, with which the tool presses on the touchable zone there
 
 
 class PositionFrom(Enum):
@@ -202,6 +203,16 @@ _POINTS: Final = 3  # of the paper's body
 TARGET_SPHERE: Final = "target sphere"  # the shape that follows the end-effector's target
 
 
+class Touch(NamedTuple):
+    """What the tool meets where it may touch a zone."""
+
+    force_max: float  # N, along the normal, never exceeded
+    stiffness_low: float  # N/m, of the surface and what is behind it: at least
+    stiffness_high: float  # N/m, at most
+    dissipation: float = 0.0  # s/m, of Hunt and Crossley
+    friction: float = 0.0  # of the tool along the surface
+
+
 @dataclass(frozen=True, slots=True)
 class Zone:
     """A shape to keep out of, or inside of, that may move."""
@@ -211,6 +222,7 @@ class Zone:
     keep_in: bool = False
     velocity: Vec3 = (0.0, 0.0, 0.0)  # m/s, NED
     t_us: int = 0  # when the shape was where its numbers say
+    touch: Touch | None = None  # what the tool may touch, as no other part may; None: nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -555,9 +567,11 @@ class PredictionState(NamedTuple):
 class PlanInput(NamedTuple):
     """The paper's u for one step of the horizon: [a_d, yaw acceleration, joint accelerations]."""
 
-    a: Vec3  # m/s^2, commanded
+    a: Vec3  # m/s^2, commanded, of thrust
     yaw_acc: float  # rad/s^2
     qdd_arm: JointVector  # rad/s^2
+    push: Vec3 = (0.0, 0.0, 0.0)  # m/s^2, NED, what pressing on a surface is taken to add
+    force: float = 0.0  # N, with which the tool is to press
 
 
 @dataclass(frozen=True, slots=True)
@@ -576,6 +590,8 @@ class PlanRequest:
     # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
     recent_disturbance: float = math.inf
     mode: Mode = Mode.TRAJECTORY  # in which the plan is flown
+    # m/s^2, NED, in each step: what pressing adds to what thrust does; empty: nothing is pressed on
+    pushes: tuple[Vec3, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -841,6 +857,19 @@ class ActuatorReport(NamedTuple):
     joints: JointVector = ()  # 0 sound, 1 stuck, 2 limp; empty: all are sound
 
 
+class ContactReport(NamedTuple):
+    """What the tool does at a surface that it may touch and that is near."""
+
+    contact: bool
+    force: Vec3  # N, NED, on the tool, observed
+    pressed: float  # N, of that along the normal
+    unsure: float  # N, by which that may be wrong
+    commanded: float  # N, what the joints press with
+    asked: float  # N, by the plan
+    most: float  # N, that the surface allows
+    distance: float  # m, of the tool to where the surface was announced
+
+
 @dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
@@ -875,6 +904,7 @@ class FlightSnapshot:
     safe_set: SafeSet = SafeSet()  # in force: announced and fence together
     actuators_found: ActuatorReport = ActuatorReport()
     sensors_lost: tuple[str, ...] = ()  # that are of no use, beside the pose
+    touching: ContactReport | None = None  # None: no surface that may be touched is near
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,6 +69,8 @@ class Accelerations(Record):
     a: Three  # m/s^2, NED
     yaw_acc: float  # rad/s^2
     qdd_arm: PerJoint  # rad/s^2
+    push: Three  # m/s^2, NED
+    force: float  # N
 
 
 class Sent(Record):
@@ -94,6 +96,7 @@ class Observed(Record):
     d: Three  # m/s^2, NED, disturbance acceleration
     disturbance_bias: Two  # m/s^2, horizontal part of d that stays: wind
     recent: float  # m/s^2, largest horizontal d of late: at once up, slowly down
+    known: Three  # m/s^2, NED, part of d that a surface gives which the tool presses on
 
 
 class Joints(Record):
@@ -104,6 +107,36 @@ class Joints(Record):
     momentum: PerJoint  # N m s, as the observer believes
     disturbance: PerJoint  # N m, as the observer believes
     integral: PerJoint  # rad s, of the errors
+
+
+class Pressing(Record):
+    """What the tool does at a surface that it may touch (``fsw/autopilot/control/press.py``)."""
+
+    near: int  # 1: there is one within reach; else all that follows is 0
+    contact: int  # 1: the tool is pressed on it
+    normal: Three  # out of the surface, NED
+    distance: float  # m, of the tool's ball to where the surface is said to be
+    surface_speed: float  # m/s, of the surface along the normal
+    most: float  # N
+    stiffness: float  # N/m, at most
+    momentum: PerJoint  # N m s, as the observer believes
+    external: PerJoint  # N m, on each joint from outside of the model
+    force: Three  # N, NED, on the tool, observed
+    pressed: float  # N, of that along the normal
+    unsure: float  # N, by which that may be wrong
+    mass: float  # kg, of the tool along the normal
+    speed: float  # m/s, of the tool into the surface
+    mean_speed: float  # m/s, the same of late
+    asked: float  # N, by the plan
+    ramped: float  # N, of that
+    commanded: float  # N, what the joints give
+    lost_for: float  # s, that it has been asked to press on a surface that it no longer meets
+    slip: Three  # m/s, NED, mean speed along the surface
+    met: int  # 1: it has been in contact since it was asked to
+    along: PerJoint  # m, what each joint moves the tool by along the normal
+    share: PerJoint  # 1/m, of each joint's torque in a static force along it
+    work: PerJoint
+    load: PerJoint  # N m, torques of joints with those of the force on the tool
 
 
 FILTER_ACTED: Final = 1  # the safety filter changed the acceleration
@@ -269,6 +302,7 @@ class Tick(Record):
     bodies: Multibody  # of the estimate
     mixer: Mixer
     arm: ArmTask
+    pressing: Pressing
 
     @property
     def commanded(self) -> ActuatorCommand:
@@ -344,11 +378,13 @@ class Tick(Record):
     def input(self) -> PlanInput:
         """The plan's input."""
         n: Any = _INPUT.unpack_from(self.memory, _INPUT_AT)
-        return PlanInput(n[:3], n[3], n[4 : 4 + self.joint_count])
+        push = n[4 + JOINTS : 7 + JOINTS]
+        return PlanInput(n[:3], n[3], n[4 : 4 + self.joint_count], push, n[-1])
 
     @input.setter
     def input(self, u: PlanInput) -> None:
-        _INPUT.pack_into(self.memory, _INPUT_AT, *u.a, u.yaw_acc, *padded(u.qdd_arm, JOINTS))
+        arm = padded(u.qdd_arm, JOINTS)
+        _INPUT.pack_into(self.memory, _INPUT_AT, *u.a, u.yaw_acc, *arm, *u.push, u.force)
 
     def take_given(self, other: Tick) -> None:
         """Take estimate, plan and input of another one."""
@@ -366,7 +402,7 @@ def estimate_in(record: Record, at: int, joints: int) -> StateEstimate:
 NO_ROTOR: Final = -1
 _ESTIMATE: Final = struct.Struct(f"<q{19 + 2 * JOINTS + 1}d")
 _PLAN: Final = struct.Struct(f"<{15 + 2 * JOINTS}d")
-_INPUT: Final = struct.Struct(f"<{4 + JOINTS}d")
+_INPUT: Final = struct.Struct(f"<{4 + JOINTS + 4}d")
 _COMMAND: Final = struct.Struct(f"<{ROTORS + JOINTS}d")
 _COUNTED_COMMAND: Final = struct.Struct(f"<2q{ROTORS + JOINTS}d")  # rotor_count, joint_count, sent
 _JOINTS: Final = struct.Struct(f"<{JOINTS}d")

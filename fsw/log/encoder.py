@@ -31,6 +31,7 @@ from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import (
     CommandRequest,
+    ContactReport,
     EstimatorReport,
     FlightSnapshot,
     Mode,
@@ -77,6 +78,7 @@ _RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
 _PLANNING: Final = Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
 _BARRIER, _END_EFFECTOR = _PLANNING.heads
 _MPC: Final = Packed(topics.MPC_STATUS)
+_CONTACT: Final = Packed(topics.TOOL_CONTACT)
 _ASKED: Final = Packed(topics.VEHICLE_COMMAND)
 _ANSWERED: Final = Packed(topics.VEHICLE_COMMAND_ACK)
 _INPUT: Final = Packed(topics.TICK_INPUT)
@@ -180,6 +182,8 @@ class LogEncoder:
         if interval != self._detailed:
             self._detailed = interval
             out += self._detail(snapshot)
+            if snapshot.touching is not None:
+                out += _contact(snapshot.t_us, snapshot.touching)
         if snapshot.plan_state is not None and snapshot.t_us // self._plan_us != self._planned:
             self._planned = snapshot.t_us // self._plan_us
             out += self._in_flight(snapshot)
@@ -325,6 +329,11 @@ class LogEncoder:
                 int(snapshot.plan_status),
             )
         )
+
+
+def _contact(t_us: int, k: ContactReport) -> bytes:
+    numbers = (*k.force, k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance)
+    return _CONTACT.pack((*_CONTACT.heads, t_us, *numbers, k.contact))
 
 
 def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:

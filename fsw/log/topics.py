@@ -166,6 +166,21 @@ BARRIER_MARGIN: Final = Topic(
         *floats("lacking", note="m, what the zone with the least room for that lacks"),
     ),
 )
+TOOL_CONTACT: Final = Topic(
+    "tool_contact",
+    "What the tool does at a surface that it may touch",
+    "near one, 50 Hz; every tick with `LOG_PROFILE` 1",
+    (
+        _vector("force", 3, "N, NED, on the tool, observed"),
+        *floats("pressed", note="N, of that along the normal"),
+        *floats("unsure", note="N, by which that may be wrong"),
+        *floats("commanded", note="N, what the joints press with"),
+        *floats("asked", note="N, by the plan"),
+        *floats("most", note="N, that the surface allows"),
+        *floats("distance", note="m, to where the surface was announced"),
+        Field("contact", "bool"),
+    ),
+)
 END_EFFECTOR: Final = Topic(
     "end_effector",
     "Estimate and the reference in use",
@@ -462,6 +477,7 @@ TOPICS: Final = (
     ESTIMATOR_SENSOR_BIAS,
     TICK,
     *px4_topics.PX4_TOPICS,
+    TOOL_CONTACT,
 )
 """Everything the flight software writes; a topic's place is its number in the file.
 

@@ -9,6 +9,7 @@ from fsw.autopilot.signals import (
     SafeSet,
     SafeSetAnnouncement,
     Shape,
+    Touch,
     Zone,
 )
 from sitl.mission_clock import MissionClock
@@ -34,7 +35,12 @@ def _zone(one: SimulatedZone, t_us: int) -> Zone:
     place = one.at(1e-6 * (t_us - START_US))
     shape = Shape(BY_NUMBER[one.kind.number].name, place.numbers)
     since_us = t_us if any(place.velocity) else 0
-    return Zone(shape, one.table.clearance_m, one.table.keep_in, place.velocity, since_us)
+    touch = getattr(one.table, "touch", None)
+    if touch is not None:
+        low, high = touch.stiffness_range_n_m
+        touch = Touch(touch.force_max_n, low, high, touch.dissipation_s_m, touch.friction)
+    table = one.table
+    return Zone(shape, table.clearance_m, table.keep_in, place.velocity, since_us, touch)
 
 
 def announced(scenario: Scenario, t_us: int = START_US) -> tuple[SafeSetAnnouncement, ...]:
@@ -47,4 +53,5 @@ def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
     """The end-effector reference at a time stamp."""
     time_s = 1e-6 * (t_us - START_US)
     point = clock.target_at(time_s)
-    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s))
+    force = getattr(point, "force", 0.0)
+    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s), force)

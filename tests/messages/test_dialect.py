@@ -24,6 +24,7 @@ PINNED = {
     "JOINT_ENCODERS": (60212, 41, 156),
     "MPC_HORIZON_ARM": (60213, 222, 38),
     "FORCE_TORQUE": (60214, 32, 198),
+    "TOOL_CONTACT": (60215, 45, 89),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have

@@ -85,6 +85,7 @@ class TargetPoints:
     q_arm: Array | None = None  # (n + 1, j) rad; None: the planner is free to choose
     t_us: int = 0  # of node 0; what moves by itself is placed by it
     recent_disturbance: float = math.inf  # m/s^2, which lambda may follow
+    pushes: Array | None = None  # (n, 3) m/s^2, NED, what pressing adds to thrust; None: nothing
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "yaw"):  # kernels rely on the layout

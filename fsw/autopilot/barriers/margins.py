@@ -52,7 +52,8 @@ class Margins:
         self.parts = tuple(part.name for part in body.parts)
         self._probes, self._bodies = body.probes, bodies
         self._settings = settings(tunings, period)
-        self._known = _known(SafeSet(), 0)
+        self._touching = len(self.parts) - sum(part.tool for part in body.parts)
+        self._known = _known(SafeSet(), 0, 0)
         self._fill = machine_code(fill_starts)
 
     def report(
@@ -60,11 +61,11 @@ class Margins:
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle; the sphere hangs on the target.
 
-        There is one of each zone and part, zone by zone; of a zone that follows the target a
-        single one, and none while there is no target.
+        There is one of each zone and part, zone by zone; none of the tool's at a zone that it may
+        touch; of a zone that follows the target a single one, and none while there is no target.
         """
         if safe_set is not self._known.safe_set:  # looked at ten times a second, and the same
-            self._known = _known(safe_set, len(self.parts))
+            self._known = _known(safe_set, len(self.parts), self._touching)
         _, zones, moving, per_zone, follows_target = self._known
         if not per_zone or (target is None and follows_target):
             return ConstraintReport(safe_set.kind)
@@ -82,9 +83,13 @@ class Margins:
         )
 
 
-def _known(safe_set: SafeSet, parts: int) -> _Known:
-    """What is known of a safe set, of which most zones have a margin for each of ``parts`` [1]."""
+def _known(safe_set: SafeSet, parts: int, touching: int) -> _Known:
+    """What is known of a safe set, of which most zones have a margin for each of ``parts`` [1].
+
+    A zone that the tool may touch has one for each of ``touching`` [1], which are not the tool's.
+    """
     zones = zone_arrays(safe_set)
     follows = [zone[FOLLOWS] > 0.0 for zone in zones.tolist()]
-    per_zone = tuple([1 if rides else parts for rides in follows])
+    kept = [parts if zone.touch is None else touching for zone in safe_set.zones]
+    per_zone = tuple([1 if rides else count for rides, count in zip(follows, kept, strict=True)])
     return _Known(safe_set, zones, all_moving_zones(safe_set), per_zone, any(follows))

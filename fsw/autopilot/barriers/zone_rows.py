@@ -9,6 +9,10 @@ distance d of the probe's surface to it and w the zone's velocity, the paper's b
 
 (eqs 11, 22 and 23); MPC-HC (eqs 14, 15) takes d itself. Rows of one zone at one node share a slack.
 
+A zone that the tool may touch is kept clear of by all other parts. The tool's ball comes to its
+surface no faster than at ``TOUCH_SPEED``, with which it may meet it: ahead of it no clearance and
+no reserve :math:`\lambda` is kept. The force is the fast loop's (``fsw.autopilot.control.press``).
+
 A row that cannot bind, whatever the inputs are, is left out exactly: over the horizon no place of
 the vehicle can go farther than its speed and the limits on the inputs allow.
 
@@ -27,7 +31,7 @@ from fsw.autopilot.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
 from fsw.autopilot.geometry.vectors import dot
-from fsw.autopilot.model.body import ON, PART, RADIUS, Body, reaches
+from fsw.autopilot.model.body import FORM, ON, OTHER, PART, RADIUS, SPHERE, TOOL, Body, reaches
 from fsw.autopilot.model.kinematics import position, velocity
 from fsw.autopilot.model.linearisation import (
     TURNED,
@@ -46,12 +50,21 @@ from fsw.autopilot.model.prediction import (
     CondensedModel,
     J,
 )
-from fsw.autopilot.shapes.zones import FOLLOWS, PLANES, all_moving_zones, shifts, zone_arrays
+from fsw.autopilot.shapes.zones import (
+    CLEARANCE,
+    FOLLOWS,
+    FORCE_MAX,
+    PLANES,
+    all_moving_zones,
+    shifts,
+    zone_arrays,
+)
 from fsw.autopilot.signals import SafeSet, Vec3, Vec4
 from fsw.compiled import kernel, machine_code
 
 _NO_ROW = 1e3  # residual of a row that is left out
 _LEAST_THRUST = 6.0  # m/s^2, specific, within the limits of the inputs
+TOUCH_SPEED = 0.05  # m/s, of a tool that meets a surface, at most
 
 
 # Entries of the settings, for kernels: one array costs what one number costs to hand over.
@@ -120,8 +133,12 @@ class ZoneRows:
             most=most,
             reach=reaches(body, model.airframe.bodies),
         )
-        parts = len(body.parts)
-        starts = sum(1 if follows else parts for follows in following)
+        parts, others = len(body.parts), sum(not part.tool for part in body.parts)
+        touched = self._zones[:, FORCE_MAX] > 0.0
+        starts = sum(
+            1 if follows else others if touch else parts
+            for follows, touch in zip(following, touched, strict=True)
+        )
         per_group = tuple(per_zone.astype(int).tolist())
         self.rows = block(per_group, first_node, model.horizon, model.inputs, starts)
         self._rows, self._fill = self.rows.rows, machine_code(_fill)
@@ -150,22 +167,28 @@ class ZoneRows:
         )
 
 
-def layout(safe_set: SafeSet) -> tuple[tuple[str, bool], ...]:
+def layout(safe_set: SafeSet) -> tuple[tuple[str, bool, bool], ...]:
     """What of a safe set decides how many rows there are; the rest is numbers."""
-    return tuple((zone.shape.kind, zone.keep_in) for zone in safe_set.zones)
+    return tuple((zone.shape.kind, zone.keep_in, zone.touch is not None) for zone in safe_set.zones)
 
 
 @kernel
-def _tuning(settings: Array, follows: bool) -> BarrierNumbers:
+def _tuning(settings: Array, follows: bool, touches: bool) -> BarrierNumbers:
     at = _FOLLOWING if follows else _KEPT
     return BarrierNumbers(
         settings[at],
         settings[at + 1],
         settings[at + 2],
-        settings[at + 3],
+        0.0 if touches else settings[at + 3],
         settings[at + 4],
         int(settings[at + 5]),
     )
+
+
+@kernel
+def _room_to_touch(zones: Array, k: int, touches: bool, tuning: BarrierNumbers) -> float:
+    """How much nearer [m] than others the tool may come."""
+    return zones[k, CLEARANCE] + TOUCH_SPEED / tuning.slope if touches else 0.0
 
 
 @kernel
@@ -193,11 +216,14 @@ def _fill(
         turned_for = (0.0, 0.0, 0.0)
         for k in range(len(zones)):
             follows = zones[k, FOLLOWS] > 0.0
-            tuning = _tuning(settings, follows)
             for b in range(1 if follows else len(probes)):
+                touches = zones[k, FORCE_MAX] > 0.0 and probes[b, TOOL] > 0.0
+                tuning = _tuning(settings, follows, touches)
                 radius, on = 0.0 if follows else probes[b, RADIUS], int(probes[b, ON])
+                radius -= _room_to_touch(zones, k, touches, tuning)
                 for which in range(int(zones[k, PLANES])):
                     local, at, binds = nearest_place(zones, k, which, shift, probes, b, frame)
+                    binds = binds and not (touches and (distances or probes[b, FORM] != SPHERE))
                     n, d = (at.nx, at.ny, at.nz), at.distance - radius
                     value, least, steepness = d, settings[_TIGHTENING], 1.0
                     if binds and not distances:
@@ -308,21 +334,26 @@ def fill_starts(
 ) -> None:
     """The least value of each zone and part at one instant: h [m/s], or the distance [m].
 
-    ``zones`` (zones, 23) [SI], ``probes`` (probes, 12) [SI] and ``settings`` (20 + j,) [SI] are as
+    ``zones`` (zones, 23) [SI], ``probes`` (probes, 14) [SI] and ``settings`` (20 + j,) [SI] are as
     in ``shapes.zones``, ``model.body`` and above, ``frame`` (FRAME,) [SI] the vehicle;
     ``shift`` (zones, 3) [m, NED] and ``speed`` (zones, 3) [m/s, NED] those of the zones. Into
-    ``starts`` (zones x parts,) [SI], zone by zone; a zone that follows the target has one entry.
+    ``starts`` (zones x parts,) [SI], zone by zone; a zone that follows the target has one entry,
+    one that may be touched none of the tool's.
     """
     starts[:] = math.inf
     first = 0
     for k in range(len(zones)):
         follows = zones[k, FOLLOWS] > 0.0
-        tuning = _tuning(settings, follows)
+        tuning = _tuning(settings, follows, False)
         tried = 1 if follows else len(probes)
         # Of the sphere the paper's pair h2a and h2b: towards the nearest place, and away from it.
         planes = 2 if follows else int(zones[k, PLANES])
+        touched, count = zones[k, FORCE_MAX] > 0.0, 0
         for b in range(tried):
-            at_part = first + int(probes[b, PART])
+            if touched and probes[b, TOOL] > 0.0:
+                continue
+            number = int(probes[b, OTHER if touched else PART])
+            at_part, count = first + number, number + 1
             for which in range(planes):
                 local, at, _ = nearest_place(zones, k, which, shift, probes, b, frame)
                 value = at.distance - (0.0 if follows else probes[b, RADIUS])
@@ -331,4 +362,4 @@ def fill_starts(
                     rate = dot(n, v) - n[0] * speed[k, 0] - n[1] * speed[k, 1] - n[2] * speed[k, 2]
                     value = barrier_value(value, rate, tuning)
                 starts[at_part] = min(starts[at_part], value)
-        first += int(probes[tried - 1, PART]) + 1
+        first += count

@@ -32,7 +32,7 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.rotor_loss import flies_without
-from fsw.autopilot.geometry.vectors import clamp, dot, subtract
+from fsw.autopilot.geometry.vectors import add, clamp, dot, subtract
 from fsw.autopilot.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import (
@@ -43,7 +43,7 @@ from fsw.autopilot.model.multibody import (
     move_bodies,
     posture,
 )
-from fsw.autopilot.model.rotors import lag_rotor, rotor_wrench
+from fsw.autopilot.model.rotors import lag_rotor, load_of_tip, rotor_wrench
 from fsw.autopilot.signals import JointVector, Vec3
 from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
@@ -177,7 +177,8 @@ def watch(
         for i in range(rotors):
             s.thrust[i] = s.slow[i] = sent.rotor_thrust[i]
     _observe_base(r, law, decay, dt, sent)
-    if angles_known:
+    # At a surface it is not known what the joints are to do.
+    if angles_known and r.pressing.near == 0:
         _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
     else:
@@ -212,7 +213,12 @@ def _observe_base(r: Tick, law: WatchLaw, decay: float, dt: float, sent: Sent) -
         s.thrust[i] = lag_rotor(before, sent.rotor_thrust[i], decay)
         r.mixer.mean[i] = 0.5 * (before + s.thrust[i])
     force, turn = rotor_wrench(airframe, r.mixer.mean)
-    load = load_on_base(r.bodies, airframe.bodies, force, sent.joint_torque)
+    if r.pressing.near > 0:
+        pushed, turned = load_of_tip(r, airframe.bodies, sent.joint_torque)
+        load = load_on_base(r.bodies, airframe.bodies, add(force, pushed), r.pressing.load)
+        load = subtract(load, turned)
+    else:
+        load = load_on_base(r.bodies, airframe.bodies, force, sent.joint_torque)
     modelled = subtract(turn, load)
     grown = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
     for i in range(2):

@@ -19,10 +19,12 @@ from fsw.autopilot.control.joint_reference import refer
 from fsw.autopilot.control.joints import (
     accelerate_joints,
     joint_torques,
+    observe_contact,
     observe_disturbance,
     rest_joints,
     torques_of_failed,
 )
+from fsw.autopilot.control.press import look_for_surface, watch_contact, weigh_tool
 from fsw.autopilot.control.safety_filter import (
     FilterLaw,
     FilterTuning,
@@ -40,7 +42,7 @@ from fsw.autopilot.control.tracking import (
 )
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround, beyond_covered
 from fsw.autopilot.geometry.rotation import rotate_back, wrap_angle
-from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
+from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, subtract
 from fsw.autopilot.model.actuator_health import (
     HEALTHY,
     SOUND,
@@ -49,12 +51,13 @@ from fsw.autopilot.model.actuator_health import (
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import ArmCoordinates, arm_coordinates
-from fsw.autopilot.model.body import Body, body_of, reaches
+from fsw.autopilot.model.body import Body, body_of, reaches, tool_radius
 from fsw.autopilot.model.multibody import load_on_base, move_bodies, torque_to_turn
 from fsw.autopilot.model.rotors import (
     MotionState,
     estimate_mass,
     lag_rotor,
+    load_of_tip,
     motion_state,
     rotor_decay,
 )
@@ -119,6 +122,7 @@ class CascadeLaw:
     tracking: TrackingLaw
     follows_plan: bool  # or only the plan's acceleration
     filter: FilterLaw
+    tool_radius: float  # m, of the ball about the end-effector
     rotor_decay: float  # share of a rotor's error left after a tick
     dt: float  # s, tick length
 
@@ -154,6 +158,7 @@ class Cascade:
                 tuning.tracking.acceleration_limit,
                 clear.speed,
             ),
+            tool_radius(body_of("full", airframe)),
             rotor_decay(airframe, dt),
             dt,
         )
@@ -212,8 +217,13 @@ def close_loops(
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     estimate = r.estimate
     settle_rotors(r, law, ticks)
-    r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks)
+    lift = 0.0
+    if r.pressing.near > 0:
+        lift = -rotate_back(estimate.R_WB, r.pressing.force)[2]
+    r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks, lift)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
+    look_for_surface(r, airframe.bodies, tuning.press, law.tool_radius, zones)
+    watch_contact(r, airframe.bodies, tuning.press, dt * ticks)
     motion = motion_state(airframe, r, r.rotors, r.sent.joint_torque)
     v = velocity_of_mass(estimate, r.bodies.swing)
     for _ in range(ticks):
@@ -226,13 +236,14 @@ def close_loops(
     turn = limited_turn(airframe, estimate, motion.turning, turn)
     refer_joints(r, law, dt * ticks)
     drive_joints(r, law, motion, ticks)
-    torque = torque_to_turn(
-        r.bodies,
-        airframe.bodies,
-        turn,
-        load_on_base(r.bodies, airframe.bodies, (0.0, 0.0, -thrust), r.wanted.joint_torque),
-        knows_arm=law.follows_plan,
-    )
+    lifted = (0.0, 0.0, -thrust)
+    if r.pressing.near > 0:
+        pushed, turned = load_of_tip(r, airframe.bodies, r.wanted.joint_torque)
+        load = load_on_base(r.bodies, airframe.bodies, add(lifted, pushed), r.pressing.load)
+        load = subtract(load, turned)
+    else:
+        load = load_on_base(r.bodies, airframe.bodies, lifted, r.wanted.joint_torque)
+    torque = torque_to_turn(r.bodies, airframe.bodies, turn, load, knows_arm=law.follows_plan)
     allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit)
     send(r, airframe)
 
@@ -267,6 +278,8 @@ def keep_off_zones(
     if law.follows_plan:
         asked = wanted_accelerations(law.tracking, r.estimate, motion, r.observed, r.plan, r.u)
     level = law.filter.level
+    known = r.observed.known  # thrust does what surfaces do not
+    asked = asked[0] + known[0], asked[1] + known[1], asked[2] + known[2]
     wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
     a = add_scaled(motion.a, r.observed.d, 1.0)
     safe, changed, margin = filtered(
@@ -335,8 +348,14 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
     for _ in range(ticks):
         torque = r.sent.joint_torque
         observe_disturbance(r.joints, r.bodies, airframe, torque, field, law.dt)
+        if r.pressing.near > 0:
+            observe_contact(r, airframe, torque, field, law.dt)
+    if r.pressing.near > 0:
+        weigh_tool(r, airframe, law.tuning.press)
     # Not what is commanded: the rotors take 40 ms to give it.
-    joint_torques(r, airframe, law.arm, law.tuning.joint, field, motion.turning, law.dt)
+    joint_torques(
+        r, airframe, law.arm, law.tuning.joint, law.tuning.press, field, motion.turning, law.dt
+    )
     if not _joints_are_sound(r, airframe):
         torques_of_failed(r, airframe, field, motion.turning)
 

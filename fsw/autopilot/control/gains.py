@@ -11,6 +11,7 @@ from scipy.linalg import expm, solve_discrete_are
 from fsw.autopilot.control.arm_compensation import CompensationLimits
 from fsw.autopilot.control.joint_reference import JointReferenceLimits
 from fsw.autopilot.control.pid import PidGains
+from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.prediction import Array
 
@@ -76,6 +77,7 @@ class LoopGains:
     # the loop has something left to correct with
     yaw_thrust_limit: float = 3.0
     tracking: TrackingTuning = field(default_factory=TrackingTuning)
+    press: PressTuning = field(default_factory=PressTuning)
 
 
 @lru_cache(maxsize=8)

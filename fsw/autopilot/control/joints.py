@@ -28,6 +28,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.pid import PidGains, pid_step
+from fsw.autopilot.control.press import PressTuning, press, presses
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
@@ -96,12 +97,36 @@ def observe_disturbance(
     The ``field`` [m/s^2, B] is gravity less the base's acceleration, which is what thrust and
     disturbance make of it, whatever the attitude.
     """
+    _observe(k.momentum, k.disturbance, _DISTURBANCE, m, airframe, torque, field, dt)
+
+
+@compilable
+def observe_contact(r: Tick, airframe: Airframe, torque: Floats, field: Vec3, dt: float) -> None:
+    """The same of a tool that may press on something, as much as the drives can hold.
+
+    ``torque`` (j,) [N m], ``field`` [m/s^2, B] and ``dt`` [s] as of ``observe_disturbance``.
+    """
+    k = r.pressing
+    _observe(k.momentum, k.external, 1.0, r.bodies, airframe, torque, field, dt)
+
+
+@compilable
+def _observe(
+    momentum: Floats,
+    disturbance: Floats,
+    share: float,
+    m: Multibody,
+    airframe: Airframe,
+    torque: Floats,
+    field: Vec3,
+    dt: float,
+) -> None:
     for i in range(int(airframe.bodies.joints)):
-        predicted = k.momentum[i] + dt * (torque[i] + joint_drift(m, i, field) + k.disturbance[i])
+        predicted = momentum[i] + dt * (torque[i] + joint_drift(m, i, field) + disturbance[i])
         surprise = m.momentum[i] - predicted
-        k.momentum[i] = predicted + 2.0 * _OBSERVER * dt * surprise
-        believed = k.disturbance[i] + _OBSERVER * _OBSERVER * dt * surprise
-        k.disturbance[i] = clamp_magnitude(believed, _DISTURBANCE * airframe.joint_torque_max[i])
+        momentum[i] = predicted + 2.0 * _OBSERVER * dt * surprise
+        believed = disturbance[i] + _OBSERVER * _OBSERVER * dt * surprise
+        disturbance[i] = clamp_magnitude(believed, share * airframe.joint_torque_max[i])
 
 
 @compilable
@@ -110,6 +135,7 @@ def joint_torques(
     airframe: Airframe,
     arm: ArmCoordinates,
     gains: PidGains,
+    tuning: PressTuning,
     field: Vec3,
     turning: Vec3,
     dt: float,
@@ -128,11 +154,36 @@ def joint_torques(
         )
         qdd[i] = wanted + r.flown_u.qdd_arm[i]
     limit_acceleration(airframe, arm, r.arm, q, qd, qdd)
+    if presses(r, tuning):
+        _press_with(r, airframe, press(r, airframe, tuning, field, turning, dt), qdd)
+        for i in range(n):
+            torque = joint_load(m, i, field, turning) + r.pressing.work[i]
+            r.wanted.joint_torque[i] = clamp_magnitude(torque, airframe.joint_torque_max[i])
+        return
+    r.pressing.commanded = r.pressing.ramped = 0.0
     for i in range(n):
         torque = joint_load(m, i, field, turning) - k.disturbance[i]
         for j in range(n):
             torque += m.qq[JOINTS * i + j] * qdd[j]
         r.wanted.joint_torque[i] = clamp_magnitude(torque, airframe.joint_torque_max[i])
+
+
+@compilable
+def _press_with(r: Tick, airframe: Airframe, force: float, qdd: Floats) -> None:
+    """Torques [N m] that press with a ``force`` [N], and beside it give ``qdd`` (j,) [rad/s^2].
+
+    What is observed along the normal is not made up for: it is what is wanted. Reads bodies;
+    writes pressing.work.
+    """
+    p, m, n, along = r.pressing, r.bodies, int(airframe.bodies.joints), 0.0
+    for i in range(n):
+        besides = p.external[i] - p.along[i] * p.pressed
+        p.work[i] = -clamp_magnitude(besides, _DISTURBANCE * airframe.joint_torque_max[i])
+        for j in range(n):
+            p.work[i] += m.qq[JOINTS * i + j] * qdd[j]
+        along += p.share[i] * p.work[i]
+    for i in range(n):
+        p.work[i] -= p.along[i] * (along + force)
 
 
 @compilable

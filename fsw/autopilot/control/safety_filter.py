@@ -43,7 +43,7 @@ from fsw.autopilot.barriers.safe_approach import (
     safe_approach_speed,
 )
 from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
-from fsw.autopilot.model.body import CAPSULE, FORM, ON, RADIUS, TURN, Body
+from fsw.autopilot.model.body import CAPSULE, FORM, ON, RADIUS, TOOL, TURN, Body
 from fsw.autopilot.model.kinematics import FRAME, put_base, put_links
 from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.model.parts import ON_BASE
@@ -51,6 +51,7 @@ from fsw.autopilot.shapes.zones import (
     ADDED,
     FLAT,
     FOLLOWS,
+    FORCE_MAX,
     KEEP_IN,
     PLANES,
     acceleration_of,
@@ -189,6 +190,8 @@ def _kept_off(
     for j in range(1 if follows else probes.shape[0]):
         if ends_do and probes[j, FORM] == CAPSULE:
             continue
+        if zones[zone, FORCE_MAX] > 0.0 and probes[j, TOOL] > 0.0:
+            continue  # the tool may touch it
         _, at, _ = nearest_place(zones, zone, which, shift, probes, j, frame)
         n, distance = (at.nx, at.ny, at.nz), at.distance
         if not follows:

@@ -53,7 +53,8 @@ def observe(k: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) ->
 
     A second-order observer with both poles at ``observer_bandwidth``: as quick as differencing the
     measured velocity ``v`` [m/s, NED], but the disturbance is a state and does not carry the
-    reading's noise straight into the rotors, which produce ``a`` [m/s^2, NED].
+    reading's noise straight into the rotors, which produce ``a`` [m/s^2, NED]. What is ``k.known``
+    of the disturbance is no wind.
     """
     bandwidth = tuning.observer_bandwidth
     for axis in range(3):
@@ -63,10 +64,12 @@ def observe(k: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: float) ->
         k.d[axis] += bandwidth * bandwidth * dt * surprise
     share = min(dt / tuning.wind_time, 1.0)
     for axis in range(2):
-        grown = k.disturbance_bias[axis] + share * (k.d[axis] - k.disturbance_bias[axis])
+        lasts = k.d[axis] - k.known[axis] - k.disturbance_bias[axis]
+        grown = k.disturbance_bias[axis] + share * lasts
         k.disturbance_bias[axis] = clamp_magnitude(grown, tuning.wind_limit)
     faded = k.recent * (1.0 - min(dt / _RECENT_S, 1.0))
-    k.recent = max(math.sqrt(k.d[0] * k.d[0] + k.d[1] * k.d[1]), faded)
+    x, y = k.d[0] - k.known[0], k.d[1] - k.known[1]
+    k.recent = max(math.sqrt(x * x + y * y), faded)
 
 
 class AxisState(NamedTuple):
@@ -97,19 +100,26 @@ def wanted_acceleration(
 
 @compilable
 def snap_command(
-    law: TrackingLaw, vehicle: AxisState, d: float, bias: float, plan: AxisState, u: float
+    law: TrackingLaw,
+    vehicle: AxisState,
+    d: float,
+    bias: float,
+    plan: AxisState,
+    u: float,
+    known: float = 0.0,
 ) -> float:
     """Commanded snap [m/s^4] of one horizontal axis, for the plan's acceleration ``u`` [m/s^2].
 
     ``d`` [m/s^2] is the observed disturbance, ``bias`` [m/s^2] its slow part, wind, which is
-    cancelled whole.
+    cancelled whole. What a surface adds that the tool presses on is ``known`` [m/s^2]: it takes
+    nothing from what the loop may ask for.
     """
     tuning, lag = law.tuning, law.lag
     k = law.gains.k
     k3, k4, k5 = k[2], k[3], k[4]
     e_s = plan.s - vehicle.s
     wanted = wanted_acceleration(law, vehicle, d, bias, plan)
-    a_ref = clamp_magnitude(wanted, tuning.acceleration_limit)
+    a_ref = clamp_magnitude(wanted + known, tuning.acceleration_limit) - known
     j_ref = plan.j + k3 / k4 * (a_ref - vehicle.a)
     # A jerk that can still be stopped before the acceleration overshoots.
     stoppable = math.sqrt(2.0 * tuning.stopping_snap * (abs(a_ref - vehicle.a) + 0.15))
@@ -140,6 +150,13 @@ def vertical_acceleration(
 
 
 @compilable
+def beyond_plan(observed: Observed, u: PlanInput | Accelerations) -> Vec3:
+    """What a surface accelerates the base by [m/s^2, NED], beyond what the plan ``u`` counts on."""
+    k, push = observed.known, u.push
+    return k[0] - push[0], k[1] - push[1], k[2] - push[2]
+
+
+@compilable
 def wanted_accelerations(
     law: TrackingLaw,
     estimate: StateEstimate | Estimate,
@@ -150,11 +167,14 @@ def wanted_accelerations(
 ) -> Vec3:
     """What ``follow_plan`` asks for on all axes [m/s^2, NED]."""
     p, v, d, bias = estimate.p_WB, observed.v, observed.d, observed.disturbance_bias
+    known, push = beyond_plan(observed, u), u.push
     x, planned = _along(0, p[0], v[0], motion, plan)
-    north = wanted_acceleration(law, x, d[0], bias[0], planned)
+    north = wanted_acceleration(law, x, d[0] - push[0], bias[0] + known[0], planned)
     y, planned = _along(1, p[1], v[1], motion, plan)
-    east = wanted_acceleration(law, y, d[1], bias[1], planned)
-    return north, east, vertical_acceleration(law, p, v, motion.a, d[2], plan, u)
+    east = wanted_acceleration(law, y, d[1] - push[1], bias[1] + known[1], planned)
+    lift = d[2] - observed.known[2]
+    down = vertical_acceleration(law, p, v, motion.a, lift, plan, u) - known[2]
+    return north, east, down
 
 
 @compilable
@@ -211,7 +231,9 @@ def follow_plan(
     wdy = (wx * -R[4] + R[1] * wy) / (-f * determinant)
     wdx = (R[0] * wy - R[3] * wx) / (-f * determinant)
 
-    a_z = vertical_acceleration(law, p, v, motion.a, observed.d[2], plan, u)
+    lift = observed.d[2] - observed.known[2]
+    a_z = vertical_acceleration(law, p, v, motion.a, lift, plan, u)
+    a_z -= observed.known[2] - u.push[2]
     thrust = mass * (GRAVITY - a_z) / max(R[8], 0.5)
     return (wdx, wdy), thrust
 
@@ -243,6 +265,6 @@ def _horizontal_snap(
 ) -> float:
     p, v = estimate.p_WB[axis] + off, observed.v[axis] + going
     vehicle, planned = _along(axis, p, v, motion, plan)
-    return snap_command(
-        law, vehicle, observed.d[axis], observed.disturbance_bias[axis], planned, u.a[axis]
-    )
+    bias = observed.disturbance_bias[axis] + (observed.known[axis] - u.push[axis])
+    d, known = observed.d[axis] - u.push[axis], observed.known[axis]
+    return snap_command(law, vehicle, d, bias, planned, u.a[axis], known)

@@ -48,6 +48,7 @@ from fsw.autopilot.flight.safety.uncertain_clearance import (
     pose_covariance,
 )
 from fsw.autopilot.flight.safety.zone_room import ZoneRoom
+from fsw.autopilot.flight.setpoints.pressed_reference import pressed_reference
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
@@ -509,6 +510,12 @@ class Autopilot:
         state, (targets, joints) = self._horizon(mode, state, estimate, apply_us)
         if state.limited and state.limited != limited:
             texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
+        p_WE, _ = end_effector(config.airframe.bodies, estimate)
+        targets, pushes = pressed_reference(targets, state.cascade, p_WE)
+        if not joints and any(zone.touch for zone in state.kept.safe_set.zones):
+            # The arm stays where it has room both ways, and the base comes along.
+            count = config.airframe.bodies.joints
+            joints = (config.airframe.home_posture[:count],) * len(targets)
         plan, safety = state.plan, state.safety
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         start, from_nominal = self._plans.start(plan, nominal, measured, now_us, safety.replan)
@@ -522,6 +529,7 @@ class Autopilot:
             joint_targets=joints,
             recent_disturbance=state.cascade.observed.recent,
             mode=state.vehicle.mode,
+            pushes=pushes,
         )
         if safety.replan:
             safety = replace(safety, replan=False)

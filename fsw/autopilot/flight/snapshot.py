@@ -5,7 +5,8 @@ from __future__ import annotations
 from fsw.autopilot.flight.failsafe.table import FAULTS
 from fsw.autopilot.flight.modes.offboard import report
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.signals import FlightSnapshot, Mode, SensorFrame
+from fsw.autopilot.signals import ContactReport, FlightSnapshot, Mode, SensorFrame
+from fsw.autopilot.tick_record import Pressing
 
 
 class Shown:
@@ -63,4 +64,15 @@ def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
         safe_set=state.mission.safe_set,
         actuators_found=state.damage.report,
         sensors_lost=tuple([one.sensor.value for one in state.aiding.lost]),
+        touching=contact_report(r.pressing) if r.pressing.near else None,
+    )
+
+
+def contact_report(k: Pressing) -> ContactReport:
+    """What the fast loop knows of the tool at a surface."""
+    x, y, z = k.force.tolist()
+    return ContactReport(
+        bool(k.contact),
+        (x, y, z),
+        *(k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance),
     )

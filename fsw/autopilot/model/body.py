@@ -35,9 +35,10 @@ _RIM_PLACES = 4
 
 
 # Columns of a probe's row, for kernels.
-PART, FORM, ON, BEGIN, END, RADIUS, RIM, TURN = 0, 1, 2, 3, 6, 9, 10, 11
+PART, FORM, ON, BEGIN, END, RADIUS, RIM, TURN, TOOL, OTHER = 0, 1, 2, 3, 6, 9, 10, 11, 12, 13
 """Index of its part; SPHERE, CAPSULE or DISC; what it is on; begin and end (3 each), radius, rim
-[m]; angle along the rim from the nearest place [rad]."""
+[m]; angle along the rim from the nearest place [rad]; whether it is of the tool, and how many parts
+before it are not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +50,22 @@ class Body:
 
     @property
     def probes(self) -> NDArray[np.float64]:
-        """A row of numbers a probe (probes, 12) [SI], in the order of the parts."""
-        rows = []
+        """A row of numbers a probe (probes, 14) [SI], in the order of the parts."""
+        rows, others = [], 0
         for k, part in enumerate(self.parts):
             form = DISC if part.rim > 0.0 else SPHERE if part.end is None else CAPSULE
             ends = (*part.begin, *(part.end or part.begin))
             for turn in range(_RIM_PLACES if form == DISC else 1):
                 angle = 2.0 * math.pi * turn / _RIM_PLACES
-                rows.append((k, form, part.on, *ends, part.radius, part.rim, angle))
+                place = (k, form, part.on, *ends, part.radius, part.rim, angle)
+                rows.append((*place, part.tool, others))
+            others += not part.tool
         return np.array(rows, dtype=np.float64)
+
+
+def tool_radius(body: Body) -> float:
+    """Radius of the ball about the end-effector [m]; 0 for a body of points."""
+    return max((part.radius for part in body.parts if part.tool and part.end is None), default=0.0)
 
 
 def reaches(body: Body, bodies: Bodies) -> tuple[float, ...]:

@@ -134,11 +134,20 @@ class Linearisation:
         object.__setattr__(self, "horizon", horizon)
         object.__setattr__(self, "tracked", tracked)
 
-    def refill(self, start: Array, inputs: Array) -> None:
-        """Linearise from ``start`` (states,) [SI] around the ``inputs`` (inputs n,) [SI]."""
+    def refill(self, start: Array, inputs: Array, pushes: Array | None = None) -> None:
+        """Linearise from ``start`` (states,) [SI] around the ``inputs`` (inputs n,) [SI].
+
+        ``pushes`` (n, 3) [m/s^2, NED] accelerate the base in each step beside its thrust.
+        """
         self.horizon.inputs[:] = inputs
         np.matmul(self.model.phi, start, out=self.states)
         np.add(self.states, self.model.gamma @ inputs, out=self.states)
+        if pushes is not None:
+            p, v, dt = np.zeros(3), np.zeros(3), self.model.period
+            for i, push in enumerate(pushes, start=1):
+                p, v = p + dt * (v + 0.5 * dt * push), v + dt * push
+                self.states[i, P : P + 3] += p
+                self.states[i, V : V + 3] += v
         _refill(self.horizon, self.tracked, packed_bodies(self.model.airframe.bodies))
 
 

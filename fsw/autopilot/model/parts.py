@@ -27,6 +27,7 @@ class Part:
     radius: float  # m, of a sphere or capsule; half the thickness of a disc
     end: Vec3 | None = None  # m; a capsule's other end
     rim: float = 0.0  # m, radius of a disc in the body's x-y plane
+    tool: bool = False  # of the tool, which alone may touch what may be touched
 
 
 def points_of(vehicle: Vehicle) -> tuple[Part, ...]:
@@ -35,7 +36,7 @@ def points_of(vehicle: Vehicle) -> tuple[Part, ...]:
         Part(point.name, vehicle.places[point.on], point.position, 0.0)
         for point in vehicle.critical_points
     ]
-    return _origin_first(points)
+    return _origin_first(_with_tool(vehicle, points))
 
 
 def parts_of(vehicle: Vehicle) -> tuple[Part, ...]:
@@ -50,7 +51,7 @@ def parts_of(vehicle: Vehicle) -> tuple[Part, ...]:
     for sphere in (*_ends(parts), *points_of(vehicle)):
         if not any(_holds(vehicle, part, sphere) for part in parts):
             parts.append(sphere)
-    return _origin_first([*parts, _rotors(vehicle)])
+    return _origin_first(_with_tool(vehicle, [*parts, _rotors(vehicle)]))
 
 
 def _origin_first(parts: list[Part]) -> tuple[Part, ...]:
@@ -61,6 +62,18 @@ def _origin_first(parts: list[Part]) -> tuple[Part, ...]:
         if (part.on, part.begin, part.end, part.rim) == (ON_BASE, _ORIGIN, None, 0.0)
     ] or [Part("origin", ON_BASE, _ORIGIN, 0.0)]
     return (at_origin[0], *(part for part in parts if part is not at_origin[0]))
+
+
+def _with_tool(vehicle: Vehicle, parts: list[Part]) -> list[Part]:
+    """The parts, with those of the last link marked that have an end at the end-effector."""
+    last, tip = len(vehicle.joints), vehicle.end_effector.position
+    return [
+        replace(part, tool=True)
+        if part.on == last
+        and min(math.dist(end, tip) for end in (part.begin, part.end or part.begin)) < _ROUNDED
+        else part
+        for part in parts
+    ]
 
 
 def _ends(parts: list[Part]) -> Iterator[Part]:

@@ -17,9 +17,10 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from fsw.autopilot.geometry.vectors import clamp, norm
+from fsw.autopilot.geometry.rotation import rotate_back
+from fsw.autopilot.geometry.vectors import add, add_scaled, clamp, cross, dot, norm, three
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.multibody import base_acceleration, posture
+from fsw.autopilot.model.multibody import Bodies, base_acceleration, place_of_tip, posture
 from fsw.autopilot.signals import JointVector, RotorVector, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
@@ -64,9 +65,8 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
 def estimate_mass(
     airframe: Airframe,
     mass: float,
-    rotors: RotorVector | Floats,
-    specific_force: float,
-    seconds: float,
+from fsw.autopilot.model.multibody import Bodies, base_acceleration, place_of_tip, posture
+from fsw.autopilot.signals import JointVector, RotorVector, Vec2, Vec3
 ) -> float:
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
 
@@ -74,9 +74,10 @@ def estimate_mass(
     makes it diverge. A second of averaging keeps gusts and arm motion out, and the estimate stays
     within 30 % of the believed mass. ``mass`` [kg] is the last estimate, ``rotors`` [N] the thrust
     of each, ``specific_force`` [m/s^2] along -z of the body, ``seconds`` [s] the time since.
+    A surface that the tool presses on gives a ``lift`` [N] along -z besides.
     """
     force, _ = rotor_wrench(airframe, rotors)
-    thrust = -force[2]
+    thrust = lift - force[2]
     if not (thrust > _WEIGHING_THRUST * airframe.mass and specific_force > _WEIGHING_THRUST):
         return mass  # hardly flying: a quotient of small numbers
     moved = mass + seconds / WEIGHING_TIME * (thrust / specific_force - mass)
@@ -95,6 +96,22 @@ def rotor_wrench(airframe: Airframe, thrust: RotorVector | Floats) -> tuple[Vec3
 
 
 @compilable
+def load_of_tip(r: Tick, b: Bodies, torque: JointVector | Floats) -> tuple[Vec3, Vec3]:
+    """Force [N, B] and torque [N m, B] about B's origin of the observed force on the tool.
+
+    What it does to the joints is added to their ``torque`` (j,) [N m], into pressing.load. Reads
+    estimate, bodies.
+    """
+    k, m = r.pressing, r.bodies
+    force = rotate_back(r.estimate.R_WB, k.force)
+    tip = place_of_tip(m, b)
+    for i in range(int(b.joints)):
+        lever = cross(three(m.axis, 3 * i), add_scaled(tip, three(m.origin, 3 * i), -1.0))
+        k.load[i] = torque[i] + dot(lever, force)
+    return force, cross(tip, force)
+
+
+@compilable
 def motion_state(
     airframe: Airframe, r: Tick, rotors: RotorVector | Floats, torque: JointVector | Floats
 ) -> MotionState:
@@ -107,7 +124,13 @@ def motion_state(
     force, turn = rotor_wrench(airframe, rotors)
     thrust = -force[2]
     f = thrust / r.mass
-    turning = base_acceleration(r.bodies, airframe.bodies, turn, force, torque)
+    if r.pressing.near > 0:
+        pushed, turned = load_of_tip(r, airframe.bodies, torque)
+        turning = base_acceleration(
+            r.bodies, airframe.bodies, add(turn, turned), add(force, pushed), r.pressing.load
+        )
+    else:
+        turning = base_acceleration(r.bodies, airframe.bodies, turn, force, torque)
     wdx, wdy = turning[0], turning[1]
     return MotionState(
         thrust,

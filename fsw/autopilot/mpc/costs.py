@@ -109,7 +109,11 @@ class TrackingCost:
     def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``."""
         target = _Target(targets.yaw, targets.position, targets.velocity)
-        return self._add_tracking(self._weights, horizon.tracked, target, quadratic)
+        cost = self._add_tracking(self._weights, horizon.tracked, target, quadratic)
+        if targets.pushes is not None:  # what holds against them costs nothing
+            of_push = quadratic.gradient.reshape(len(targets.pushes), -1)[:, :3]
+            of_push += 2.0 * self._weights.inputs * targets.pushes
+        return cost
 
 
 _SETTLED = 2  # joints, by what the paper's costs say

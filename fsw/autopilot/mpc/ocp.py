@@ -46,7 +46,7 @@ class Ocp:
     def linearise(self, start: Array, guess: Array, targets: TargetPoints) -> None:
         """Refill it around ``guess`` (inputs n,) [SI] from ``start`` (states,) [SI]."""
         program = self.qp
-        self._horizon.refill(start, guess)
+        self._horizon.refill(start, guess, targets.pushes)
         program.hessian[:] = 0.0
         program.linear[:] = 0.0
         guess = np.ascontiguousarray(guess)

@@ -98,6 +98,7 @@ class Planner:
             np.array(request.joint_targets) if request.joint_targets else None,
             request.t_apply_us,
             request.recent_disturbance,
+            np.array(request.pushes) if request.pushes else None,
         )
         asked = Question(ocp, start, targets, self._guess(request.t_apply_us))
         search = SOLVERS[self._config.solver](asked, self._config, self._stopwatch_us)
@@ -115,7 +116,7 @@ class Planner:
             t_us=request.t_apply_us,
             period_us=self._period_us,
             start=request.start,
-            inputs=_as_plan_inputs(inputs.reshape(-1, self._model.inputs)),
+            inputs=_as_plan_inputs(inputs.reshape(-1, self._model.inputs), request),
             status=solution.status,
             cost=ocp.cost,
             slack_max=ocp.largest_barrier_slack(solution.x),
@@ -141,6 +142,10 @@ class Planner:
             )
         if not math.isfinite(sum(map(sum, request.joint_targets))):
             return "a joint target is not finite"
+        if len(request.pushes) not in (0, self._config.horizon):
+            return f"{len(request.pushes)} pushes given for {self._config.horizon} steps"
+        if not math.isfinite(sum(map(sum, request.pushes))):
+            return "a push is not finite"
         return None
 
     def _retune(self, tuning: Tuning) -> None:
@@ -175,7 +180,12 @@ def _timings(search: Search, total_us: float) -> PlanTimings:
     return PlanTimings(search.linearise_us, search.solve_us, total_us)
 
 
-def _as_plan_inputs(inputs: Array) -> tuple[PlanInput, ...]:
-    return tuple(
-        PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:])) for u in inputs.tolist()
-    )
+def _as_plan_inputs(inputs: Array, request: PlanRequest) -> tuple[PlanInput, ...]:
+    found = [PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:])) for u in inputs.tolist()]
+    if request.pushes:
+        forces = [target.force for target in request.targets]
+        found = [
+            u._replace(push=push, force=force)
+            for u, push, force in zip(found, request.pushes, forces, strict=False)
+        ]
+    return tuple(found)

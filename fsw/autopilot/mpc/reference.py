@@ -45,7 +45,9 @@ def merge(
 
 
 def _is_finite(point: EndEffectorTarget) -> bool:
-    return math.isfinite(sum(point.p_WE) + sum(point.v_WE) + sum(point.a_WE) + point.yaw)
+    return math.isfinite(
+        sum(point.p_WE) + sum(point.v_WE) + sum(point.a_WE) + point.yaw + point.force
+    )
 
 
 def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarget:
@@ -67,7 +69,10 @@ def _hermite(first: EndEffectorTarget, last: EndEffectorTarget, t_us: int) -> En
         *(first.p_WE, first.v_WE, first.yaw, first.t_us),
         *(last.p_WE, last.v_WE, last.yaw, last.t_us, t_us),
     )
-    return EndEffectorTarget(t_us, p, v, a, yaw)
+    force = first.force
+    if force != last.force:
+        force += (t_us - first.t_us) / (last.t_us - first.t_us) * (last.force - force)
+    return EndEffectorTarget(t_us, p, v, a, yaw, force)
 
 
 @kernel

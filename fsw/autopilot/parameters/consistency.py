@@ -31,6 +31,7 @@ from fsw.autopilot.control.tube import (
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.flight_config import DisturbanceModel, FlightConfig
+from fsw.autopilot.parameters.touching import against_touching
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.ball import is_point
 from fsw.autopilot.signals import SafeSet, Zone
@@ -98,12 +99,25 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
             findings.append(_tube_of_all_axes(config, tuning, loop, kept))
         else:
             findings.append(_sampled(tuning, surroundings, planner.period))
+    findings += _touched(config, safe_set, loop)
     if config.inner == "tracking":
         if others:
             findings += _tubes_of_parts(config, loop, others)
             findings += _returns(config, loop)
         findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
+
+
+def _touched(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> list[Finding]:
+    """What can be promised at each surface that may be touched, or why nothing can."""
+    found = []
+    for number, zone in enumerate(safe_set.zones, start=1):
+        if zone.touch is not None:
+            against = against_touching(config, zone, loop)
+            found.append(
+                Finding("touch", not against, f"zone {number} cannot be touched: {against}")
+            )
+    return found
 
 
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:

@@ -104,6 +104,7 @@ STREAMS: Final = (
     Stream(message_ids.GPS_RAW_INT, 1, 5, AUTOPILOT, encode_place.gps_raw),
     Stream(message_ids.MPC_HORIZON, 0, 0, PANDION, encode_dialect.mpc_horizon),
     Stream(message_ids.MPC_HORIZON_ARM, 0, 0, PANDION, encode_dialect.mpc_horizon_arm),
+    Stream(message_ids.TOOL_CONTACT, 10, 20, PANDION, encode_dialect.tool_contact),
 )
 
 # These leave at once when mode, arming, landing or health change.

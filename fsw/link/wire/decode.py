@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final, cast
 
-from fsw.autopilot.flight.commands.bounds import point_problem, zone_problem
+from fsw.autopilot.flight.commands.bounds import reference_problem, zone_problem
 from fsw.autopilot.shapes import BY_NUMBER, kind_of
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
@@ -23,6 +23,7 @@ from fsw.autopilot.signals import (
     EndEffectorTarget,
     SensorFrame,
     Shape,
+    Touch,
     Vec3,
     Zone,
 )
@@ -43,6 +44,9 @@ _POSITION_IGNORED: Final = 0x007
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 MAX_ZONES: Final = 64  # in a set
 _KEEP_IN: Final = 1  # PANDION_SHAPE_FLAGS
+_TOUCH: Final = 2
+_FORCE_AT: Final = 16  # among the numbers of an END_EFFECTOR_TARGET
+_TOUCH_AT: Final = 27  # of an OBSTACLE_SHAPE
 
 
 class RefusedError(Exception):
@@ -160,10 +164,13 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
     velocity = _ZERO if mask & _VELOCITY_IGNORED else cast(Vec3, values[4:7])
     acceleration = _ZERO if mask & _ACCELERATION_IGNORED else cast(Vec3, values[7:10])
     yaw = 0.0 if mask & _YAW_IGNORED else values[10]
-    problem = point_problem(position, velocity, acceleration, yaw)
+    target = EndEffectorTarget(
+        int(values[0]), position, velocity, acceleration, yaw, values[_FORCE_AT]
+    )
+    problem = reference_problem(target)
     if problem is not None:
         raise RefusedError(f"target refused: {problem}")
-    return EndEffectorTarget(int(values[0]), position, velocity, acceleration, yaw)
+    return target
 
 
 def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
@@ -196,13 +203,14 @@ def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
     """
     index, count, number, flags = map(int, values[23:27])
     kind = BY_NUMBER.get(number)
-    if kind is None or flags & ~_KEEP_IN:
+    if kind is None or flags & ~(_KEEP_IN | _TOUCH):
         return None
-    clearance, velocity, keep_in = values[1], cast(Vec3, values[2:5]), flags == _KEEP_IN
+    clearance, velocity, keep_in = values[1], cast(Vec3, values[2:5]), bool(flags & _KEEP_IN)
+    touch = Touch(*values[_TOUCH_AT : _TOUCH_AT + 5]) if flags & _TOUCH else None
     # One that stands is the same whenever it is announced.
     t_us = int(values[0]) if velocity != _ZERO else 0
     shape = Shape(kind.name, values[5 : 5 + kind.size])
-    return _indexed(Zone(shape, clearance, keep_in, velocity, t_us), index, count)
+    return _indexed(Zone(shape, clearance, keep_in, velocity, t_us, touch), index, count)
 
 
 def workspace_sphere(values: Numbers) -> Zone:

@@ -13,7 +13,7 @@ from typing import Final
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.shapes import kind_of
-from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind
+from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind, Zone
 from fsw.link.wire import message_ids
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
@@ -28,6 +28,7 @@ _U32: Final = 0xFFFFFFFF
 _HORIZON_STEPS, _HORIZON_JOINTS = 6, 2  # of an MPC_HORIZON
 _SHAPE_NUMBERS: Final = 16  # of an OBSTACLE_SHAPE
 _NOT_TOUCHED: Final = (0.0,) * 5  # its numbers of contact
+_TOUCH: Final = 2  # PANDION_SHAPE_FLAGS
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
 
@@ -61,7 +62,7 @@ def end_effector_target(snapshot: FlightSnapshot, _: TelemetryContext) -> WireVa
     if target is None:
         return None
     motion = (*target.p_WE, *target.v_WE, *target.a_WE)
-    return (target.t_us, *motion, target.yaw, 0.0, 0, 0, 0, _LOCAL_NED, 0.0)
+    return (target.t_us, *motion, target.yaw, 0.0, 0, 0, 0, _LOCAL_NED, target.force)
 
 
 def setpoint_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
@@ -94,6 +95,15 @@ def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues 
         *padded(report.added[:_MAX_CONSTRAINTS], _MAX_CONSTRAINTS),
         report.shortfall,
     )
+
+
+def tool_contact(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """TOOL_CONTACT while a surface that may be touched is near."""
+    k = snapshot.touching
+    if k is None:
+        return None
+    about = (k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance)
+    return (snapshot.t_us, *k.force, *about, int(k.contact))
 
 
 def mpc_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
@@ -146,6 +156,11 @@ def mpc_horizon_arm(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
     return (plan.t_us, *arm, plan.plan_id & _U32, len(steps), len(x.q_arm))
 
 
+def _flags(zone: Zone) -> int:
+    """PANDION_SHAPE_FLAGS."""
+    return int(zone.keep_in) | (0 if zone.touch is None else _TOUCH)
+
+
 def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext) -> list[Outgoing]:
     """OBSTACLE_SHAPE of the safe set in force: all, or the one of number ``which`` [1], from 1."""
     zones = snapshot.safe_set.zones
@@ -159,8 +174,8 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
             (
                 *(zone.t_us, zone.clearance, *zone.velocity),
                 *padded(zone.shape.numbers, _SHAPE_NUMBERS),
-                *(0, 0, index, len(zones), kind_of(zone.shape).number, int(zone.keep_in)),
-                *_NOT_TOUCHED,
+                *(0, 0, index, len(zones), kind_of(zone.shape).number, _flags(zone)),
+                *(_NOT_TOUCHED if zone.touch is None else zone.touch),
             ),
             message_ids.PANDION,
         )

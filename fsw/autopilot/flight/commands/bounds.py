@@ -26,6 +26,8 @@ from fsw.autopilot.signals import (
 from fsw.frozen import replace
 
 MAX_CLEARANCE: Final = 10.0  # m; what needs more is a larger shape
+MAX_FORCE: Final = 200.0  # N, on a surface
+MAX_STIFFNESS: Final = 1e6  # N/m, of one
 MAX_SPEED: Final = 20.0  # m/s; faster is a slip of the unit
 MAX_ACCELERATION: Final = 20.0  # m/s^2, the same
 MAX_RATE: Final = 10.0  # rad/s
@@ -75,8 +77,31 @@ def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
     if not speed <= min(max_speed, MAX_SPEED):
         most = min(max_speed, MAX_SPEED)
         return f"it moves at {speed:g} m/s; at most {most:g} m/s is expected (SUR_V_ZONE)"
+    if zone.touch is not None:
+        problem = touch_problem(zone)
+        if problem is not None:
+            return problem
     if kind.follows_target and (not zone.keep_in or zone.velocity != _AT_REST):
         return "what follows the target is to be kept in, and has no velocity of its own"
+    return None
+
+
+def touch_problem(zone: Zone) -> str | None:
+    """Why what is said of a surface that may be touched is out of range."""
+    touch = zone.touch
+    if touch is None:
+        return None
+    if zone.keep_in:
+        return "what is to be kept in cannot be touched"
+    low, high = touch.stiffness_low, touch.stiffness_high
+    if not 0.0 < touch.force_max <= MAX_FORCE:
+        return f"a force of {touch.force_max:g} N is outside 0 to {MAX_FORCE:g} N"
+    if not 0.0 < low <= high <= MAX_STIFFNESS:
+        return (
+            f"a stiffness of {low:g} to {high:g} N/m is no range within 0 to {MAX_STIFFNESS:g} N/m"
+        )
+    if not (0.0 <= touch.dissipation <= 1000.0 and 0.0 <= touch.friction <= 10.0):
+        return "dissipation must be 0 to 1000 s/m and friction 0 to 10"
     return None
 
 
@@ -84,6 +109,13 @@ def target_problem(target: EndEffectorTarget, now_us: int) -> str | None:
     """Why a target of a stream cannot be believed at a time."""
     if abs(target.t_us - now_us) > 1e6 * MAX_STAY:
         return f"its time is more than {MAX_STAY:g} s from now"
+    return reference_problem(target)
+
+
+def reference_problem(target: EndEffectorTarget) -> str | None:
+    """Why a target is out of range; none of its axes may be open."""
+    if not 0.0 <= target.force <= MAX_FORCE:
+        return f"a force of {target.force:g} N is outside 0 to {MAX_FORCE:g} N"
     return point_problem(target.p_WE, target.v_WE, target.a_WE, target.yaw)
 
 

@@ -24,6 +24,9 @@ MISSED_TICKS: Final = 10
 JUMP_SHOWN_US: Final = 1_000_000  # for which a jump of time is a condition
 FALLING_US: Final = 1_000_000  # in which what rotors do not carry falls plainly, or stands
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
+CONTACT_LOST_S: Final = 1.0  # without contact while it is asked for
+SURFACE_OFF: Final = 0.06  # m, from where it was announced
+SLIP: Final = 0.2  # m/s along the surface, which no reference asks for
 _HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be believed again
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 
@@ -102,6 +105,35 @@ def lacks_room(context: FailsafeContext) -> bool:
     kept = context.state.kept
     lasts = context.estimate.t_us - kept.sufficient_us >= _LACKING_US
     return kept.shortfall > SHORTFALL and lasts and context.state.vehicle.flies
+
+
+def presses_too_hard(context: FailsafeContext) -> bool:
+    """In flight, the tool is pressed upon by more than its surface allows, as far as is known."""
+    pressing = context.state.cascade.pressing
+    return bool(pressing.near and pressing.pressed > pressing.most) and _flies(context)
+
+
+def has_lost_contact(context: FailsafeContext) -> bool:
+    """In flight, the tool has missed its surface for a while."""
+    return context.state.cascade.pressing.lost_for > CONTACT_LOST_S and _flies(context)
+
+
+def surface_has_moved(context: FailsafeContext) -> bool:
+    """In flight, the tool meets its surface far from where it was announced."""
+    pressing = context.state.cascade.pressing
+    return bool(pressing.contact and abs(pressing.distance) > SURFACE_OFF) and _flies(context)
+
+
+def tool_slips(context: FailsafeContext) -> bool:
+    """In flight, the tool moves along its surface faster than any reference leads it."""
+    pressing = context.state.cascade.pressing
+    if not pressing.contact:
+        return False
+    return math.hypot(*pressing.slip.tolist()) > SLIP and _flies(context)
+
+
+def _flies(context: FailsafeContext) -> bool:
+    return context.state.vehicle.flies
 
 
 def is_unaided(context: FailsafeContext) -> bool:

@@ -104,6 +104,12 @@ def by_mm(length: float) -> str:
     return f" by {1e3 * length:.0f} mm"
 
 
+def force(context: FailsafeContext) -> str:
+    """How hard the tool is pressed upon, and what is allowed."""
+    pressing = context.state.cascade.pressing
+    return f": {pressing.pressed:.1f} N of {pressing.most:.1f} N"
+
+
 def carried(context: FailsafeContext) -> str:
     """What tells that the ground carries the vehicle, and for how long it has."""
     since_us = context.state.safety.light_us

@@ -18,7 +18,7 @@ from collections import Counter
 
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.zones import surfaces
-from fsw.autopilot.signals import SafeSet, Shape, Vec3, Zone
+from fsw.autopilot.signals import SafeSet, Shape, Touch, Vec3, Zone
 
 
 def growth(old: SafeSet, new: SafeSet) -> str:
@@ -50,7 +50,7 @@ def held(zone: Zone, after_us: int) -> Zone:
     moved = kind_of(zone.shape).moved(
         zone.shape.numbers, (elapsed * vx, elapsed * vy, elapsed * vz)
     )
-    return Zone(Shape(zone.shape.kind, moved), zone.clearance, zone.keep_in)
+    return Zone(Shape(zone.shape.kind, moved), zone.clearance, zone.keep_in, touch=zone.touch)
 
 
 def summary(safe_set: SafeSet) -> str:
@@ -69,13 +69,15 @@ def is_moving(zone: Zone) -> bool:
     return zone.velocity != (0.0, 0.0, 0.0)
 
 
-def _look(zone: Zone) -> tuple[str, float, bool]:
-    return zone.shape.kind, zone.clearance, zone.keep_in
+def _look(zone: Zone) -> tuple[str, float, bool, Touch | None]:
+    return zone.shape.kind, zone.clearance, zone.keep_in, zone.touch
 
 
 def _implies(new: Zone, old: Zone) -> bool:
     """Whether a place that is safe of the new zone is safe of the old one, as far as is shown."""
     if (new.velocity, new.keep_in) != (old.velocity, old.keep_in):
+        return False
+    if not _touches_no_more(new.touch, old.touch):
         return False
     if is_moving(new) and new.t_us != old.t_us:
         return False
@@ -84,6 +86,13 @@ def _implies(new: Zone, old: Zone) -> bool:
     if new.shape.kind == old.shape.kind and kind_of(new.shape).covers(new, old):
         return True
     return not old.keep_in and _holds_ball_around(new, old)
+
+
+def _touches_no_more(new: Touch | None, old: Touch | None) -> bool:
+    """Whether the tool may touch nothing that it might not before, nor press harder."""
+    if new is None or new == old:
+        return True
+    return old is not None and new == old._replace(force_max=min(new.force_max, old.force_max))
 
 
 def _holds_ball_around(new: Zone, old: Zone) -> bool:
@@ -101,6 +110,9 @@ def _change(old: Zone, zones: tuple[Zone, ...]) -> str:
     for new in zones:
         if new.shape == old.shape and new.clearance < old.clearance:
             return f"loses {1e3 * (old.clearance - new.clearance):.1f} mm of clearance"
+    for new in zones:
+        if new.shape == old.shape and not _touches_no_more(new.touch, old.touch):
+            return "may be touched, or pressed harder"
     before = _reach(old)
     if before is not None:
         normal, reach = before

@@ -148,7 +148,7 @@ def _limit_all(
             *(zones, begin_us, target.t_us, target.p_WE, target.v_WE),
             *(p_WE, v_WE, barrier.alpha, barrier.slope, limits),
         )
-        limited.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw))
+        limited.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw, target.force))
         left |= which
     result = tuple(limited)
     return targets if result == targets else result, left

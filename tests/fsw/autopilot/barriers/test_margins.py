@@ -10,10 +10,19 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.barriers.margins import Margins
 from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.body import body_of
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
-from fsw.autopilot.signals import ConstraintKind, EndEffectorTarget, SafeSet, StateEstimate, Zone
+from fsw.autopilot.signals import (
+    ConstraintKind,
+    EndEffectorTarget,
+    SafeSet,
+    StateEstimate,
+    Touch,
+    Zone,
+)
+from fsw.frozen import replace
 from tests.fsw.autopilot.barriers.horizons import (
     PERIOD,
     POINTS,
@@ -128,3 +137,21 @@ def test_open_space_and_a_sphere_without_target_report_nothing() -> None:
     estimate = estimate_of(Rotation.identity())
     assert MARGINS.report(SafeSet(), estimate, None).margins == ()
     assert MARGINS.report(SafeSet((SPHERE,)), estimate, None).margins == ()
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_of_a_wall_that_may_be_touched_only_the_tool_has_no_margin() -> None:
+    """The others' are those of any wall, in the same order."""
+    full, case = body_of("full", AIRFRAME), random_case(np.random.default_rng(3))
+    margins = Margins(full, AIRFRAME.bodies, (TUNING, TUNING), PERIOD)
+    touched = replace(WALLS[0], touch=Touch(10.0, 1e3, 1e4))
+    now = estimate_at_start(case)
+    kept = margins.report(SafeSet((WALLS[0], WALLS[1])), now, None)
+    seen = margins.report(SafeSet((touched, WALLS[1])), now, None)
+    tool = [k for k, part in enumerate(full.parts) if part.tool]
+    assert {full.parts[k].name for k in tool} == {"end_effector", "link2"}
+    count = len(full.parts)
+    others = [k for k in range(count) if k not in tool]
+    assert seen.per_zone == (count - 2, count)
+    assert seen.margins == tuple(kept.margins[k] for k in others) + kept.margins[count:]
+    assert seen.barrier == tuple(kept.barrier[k] for k in others) + kept.barrier[count:]

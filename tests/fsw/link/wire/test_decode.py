@@ -7,7 +7,15 @@ import math
 import pytest
 
 from fsw.autopilot.shapes import BY_NAME, KINDS
-from fsw.autopilot.signals import Arm, MessageSource, Mode, Rejected, SensorFrame, SwitchMode
+from fsw.autopilot.signals import (
+    Arm,
+    MessageSource,
+    Mode,
+    Rejected,
+    SensorFrame,
+    SwitchMode,
+    Touch,
+)
 from fsw.link.inbox import Inbox
 from fsw.link.wire import message_ids as ids
 from messages import dialect
@@ -185,6 +193,53 @@ def shape(kind: int, index: int = 0, count: int = 1, **fields: float) -> Frame:
     return frame(
         ids.OBSTACLE_SHAPE, index=index, count=count, kind=kind, **{**default, **numbers, **fields}
     )
+
+
+TOUCHED = {
+    "flags": 2,
+    "force_max": 10.0,
+    "stiffness[0]": 512.0,
+    "stiffness[1]": 2048.0,
+    "dissipation": 4.0,
+    "friction": 0.5,
+}
+
+
+def test_what_the_tool_meets_is_read() -> None:
+    inbox = Inbox()
+    inbox.accept(shape(0, **TOUCHED))
+    (one,) = inbox.take().announced
+    (zone,) = one.safe_set.zones
+    assert zone.touch == Touch(10.0, 512.0, 2048.0, 4.0, 0.5)
+    inbox.accept(target(force=2.5))
+    assert [point.force for point in inbox.take().targets] == [2.5]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ({"force_max": 0.0}, "a force of 0 N is outside 0 to 200 N"),
+        ({"force_max": NAN}, "a force of nan N"),
+        ({"stiffness[0]": 4096.0}, "4096 to 2048 N/m is no range within"),
+        ({"flags": 3}, "what is to be kept in cannot be touched"),
+        ({"friction": -1.0}, "friction 0 to 10"),
+    ],
+)
+def test_a_surface_that_cannot_be_is_refused(wrong: dict[str, float], why: str) -> None:
+    inbox = Inbox()
+    inbox.accept(shape(0, **{**TOUCHED, **wrong}))
+    received = inbox.take()
+    assert not received.announced
+    assert why in " ".join(received.refused)
+
+
+@pytest.mark.parametrize("force", [-1.0, 201.0, NAN])
+def test_a_force_out_of_bounds_is_refused(force: float) -> None:
+    inbox = Inbox()
+    inbox.accept(target(force=force))
+    received = inbox.take()
+    assert not received.targets
+    assert "is outside 0 to 200 N" in " ".join(received.refused)
 
 
 def test_the_dialect_names_every_shape_there_is() -> None:

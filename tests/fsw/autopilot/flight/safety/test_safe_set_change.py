@@ -16,7 +16,7 @@ from fsw.autopilot.shapes.half_space import half_space, wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.shapes.vertical_cylinder import column, vertical_cylinder
 from fsw.autopilot.shapes.zones import surfaces
-from fsw.autopilot.signals import EndEffectorTarget, SafeSet, Shape, Vec3, Zone
+from fsw.autopilot.signals import EndEffectorTarget, SafeSet, Shape, Touch, Vec3, Zone
 
 ZERO = (0.0, 0.0, 0.0)
 TARGET = EndEffectorTarget(0, (0.2, -0.1, -1.0), ZERO, ZERO)
@@ -195,3 +195,22 @@ def test_a_safe_set_is_summed_up_in_words() -> None:
     assert summary(SafeSet()) == "nothing to keep clear of"
     assert summary(SafeSet((FRONT, BALL, BALL))) == "1 half-space, 2 balls"
     assert summary(SafeSet((SHELF, SHELF))) == "2 boxes"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "grown"),
+    [
+        (None, Touch(5.0, 1e3, 1e4), True),
+        (Touch(5.0, 1e3, 1e4), Touch(6.0, 1e3, 1e4), True),
+        (Touch(5.0, 1e3, 1e4), Touch(5.0, 1e3, 9e3), True),
+        (Touch(5.0, 1e3, 1e4), Touch(4.0, 1e3, 1e4), False),
+        (Touch(5.0, 1e3, 1e4), None, False),
+    ],
+)
+def test_to_touch_what_might_not_be_touched_is_growth(
+    old: Touch | None, new: Touch | None, grown: bool
+) -> None:
+    one = wall((1.0, 0.0, 0.0), 2.0, 0.1)
+    before, after = (SafeSet((replace(one, touch=touch),)) for touch in (old, new))
+    said = growth(before, after)
+    assert said == ("zone 1 (half-space) may be touched, or pressed harder" if grown else "")

@@ -1,0 +1,312 @@
+r"""The tool on a surface: who pushes how hard, known without a force sensor, and never too hard.
+
+Position cannot bound a force: a wall of 10 kN/m takes 5 N within half a millimetre, and the base is
+pushed about by centimetres. So along the surface's normal the arm gives a force and the base a
+place. With the tool's Jacobian J, the joints' levers :math:`J_n = n^T J` along the normal n, their
+mass matrix M and
+
+.. math:: \lambda = (J_n M^{-1} J_n^T)^{-1}, \qquad s = n^T (J J^T + \epsilon)^{-1} J
+
+the tool's mass along n and what joint torques give statically along n, the joint loop's torques
+lose their :math:`J_n^T s\tau`, the tool is kept still against the base's own acceleration, and
+:math:`-J_n^T f` presses. Whatever the wall's stiffness and wherever it moves, it then meets f, the
+tool's mass, and friction. What pushes the base is taken up by the arm.
+
+The observer of the joints' generalised momentum gives the torques from outside, from which follow
+
+.. math:: \hat f = s\,\hat\tau, \qquad
+          |\hat f - f| \le \sum_k |s_k| (\tau_{c,k} + |M_{qv,k}| d_m + \mu |g_k|) =: e
+
+with the drives' friction :math:`\tau_c`, a push :math:`d_m` on the base that is not yet observed,
+and masses that are wrong by a share :math:`\mu`. The barrier on the force is
+
+.. math:: h_f = f_{max} - e - f \ge 0, \qquad v \le \rho (f_{max} - e) / \sqrt{k_{max} \lambda}
+
+: what is commanded never exceeds :math:`f_{max} - e`, and in free air the tool comes no faster than
+the hardest wall can stop within a share :math:`\rho` of it. To keep in contact is soft: a wall that
+yields is followed as far as the force reaches.
+
+Source: docs/equations.md T8.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fsw.autopilot.geometry.rotation import rotate, rotate_back
+from fsw.autopilot.geometry.vectors import (
+    add_scaled,
+    clamp,
+    cross,
+    dot,
+    norm,
+    put_three,
+    subtract,
+    three,
+)
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
+from fsw.autopilot.model.multibody import (
+    Bodies,
+    factorise,
+    place_of_tip,
+    solve,
+    tip_in_body,
+)
+from fsw.autopilot.shapes.zones import (
+    CLEARANCE,
+    FORCE_MAX,
+    STIFF,
+    Array,
+    moved_by,
+    surface_at,
+    velocity_of,
+)
+from fsw.autopilot.signals import Vec3
+from fsw.autopilot.tick_record import Tick
+from fsw.compiled import compilable
+from fsw.record import JOINTS
+from vehicles.description import V6
+
+
+@dataclass(frozen=True, slots=True)
+class PressTuning:
+    """How the tool meets a surface and presses on it."""
+
+    near: float = 0.15  # m from a surface that may be touched the observer is at work
+    band: float = 0.04  # m from it the tool's force along the normal is bounded
+    bandwidth: float = 80.0  # rad/s, of the tool's speed along the normal
+    stiffness: float = 10.0  # 1/s, of its place in the band
+    speed: float = 0.05  # m/s, with which it looks for a surface, at most
+    back: float = 0.3  # m/s, at most, out of the band
+    share: float = 0.3  # rho, of the largest force, that an impact may give
+    search: float = 2.0  # N, at most, to move the tool in free air
+    rise: float = 6.0  # N/s, of the force
+    fall: float = 150.0  # N/s, the same
+    felt: float = 0.4  # N, from which on there is contact
+    lost: float = 0.15  # N, below which there is none
+    slipping: float = 0.3  # s, over which the mean of a slip is taken
+    remember: float = 0.1  # s, in which the mean speed of a tool in contact follows
+    damping: float = 1.0  # N, at most, against speeds beside the mean
+    disturbance: float = 0.8  # m/s^2, d_m
+    wrong: float = 0.03  # mu, share by which masses may be wrong
+    heaviest: float = 5.0  # kg; a tool that is heavier cannot be moved along the normal
+
+
+@compilable
+def look_for_surface(
+    r: Tick, bodies: Bodies, tuning: PressTuning, radius: float, zones: Array
+) -> None:
+    """The surface that the tool's ball of ``radius`` [m] may touch, the nearest of ``zones``.
+
+    Those are (zones, k) [SI] of ``moving_zones``. Reads estimate, bodies; writes pressing.
+    """
+    k, estimate, found = r.pressing, r.estimate, False
+    nearest = tuning.near
+    for zone in range(zones.shape[0]):
+        if not zones[zone, FORCE_MAX] > 0.0:
+            continue
+        tip = rotate(estimate.R_WB, place_of_tip(r.bodies, bodies))
+        p = estimate.p_WB[0] + tip[0], estimate.p_WB[1] + tip[1], estimate.p_WB[2] + tip[2]
+        x, y, z = subtract(p, moved_by(zones, zone, estimate.t_us))
+        at = surface_at(zones, zone, 0, x, y, z)
+        distance = at.distance + zones[zone, CLEARANCE] - radius
+        if distance < nearest:
+            found, nearest = True, distance
+            n = (at.nx, at.ny, at.nz)
+            put_three(k.normal, 0, n)
+            k.surface_speed = dot(n, velocity_of(zones, zone, estimate.t_us))
+            k.most, k.stiffness = zones[zone, FORCE_MAX], zones[zone, STIFF]
+    if not found:
+        if k.near > 0:
+            _forget(r)
+        return
+    k.distance = nearest
+    if k.near == 0:
+        k.near = 1
+        for i in range(int(bodies.joints)):
+            k.momentum[i], k.external[i] = r.bodies.momentum[i], r.joints.disturbance[i]
+
+
+@compilable
+def watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> None:
+    """How long the tool has missed the surface, and how it slips, a tick of ``dt`` [s] later.
+
+    Reads u, estimate, bodies; writes pressing.
+    """
+    k = r.pressing
+    if not r.u.force > 0.0:
+        if k.met > 0:
+            k.met, k.lost_for = 0, 0.0
+            for i in range(3):
+                k.slip[i] = 0.0
+        return
+    if k.contact > 0:
+        k.met, k.lost_for = 1, 0.0
+        _, rel = tip_in_body(r.bodies, bodies)
+        v, normal = rotate(r.estimate.R_WB, rel), three(k.normal, 0)
+        base = r.estimate.v_WB
+        v = v[0] + base[0], v[1] + base[1], v[2] + base[2]
+        v = add_scaled(v, normal, -dot(normal, v))
+        for i in range(3):
+            k.slip[i] += min(dt / tuning.slipping, 1.0) * (v[i] - k.slip[i])
+    elif k.met > 0:
+        k.lost_for += dt
+
+
+@compilable
+def _forget(r: Tick) -> None:
+    k = r.pressing
+    k.near = k.contact = 0
+    k.pressed = k.unsure = k.mass = k.speed = k.mean_speed = 0.0
+    k.asked = k.ramped = k.commanded = 0.0
+    for i in range(3):
+        k.force[i] = r.observed.known[i] = 0.0
+    for i in range(JOINTS):
+        k.momentum[i] = k.external[i] = 0.0
+
+
+@compilable
+def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
+    """The force on the tool, from what the joints' observer has found.
+
+    Reads estimate, bodies, pressing.external; writes pressing, observed.known.
+    """
+    k, m, b, n = r.pressing, r.bodies, airframe.bodies, int(airframe.bodies.joints)
+    R, normal = r.estimate.R_WB, three(k.normal, 0)
+    along, (tip, rel) = rotate_back(R, normal), tip_in_body(m, b)
+    shape = _levers(r, tip, n)
+    for i in range(n):
+        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
+        k.along[i] = k.work[i] = dot(along, lever)
+        k.share[i] = dot(along, _through(shape, lever))
+    factorise(m.factor, m.qq, n)
+    solve(m.factor, k.work, n)
+    eased = felt = whole = 0.0
+    for i in range(n):
+        eased += k.along[i] * k.work[i]
+        whole += k.share[i] * k.along[i]
+        felt += k.share[i] * k.external[i]
+    v = rotate(R, rel)
+    speed = dot(
+        normal, (v[0] + r.estimate.v_WB[0], v[1] + r.estimate.v_WB[1], v[2] + r.estimate.v_WB[2])
+    )
+    k.speed = k.surface_speed - speed
+    if not (eased * tuning.heaviest > 1.0 and whole > _WHOLE):
+        k.mass = math.inf  # the arm does not move along this normal
+        return
+    k.mass, k.pressed = 1.0 / eased, felt
+    k.unsure = 0.0
+    gravity = rotate_back(R, (0.0, 0.0, GRAVITY))
+    for i in range(n):
+        held = abs(dot(three(m.vq, 3 * i), gravity))
+        torque = airframe.joint_friction[i] + tuning.wrong * held
+        torque += tuning.disturbance * norm(three(m.vq, 3 * i))
+        k.unsure += abs(k.share[i]) * torque
+    force = rotate(R, _force_on_tool(r, shape, tip, n))
+    put_three(k.force, 0, force)
+    # What the base counts on is no more than what it was asked to stand.
+    into = clamp(dot(normal, force), 0.0, k.commanded + tuning.damping) if k.contact > 0 else 0.0
+    aside = add_scaled(force, normal, -dot(normal, force))
+    slipping = norm(aside)
+    share = min(1.0, into / slipping) if slipping > 0.0 else 0.0
+    for i in range(3):
+        r.observed.known[i] = (into * normal[i] + share * aside[i]) / r.mass
+
+
+_BLOCKED = 0.5  # share of the speed asked for below which something is in the way
+_WHOLE = 0.9  # of a force along the normal, that the joints must be able to give
+_DAMPED = 1e-4  # m^2, of levers without which a direction is left out
+
+
+@compilable
+def _levers(r: Tick, tip: Vec3, n: int) -> V6:
+    """Inverse of J J^T, damped [1/m^2, B], of the joints' levers of the tool: xx yy zz xy xz yz."""
+    m = r.bodies
+    xx = yy = zz = _DAMPED
+    xy = xz = yz = 0.0
+    for i in range(n):
+        x, y, z = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
+        xx, yy, zz = xx + x * x, yy + y * y, zz + z * z
+        xy, xz, yz = xy + x * y, xz + x * z, yz + y * z
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    size = 1.0 / (xx * a + xy * b + xz * c)
+    d, e, f = xx * zz - xz * xz, xx * yy - xy * xy, xy * xz - xx * yz
+    return a * size, d * size, e * size, b * size, c * size, f * size
+
+
+@compilable
+def _through(s: V6, v: Vec3) -> Vec3:
+    return (
+        s[0] * v[0] + s[3] * v[1] + s[4] * v[2],
+        s[3] * v[0] + s[1] * v[1] + s[5] * v[2],
+        s[4] * v[0] + s[5] * v[1] + s[2] * v[2],
+    )
+
+
+@compilable
+def _force_on_tool(r: Tick, shape: V6, tip: Vec3, n: int) -> Vec3:
+    """Least force [N, B] on the tool that gives the observed torques, by damped least squares."""
+    total, m = (0.0, 0.0, 0.0), r.bodies
+    for i in range(n):
+        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
+        total = add_scaled(total, lever, r.pressing.external[i])
+    return _through(shape, total)
+
+
+@compilable
+def presses(r: Tick, tuning: PressTuning) -> bool:
+    """Whether the tool's motion along the normal is a matter of force now."""
+    k = r.pressing
+    if k.near == 0 or not k.mass < tuning.heaviest:
+        return False
+    return k.contact > 0 or k.asked > 0.0 or k.distance < tuning.band
+
+
+@compilable
+def press(
+    r: Tick, airframe: Airframe, tuning: PressTuning, field: Vec3, turning: Vec3, dt: float
+) -> float:
+    """Force [N] with which joints bring the tool to the surface and press, a tick of ``dt`` [s].
+
+    That is pressing.commanded and what carries the tool's mass along with the base; ``field``
+    [m/s^2, B] and ``turning`` [rad/s^2, B] are as of ``joint_torques``. Reads u, joints, estimate;
+    writes pressing.
+    """
+    k, m, n = r.pressing, r.bodies, int(airframe.bodies.joints)
+    normal, R = three(k.normal, 0), r.estimate.R_WB
+    k.asked = min(r.u.force, max(k.most - k.unsure - tuning.damping, 0.0))
+    firm = k.mass * tuning.bandwidth
+    most = max(k.most - k.unsure, 0.0)
+    fastest = min(tuning.speed, tuning.share * most / math.sqrt(max(k.stiffness, 1.0) * k.mass))
+    # What is in the way is felt by the tool's standing still, before the observer is sure.
+    blocked = k.distance < tuning.band and k.asked > 0.0 and k.speed < _BLOCKED * fastest
+    if k.contact > 0:
+        if k.pressed < tuning.lost:
+            k.contact = 0
+    elif blocked and k.pressed > tuning.felt + k.unsure:
+        k.contact, k.mean_speed = 1, 0.0
+    wanted = k.asked if k.contact > 0 or blocked else 0.0
+    k.ramped = clamp(wanted, k.ramped - tuning.fall * dt, k.ramped + tuning.rise * dt)
+    if k.contact > 0 and k.asked > 0.0:
+        k.mean_speed += min(dt / tuning.remember, 1.0) * (k.speed - k.mean_speed)
+        damped = clamp(firm * (k.mean_speed - k.speed), -tuning.damping, tuning.damping)
+        force = clamp(k.ramped + damped, 0.0, most)
+    else:
+        toward, lead = fastest, 0.0
+        if not k.asked > 0.0:
+            # The reference of the joints leads, which knows where the base really is.
+            for i in range(n):
+                off = r.joints.reference[i] - r.estimate.q_arm[i]
+                rate = r.joints.reference_rate[i] - r.estimate.qd_arm[i]
+                lead -= k.along[i] * (tuning.stiffness * off + rate)
+            toward = k.speed + lead
+            toward = clamp(toward, -tuning.back, fastest)
+        top = min(tuning.share * most, tuning.search)
+        force = k.ramped + clamp(firm * (toward - k.speed), -3.0 * top, top)
+        force = min(force, most)
+    k.commanded = force
+    # What the tool does of itself: nothing, in the world.
+    carried = GRAVITY * normal[2] - dot(rotate_back(R, normal), field)
+    carried += dot(rotate_back(R, normal), cross(turning, place_of_tip(m, airframe.bodies)))
+    return float(force + k.mass * carried)

@@ -1,0 +1,183 @@
+"""What the tool is pressed upon by, against Pinocchio's arm; and that it presses no harder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from fsw.autopilot.control.joints import observe_contact
+from fsw.autopilot.control.press import PressTuning, look_for_surface, press, presses, weigh_tool
+from fsw.autopilot.model.airframe import Airframe, airframe_of
+from fsw.autopilot.model.multibody import move_bodies
+from fsw.autopilot.shapes.half_space import wall
+from fsw.autopilot.shapes.zones import moving_zones
+from fsw.autopilot.signals import SafeSet, StateEstimate, Touch, Vec3
+from fsw.autopilot.tick_record import Tick, new_tick
+from fsw.record import JOINTS
+from tests.fsw.autopilot.model.test_multibody import Referee, estimate
+from tests.fsw.random_states import vec3
+from tests.vehicles.random_vehicles import random_vehicle
+from vehicles.description import Vehicle
+from vehicles.vehicle_file import load_vehicle
+
+TUNING = PressTuning()
+DT = 0.002
+G = np.array([0.0, 0.0, 9.81])
+TOUCH = Touch(10.0, 1e3, 1e4)
+
+
+class Arm:
+    """Pinocchio's arm under a base that is swung about, held by springs in its joints."""
+
+    def __init__(self, vehicle: Vehicle, q: np.ndarray) -> None:
+        self.vehicle, self.referee, self.n = vehicle, Referee(vehicle), len(q)
+        self.hold, self.q, self.qd = q.copy(), q.copy(), np.zeros(self.n)
+        self.torque = np.zeros(self.n)
+
+    def jacobian(self) -> np.ndarray:
+        """Of the end-effector, (3, j), by differences."""
+        tips = []
+        for k in range(self.n):
+            for sign in (1.0, -1.0):
+                q = self.q.copy()
+                q[k] += sign * 1e-6
+                tips.append(self.tip(q))
+        rows = [(tips[2 * k] - tips[2 * k + 1]) / 2e-6 for k in range(self.n)]
+        return np.array(rows).T
+
+    def tip(self, q: np.ndarray) -> np.ndarray:
+        self.referee.place(q, np.zeros(self.n), np.zeros(3))
+        pin.forwardKinematics(self.referee.model, self.referee.data, self.referee.q)
+        last = self.referee.data.oMi[-1]
+        return np.array(last.translation + last.rotation @ self.vehicle.end_effector.position)
+
+    def move(self, swing: np.ndarray, force: np.ndarray, stiff: np.ndarray, parts: int = 4) -> None:
+        """A tick; the base accelerates by ``swing``, ``force`` is on the tool."""
+        by_force = self.jacobian().T @ force
+        for _ in range(parts):
+            self.referee.place(self.q, self.qd, np.zeros(3))
+            mass, bias = self.referee.mass, self.referee.bias
+            free = self.torque + by_force - bias[6:] - mass[6:, :3] @ (swing - G)
+            qdd = np.linalg.solve(mass[6:, 6:], free)
+            self.qd = self.qd + DT / parts * qdd
+            self.q = self.q + DT / parts * self.qd
+        self.torque = stiff @ (1e4 * (self.hold - self.q) - 150.0 * self.qd)
+
+
+def stiffnesses(arm: Arm) -> np.ndarray:
+    arm.referee.place(arm.q, arm.qd, np.zeros(3))
+    return arm.referee.mass[6:, 6:].copy()
+
+
+def at_surface(airframe: Airframe, seen: StateEstimate, normal: Vec3) -> Tick:
+    """A record whose tool is just in front of a surface with a ``normal``."""
+    r = new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints)
+    r.known = seen
+    move_bodies(r.bodies, airframe.bodies, 0.0, seen)
+    zones = moving_zones(SafeSet((replace(wall(normal, -9.0, 0.0), touch=TOUCH),)), None)
+    r.pressing.near = 0
+    look_for_surface(r, airframe.bodies, replace(TUNING, near=20.0), 0.0, zones)
+    assert r.pressing.near == 1
+    return r
+
+
+def pressed_upon(
+    vehicle: Vehicle, q: np.ndarray, force: np.ndarray, normal: Vec3, seed: int = 1
+) -> tuple[Tick, Airframe]:
+    """The record after 0.4 s under a ``force`` on the tool, the base being swung about."""
+    airframe = airframe_of(vehicle)
+    airframe = replace(airframe, joint_torque_max=(1e3,) * JOINTS)
+    arm, random = Arm(vehicle, q), np.random.default_rng(seed)
+    stiff, phase = stiffnesses(arm), random.uniform(0.0, 6.0, 3)
+    r = at_surface(airframe, estimate(arm.q, arm.qd, np.zeros(3)), normal)
+    for step in range(200):
+        swing = np.cos(phase + np.array([9.0, 7.0, 5.0]) * step * DT)
+        sent = np.zeros(JOINTS)
+        sent[: arm.n] = arm.torque
+        arm.move(swing, force, stiff)
+        r.known = estimate(arm.q, arm.qd, np.zeros(3))
+        move_bodies(r.bodies, airframe.bodies, 0.0, r.known)
+        observe_contact(r, airframe, sent, vec3(G - swing), DT)
+        weigh_tool(r, airframe, TUNING)
+    return r, airframe
+
+
+def cases() -> list[tuple[Vehicle, np.ndarray, np.ndarray]]:
+    random = np.random.default_rng(5)
+    found = []
+    for joints in (2, 3, 4, 5, 6):
+        for _ in range(3):
+            vehicle = random_vehicle(random, joints)
+            q = random.uniform(-1.0, 1.0, joints)
+            u, s, _ = np.linalg.svd(Arm(vehicle, q).jacobian())
+            within = [u[:, k] for k in range(min(3, joints)) if s[k] > 0.08]
+            way = sum(random.normal() * one for one in within)
+            if within:
+                found.append((vehicle, q, 5.0 * way / np.linalg.norm(way)))
+    return found
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_the_force_on_the_tool_is_observed_of_any_vehicle_in_any_direction() -> None:
+    """That of the joints' reach, along the surface's normal and as a vector."""
+    assert len(cases()) >= 10
+    for vehicle, q, force in cases():
+        normal = force / np.linalg.norm(force)
+        r, _ = pressed_upon(vehicle, q, force, vec3(normal))
+        assert math.isfinite(r.pressing.mass)
+        assert r.pressing.pressed == pytest.approx(5.0, abs=max(0.25, r.pressing.unsure))
+        np.testing.assert_allclose(r.pressing.force, force, atol=0.7)
+
+
+def test_no_force_is_observed_where_there_is_none() -> None:
+    vehicle, q, force = cases()[0]
+    r, _ = pressed_upon(vehicle, q, 0.0 * force, vec3(force / np.linalg.norm(force)))
+    assert abs(r.pressing.pressed) < 0.25
+
+
+def test_a_normal_that_the_arm_does_not_move_along_is_not_pressed_on() -> None:
+    vehicle = load_vehicle("probe-2r")  # its arm is in the body's x-z plane
+    q = np.array(vehicle.home_posture)
+    r, _ = pressed_upon(vehicle, q, np.zeros(3), (0.0, -1.0, 0.0))
+    r.u.force = 5.0
+    assert math.isinf(r.pressing.mass)
+    assert not presses(r, TUNING)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+@pytest.mark.parametrize("asked", [2.0, 9.5, 50.0])
+def test_no_more_is_commanded_than_the_bound_less_what_is_unknown(asked: float) -> None:
+    vehicle = load_vehicle("probe-2r")
+    q, normal = np.array(vehicle.home_posture), (-1.0, 0.0, 0.0)
+    r, airframe = pressed_upon(vehicle, q, np.array([-1.0, 0.0, 0.0]), normal)
+    r.u.force, r.pressing.distance = asked, 0.0
+    most = 0.0
+    for _ in range(2000):
+        press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
+        most = max(most, r.pressing.commanded)
+    assert r.pressing.contact
+    assert 0.0 < r.pressing.unsure < 1.0
+    assert most <= TOUCH.force_max - r.pressing.unsure
+    wanted = min(asked, TOUCH.force_max - r.pressing.unsure - TUNING.damping)
+    assert r.pressing.commanded == pytest.approx(wanted, abs=TUNING.damping)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_a_surface_is_looked_for_no_faster_than_the_hardest_can_stop_the_tool() -> None:
+    vehicle = load_vehicle("probe-2r")
+    r, airframe = pressed_upon(
+        vehicle, np.array(vehicle.home_posture), np.zeros(3), (-1.0, 0.0, 0.0)
+    )
+    k = r.pressing
+    k.stiffness, k.distance, r.u.force = 1e5, 0.02, 5.0
+    k.speed = TUNING.share * (k.most - k.unsure) / math.sqrt(k.stiffness * k.mass)
+    assert k.speed < TUNING.speed
+    press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
+    assert k.commanded == pytest.approx(0.0, abs=1e-9)
+    k.speed *= 1.5
+    press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
+    assert k.commanded < -0.1
