@@ -327,9 +327,10 @@ def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
     """What the joints are to do, ``seconds`` [s] later. Writes off_plan, joints.reference."""
     airframe, tuning, plan = law.airframe, law.tuning, r.flown
     if law.follows_plan and tuning.compensate and _joints_are_sound(r, airframe):
-        r.off_plan = lately_off_plan(tuning.compensation, r.off_plan, r.estimate, plan, seconds)
+        limits = tuning.compensation_near if r.pressing.near > 0 else tuning.compensation
+        r.off_plan = lately_off_plan(limits, r.off_plan, r.estimate, plan, seconds)
         compensate(
-            *(r.arm, airframe.bodies, law.arm, tuning.compensation, tuning.joint_limits),
+            *(r.arm, airframe.bodies, law.arm, limits, tuning.joint_limits),
             *(r.off_plan, r.estimate, plan),
         )
     else:

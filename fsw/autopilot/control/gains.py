@@ -78,6 +78,10 @@ class LoopGains:
     yaw_thrust_limit: float = 3.0
     tracking: TrackingTuning = field(default_factory=TrackingTuning)
     press: PressTuning = field(default_factory=PressTuning)
+    # At a surface that it may touch the arm takes up all that the base is pushed about.
+    compensation_near: CompensationLimits = field(
+        default_factory=lambda: CompensationLimits(whole=0.08, most=0.12, near=0.12, far=0.2)
+    )
 
 
 @lru_cache(maxsize=8)

@@ -512,10 +512,6 @@ class Autopilot:
             texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
         p_WE, _ = end_effector(config.airframe.bodies, estimate)
         targets, pushes = pressed_reference(targets, state.cascade, p_WE)
-        if not joints and any(zone.touch for zone in state.kept.safe_set.zones):
-            # The arm stays where it has room both ways, and the base comes along.
-            count = config.airframe.bodies.joints
-            joints = (config.airframe.home_posture[:count],) * len(targets)
         plan, safety = state.plan, state.safety
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         start, from_nominal = self._plans.start(plan, nominal, measured, now_us, safety.replan)

@@ -50,6 +50,9 @@ class CostWeights:
     # to fly in, with what its rate makes of it, or joints that nothing asks for drift for ever.
     home: float = 0.02
     home_lead: float = 0.5  # s
+    # The same of any arm where there is something to touch: there it has room both ways. What
+    # leads the arm's centre of mass below the base is left out, which leads it there.
+    home_to_touch: float = 0.1
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
 
@@ -125,10 +128,12 @@ class PostureCost:
     Where none are, an arm that has more joints than are settled is led to its home posture.
     """
 
-    def __init__(self, weights: CostWeights, airframe: Airframe) -> None:
+    def __init__(self, weights: CostWeights, airframe: Airframe, *, touches: bool = False) -> None:
+        """For a vehicle of this ``airframe``, which may touch something or not."""
         joints = airframe.bodies.joints
         self._weights, self._home = weights, np.array([airframe.home_posture[:joints]])
-        self._redundant = joints > _SETTLED
+        self._redundant = touches or joints > _SETTLED
+        self._home_weight = weights.home_to_touch if touches else weights.home
 
     def add(self, horizon: Linearisation, targets: TargetPoints, quadratic: Quadratic) -> float:
         """See ``Cost``; nothing where no joints are asked for and none are redundant."""
@@ -136,7 +141,7 @@ class PostureCost:
         if wanted is None:
             if not self._redundant:
                 return 0.0
-            weight, lead = self._weights.home, self._weights.home_lead
+            weight, lead = self._home_weight, self._weights.home_lead
             wanted = self._home.repeat(len(horizon.states), axis=0)
         return _add_posture(
             weight, lead, horizon.model.inputs, horizon.states, horizon.model.gamma, wanted,

@@ -107,7 +107,10 @@ def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
 
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
-    costs, body = (TrackingCost(config.weights),), body_of(config.body, model.airframe)
+    weights, body = config.weights, body_of(config.body, model.airframe)
+    if may_touch(safe_set):
+        weights = replace(weights, arm_com=0.0, arm_com_terminal=0.0)
+    costs = (TrackingCost(weights),)
     if not safe_set.zones:
         return OcpTerms(costs)
     barrier = ZoneRows(
@@ -121,6 +124,11 @@ def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Ocp
     return OcpTerms(costs, (barrier,), config.barrier_slack)
 
 
+def may_touch(safe_set: SafeSet) -> bool:
+    """Whether there is a surface that the tool may touch."""
+    return any(zone.touch is not None for zone in safe_set.zones)
+
+
 VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {
     "naive": _naive,
     "hc": _hard,
@@ -132,4 +140,5 @@ VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]
 def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     """The terms of the configured controller, and the cost of requested joints."""
     parts = VARIANTS[config.controller](config, model, safe_set)
-    return replace(parts, costs=(*parts.costs, PostureCost(config.weights, model.airframe)))
+    posture = PostureCost(config.weights, model.airframe, touches=may_touch(safe_set))
+    return replace(parts, costs=(*parts.costs, posture))

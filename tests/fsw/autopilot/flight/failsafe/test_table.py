@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,7 +40,9 @@ from fsw.autopilot.signals import (
     Severity,
     SolverStatus,
 )
+from fsw.autopilot.tick_record import Pressing, Tick
 from tests.fsw.random_states import random_estimate
+from tests.fsw.records import changed
 
 PERIOD_US = 100_000
 NOW_US = 10**9
@@ -72,6 +75,7 @@ class Evidence:
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = field(default_factory=Damage)
     plan: PlanMemory = field(default_factory=PlanMemory)
+    pressing: dict[str, Any] = field(default_factory=dict)
 
     def context(self) -> FailsafeContext:
         last_received_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
@@ -96,6 +100,7 @@ class Evidence:
             host=self.host,
             damage=self.damage,
             kept=self.kept,
+            cascade=changed(Tick(), pressing=changed(Pressing(), **self.pressing)),
         )
         estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US)
         return FailsafeContext(state, estimate, replace(self.config, limits=self.limits))
@@ -189,6 +194,10 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, safety=OUTSIDE), Condition.BREACH),
         (replace(FINE, safety=OFF_PLAN), Condition.TUBE_LEFT),
         (replace(FINE, kept=CRAMPED), Condition.ROOM_LACKING),
+        (replace(FINE, pressing={"near": 1, "pressed": 5.1, "most": 5.0}), Condition.FORCE_HIGH),
+        (replace(FINE, pressing={"near": 1, "lost_for": 1.1}), Condition.CONTACT_LOST),
+        (replace(FINE, pressing={"contact": 1, "distance": -0.07}), Condition.SURFACE_MOVED),
+        (replace(FINE, pressing={"contact": 1, "slip": (0.2, 0.1, 0.0)}), Condition.TOOL_SLIPS),
         (OFFBOARD, Condition.SETPOINTS_LOST),
         (replace(FINE, silent_zones=1), Condition.ZONES_SILENT),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
@@ -646,6 +655,7 @@ def test_a_fault_is_the_vehicles_own() -> None:
     others |= {Condition.TIME_JUMPED, Condition.LOOP_OVERRUN, Condition.CLOCK_JUMPED}
     others |= {Condition.LINK_FLOODED, Condition.LOG_STOPPED, Condition.DISK_FULL}
     others |= {Condition.ROOM_LACKING, Condition.PARAMETERS_CONTRADICT}
+    others |= {Condition.CONTACT_LOST, Condition.SURFACE_MOVED, Condition.TOOL_SLIPS}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 
@@ -685,3 +695,28 @@ def test_without_a_position_it_descends_where_clearances_lack_room() -> None:
         context = replace(FINE, kept=CRAMPED, aiding=aiding).context()
         (row,) = [one for one in active(context) if one.condition is Condition.ROOM_LACKING]
         assert row.action(context) is expected
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+@pytest.mark.parametrize(
+    "pressing",
+    [
+        {"near": 1, "pressed": 4.9, "most": 5.0},
+        {"near": 0, "pressed": 5.1, "most": 5.0},
+        {"near": 1, "lost_for": 0.9},
+        {"contact": 1, "distance": 0.05, "slip": (0.1, 0.1, 0.0)},
+        {"contact": 0, "distance": -0.07, "slip": (0.3, 0.0, 0.0)},
+    ],
+)
+def test_a_contact_as_it_should_be_is_no_condition(pressing: dict[str, Any]) -> None:
+    assert conditions(replace(FINE, pressing=pressing)) == ()
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+def test_what_is_wrong_with_a_contact_leads_off_the_surface() -> None:
+    too_hard = replace(FINE, pressing={"near": 1, "pressed": 5.06, "most": 5.0})
+    assert action(too_hard) is Action.RETREAT
+    (row,) = active(too_hard.context())
+    assert row.detail(too_hard.context()) == ": 5.1 N of 5.0 N"
+    on_the_ground = replace(too_hard, mode=Mode.DISARMED)
+    assert conditions(on_the_ground) == ()

@@ -1,0 +1,62 @@
+"""The tool presses on a wall in the plant: the scenario push, of any stiffness in its range."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.signals import Mode
+from sitl.scenario import Push, Scenario, Uniform, vehicle_of
+from sitl.scenario_file import load_scenario
+from tests.closed_loop.harness import Flight
+
+HOLD_S = 2.0
+
+
+def push(stiffness: float = 1000.0, disturbance: float = 0.8) -> Scenario:
+    """One place of the scenario ``push``, pressed on for a shorter time."""
+    whole = load_scenario("push")
+    assert isinstance(whole.trajectory, Push)
+    (panel,) = whole.zones
+    assert panel.touch is not None
+    one = replace(
+        whole.trajectory, position_m=whole.trajectory.position_m[:1], force_n=(5.0,),
+        hold_s=(HOLD_S,),
+    )  # fmt: skip
+    touch = replace(panel.touch, stiffness_n_m=stiffness)
+    shaken = (Uniform(disturbance, 0.1),) if disturbance else ()
+    zones = (replace(panel, touch=touch),)
+    return replace(whole, trajectory=one, zones=zones, disturbances=shaken)
+
+
+def flown(scenario: Scenario, seed: int, seconds: float) -> tuple[Flight, np.ndarray]:
+    """A flight, and of each tick: force, its estimate, its uncertainty, force asked for [N]."""
+    config = flight_config(body="full", vehicle=vehicle_of(scenario))
+    flight, seen = Flight(scenario, seed, config=config), []
+    flight.follow()
+    while flight.sim.step * 0.002 < seconds:
+        flight.step()
+        k = flight.state.cascade.pressing
+        force = -flight.sim.tip_force[0]
+        seen.append((force, k.pressed, k.unsure, k.asked))
+    return flight, np.array(seen)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+@pytest.mark.parametrize("stiffness", [500.0, 2000.0])
+def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffness: float) -> None:
+    flight, seen = flown(push(stiffness), seed=2, seconds=11.0)
+    (use,) = flight.sim.touch.uses().values()
+    assert use.force_max_n < use.force_bound_n
+    held = np.abs(seen[:, 3] - 5.0) < 0.01
+    assert held.sum() * 0.002 > HOLD_S - 0.5
+    error = seen[held, 0] - 5.0
+    assert math.sqrt(float((error**2).mean())) < 1.0  # 20 %
+    observed = np.abs(seen[held, 1] - seen[held, 0])
+    assert float(np.quantile(observed, 0.95)) < 0.7
+    assert flight.mode is Mode.TRAJECTORY, flight.texts
+    assert flight.snapshot.safety.breaches == 0
