@@ -65,8 +65,10 @@ def rotor_decay(airframe: Airframe, dt: float) -> float:
 def estimate_mass(
     airframe: Airframe,
     mass: float,
-from fsw.autopilot.model.multibody import Bodies, base_acceleration, place_of_tip, posture
-from fsw.autopilot.signals import JointVector, RotorVector, Vec2, Vec3
+    rotors: RotorVector | Floats,
+    specific_force: float,
+    seconds: float,
+    lift: float = 0.0,
 ) -> float:
     """The vehicle's mass [kg], from what the accelerometer makes of the rotors' thrust.
 
