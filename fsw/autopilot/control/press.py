@@ -51,7 +51,7 @@ from fsw.autopilot.model.multibody import (
     factorise,
     place_of_tip,
     solve,
-    tip_in_body,
+    velocity_of_tip,
 )
 from fsw.autopilot.shapes.zones import (
     CLEARANCE,
@@ -143,8 +143,8 @@ def watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> No
         return
     if k.contact > 0:
         k.met, k.lost_for = 1, 0.0
-        _, rel = tip_in_body(r.bodies, bodies)
-        v, normal = rotate(r.estimate.R_WB, rel), three(k.normal, 0)
+        v = rotate(r.estimate.R_WB, velocity_of_tip(r.bodies, bodies))
+        normal = three(k.normal, 0)
         base = r.estimate.v_WB
         v = v[0] + base[0], v[1] + base[1], v[2] + base[2]
         v = add_scaled(v, normal, -dot(normal, v))
@@ -174,7 +174,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     """
     k, m, b, n = r.pressing, r.bodies, airframe.bodies, int(airframe.bodies.joints)
     R, normal = r.estimate.R_WB, three(k.normal, 0)
-    along, (tip, rel) = rotate_back(R, normal), tip_in_body(m, b)
+    along, tip = rotate_back(R, normal), place_of_tip(m, b)
     shape = _levers(r, tip, n)
     for i in range(n):
         lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
@@ -187,7 +187,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         eased += k.along[i] * k.work[i]
         whole += k.share[i] * k.along[i]
         felt += k.share[i] * k.external[i]
-    v = rotate(R, rel)
+    v = rotate(R, velocity_of_tip(m, b))
     speed = dot(
         normal, (v[0] + r.estimate.v_WB[0], v[1] + r.estimate.v_WB[1], v[2] + r.estimate.v_WB[2])
     )

@@ -485,3 +485,11 @@ def place_of_tip(m: Multibody | ArmTask, b: Bodies) -> Vec3:
     last = int(b.joints) - 1
     tip = (b.tip[0], b.tip[1], b.tip[2])
     return add(three(m.origin, 3 * last), rotate(nine(m.rotation, 9 * last), tip))
+
+
+@compilable
+def velocity_of_tip(m: Multibody, b: Bodies) -> Vec3:
+    """Velocity [m/s, B] of the end-effector beside that of B's origin."""
+    last = int(b.joints) - 1
+    arm = rotate(nine(m.rotation, 9 * last), (b.tip[0], b.tip[1], b.tip[2]))
+    return add(three(m.speed, 3 * last), cross(three(m.rate, 3 * last), arm))

@@ -23,7 +23,7 @@ from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.control.tube import Tube
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
-from fsw.autopilot.model.multibody import posture, tip_in_body
+from fsw.autopilot.model.multibody import place_of_tip, posture
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Touch, Vec3, Zone
@@ -65,31 +65,36 @@ def grip(airframe: Airframe, tuning: PressTuning, normal: Vec3, disturbance: flo
     return Grip(float(np.abs(share) @ torque), 1.0 / eased, inwards, outwards)
 
 
+def _tip(airframe: Airframe, q: tuple[float, ...]) -> Array:
+    """Place of the tool (3,) [m, B]."""
+    return np.array(place_of_tip(posture(airframe.bodies, q), airframe.bodies))
+
+
 def _levers(airframe: Airframe, q: tuple[float, ...]) -> Array:
     """How each joint moves the tool (j, 3) [m, B]."""
     m = posture(airframe.bodies, q)
-    tip, _ = tip_in_body(m, airframe.bodies)
+    tip = _tip(airframe, q)
     n = len(q)
     axes, origins = m.axis.reshape(JOINTS, 3)[:n], m.origin.reshape(JOINTS, 3)[:n]
-    found: Array = np.cross(axes, np.array(tip) - origins)
+    found: Array = np.cross(axes, tip - origins)
     return found
 
 
 def _room(airframe: Airframe, home: tuple[float, ...], way: Array) -> float:
     """How far [m] the tool can be moved one ``way`` (3,) [1, B] from home, and straight."""
     arm, q = arm_coordinates(airframe), np.array(home)
-    begin = np.array(tip_in_body(posture(airframe.bodies, home), airframe.bodies)[0])
+    begin = _tip(airframe, home)
     far = 0.0
     while far < _FARTHEST:
         goal = begin + (far + _STEP) * way
         for _ in range(3):
             at = tuple(q.tolist())
-            tip = np.array(tip_in_body(posture(airframe.bodies, at), airframe.bodies)[0])
+            tip = _tip(airframe, at)
             levers = _levers(airframe, at)
             gram = levers @ levers.T + 1e-5 * np.eye(len(at))
             q = q + np.linalg.solve(gram, levers @ (goal - tip))
         q = np.array(within_limits(arm, tuple(q.tolist()), 0.03))
-        tip = np.array(tip_in_body(posture(airframe.bodies, tuple(q.tolist())), airframe.bodies)[0])
+        tip = _tip(airframe, tuple(q.tolist()))
         if np.linalg.norm(goal - tip) > _ASTRAY:
             return far
         far += _STEP
