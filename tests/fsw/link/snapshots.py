@@ -12,6 +12,7 @@ from fsw.autopilot.signals import (
     BatteryState,
     ConstraintKind,
     ConstraintReport,
+    ContactReport,
     EndEffectorTarget,
     EstimatorReport,
     FlightSnapshot,
@@ -134,6 +135,7 @@ SNAPSHOT = FlightSnapshot(
     orbit=Orbit((1.0, 2.0, -3.0), 2.5, 0.4, clockwise=False),
     accel_B=(0.1, 0.2, -9.7),
     estimator=REPORT,
+    touching=ContactReport(True, (-5.0, 0.5, 1.5), 5.25, 0.375, 5.125, 4.75, 10.0, -0.0625),
 )  # fmt: skip
 
 
