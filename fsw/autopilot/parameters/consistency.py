@@ -18,6 +18,7 @@ import numpy as np
 from fsw.autopilot.barriers.safe_approach import LOUD, BarrierTuning
 from fsw.autopilot.control.gains import tracking_gains
 from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
+from fsw.autopilot.control.px4_tube import is_stable, px4_tube
 from fsw.autopilot.control.tube import (
     EstimateTube,
     Tube,
@@ -90,20 +91,29 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         if points and planner.body == "points":
             findings.append(_links(config, min(points)))
     for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
-        if not zones:
-            continue
-        if config.inner == "tracking":
-            kept = SafeSet(tuple(zones))
-            findings.append(_base_tube(tuning, loop, surroundings))
-            findings.append(_tube_of_all_axes(config, tuning, loop, kept))
-        else:
-            findings.append(_sampled(tuning, surroundings, planner.period))
+        if zones:
+            findings += _loop_beside(config, tuning, loop, SafeSet(tuple(zones)))
+    if config.inner == "px4":
+        findings += [_px4_settles(config), *([_end_effector_tube(config, loop)] * bool(others))]
     if config.inner == "tracking":
         if others:
             findings += _tubes_of_parts(config, loop, others)
             findings += _returns(config, loop)
         findings.append(_limits(config, loop, surroundings))
     return tuple(findings)
+
+
+def _loop_beside(
+    config: FlightConfig, tuning: BarrierTuning, loop: Tube, kept: SafeSet
+) -> list[Finding]:
+    """Whether what a plan keeps from zones of one kind is enough for the loop that follows it."""
+    surroundings = config.surroundings
+    if not config.follows_plan:
+        return [_sampled(tuning, surroundings, config.planner.period)]
+    found = [_base_tube(tuning, loop, surroundings)]
+    if config.inner == "tracking":
+        found.append(_tube_of_all_axes(config, tuning, loop, kept))
+    return found
 
 
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
@@ -117,9 +127,11 @@ def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
 
 
 def loop_tube(config: FlightConfig) -> Tube:
-    """Tube of the configured tracking loop, per m/s^2 of disturbance."""
+    """Tube of the loops that follow the plan, ours or PX4's, per m/s^2 of disturbance."""
     surroundings = config.surroundings
     dt = config.tick_period_us * 1e-6
+    if config.inner == "px4":
+        return px4_tube(config.px4, surroundings.hanging, surroundings.disturbance_hold, dt)
     tracking = config.tuning.tracking
     gains = tracking_gains(tracking, config.airframe.rotor_lag, dt)
     return tube(
@@ -478,6 +490,19 @@ def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) ->
         f"m/s^2 on one axis uses {used[worst]:.0%} of the {worst}",
         f"up to {disturbance / used[worst]:.2f} m/s^2 none is",
         refuses=False,
+    )
+
+
+def _px4_settles(config: FlightConfig) -> Finding:
+    px4 = config.px4
+    return _finding(
+        "PX4's loops",
+        is_stable(px4),
+        f"PX4's loops as PX4_XY_P {px4.position_gain:g}, PX4_XY_V_P {px4.velocity_gain:g}, "
+        f"PX4_TILT_KP {px4.tilt_kp:g}, PX4_TILT_KD {px4.tilt_kd:g} and a delay of "
+        f"{1e3 * px4.delay:.0f} ms have them, with {px4.cancelled:.0%} of the disturbance "
+        "cancelled, settle",
+        "they do not: identify them anew, or cancel less by PX4_CANCEL",
     )
 
 
