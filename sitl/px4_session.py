@@ -15,6 +15,7 @@ from sitl.link.px4_messages import Px4Encoder
 from sitl.link.px4_server import Px4Exchange, serve_px4
 from sitl.link.stream_endpoint import ByteStream
 from sitl.link.udp_endpoint import PeerSocket, parse_address
+from sitl.sensors.measurements import Measurement
 from sitl.simulation import START_US, STEP_US, Simulation
 
 
@@ -34,13 +35,12 @@ class Px4Session:
         exchange = Px4Exchange(self._stream, simulation.vehicle, period_s, stop, self._answers)
         with contextlib.ExitStack() as open_ends:
             companion = self._companion(simulation, open_ends)
-            beside = {} if companion is None else {"beside": companion.step}
             timing = serve_px4(
                 *(simulation, exchange, Px4Encoder(options.origin), stop),
                 *(watch.progress, watch.truth, watch.begun),
                 every=round(1e6 * period_s) // STEP_US,
                 pace_s=None if options.speed is None else period_s / options.speed,
-                **beside,
+                beside=_nobody if companion is None else companion.step,
             )
         return FlownSession(timing, exchange.counts, silent=not self._stream.connected)
 
@@ -64,3 +64,7 @@ class Px4Session:
 
     def _answers(self, number: int) -> None:
         self._events.report("answering", f"sitl: PX4 answers from step {number} on", step=number)
+
+
+def _nobody(simulation: Simulation, measured: list[Measurement]) -> None:
+    """Stands beside PX4 where there is no planner above it."""

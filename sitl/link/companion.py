@@ -25,8 +25,8 @@ from sitl.simulation import Simulation
 _HOLD: Final = 4 << 16 | 3 << 24
 _ARMED: Final = 128
 _NEAR_M: Final = 0.12  # to the first point, for a trajectory to begin
-_SLOW_M_S: Final = 0.1
-_STILL_S: Final = 1.0
+_SLOW_M_S: Final = 0.25
+_STILL_S: Final = 0.5
 _LEAD_S: Final = 2.5  # later than the last point that was sent ahead
 
 

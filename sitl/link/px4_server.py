@@ -139,7 +139,7 @@ def serve_px4(
     *,
     every: int,
     pace_s: float | None,
-    beside: Beside = lambda simulation, measured: None,
+    beside: Beside = lambda _simulation, _measured: None,
 ) -> RunTiming:
     """Step until the simulation, a signal or PX4 ends the run; PX4 is asked every so many steps.
 

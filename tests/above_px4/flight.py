@@ -35,8 +35,6 @@ TARGET_US = 100_000
 class Wire:
     """Both ends of the link, without a wire."""
 
-    bytes_per_s: int | None = None
-
     def __init__(self, px4: Px4Companion) -> None:
         self.px4 = px4
 

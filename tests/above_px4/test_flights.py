@@ -64,7 +64,7 @@ def test_our_operator_asks_px4_for_offboard_and_gives_it_back() -> None:
     flight.run(1.0)
     assert flight.px4.mode == OFFBOARD
     assert flight.mode is Mode.HOLD
-    flight.commands.append(command(400, 0.0, 21196.0))
+    flight.commands.append(command(400, 0.0))
     flight.run(0.5)
     assert flight.px4.mode == HOLD
     assert "given back to PX4, which is asked to hold" in flight.texts

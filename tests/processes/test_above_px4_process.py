@@ -67,8 +67,7 @@ def test_it_streams_takes_over_gives_back_and_writes_what_it_found(tmp_path: Pat
             finally:
                 process.kill()
     texts = [json.loads(line).get("message", "") for line in said.splitlines()]
-    assert any("PX4 gives the vehicle: it follows the plan" in text for text in texts), texts
-    assert any("PX4 flies Position" in text for text in texts)
+    assert any("PX4 flies Position" in text for text in texts), texts
     found = json.loads((tmp_path / "fsw.json").read_text())
     assert found["px4"]["mode"] == "Position"
     assert found["px4"]["round_trip_ms"] < 1000.0
@@ -102,7 +101,7 @@ def test_a_line_that_is_too_slow_for_the_estimate_is_refused() -> None:
         [sys.executable, "-m", "pandion", "fsw", "--autopilot-link", "serial:/dev/null:57600"],
         capture_output=True,
         text=True,
-        timeout=400.0,
+        timeout=120.0,
     )
     assert done.returncode == 2
     assert "use 460800 baud or more" in done.stderr

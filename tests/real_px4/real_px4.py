@@ -15,12 +15,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
+from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.link.px4.arm import servo_ranges
+from fsw.link.px4.messages import shares_of
 from messages.frames import Frame, FrameWriter, split
 
 BUILD = os.environ.get("PX4_BUILD", "")
 NO_BUILD = "PX4_BUILD does not name a folder with bin/px4 and etc: a build of PX4's SITL"
 HOLD, OFFBOARD, LAND = (4, 3), (6, 0), (4, 6)
-ARM, SET_MODE, TAKEOFF, REPOSITION, SET_INTERVAL = 400, 176, 22, 192, 511
+ARM, SET_MODE, TAKEOFF, SET_ACTUATOR = 400, 176, 22, 187
 ORIGIN = (473977420, 85455940, 488000)  # of `pandion px4 params`
 COMPANION, ARM_LINK = "udp:127.0.0.1:14580", "udp:127.0.0.1:14582"
 # Nobody holds sticks, and a lost stream is to end in Hold.
@@ -117,6 +120,13 @@ class Operator:
         self.set_mode(HOLD)
         assert self.until(lambda: self.mode == HOLD, 10.0)
 
+    def fold(self, seconds: float) -> None:
+        """Bring the arm to its home posture, from where plans begin."""
+        joints = AIRFRAME.bodies.joints
+        shares = shares_of(servo_ranges(AIRFRAME), tuple(AIRFRAME.home_posture[:joints]))
+        rest = (float("nan"),) * (6 - joints)
+        self.until(lambda: False, seconds, lambda: self.command(SET_ACTUATOR, *shares, *rest))
+
 
 @contextmanager
 def started(command: list[str], log: Path, **more: Any) -> Iterator[subprocess.Popen[bytes]]:
@@ -141,6 +151,9 @@ class Loop:
     folder: Path
 
     def result(self) -> dict[str, Any]:
+        """Of the plant, which ends now."""
+        self.sitl.terminate()
+        self.sitl.wait(20.0)
         return cast("dict[str, Any]", json.loads((self.folder / "sitl.json").read_text()))
 
     def said(self, who: str) -> str:

@@ -10,19 +10,20 @@ from tests.real_px4.real_px4 import HOLD, NO_BUILD, OFFBOARD, flying, there_is_o
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(not there_is_one(), reason=NO_BUILD)]
 
-START = 1.35  # m, above which `walls` begins
+START = 1.45  # m, where `walls` begins
 
 
 def test_walls_are_kept_by_the_planner_above_px4(tmp_path: Path) -> None:
     with flying("walls", tmp_path, seed=21) as loop:
         operator = loop.operator
         operator.take_off(START)
+        operator.fold(5.0)
         assert operator.until(
             lambda: operator.mode == OFFBOARD, 20.0, lambda: operator.set_mode(OFFBOARD)
         )
         operator.until(lambda: loop.sitl.poll() is not None, 100.0)
         assert operator.mode == OFFBOARD, (operator.texts[-5:], loop.said("fsw"))
-    result = loop.result()
+        result = loop.result()
     assert result["min_margin_m"] > 0.0
     assert result["tracking_error_rms_m"] < 0.1
 
@@ -31,6 +32,7 @@ def test_a_planner_that_is_killed_leaves_px4_to_its_failsafe(tmp_path: Path) -> 
     with flying("walls-calm", tmp_path, seed=22) as loop:
         operator = loop.operator
         operator.take_off(START)
+        operator.fold(5.0)
         assert operator.until(
             lambda: operator.mode == OFFBOARD, 20.0, lambda: operator.set_mode(OFFBOARD)
         )

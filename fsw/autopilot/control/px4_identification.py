@@ -4,7 +4,7 @@ PX4 is asked for pushes that end where they began, and its gains are known from 
 what its position loop commands at each instant is known, c of ``px4_loops.py``, and how its
 attitude follows is seen as the vehicle leans. Of
 
-.. math:: \ddot a = k_p(c(t - \tau) - a) - k_d \dot a
+.. math:: \tau \dddot a + \ddot a = k_p(c - a) - k_d \dot a
 
 the three numbers are those with which the simulated lean is nearest to the one that was seen, by
 least squares, with a constant beside it for what PX4's integral holds.
@@ -136,11 +136,13 @@ def identify(seen: list[Pushed], px4: Px4Tuning) -> Identified:
     commands = np.stack([_commanded(seen, px4, k, times, grid, lean[k]) for k in range(2)])
 
     def left(x: Array) -> Array:
-        return (_followed(commands, grid, *x) - lean).ravel()
+        found: Array = (_followed(commands, *x) - lean).ravel()
+        return found
 
     def against(x: Array) -> Array:
         rest = left(x).reshape(2, -1)
-        return (rest - rest.mean(axis=1, keepdims=True)).ravel()
+        found: Array = (rest - rest.mean(axis=1, keepdims=True)).ravel()
+        return found
 
     start = np.array([px4.tilt_kp, px4.tilt_kd, px4.delay])
     bounds = (np.array([5.0, 1.0, 0.002]), np.array([1000.0, 100.0, 0.2]))
@@ -171,9 +173,9 @@ def _commanded(
     return found
 
 
-def _followed(commands: Array, grid: Array, kp: float, kd: float, delay: float) -> Array:
+def _followed(commands: Array, kp: float, kd: float, delay: float) -> Array:
     """The lean that follows ``commands`` (2, n) [m/s^2]."""
-    late = np.stack([np.interp(grid - delay, grid, one) for one in commands])
-    b, a, _ = cont2discrete(([kp], [1.0, kd, kp]), _STEP_S)
-    followed: Array = lfilter(b.ravel(), a, late - late[:, :1], axis=1) + late[:, :1]
+    b, a, _ = cont2discrete(([kp], [delay, 1.0, kd, kp]), _STEP_S)
+    begun = commands[:, :1]
+    followed: Array = lfilter(b.ravel(), a, commands - begun, axis=1) + begun
     return followed

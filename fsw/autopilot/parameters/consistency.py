@@ -94,7 +94,7 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         if zones:
             findings += _loop_beside(config, tuning, loop, SafeSet(tuple(zones)))
     if config.inner == "px4":
-        findings += [_px4_settles(config), *([_end_effector_tube(config, loop)] * bool(others))]
+        findings += _px4_loops(config, loop, others)
     if config.inner == "tracking":
         if others:
             findings += _tubes_of_parts(config, loop, others)
@@ -110,6 +110,8 @@ def _loop_beside(
     surroundings = config.surroundings
     if not config.follows_plan:
         return [_sampled(tuning, surroundings, config.planner.period)]
+    if config.inner == "px4" and not is_stable(config.px4):
+        return []  # nothing bounds it
     found = [_base_tube(tuning, loop, surroundings)]
     if config.inner == "tracking":
         found.append(_tube_of_all_axes(config, tuning, loop, kept))
@@ -493,17 +495,19 @@ def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) ->
     )
 
 
-def _px4_settles(config: FlightConfig) -> Finding:
-    px4 = config.px4
-    return _finding(
+def _px4_loops(config: FlightConfig, loop: Tube, others: list[Zone]) -> list[Finding]:
+    """Whether PX4's loops are of any use, and what they leave of an end-effector beside walls."""
+    px4, holds = config.px4, is_stable(config.px4)
+    settles = _finding(
         "PX4's loops",
-        is_stable(px4),
-        f"PX4's loops as PX4_XY_P {px4.position_gain:g}, PX4_XY_V_P {px4.velocity_gain:g}, "
-        f"PX4_TILT_KP {px4.tilt_kp:g}, PX4_TILT_KD {px4.tilt_kd:g} and a delay of "
-        f"{1e3 * px4.delay:.0f} ms have them, with {px4.cancelled:.0%} of the disturbance "
-        "cancelled, settle",
-        "they do not: identify them anew, or cancel less by PX4_CANCEL",
+        holds,
+        f"PX4's loops {'settle' if holds else 'do not settle'} as they are believed to be: "
+        f"PX4_XY_P {px4.position_gain:g}, PX4_XY_V_P {px4.velocity_gain:g}, "
+        f"PX4_TILT_KP {px4.tilt_kp:g}, PX4_TILT_KD {px4.tilt_kd:g}, a delay of "
+        f"{1e3 * px4.delay:.0f} ms and {px4.cancelled:.0%} of the disturbance cancelled",
+        "identify them anew, or cancel less by PX4_CANCEL",
     )
+    return [settles, _end_effector_tube(config, loop)] if holds and others else [settles]
 
 
 def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: float) -> Finding:

@@ -229,8 +229,8 @@ def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
     """
     planner = replace(
         config.planner,
-        walls=replace(config.planner.walls, alpha=1.75, lambda_=0.45),
-        workspace=replace(config.planner.workspace, alpha=1.75, lambda_=0.42),
+        walls=replace(config.planner.walls, alpha=1.63, lambda_=0.5),
+        workspace=replace(config.planner.workspace, alpha=1.56, lambda_=0.5),
         lambda_min=0.0,
     )
     limits = replace(config.limits, watches_actuators=0, clearance_sigmas=0.0)

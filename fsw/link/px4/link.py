@@ -60,10 +60,11 @@ _STREAMS: Final = {  # asked for, with its period [us]
     message_ids.EXTENDED_SYS_STATE: 200_000,
     message_ids.BATTERY_STATUS: 1_000_000,
 }
-LEAST_BYTES_PER_S: Final = 46_080  # of 460,800 baud: the streams take 40,000
+LEAST_BYTES_PER_S: Final = 46_080  # of 460,800 baud: the streams take 42,000
 PX4_PORT: Final = 14540  # to which PX4 sends what a companion hears, before it has heard one
 STREAM_US: Final = 20_000  # of set-points
 _HEARTBEAT_US: Final = 1_000_000
+_WHOLE_PIECE, _PIECES = 50, 5  # bytes of a STATUSTEXT, and pieces of a sentence
 _PATIENCE_S: Final = 0.02
 _SLOW: Final = 0.5  # of the rate asked for: less is asked for again
 _US: Final = (SYSTEM_ID, PATH_PLANNER)  # who commands our autopilot to follow what PX4 does
@@ -72,11 +73,6 @@ _SPOKEN: Final = {ARM_DISARM: "arming", SET_MODE: "its mode", SET_INTERVAL: "a s
 
 class Endpoint(Protocol):
     """The end of a link, as ``fsw.link.endpoints`` opens it."""
-
-    @property
-    def bytes_per_s(self) -> int | None:
-        """What it takes; None: not known."""
-        ...
 
     def fileno(self) -> int:
         """The handle, to wait for."""
@@ -144,14 +140,8 @@ class Px4Link:
         Joints are PX4's ``servos``, beside encoders on that link; without the link they are anyway.
 
         Raises:
-            LinkError: The line is too slow.
+            LinkError: The arm has more joints than PX4 moves.
         """
-        slow = endpoint.bytes_per_s is not None and endpoint.bytes_per_s < LEAST_BYTES_PER_S
-        if slow:
-            raise LinkError(
-                f"the line to PX4 takes {endpoint.bytes_per_s} bytes/s and PX4's estimate needs "
-                f"{LEAST_BYTES_PER_S}; use 460800 baud or more"
-            )
         self.pacing: Pacing | None = None
         self.shutdown = False
         self.retransmissions = 0
@@ -186,6 +176,7 @@ class Px4Link:
             message_ids.TIMESYNC: self._take_time,
             message_ids.COMMAND_ACK: self._hear_answer,
         }
+        self._pieces: list[Frame] = []  # of a sentence of PX4's that is not whole yet
         self._odd = ""  # the frame of velocities that was told of
         self._believed_us = 0
 
@@ -287,7 +278,12 @@ class Px4Link:
             self._tell(Severity.WARNING, "PX4 has reset its estimate")
 
     def _hear(self, frame: Frame) -> None:
-        for severity, sentence in status_text.graded([frame]):
+        _, raw, text_id, _ = cast("tuple[int, bytes, int, int]", frame.payload_values)
+        self._pieces = [*self._pieces[-_PIECES:], frame]
+        if text_id and len(raw.rstrip(b"\0")) == _WHOLE_PIECE:
+            return  # the rest of it is to come
+        pieces, self._pieces = self._pieces, []
+        for severity, sentence in status_text.graded(pieces):
             if severity <= Severity.WARNING and sentence:
                 grade = Severity.CRITICAL if severity <= Severity.CRITICAL else Severity.WARNING
                 self._tell(grade, f"PX4: {sentence.strip()}")
