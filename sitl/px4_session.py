@@ -15,8 +15,10 @@ from sitl.link.px4_messages import Px4Encoder
 from sitl.link.px4_server import Px4Exchange, serve_px4
 from sitl.link.stream_endpoint import ByteStream
 from sitl.link.udp_endpoint import PeerSocket, parse_address
+from sitl.plant.state import P_WB
 from sitl.sensors.measurements import Measurement
 from sitl.simulation import START_US, STEP_US, Simulation
+from sitl.start import hovering
 
 
 class Px4Session:
@@ -60,7 +62,10 @@ class Px4Session:
         )
         # On the ground no pilot asks for it; the planner's is told all the same.
         plan = replace(plan, target_at=lambda t_us: clock.target_at(1e-6 * (t_us - START_US)))
-        return Companion(peer, plan, StepEncoder(lockstep=True, measured=True))
+        first = clock.target_at(0.0).p
+        place, _ = hovering(simulation.vehicle, simulation.scenario, first)
+        x, y, z = (float(one) for one in place[P_WB : P_WB + 3])
+        return Companion(peer, plan, StepEncoder(lockstep=True, measured=True), (x, y, z))
 
     def _answers(self, number: int) -> None:
         self._events.report("answering", f"sitl: PX4 answers from step {number} on", step=number)

@@ -71,6 +71,9 @@ class Encoders:
     def send(self, t_us: int, outputs: TickOutputs, q: Any) -> None:
         pass
 
+    def acknowledge(self, ack: Any) -> None:
+        pass
+
     def close(self) -> None:
         pass
 

@@ -12,7 +12,7 @@ from typing import Final, cast
 
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.ports import Clock
-from fsw.autopilot.signals import JointVector, MessageSource, Mode, TickOutputs
+from fsw.autopilot.signals import CommandAck, JointVector, MessageSource, Mode, TickOutputs
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.wire import encode_replies, message_ids
@@ -114,7 +114,10 @@ class ArmLink:
             flags = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
             values = (custom_mode(outputs.mode), _GENERIC, _PX4_MODES, flags, _ACTIVE, 3)
             self._send(message_ids.HEARTBEAT, *values)
-        for ack in outputs.acks:
+
+    def acknowledge(self, ack: CommandAck) -> None:
+        """Answer a command that came here."""
+        if self._known:
             self._send(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))
 
     def close(self) -> None:

@@ -115,6 +115,10 @@ class AnyArm(Protocol):
         """Send where joints are to be [rad]; None: they are not its own to move."""
         ...
 
+    def acknowledge(self, ack: CommandAck) -> None:
+        """Send an answer to who speaks beside the arm."""
+        ...
+
     def close(self) -> None:
         """Close it."""
         ...
@@ -362,7 +366,9 @@ class Px4Link:
         """PX4 is told nothing: its own ground station hears it, not us."""
 
     def queue_ack(self, ack: CommandAck) -> None:
-        """What our autopilot answers to what PX4's state commanded; a refusal has its own text."""
+        """Acknowledge a command of who speaks beside the arm."""
+        if self._arm is not None:
+            self._arm.acknowledge(ack)
 
     def route(self, request: CommandRequest) -> None:
         """A real vehicle lets nothing fail on command."""
