@@ -226,6 +226,8 @@ def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
     A ``tuning`` of the start says what is known of PX4's loops; plans are predicted with their lag.
     They are slower than ours, so a plan keeps more from walls: with this lambda the tube of the
     default loops fits, and with this alpha the tilt can brake. Actuators are PX4's to watch.
+    Quick pushes are not for a loop whose rates saturate by them: the safety filter is off, and the
+    arm does not compensate, because PX4 knows nothing of what its reaction does.
     """
     planner = replace(
         config.planner,
@@ -234,7 +236,15 @@ def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
         lambda_min=0.0,
     )
     limits = replace(config.limits, watches_actuators=0, clearance_sigmas=0.0)
-    config = tuned(replace(config, inner="px4", planner=planner, limits=limits), tuning)
+    config = replace(
+        config,
+        inner="px4",
+        planner=planner,
+        limits=limits,
+        tuning=replace(config.tuning, compensate=False),
+        safety_filter=replace(config.safety_filter, enabled=0),
+    )
+    config = tuned(config, tuning)
     return replace(config, airframe=airframe_above_px4(config.airframe, config.px4))
 
 
