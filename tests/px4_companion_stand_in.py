@@ -1,12 +1,15 @@
 """A stand-in for PX4 as a companion computer sees it: modes, streams, and a model of its control.
 
 What it accepts and answers is what a real one did, PX4 v1.17 at a70a558393: DO_SET_MODE gets two
-answers, Offboard needs a stream and is left 1 s after the last set-point with "Failsafe activated",
-SET_MESSAGE_INTERVAL is answered 0, ODOMETRY comes 125 times a second at most with its velocity in
-NED (child frame 1), DO_SET_ACTUATOR acts at once.
+answers, HEARTBEAT comes once a second and CURRENT_MODE when it changes, Offboard needs a stream and
+is left 1 s after the last set-point with "Failsafe activated", SET_MESSAGE_INTERVAL is answered 0,
+ODOMETRY comes 125 times a second at most with its velocity in NED (child frame 1), DO_SET_ACTUATOR
+acts at once.
 
 Its control is PX4's in structure, with the gains that it has: position P, velocity P, I and D on
 the measured acceleration, thrust vector, attitude P, rates PID; the outer loop every second step.
+Pushed as `pandion px4 identify` pushes, it was found to be 55 1/s^2, 8.7 1/s and 40 ms, and a real
+PX4 with the same gains 56, 9.5 and 51.
 """
 
 from __future__ import annotations
@@ -26,7 +29,8 @@ EXTENDED_SYS_STATE, BATTERY_STATUS, ODOMETRY, HEARTBEAT, COMMAND_LONG = 245, 147
 POSITION, TAKEOFF, HOLD, LAND, OFFBOARD = (3, 0), (4, 2), (4, 3), (4, 6), (6, 0)
 ARM, SET_MODE, SET_ACTUATOR, SET_INTERVAL, NAV_TAKEOFF = 400, 176, 187, 511, 22
 STREAM_LOSS_S = 1.0  # COM_OF_LOSS_T
-KNOWN = (ATTITUDE_QUATERNION, ODOMETRY, EXTENDED_SYS_STATE, BATTERY_STATUS)
+CURRENT_MODE = 436
+KNOWN = (CURRENT_MODE, ATTITUDE_QUATERNION, ODOMETRY, EXTENDED_SYS_STATE, BATTERY_STATUS)
 FASTEST_US = {ODOMETRY: 8000, ATTITUDE_QUATERNION: 4000}
 SINKS = 0.75  # m/s, in Position without sticks
 
@@ -113,8 +117,13 @@ class Px4Companion(Px4StandIn):
             return False
         if mode != self.mode:
             self.mode, self.hold = mode, None
-        self.due[HEARTBEAT] = 0
+            if CURRENT_MODE in self.intervals:
+                self._say(CURRENT_MODE, self._custom, self._custom, 0)
         return True
+
+    @property
+    def _custom(self) -> int:
+        return self.mode[0] << 16 | self.mode[1] << 24
 
     def hear_companion(self, data: bytes) -> None:
         if self.deaf:
@@ -193,9 +202,8 @@ class Px4Companion(Px4StandIn):
                 cells = (16200, *(65535,) * 9)
                 self._say(message, 0, 0, 32767, *cells, -1, 0, 1, 1, 100, 0, 0, *(0,) * 4, 0, 0)
             elif message == HEARTBEAT:
-                custom = self.mode[0] << 16 | self.mode[1] << 24
                 base = 1 | (128 if self.armed else 0)
-                self._say(message, custom, 2, 12, base, 4, 3)
+                self._say(message, self._custom, 2, 12, base, 4, 3)
 
     # ---------------------------------------------------------------- its loops
 

@@ -42,6 +42,7 @@ from fsw.link.px4.messages import (
     CompanionWriter,
     is_of_px4,
     mode_name,
+    mode_of,
     shares_of,
     state_of,
 )
@@ -57,9 +58,12 @@ from messages.frames import Frame, Losses
 _STREAMS: Final = {  # asked for, with its period [us]
     message_ids.ATTITUDE_QUATERNION: 4_000,
     message_ids.ODOMETRY: 8_000,
+    # Sent when it changes: HEARTBEAT tells of another mode up to a second later.
+    message_ids.CURRENT_MODE: 20_000,
     message_ids.EXTENDED_SYS_STATE: 200_000,
     message_ids.BATTERY_STATUS: 1_000_000,
 }
+_STEADY: Final = (message_ids.ATTITUDE_QUATERNION, message_ids.ODOMETRY)
 LEAST_BYTES_PER_S: Final = 46_080  # of 460,800 baud: the streams take 42,000
 PX4_PORT: Final = 14540  # to which PX4 sends what a companion hears, before it has heard one
 STREAM_US: Final = 20_000  # of set-points
@@ -175,6 +179,7 @@ class Px4Link:
             message_ids.ATTITUDE_QUATERNION: self._take_attitude,
             message_ids.ODOMETRY: self._take_odometry,
             message_ids.HEARTBEAT: self._take_heartbeat,
+            message_ids.CURRENT_MODE: self._take_mode,
             message_ids.EXTENDED_SYS_STATE: self._take_landed,
             message_ids.BATTERY_STATUS: self._take_battery,
             message_ids.TIMESYNC: self._take_time,
@@ -257,6 +262,9 @@ class Px4Link:
         if found is not None:
             self._armed, self._mode = found
 
+    def _take_mode(self, values: Numbers) -> None:
+        self._mode = mode_of(int(values[0]))
+
     def _take_landed(self, values: Numbers) -> None:
         self._landed = int(values[1]) <= ON_GROUND
 
@@ -322,7 +330,7 @@ class Px4Link:
                 self._tell(Severity.WARNING, f"PX4's link: {news}")
         if self._is_due("ask", t_us, ASK_US):
             self._send(self._writer.time_sync(0, 1000 * self._clock()))
-            if any(self._counts[k] * p < _SLOW * ASK_US for k, p in _STREAMS.items()):
+            if any(self._counts[k] * _STREAMS[k] < _SLOW * ASK_US for k in _STEADY):
                 self._ask_for_streams()
             self._counts = dict.fromkeys(_STREAMS, 0)
 

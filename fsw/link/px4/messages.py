@@ -99,7 +99,12 @@ def state_of(heartbeat: Numbers) -> tuple[bool, tuple[int, int]] | None:
     custom, _, autopilot, base, _, _ = heartbeat
     if autopilot != _AUTOPILOT_PX4:
         return None
-    return bool(int(base) & _ARMED), (int(custom) >> 16 & 0xFF, int(custom) >> 24 & 0xFF)
+    return bool(int(base) & _ARMED), mode_of(int(custom))
+
+
+def mode_of(custom: int) -> tuple[int, int]:
+    """PX4's main and sub mode of a custom mode."""
+    return custom >> 16 & 0xFF, custom >> 24 & 0xFF
 
 
 def mode_name(mode: tuple[int, int]) -> str:
