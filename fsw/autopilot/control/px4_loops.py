@@ -130,7 +130,7 @@ class Px4Loops(Cascade):
         health: ActuatorHealth = HEALTHY,
         tube: TubeAround = NO_TUBE,
     ) -> None:
-        """See ``Cascade.step``; rotors are PX4's, whatever their ``health``."""
+        """See ``Cascade.step``, ``zones`` (zones, k) [SI]; rotors are PX4's whatever ``health``."""
         r.flags = 0
         self._ask(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
 

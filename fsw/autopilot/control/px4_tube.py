@@ -27,7 +27,11 @@ _SETTLED_S = 15.0  # PX4's integral is slow
 
 @lru_cache(maxsize=8)
 def px4_tube(px4: Px4Tuning, hanging: float, hold_s: float, dt: float) -> Tube:
-    """The tube of PX4's loops; see ``tube.tube``. There is no memory of wind."""
+    """The tube of PX4's loops with a tick of ``dt`` [s]; there is no memory of wind.
+
+    The end-effector is ``hanging`` [m] below the base; a random disturbance keeps its value for
+    ``hold_s``.
+    """
     below = hanging / GRAVITY
     a, b = horizontal_loop(px4)
     states = after_a_push(a, b, dt, _SETTLED_S)

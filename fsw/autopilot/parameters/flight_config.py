@@ -226,8 +226,8 @@ def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
     A ``tuning`` of the start says what is known of PX4's loops; plans are predicted with their lag.
     They are slower than ours, so a plan keeps more from walls: with this lambda the tube of the
     default loops fits, and with this alpha the tilt can brake. Actuators are PX4's to watch.
-    Quick pushes are not for a loop whose rates saturate by them: the safety filter is off, and the
-    arm does not compensate, because PX4 knows nothing of what its reaction does.
+    The safety filter is off, which relies on quicker loops, and the arm does not compensate,
+    because PX4 knows nothing of what its reaction does.
     """
     planner = replace(
         config.planner,

@@ -51,7 +51,7 @@ class Joints:
         self.qd = (0.0,) * len(q) if qd is None else qd
 
     def sent(self, q: JointVector, seconds: float) -> None:
-        """Believe that servos go to angles [rad]."""
+        """Believe that servos go to angles [rad] for ``seconds`` [s]."""
         self.qd = tuple([_SERVO * (a - b) for a, b in zip(q, self.q, strict=True)])
         self.q = tuple(
             [b + min(seconds, 1.0 / _SERVO) * r for b, r in zip(self.q, self.qd, strict=True)]

@@ -64,7 +64,7 @@ _STREAMS: Final = {  # asked for, with its period [us]
     message_ids.BATTERY_STATUS: 1_000_000,
 }
 _STEADY: Final = (message_ids.ATTITUDE_QUATERNION, message_ids.ODOMETRY)
-LEAST_BYTES_PER_S: Final = 46_080  # of 460,800 baud: the streams take 42,000
+MIN_BYTES_PER_S: Final = 46_080  # of 460,800 baud: the streams take 42,000
 PX4_PORT: Final = 14540  # to which PX4 sends what a companion hears, before it has heard one
 STREAM_US: Final = 20_000  # of set-points
 _HEARTBEAT_US: Final = 1_000_000

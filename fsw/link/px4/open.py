@@ -9,7 +9,7 @@ from fsw.autopilot.ports import Clock, VehicleFacts
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.px4.arm import ArmLink, Joints
-from fsw.link.px4.link import LEAST_BYTES_PER_S, PX4_PORT, Px4Link
+from fsw.link.px4.link import MIN_BYTES_PER_S, PX4_PORT, Px4Link
 from fsw.link.udp_endpoint import LinkError
 from messages.addresses import LinkAddress, parse_link_address
 
@@ -29,9 +29,9 @@ def px4_addresses(px4: str, arm: str | None) -> Px4Addresses:
     """
     found = Px4Addresses(parse_link_address(px4), None if arm is None else parse_link_address(arm))
     speed = None if isinstance(found.px4, tuple) else found.px4.bytes_per_s
-    if speed is not None and speed < LEAST_BYTES_PER_S:
+    if speed is not None and speed < MIN_BYTES_PER_S:
         raise LinkError(
-            f"{px4} takes {speed} bytes/s and PX4's estimate needs {LEAST_BYTES_PER_S}; "
+            f"{px4} takes {speed} bytes/s and PX4's estimate needs {MIN_BYTES_PER_S}; "
             "use 460800 baud or more"
         )
     return found
