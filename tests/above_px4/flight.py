@@ -130,7 +130,7 @@ class AbovePx4:
         )
         self.px4.joints = shares_of(servo_ranges(self.config.airframe), truth.q_arm)
         self.link.joints.measured(0, truth.q_arm, truth.qd_arm)
-        self.answer = Px4Answer(0, *Controls.off(self.sim.vehicle))
+        self.answer = Px4Answer(0, *Controls.off(self.sim.vehicle)[:3])
         self.outputs: TickOutputs | None = None
         self.commands: list[Any] = []
         self.next_target_us = START_US
