@@ -43,12 +43,12 @@ $(shell .venv/bin/python -I -c '' 2>/dev/null || rm -f .venv/ready*; \
 READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_hook.py Makefile)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-long nightly faults soak wheel code-checks tests-of-clocks tests-of-clients \
+.PHONY: help setup run test test-long px4 nightly faults soak wheel code-checks tests-of-clocks tests-of-clients \
 	tests-of-processes tests-of-the-plant tests-of-studies tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 setup: $(READY) messages/dialect.py ## create .venv with everything in it (nothing to do if nothing changed)
 	@echo "setup: .venv is ready"
@@ -101,6 +101,9 @@ fsw-kernels sitl-kernels: %-kernels:
 test-long: setup ## the tests that make test leaves out for its four minutes, and properties with more examples
 	$(PYTEST) -m long
 	PROPERTIES=thorough $(PYTEST) -m hypothesis
+
+px4: setup ## fly with a real PX4, plant below and planner above (long): PX4_BUILD=folder of its SITL build
+	PX4_BUILD="$(PX4_BUILD)" $(PYTEST) -m long -s -rs tests/real_px4
 
 faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
 	@mkdir -p build

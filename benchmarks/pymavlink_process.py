@@ -53,7 +53,7 @@ def _swap_sitl() -> None:
 
 def step(sender: Any, readings: Any) -> bytes:
     """The frames of one step, by pymavlink."""
-    t_us, p, v, q, w, gyro, accel, angles, rates, torques = readings
+    t_us, p, v, q, w, gyro, accel, angles, rates, torques, _ = readings
     still = [0.0, 0.0, 0.0]
     rest = [0.0] * (4 - len(angles))
     messages = (

@@ -21,6 +21,7 @@ from command_line.process import (
 from fsw.arguments import FswOptions
 from fsw.autopilot.control.control_metrics import ControlMetrics
 from fsw.autopilot.ports import LoopHealth, PlanningCycle
+from fsw.autopilot.tuning import Tuning
 from fsw.link.build_links import build_links
 from fsw.link.events.event_service import EventService
 from fsw.link.files.flight_logs import FlightLogs
@@ -30,6 +31,8 @@ from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
+from fsw.link.px4.link import Px4Link
+from fsw.link.px4.open import open_px4, px4_addresses
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import SimLink
@@ -82,8 +85,11 @@ class _Session:
 
     def run(self) -> int:
         options = self._options
-        simulator = parse_address(options.sim)
-        addresses(options.links)  # what is no address is refused before a minute of compiling
+        chosen = options.ground
+        # What is no address is refused before a minute of compiling.
+        simulator, px4 = parse_address(options.sim), options.autopilot_link
+        where = None if px4 is None else px4_addresses(px4, options.arm_link)
+        addresses(chosen)
         directory = _output_directory(options.out)
         self._events.report("preparing", "fsw: preparing")
         keeping = self._kept_parameters(directory)  # what is of no use, as well
@@ -99,28 +105,33 @@ class _Session:
         settle_memory()
         planner = ProcessPlanner(program.planner, clock.now_us, record.mpc)
         keeping.start()
-        inbox = Inbox(options.links.origin)
+        inbox = Inbox(chosen.origin)
         start_us = clock.unix_us()
         files = self._files(directory, start_us, program)
-        vehicle: VehicleLink = SimLink(simulator, inbox, facts, clock.now_us)
-        autopilot = AUTOPILOTS[options.links.autopilot]
+        vehicle: VehicleLink = (
+            SimLink(simulator, inbox, facts, clock.now_us)
+            if where is None
+            else open_px4(where, inbox, facts, clock.now_us, servos=options.arm_servos)
+        )
+        autopilot = AUTOPILOTS[chosen.autopilot]
         context = TelemetryContext(
             facts,
             record.health,
             autopilot,
-            options.links.origin,
+            chosen.origin,
             start_unix_us=start_us,
             plan_ids=program.missions.ids,
         )
         logs = FlightLogs(directory, options.params)
         clocks = (clock.now_us, clock.unix_us)
         ground = build_links(
-            options.links,
+            chosen,
             inbox,
             context,
             clocks,
             files.tlog.add,
             lambda: self._services(program, logs),
+            beside=options.above_px4,
         )
         # For a view beside it: the usual port may have been taken.
         ports = {link.name: link.port for link in ground.links if link.port is not None}
@@ -135,7 +146,9 @@ class _Session:
         finally:
             for part in (planner, vehicle, ground, files, keeping, console):
                 part.close()
-        result = report.as_json(options.control, facts, end, record)
+        result = report.as_json(options.flown, facts, end, record)
+        if isinstance(vehicle, Px4Link):
+            result["px4"] = vehicle.as_json()
         result["retransmissions"] = vehicle.retransmissions
         result["inbox_refused"] = inbox.refused
         result["links"] = {link.name: link.as_json() for link in ground.links}
@@ -190,7 +203,7 @@ class _Session:
 
         path, record = self._options.params, directory / "parameters.params"
         try:
-            config = configured(self._options.control)
+            config = configured(self._options.flown)
         except ValueError as error:
             raise CouldNotStart(str(error)) from None
         with _refused(path or directory):
@@ -222,14 +235,15 @@ class _Session:
     ) -> FlightEnd:
         options = self._options
         self._stop.listen()
-        self._events.report("ready", f"fsw: ready, looking for the simulator at {options.sim}")
+        whom = "PX4" if options.above_px4 else "the simulator"
+        where = options.autopilot_link or options.sim
+        self._events.report("ready", f"fsw: ready, looking for {whom} at {where}")
         first = loop.connect(options.wait_s)
         if first is None:
             if self._stop.requested:
                 return FlightEnd(Ending.STOPPED, "stopped before the flight began")
-            raise CouldNotStart(
-                f"no simulator answered at {options.sim} within {options.wait_s:g} s"
-            )
+            who = "no PX4 with an estimate" if options.above_px4 else "no simulator"
+            raise CouldNotStart(f"{who} answered at {where} within {options.wait_s:g} s")
         # Lockstep announces itself with the first step; a first step without it was not the first.
         if vehicle.pacing is Pacing.LOCKSTEP:
             settle_memory()
@@ -259,14 +273,17 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[A
 
     def load() -> FlightProgram[Any]:
         return flight_software(
-            options.control, origin=options.links.origin, vehicle=load_vehicle(options.vehicle)
+            options.flown,
+            origin=options.links.origin,
+            vehicle=load_vehicle(options.vehicle),
+            px4=_px4_loops(options),
         )
 
     def compile_first() -> None:
         load()
-        cache().note(options.control.kernels)
+        cache().note(options.flown.kernels)
 
-    due = cache().is_due(options.control.kernels)
+    due = cache().is_due(options.flown.kernels)
     if due or cache().folder is None:
         cache().announce("fsw", events)
     if due:
@@ -285,7 +302,7 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         "ver_sw": revision(),
         "scenario": options.scenario,
         "scenario_digest": options.scenario_digest,
-        **options.control.facts(),
+        **options.flown.facts(),
         **vehicle_facts(load_vehicle(options.vehicle)),
     }
     if options.seed is not None:
@@ -297,6 +314,17 @@ def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
         airframe=program.facts.airframe,
         profile=round(program.parameters.values["LOG_PROFILE"]),
     )
+
+
+def _px4_loops(options: FswOptions) -> Tuning:
+    """What the kept parameters say of PX4's loops, with whose lag plans are predicted."""
+    from fsw.autopilot.parameters.registry import tuning_of
+    from fsw.storage.parameter_file import load
+
+    path = options.params
+    if not options.above_px4 or path is None or not path.exists():
+        return ()
+    return tuning_of({n: v for n, v in load(path).values.items() if n.startswith("PX4_")})
 
 
 @contextmanager

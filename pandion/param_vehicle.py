@@ -41,13 +41,17 @@ class ParameterRefused(Exception):
 class ParameterClient:
     """Asks one vehicle; a context manager."""
 
-    def __init__(self, vehicle: LinkAddress, patience_s: float = 1.0) -> None:
-        """Open a link; each answer is waited for ``patience_s``, three times."""
+    def __init__(
+        self, vehicle: LinkAddress, patience_s: float = 1.0, *, local_port: int = 0
+    ) -> None:
+        """Open a link, of UDP from a ``local_port``; each answer is waited for, three times."""
         self._where = address_text(vehicle)
         self._known: dict[str, float] = {}  # values that have come, for their types
         self._patience_s = patience_s
         self._writer = FrameWriter(_SYSTEM, _COMPONENT)
-        self._endpoint, self._peer = open_endpoint(vehicle, lambda: time.monotonic_ns() // 1000)
+        self._endpoint, self._peer = open_endpoint(
+            vehicle, lambda: time.monotonic_ns() // 1000, local_port
+        )
         self._losses = Losses()
         self._waiting: list[Frame] = []  # frames that were not looked at yet
 
@@ -92,6 +96,16 @@ class ParameterClient:
         missing = "nothing" if not values else f"{len(values)} of {count} parameters"
         raise NoAnswer(f"{missing} came from the vehicle at {self._where}")
 
+    def read(self, name: str) -> float:
+        """One parameter [its unit].
+
+        Raises:
+            NoAnswer: The vehicle is silent.
+            ParameterRefused: It has no such parameter.
+        """
+        request = ids.PARAM_REQUEST_READ, _BY_NAME, *_VEHICLE, name.encode()
+        return self._ask(name, *request)[0]
+
     def write(self, name: str, value: float) -> None:
         """Change one parameter to ``value`` [the parameter's unit].
 
@@ -100,7 +114,7 @@ class ParameterClient:
             NoAnswer: The vehicle is silent.
         """
         if name not in self._known:
-            self._ask(name, ids.PARAM_REQUEST_READ, _BY_NAME, *_VEHICLE, name.encode())
+            self.read(name)
         # In the vehicle's type; a value that this cannot hold is the vehicle's to refuse.
         whole = isinstance(self._known[name], int) and float(value).is_integer()
         value = int(value) if whole else nearest_decimal(value)

@@ -11,7 +11,7 @@ from command_line.actions import read_action
 from command_line.options import option
 from command_line.output import print_error, try_write
 from command_line.parser import COULD_NOT_START
-from command_line.values import known, one_of, place
+from command_line.values import known, one_of, place, seconds
 from messages.addresses import LinkError, parse_link_address
 from sitl.arguments import rate
 from sitl.earth import DEFAULT_ORIGIN, Place
@@ -57,6 +57,29 @@ class _Params(_Plant):
         lambda text: Place(*place(text)),
         default=DEFAULT_ORIGIN,
         text=lambda origin: ",".join(map(repr, origin)),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Identify:
+    link: str = option(
+        "--autopilot-link ADDRESS",
+        "PX4, as of pandion fsw: udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD",
+        default="udp:127.0.0.1:14580",
+    )
+    flown: str = option(
+        "--vehicle NAME",
+        "vehicle that it flies: one that comes with Pandion, or a .toml file",
+        default="paper",
+    )
+    out: Path = option(
+        "--out FILE",
+        "write the parameters for pandion fsw --params",
+        Path,
+        default=Path("px4-loops.params"),
+    )
+    wait_s: float = option(
+        "--wait S", "how long to wait for the vehicle, in seconds", seconds, default=120.0
     )
 
 
@@ -137,6 +160,27 @@ def _print_environment(options: _Plant) -> int:
     return DONE
 
 
+def _identify(options: _Identify) -> int:
+    from fsw.storage.parameter_file import as_params
+    from pandion.px4_identify import NotIdentified, fly, report
+
+    def tell(sentence: str) -> None:
+        print(sentence, flush=True)
+
+    try:
+        found, config = fly(parse_link_address(options.link), options.flown, tell, options.wait_s)
+    except NotIdentified as error:
+        print_error("pandion px4", error)
+        return FAILED
+    values, sentences = report(found, config)
+    for sentence in sentences:
+        tell(sentence)
+    for problem in try_write(options.out, as_params(values)):
+        print_error("pandion px4", f"cannot write {problem}")
+        return FAILED
+    return DONE
+
+
 _USAGE: Final = "[SCENARIO] [options]"
 _PURPOSE: Final = "What PX4 needs to fly the simulated vehicle."
 ACTIONS: Final[dict[str, tuple[type[Any], Callable[[Any], int], str]]] = {
@@ -144,6 +188,11 @@ ACTIONS: Final[dict[str, tuple[type[Any], Callable[[Any], int], str]]] = {
         _Params,
         _print_parameters,
         "print the parameters PX4 needs; write or set them",
+    ),
+    "identify": (
+        _Identify,
+        _identify,
+        "find out by a short manoeuvre what the planner above PX4 must know of its loops",
     ),
     "env": (_Plant, _print_environment, "print the environment of PX4's own start command"),
 }

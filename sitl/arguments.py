@@ -82,6 +82,11 @@ class SitlOptions(RunOptions):
         "for px4 tcp:HOST:PORT (default tcp:127.0.0.1:4560)",
     )
     rate_hz: int = option("--rate HZ", "for px4: steps a second, 250 or 500", rate, default=250)
+    companion: str | None = option(
+        "--companion udp:HOST:PORT",
+        "for px4: the --arm-link of a planner above it, which is told the joints' angles, the "
+        "trajectory and the safe set",
+    )
     wait_s: float = option(
         "--wait S", "how long to wait for the flight software, in seconds", seconds, default=60.0
     )
@@ -107,6 +112,8 @@ class SitlOptions(RunOptions):
         if not self.for_px4:
             if self.rate_hz != 250:
                 raise ContradictionError("--rate is of the exchange with PX4; add --for px4")
+            if self.companion is not None:
+                raise ContradictionError("--companion stands beside PX4; add --for px4")
         elif self.realtime:
             raise ContradictionError(
                 "--for px4 is in lockstep with PX4; --speed 1 is real time, without --realtime"

@@ -641,6 +641,17 @@ class ActuatorCommand(NamedTuple):
     joint_torque: JointVector  # N m
 
 
+class Setpoint(NamedTuple):
+    """Where an autopilot that has loops of its own is asked to bring the vehicle."""
+
+    p: Vec3  # m, NED, body origin
+    v: Vec3  # m/s, NED
+    a: Vec3  # m/s^2, NED, beside what its loops make of the rest
+    yaw: float  # rad
+    yaw_rate: float  # rad/s
+    q_arm: JointVector  # rad
+
+
 @dataclass(frozen=True, slots=True)
 class CommandAck:
     """Answer to one CommandRequest."""
@@ -988,6 +999,7 @@ class TickOutputs:
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = ()
     tuning_taken: bool | None = None  # whether the requested one is in use; None: none was
+    setpoint: Setpoint | None = None  # for an autopilot with loops of its own; None: nothing flown
 
     @property
     def snapshot(self) -> FlightSnapshot:

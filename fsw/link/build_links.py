@@ -31,11 +31,14 @@ def build_links(
     clocks: tuple[Clock, Clock],
     record: RecordFrame,
     services: Callable[[], Sequence[LinkService]],
+    *,
+    beside: bool = False,
 ) -> GroundLinks:
     """Open the links; ``clocks`` are monotonic time and Unix time [us].
 
     Only the ground station's link is recorded: the programs' link would repeat the same telemetry
-    under the same sequence numbers. ``services`` makes what one link serves.
+    under the same sequence numbers. ``services`` makes what one link serves. A planner ``beside``
+    PX4 leaves PX4 its ports.
 
     Raises:
         LinkError: An address is none, or a key cannot be trusted.
@@ -46,7 +49,7 @@ def build_links(
         LinkSetup(
             name="gcs",
             target=gcs,
-            local_port=_GCS_PORT,
+            local_port=_GCS_PORT + beside,
             rates_hz=GROUND_RATES,
             unheard=True,
             remote=choice.allow_remote,
@@ -58,7 +61,7 @@ def build_links(
             LinkSetup(
                 name="api",
                 target=api,
-                local_port=_API_PORT,
+                local_port=_API_PORT + beside,
                 rates_hz=API_RATES,
                 unheard=False,
                 remote=choice.allow_remote,

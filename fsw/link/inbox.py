@@ -138,6 +138,11 @@ class Inbox:
         self._source, self._is_news = source, True
         return handler(frame)
 
+    def accept_command(self, command: Command) -> None:
+        """Keep a command of our own, which is carried out in the next tick."""
+        self._is_news = True
+        self._received.commands.append(command)
+
     def accept_samples(self, samples: list[Sample]) -> None:
         """Keep what sensors have measured; the oldest go where a tick has taken none for long."""
         kept = self._received.samples

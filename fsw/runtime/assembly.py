@@ -12,10 +12,10 @@ from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.control_choice import FULL, ControlChoice
-from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.parameters.flight_config import FlightConfig, above_px4, flight_config
 from fsw.autopilot.ports import VehicleFacts
 from fsw.autopilot.signals import Origin
-from fsw.autopilot.tuning import flat
+from fsw.autopilot.tuning import Tuning, flat
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.runtime import clock
 from fsw.runtime.program import FlightProgram
@@ -29,21 +29,24 @@ def flight_software(
     origin: Origin = DEFAULT_ORIGIN,
     vehicle: Vehicle | None = None,
     to_plan: bool = True,
+    px4: Tuning = (),
 ) -> FlightProgram[Any]:
     """Build the program and, unless ``to_plan`` is False, compile it: a minute the first time.
 
-    For a ``vehicle``; without one, the paper's.
+    For a ``vehicle``; without one, the paper's. Above PX4, ``px4`` is what is known of its loops
+    at the start.
 
     Raises:
         ValueError: For an unknown name, listing the known ones.
     """
-    config = configured(choice, origin, vehicle)
+    config = configured(choice, origin, vehicle, px4)
     planner = Planner(config.planner, config.airframe, clock.stopwatch_us)
     flight = TunedAutopilot(config)
     if to_plan:
         planner.warm_up()
         flight.warm_up()
-    parameters = ParameterStore(config, flight.prepare)
+    # Whose defaults are those of a vehicle of which nothing is known.
+    parameters = ParameterStore(configured(choice, origin, vehicle), flight.prepare)
     missions = MissionStore(
         Site(
             locate=partial(to_local, config.origin),
@@ -67,7 +70,10 @@ def flight_software(
 
 
 def configured(
-    choice: ControlChoice, origin: Origin = DEFAULT_ORIGIN, vehicle: Vehicle | None = None
+    choice: ControlChoice,
+    origin: Origin = DEFAULT_ORIGIN,
+    vehicle: Vehicle | None = None,
+    px4: Tuning = (),
 ) -> FlightConfig:
     """The configuration of the start.
 
@@ -84,6 +90,8 @@ def configured(
         soft=choice.allow_inconsistent,
         vehicle=vehicle,
     )
+    if config.inner == "px4":
+        config = above_px4(config, px4)
     return replace(config, origin=origin)
 
 

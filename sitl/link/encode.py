@@ -79,7 +79,7 @@ class StepEncoder:
             + self._arm(t_us, angles, rates, torques)
             + self._hil_sensor(t_us, *accel, *gyro)
         )
-        return self._spoken(messages) + step if messages else step
+        return self.spoken(messages) + step if messages else step
 
     def _arm(self, t_us: int, *arrays: tuple[float, ...]) -> bytes:
         """ARM_JOINT_STATE; without joints in the extension its length is always the same."""
@@ -108,7 +108,7 @@ class StepEncoder:
             datagram = opening + b"".join(frames)
             if len(datagram) <= _MAX_DATAGRAM:  # almost always
                 return [], datagram
-        step = [opening, self._spoken(messages)] if messages else [opening]
+        step = [opening, self.spoken(messages)] if messages else [opening]
         size = sum(map(len, step)) + len(frames[-1])
         first = len(frames) - 1
         while first > 0 and size + len(frames[first - 1]) <= _MAX_DATAGRAM:
@@ -145,9 +145,10 @@ class StepEncoder:
 
     def command(self, message: SendCommand) -> bytes:
         """One COMMAND_LONG of the pilot."""
-        return self._spoken((message,))
+        return self.spoken((message,))
 
-    def _spoken(self, messages: tuple[PilotMessage, ...]) -> bytes:
+    def spoken(self, messages: tuple[PilotMessage, ...]) -> bytes:
+        """What the pilot says."""
         return b"".join(self._pilot.frame(*_wire(message)) for message in messages)
 
 

@@ -70,7 +70,7 @@ class SensorEncoder:
             if isinstance(one, ImuMeasurement) and one.t_us == t_us:
                 clock = one
             elif isinstance(one, JointMeasurement):
-                out.append(self._encoders(max(one.t_us, 0), one.angles))
+                out.append(self.encoders(max(one.t_us, 0), one.angles))
             else:
                 out.append(self._frame(one))
         if clock is not None:
@@ -79,8 +79,11 @@ class SensorEncoder:
             out.append(self._hil_sensor(t_us, (0.0,) * 13, 0, 0))
         return out
 
-    def _encoders(self, t_us: int, angles: tuple[float, ...]) -> bytes:
-        """JOINT_ENCODERS; without joints in the extension its length is always the same."""
+    def encoders(self, t_us: int, angles: tuple[float, ...]) -> bytes:
+        """JOINT_ENCODERS with ``angles`` (j,) [rad].
+
+        Without joints in the extension its length is always the same.
+        """
         if len(angles) in self._joints:
             return self._joints[len(angles)](t_us, *angles)
         values = (*base(angles), len(angles), *more(angles))

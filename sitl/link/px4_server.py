@@ -31,6 +31,9 @@ _SLICE_S: Final = 0.1  # after which a request to stop is seen
 _READ: Final = 4096
 
 
+Beside = Callable[[Simulation, list[Measurement]], None]
+
+
 class Px4Exchange:
     """Steps with PX4 at the other end of a stream."""
 
@@ -136,8 +139,11 @@ def serve_px4(
     *,
     every: int,
     pace_s: float | None,
+    beside: Beside = lambda _simulation, _measured: None,
 ) -> RunTiming:
     """Step until the simulation, a signal or PX4 ends the run; PX4 is asked every so many steps.
+
+    Whoever is ``beside`` PX4 is given what has been measured since the last exchange.
 
     Exchanges begin ``pace_s`` [s] of wall time apart, or as soon as possible. The reason for the
     end is in ``simulation.ended``.
@@ -164,6 +170,7 @@ def serve_px4(
                 if pace_s is not None:
                     time.sleep(max(begin_s + number * pace_s - time.perf_counter(), 0.0))
                 message = encoder.step(simulation.sensor_time_us, arrived)
+                beside(simulation, arrived)
                 arrived.clear()
                 stamp_us = simulation.sensor_time_us
                 answer = exchange.step(number, stamp_us, message, meanwhile) or answer

@@ -93,7 +93,9 @@ def test_what_cannot_be_done_is_one_sentence(
         ("MIS_TAKEOFF_ALT 2\nNAV_DLL_ACT 3\n", 0, "2 parameters read, 2 changed, 0 refused"),
         ("COM_OBL_RC_ACT 0\nMIS_TAKEOFF_ALT 2\n", 1, "1 parameters read, 1 changed, 1 refused"),
         ("NOT_OURS 1\n" * 30, 1, "0 parameters read, 0 changed, 30 refused"),
-        ("MAV_TYPE 13\n", 1, "0 parameters read, 0 changed, 1 refused"),
+        ("SYS_AUTOSTART 13\n", 1, "0 parameters read, 0 changed, 1 refused"),
+        # The file of another vehicle: what a vehicle states is no parameter to change.
+        ("MAV_TYPE 13\n", 0, "0 parameters read, 0 changed, 0 refused"),
     ],
 )
 def test_an_import_that_refuses_a_line_fails(

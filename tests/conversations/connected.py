@@ -114,7 +114,7 @@ class Connected:
 
     def _step(self) -> None:
         flight, inbox = self.flight, self.inbox
-        sensors = flight.closed.sense()
+        sensors = flight.closed.observe()[0]
         tuning = self.parameters.take_tuning()
         inputs = inbox.take_inputs(
             sensors, flight.closed.planner.take(sensors.t_us), tuning, self.missions.take_update()

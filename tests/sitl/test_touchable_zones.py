@@ -272,7 +272,7 @@ def test_the_vehicle_is_told_what_the_tool_meets() -> None:
     about = {"number": 1, "numbers": (0.0, 0.0, 0.0, 0.1), "velocity": (0.0,) * 3, "t_us": 5}
     placed = {"clearance_m": 0.1, "index": 0, "count": 1}
     plain = Announce(**about, **placed, keep_in=True)
-    spoken = StepEncoder(lockstep=True)._spoken((plain, replace(plain, touch=TOUCH)))
+    spoken = StepEncoder(lockstep=True).spoken((plain, replace(plain, touch=TOUCH)))
     values = [frame.payload_values for frame in split(spoken)]
     assert [one[26:] for one in values] == [
         (1, 0.0, 0.0, 0.0, 0.0, 0.0),

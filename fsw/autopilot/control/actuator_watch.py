@@ -456,15 +456,18 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
     s.odd2 += forget * (odd2 - s.odd2)
 
 
-def felt_by_base(s: Watched, airframe: Airframe) -> JointVector:
-    """How much of what undoes each joint's torque the base feels to act on it (j,) [1].
+def felt_inside(s: Watched, airframe: Airframe) -> JointVector:
+    """How much of what undoes each joint's torque is felt nearer to the base (j,) [1].
 
-    By mean squares of what turns the base beside the model, for drives that act on it as they are
-    asked, and as the arm is seen to move.
+    By mean squares, of what turns the base beside the model where drives act on it as they are
+    asked, and as the arm is seen to move; or of what undoes the torque of a joint between.
     """
     turned2 = airframe.rotor_lever**2 * float(s.products[0] + s.products[1])
-    unseen = float(s.odd2) - turned2
-    return tuple([unseen / max(u, ODD * ODD) for u in s.undone2[: airframe.bodies.joints].tolist()])
+    unseen, inside, felt = float(s.odd2) - turned2, 0.0, []
+    for u in s.undone2[: airframe.bodies.joints].tolist():
+        felt.append(max(unseen / max(u, ODD * ODD), inside / max(u, UNDONE * UNDONE)))
+        inside = max(inside, u)
+    return tuple(felt)
 
 
 @compilable

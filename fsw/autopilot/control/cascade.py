@@ -62,7 +62,7 @@ from fsw.autopilot.model.rotors import (
     rotor_decay,
 )
 from fsw.autopilot.shapes.zones import NO_ZONES
-from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec3, Vec4
+from fsw.autopilot.signals import JointVector, Mat3, Setpoint, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import (
     BREACH,
     FILTER_ACTED,
@@ -74,7 +74,7 @@ from fsw.autopilot.tick_record import (
 )
 from fsw.compiled import compilable, compiled, kernel, machine_code, packed
 
-Inner = Literal["tracking", "pid"]
+Inner = Literal["tracking", "pid", "px4"]
 Model = Vec4
 """What rotors make of it: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
 
@@ -164,9 +164,13 @@ class Cascade:
         )
         self.probes = filter_probes(clear.body)
         self.packed = packed(self.law)
-        example = self.packed, Tick().array
         rest = NO_ZONES, self.probes, NO_TUBE
-        self._close_loops = machine_code(_close_loops, *example, 1, *rest)
+        self._close_loops = machine_code(_close_loops, self.packed, Tick().array, 1, *rest)
+        self._load()
+
+    def _load(self) -> None:
+        """Load what says how the vehicle moves, for a law that is packed."""
+        example = self.packed, Tick().array
         self._expected = machine_code(_expected, *example)
         self._motion = machine_code(_motion, *example)
 
@@ -184,6 +188,10 @@ class Cascade:
     def joint_acceleration(self, r: Tick) -> JointVector:
         """The joints' part of ``expected`` [rad/s^2]."""
         return self.expected(r)[0]
+
+    def setpoint(self, r: Tick) -> Setpoint | None:
+        """What another autopilot is asked for; None: these loops command rotors."""
+        return None
 
     def step(
         self,

@@ -183,7 +183,7 @@ def estimate_tube(
     for name, entries in enters.items():
         b = np.zeros(len(a))
         b[4:] = entries
-        moved[name] = _after_a_push(a, b, dt)[:, 0]
+        moved[name] = after_a_push(a, b, dt)[:, 0]
     return EstimateTube(
         position=_sum(moved["position"]),
         velocity=_sum(moved["velocity"]),
@@ -325,7 +325,7 @@ def impulse_responses(
         b[4] = (gains.k_disturbance - gains.k[2]) / airframe.rotor_lag
     else:
         b[1] = 1.0
-    return _after_a_push(a, b, dt)
+    return after_a_push(a, b, dt)
 
 
 def _loop(airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains) -> Array:
@@ -361,18 +361,21 @@ def _vertical_responses(
     # The thrust follows a mass that changes with its lag, too.
     weighing = 1.0 / WEIGHING_TIME
     a[1, 5], a[2, 5], a[5, 5] = -1.0, a[2, 5] - weighing, -weighing
-    return _after_a_push(a, np.array([0.0, 1.0, weighing, 0.0, 0.0, weighing]), dt)
+    return after_a_push(a, np.array([0.0, 1.0, weighing, 0.0, 0.0, weighing]), dt)
 
 
-def _after_a_push(a: Array, b: Array, dt: float) -> Array:
-    """States of ``x' = a x + b d`` from one tick of d = 1 on, a row per tick."""
+def after_a_push(a: Array, b: Array, dt: float, settled_s: float = _SETTLED_S) -> Array:
+    """States of ``x' = a x + b d`` [SI] from one tick of d = 1 on, a row per tick of ``dt`` [s].
+
+    ``a`` is (n, n) and ``b`` (n,) [SI]; nothing is left after ``settled_s`` [s].
+    """
     n = len(a)
     block = np.zeros((n + 1, n + 1))
     block[:n, :n], block[:n, n] = a * dt, b * dt
     exponential = expm(block)
     x = exponential[:n, n]
     states = []
-    for _ in range(round(_SETTLED_S / dt)):
+    for _ in range(round(settled_s / dt)):
         states.append(x)
         x = exponential[:n, :n] @ x
     return np.array(states)

@@ -52,9 +52,9 @@ class EncoderWatch(NamedTuple):
 
     angles: JointVector = ()  # rad, the last reading
     # Of each: readings in a row that were the same, infinite of one that is stuck, and what undid
-    # the torques of all joints when they began [N m].
+    # its joint's torque when they began [N m].
     repeats: tuple[float, ...] = ()
-    first: tuple[JointVector, ...] = ()
+    first: JointVector = ()
 
     @property
     def repeating(self) -> bool:
@@ -73,25 +73,19 @@ class EncoderWatch(NamedTuple):
 
         An encoder is stuck that says the same while torque that its joint is given moves nothing,
         and what carries the joint feels that it moves. ``undone`` (j,) [N m] is what the watch over
-        the joints finds to act against each torque, and ``felt`` (j,) [1] how much of that the base
-        feels (``actuator_watch.felt_by_base``); or a joint nearer to the base does. A joint that
-        fails is felt by none, a load that is not known acts from the start. On the ground, and
-        where a joint is known to have failed, they are not ``judged``.
+        the joints finds to act against each torque, and ``felt`` (j,) [1] how much of that is felt
+        nearer to the base (``actuator_watch.felt_inside``). A joint that fails is not felt, a load
+        that is not known acts from the start. On the ground, and where a joint is known to have
+        failed, they are not ``judged``.
         """
-        n = len(angles)
-        repeats, first = [0.0] * n, [undone] * n
-        for k in range(n if judged and len(self.angles) == n else 0):
+        repeats, first = [0.0] * len(angles), list(undone)
+        for k in range(len(angles) if judged and len(self.angles) == len(angles) else 0):
             if angles[k] == self.angles[k]:
                 repeats[k], first[k] = self.repeats[k] + 1.0, self.first[k]
-                if repeats[k] >= _REPEATS and self._moves(k, undone, felt[k]):
+                held = abs(undone[k] - first[k]) > _HELD and felt[k] > _FELT
+                if held and repeats[k] >= _REPEATS:
                     repeats[k] = math.inf
         return EncoderWatch(angles, tuple(repeats), tuple(first))
-
-    def _moves(self, k: int, undone: JointVector, felt: float) -> bool:
-        """Whether joint ``k`` moves all the same: see ``after``."""
-        grown = [abs(now - then) for now, then in zip(undone, self.first[k], strict=True)]
-        inside = max(grown[:k], default=0.0)
-        return grown[k] > _HELD and (felt > _FELT or inside > _FELT * grown[k])
 
 
 TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4]

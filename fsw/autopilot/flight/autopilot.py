@@ -13,6 +13,7 @@ import numpy as np
 from fsw.autopilot.control.actuator_watch import pause
 from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
 from fsw.autopilot.control.joints import arm_damping
+from fsw.autopilot.control.px4_loops import Px4Loops
 from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
@@ -132,9 +133,7 @@ class Autopilot:
         self._horizon = ReferenceHorizon(config)
         self._plans = PlanExchange(config)
         self._watch = SafetyWatch(config, self._safe_sets.loop_tube)
-        self._cascade = Cascade(
-            config.airframe, config.tuning, config.inner, tick, keep_clear(config)
-        )
+        self._cascade = loops_of(config)
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
         self._descent = Descent(config)
@@ -195,7 +194,9 @@ class Autopilot:
         calm = self.calm.fly(state, inputs)
         if calm is not None:
             r, fusion, estimate = calm
-            outputs = TickOutputs(r.commanded, state.vehicle.mode, True)
+            outputs = TickOutputs(
+                r.commanded, state.vehicle.mode, True, setpoint=self._cascade.setpoint(r)
+            )
             return Controlled(
                 outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
             )
@@ -234,7 +235,10 @@ class Autopilot:
         else:
             r.input = rest_input(r.joint_count)
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
-        outputs = TickOutputs(sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts))
+        wanted = self._cascade.setpoint(r) if flown else None
+        outputs = TickOutputs(
+            sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts), setpoint=wanted
+        )
         return Controlled(
             outputs, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
         )
@@ -573,7 +577,7 @@ class Autopilot:
 
     def _wind_room(self, memory: Tick) -> Vec2:
         """What the memory of wind in force can add to the tube [m, NED]."""
-        if self.config.inner != "tracking":
+        if not self.config.follows_plan:
             return 0.0, 0.0
         return beyond_covered(self._safe_sets.loop_tube, memory.wind)
 
@@ -701,6 +705,14 @@ class Autopilot:
                 zones = moving_zones(kept.safe_set, target, kept.beyond)
             self._zones = (kept, target, zones)
         return zones
+
+
+def loops_of(config: FlightConfig) -> Cascade:
+    """The loops of a configuration: our own, or what asks PX4's."""
+    tick, clear = config.tick_period_us * 1e-6, keep_clear(config)
+    if config.inner == "px4":
+        return Px4Loops(config.airframe, config.tuning, config.px4, tick, clear)
+    return Cascade(config.airframe, config.tuning, config.inner, tick, clear)
 
 
 def keep_clear(config: FlightConfig) -> KeepClear:

@@ -140,6 +140,7 @@ class Commander:
             acceleration=setpoint_limits.acceleration,
             highest=setpoint_limits.highest,
             failures_allowed=limits.failure_injection == 1,
+            above_px4=self._config.inner == "px4",
             rests=rests(state, estimate, limits.aiding_loss_us),
         )
 

@@ -201,7 +201,7 @@ class PlanExchange:
         config, delay = self._config, self._config.plan_delay_ticks
         from_nominal = (
             not replan
-            and config.inner == "tracking"
+            and config.follows_plan
             and math.dist(nominal.p, measured.p) < config.upset_distance
             and abs(wrap_angle(nominal.yaw - measured.yaw)) < config.upset_yaw
         )

@@ -18,6 +18,7 @@ import numpy as np
 from fsw.autopilot.barriers.safe_approach import LOUD, BarrierTuning
 from fsw.autopilot.control.gains import tracking_gains
 from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
+from fsw.autopilot.control.px4_tube import is_stable, px4_tube
 from fsw.autopilot.control.tube import (
     EstimateTube,
     Tube,
@@ -91,14 +92,10 @@ def analyse(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> tuple[Findin
         if points and planner.body == "points":
             findings.append(_links(config, min(points)))
     for tuning, zones in ((planner.workspace, spheres), (planner.walls, others)):
-        if not zones:
-            continue
-        if config.inner == "tracking":
-            kept = SafeSet(tuple(zones))
-            findings.append(_base_tube(tuning, loop, surroundings))
-            findings.append(_tube_of_all_axes(config, tuning, loop, kept))
-        else:
-            findings.append(_sampled(tuning, surroundings, planner.period))
+        if zones:
+            findings += _loop_beside(config, tuning, loop, SafeSet(tuple(zones)))
+    if config.inner == "px4":
+        findings += _px4_loops(config, loop, others)
     findings += _touched(config, safe_set, loop)
     if config.inner == "tracking":
         if others:
@@ -120,6 +117,21 @@ def _touched(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> list[Findin
     return found
 
 
+def _loop_beside(
+    config: FlightConfig, tuning: BarrierTuning, loop: Tube, kept: SafeSet
+) -> list[Finding]:
+    """Whether what a plan keeps from zones of one kind is enough for the loop that follows it."""
+    surroundings = config.surroundings
+    if not config.follows_plan:
+        return [_sampled(tuning, surroundings, config.planner.period)]
+    if config.inner == "px4" and not is_stable(config.px4):
+        return []  # nothing bounds it
+    found = [_base_tube(tuning, loop, surroundings)]
+    if config.inner == "tracking":
+        found.append(_tube_of_all_axes(config, tuning, loop, kept))
+    return found
+
+
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
     """The statements that speak against flying."""
     return tuple(f.statement for f in findings if f.refuses and not f.holds)
@@ -131,9 +143,11 @@ def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
 
 
 def loop_tube(config: FlightConfig) -> Tube:
-    """Tube of the configured tracking loop, per m/s^2 of disturbance."""
+    """Tube of the loops that follow the plan, ours or PX4's, per m/s^2 of disturbance."""
     surroundings = config.surroundings
     dt = config.tick_period_us * 1e-6
+    if config.inner == "px4":
+        return px4_tube(config.px4, surroundings.hanging, surroundings.disturbance_hold, dt)
     tracking = config.tuning.tracking
     gains = tracking_gains(tracking, config.airframe.rotor_lag, dt)
     return tube(
@@ -493,6 +507,21 @@ def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) ->
         f"up to {disturbance / used[worst]:.2f} m/s^2 none is",
         refuses=False,
     )
+
+
+def _px4_loops(config: FlightConfig, loop: Tube, others: list[Zone]) -> list[Finding]:
+    """Whether PX4's loops are of any use, and what they leave of an end-effector beside walls."""
+    px4, holds = config.px4, is_stable(config.px4)
+    settles = _finding(
+        "PX4's loops",
+        holds,
+        f"PX4's loops {'settle' if holds else 'do not settle'} as they are believed to be: "
+        f"PX4_XY_P {px4.position_gain:g}, PX4_XY_V_P {px4.velocity_gain:g}, "
+        f"PX4_TILT_KP {px4.tilt_kp:g}, PX4_TILT_KD {px4.tilt_kd:g}, a delay of "
+        f"{1e3 * px4.delay:.0f} ms and {px4.cancelled:.0%} of the disturbance cancelled",
+        "identify them anew, or cancel less by PX4_CANCEL",
+    )
+    return [settles, _end_effector_tube(config, loop)] if holds and others else [settles]
 
 
 def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: float) -> Finding:

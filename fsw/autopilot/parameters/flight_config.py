@@ -8,6 +8,7 @@ from typing import cast
 
 from fsw.autopilot.control.cascade import Inner
 from fsw.autopilot.control.gains import LoopGains
+from fsw.autopilot.control.px4_loops import Px4Tuning, airframe_above_px4
 from fsw.autopilot.control.safety_filter import FilterTuning
 from fsw.autopilot.control.tube import closest_tracking
 from fsw.autopilot.estimation.tuning import EstimatorTuning
@@ -20,10 +21,11 @@ from fsw.autopilot.mpc.solvers import SOLVERS
 from fsw.autopilot.mpc.variants import VARIANTS
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.signals import Origin
+from fsw.autopilot.tuning import Tuning, tuned
 from vehicles.description import Vehicle
 
 CONTROLLERS = tuple(VARIANTS)
-INNERS: tuple[Inner, ...] = ("tracking", "pid")
+INNERS: tuple[Inner, ...] = ("tracking", "pid", "px4")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +138,7 @@ class FlightConfig:
     airframe: Airframe = AIRFRAME
     planner: PlannerConfig = field(default_factory=PlannerConfig)
     tuning: LoopGains = field(default_factory=LoopGains)
+    px4: Px4Tuning = field(default_factory=Px4Tuning)  # of use above PX4 alone
     limits: FlightLimits = field(default_factory=FlightLimits)
     surroundings: DisturbanceModel = field(default_factory=DisturbanceModel)
     steering: SetpointLimits = field(default_factory=SetpointLimits)
@@ -157,6 +160,11 @@ class FlightConfig:
     # module:Name of what a study flies in place of ours; a vehicle flies its own.
     own_planner: str = ""
     own_controller: str = ""
+
+    @property
+    def follows_plan(self) -> bool:
+        """Whether the inner loop follows the plan's state, or only its acceleration."""
+        return self.inner != "pid"
 
     @property
     def mpc_period_us(self) -> int:
@@ -210,6 +218,34 @@ def flight_config(
         )
     config = FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)
     return config if vehicle is None else of_vehicle(config, vehicle)
+
+
+def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
+    """The configuration of the planner above PX4, which flies the vehicle.
+
+    A ``tuning`` of the start says what is known of PX4's loops; plans are predicted with their lag.
+    They are slower than ours, so a plan keeps more from walls: with this lambda the tube of the
+    default loops fits, and with this alpha the tilt can brake. Actuators are PX4's to watch.
+    The safety filter is off, which relies on quicker loops, and the arm does not compensate,
+    because PX4 knows nothing of what its reaction does.
+    """
+    planner = replace(
+        config.planner,
+        walls=replace(config.planner.walls, alpha=1.63, lambda_=0.5),
+        workspace=replace(config.planner.workspace, alpha=1.56, lambda_=0.5),
+        lambda_min=0.0,
+    )
+    limits = replace(config.limits, watches_actuators=0, clearance_sigmas=0.0)
+    config = replace(
+        config,
+        inner="px4",
+        planner=planner,
+        limits=limits,
+        tuning=replace(config.tuning, compensate=False),
+        safety_filter=replace(config.safety_filter, enabled=0),
+    )
+    config = tuned(config, tuning)
+    return replace(config, airframe=airframe_above_px4(config.airframe, config.px4))
 
 
 def of_vehicle(config: FlightConfig, vehicle: Vehicle) -> FlightConfig:

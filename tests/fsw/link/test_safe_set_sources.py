@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import MessageSource, SensorFrame, Severity, TickOutputs
@@ -42,7 +42,7 @@ class Vehicle:
     simulator: socket.socket
     sim: SimLink
     ground: Ground
-    state: FlightState = field(default_factory=FlightState)
+    state: FlightState = field(default_factory=lambda: first_state(flight_config().airframe))
     t_us: int = 1_000_000
     step_us: int = 1_000_000  # of the simulator, which sends a step only where it announces
 

@@ -140,7 +140,7 @@ def _arm(action: Arm, context: CommandContext, modes: Modes) -> Decision:
 def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
     if not _is_armed(context):
         return Decision(ACCEPTED)
-    if context.landed:
+    if context.landed or context.above_px4:
         return Decision(ACCEPTED, mode=Mode.DISARMED)
     if not action.force:
         return Decision(LATER, "not disarmed: the vehicle is in the air; land first or force")
@@ -332,6 +332,8 @@ def _terminate(context: CommandContext, modes: Modes) -> Decision:
     """Stop the rotors until the flight software is restarted."""
     if not _is_armed(context):
         return Decision(DENIED, "not terminated: the vehicle is not armed")
+    if context.above_px4:
+        return Decision(DENIED, "not terminated: the rotors are PX4's; terminate it there")
     reason = "flight terminated by {sender}: the rotors stop"
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
 

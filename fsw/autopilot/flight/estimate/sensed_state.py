@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from fsw.autopilot.control.actuator_watch import felt_by_base
+from fsw.autopilot.control.actuator_watch import felt_inside
 from fsw.autopilot.control.cascade import Cascade, in_hover
 from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.correlated_error import correlated_error
@@ -332,7 +332,7 @@ def _without_stuck(
             seen = state.cascade.watch
             undone = tuple(seen.undone[: len(one.angles)].tolist())
             judged = state.vehicle.flies and not state.damage.joint
-            watch = watch.after(one.angles, undone, felt_by_base(seen, airframe), judged=judged)
+            watch = watch.after(one.angles, undone, felt_inside(seen, airframe), judged=judged)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, law, one)
     if watch.stuck:

@@ -148,14 +148,9 @@ def is_blind(context: FailsafeContext) -> bool:
 
 
 def attitude_is_lost(context: FailsafeContext) -> bool:
-    """In flight, roll or pitch is uncertain by more than COM_ATT_LOSS, or nothing is known.
-
-    A vehicle that the ground carries with idle rotors does not tilt by what is not known of it.
-    """
-    vehicle = context.state.vehicle
+    """In flight, roll or pitch is uncertain by more than COM_ATT_LOSS, or nothing is known."""
     known = context.state.aiding.attitude_sigma <= context.limits.attitude_loss
-    uncertain = not known and vehicle.unloaded is None
-    return (uncertain or is_blind(context)) and vehicle.flies
+    return (not known or is_blind(context)) and context.state.vehicle.flies
 
 
 def position_is_off(context: FailsafeContext, most: float) -> bool:

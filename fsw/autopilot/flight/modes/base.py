@@ -77,6 +77,7 @@ class CommandContext:
     yaw_rate: float  # rad/s, at most
     acceleration: float  # m/s^2, of a generated setpoint
     failures_allowed: bool = False  # to be injected
+    above_px4: bool = False  # PX4 flies: what is disarmed here is given back to it
     rests: bool = True  # it lies or stands still
     highest: float = math.inf  # m above the origin, of the base
 

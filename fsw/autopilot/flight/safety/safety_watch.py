@@ -34,7 +34,7 @@ class SafetyWatch:
 
     def __init__(self, config: FlightConfig, loop: Tube) -> None:
         self._config = config
-        follows_state = config.inner == "tracking"
+        follows_state = config.follows_plan
         reach = base_reach(loop, config.surroundings) + NOISE_ROOM
         # The other loop follows no state: only an upset takes it off its plan.
         self.radius = max(reach, _MIN_TUBE) if follows_state else config.upset_distance

@@ -9,7 +9,7 @@ from fsw.autopilot.signals import JointVector
 
 STANDS, MOVES = (0.7, -0.2), (0.7015, -0.2)  # rad
 LOAD, HELD = 0.3, 0.25  # N m
-FELT, UNFELT = (1.0, 1.0), (-1.0, 0.0)  # of it, by the base
+FELT, UNFELT = (1.0, 1.0), (-1.0, 0.0)  # of it, nearer to the base
 
 
 def watched(
@@ -32,7 +32,7 @@ def rising(first: float, second: float) -> list[JointVector]:
     [
         (rising(HELD, -HELD), (1.0, 0.0)),
         (rising(HELD, 0.0), (1.0, 0.0)),
-        (rising(0.7 * HELD, HELD), UNFELT),
+        (rising(0.7 * HELD, HELD), (-1.0, 0.7)),
     ],
     ids=["both, the base feels it", "the first, the base feels it", "the first joint feels it"],
 )
@@ -47,7 +47,7 @@ def test_an_encoder_is_stuck_where_its_joint_is_felt_to_move(
 
 
 def test_one_that_is_stuck_stays_so_while_another_one_moves() -> None:
-    watch = watched(rising(0.7 * HELD, HELD), UNFELT)
+    watch = watched(rising(0.0, HELD), (-1.0, 0.7))
     assert watch.after(MOVES, (0.0, 0.0), UNFELT, judged=True).stuck
 
 

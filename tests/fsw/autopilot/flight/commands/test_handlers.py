@@ -626,3 +626,12 @@ def test_a_place_above_the_highest_height_is_refused() -> None:
         decision = ask(low, command, *[math.nan] * 6, 5.5)
         assert decision.result == DENIED
         assert decision.reason.endswith("too high; the maximum is 5 m")
+
+
+def test_above_px4_disarming_gives_back_and_its_rotors_are_not_ours_to_stop() -> None:
+    above = replace(HOLDING, above_px4=True)
+    given_back = ask(above, ARM, 0.0)
+    assert (given_back.result, given_back.mode, given_back.reason) == (ACCEPTED, Mode.DISARMED, "")
+    refused = ask(above, 185, 1.0)
+    assert refused.result == DENIED
+    assert "PX4's" in refused.reason

@@ -238,13 +238,6 @@ def test_what_can_be_lived_with_is_no_condition(evidence: Evidence) -> None:
     assert active(evidence.context()) == ()
 
 
-def test_an_attitude_that_is_not_known_ends_no_flight_of_idle_rotors_on_the_ground() -> None:
-    lost = replace(FINE, aiding=Aiding(attitude_sigma=9.0)).context()
-    assert [row.condition for row in active(lost)] == [Condition.ATTITUDE_LOST]
-    carried = replace(lost.state, vehicle=replace(lost.state.vehicle, unloaded=(NOW_US, 0.0)))
-    assert active(replace(lost, state=carried)) == ()
-
-
 @pytest.mark.requirement("REQ-EST-8")
 def test_a_vehicle_that_knows_nothing_for_a_quarter_of_a_second_terminates() -> None:
     assert conditions(replace(FINE, invalid_ticks=124)) == (Condition.ESTIMATE_INVALID,)

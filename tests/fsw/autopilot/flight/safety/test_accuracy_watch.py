@@ -52,7 +52,7 @@ def test_what_takes_longer_than_a_tick_is_worked_out_before_the_flight(
 ) -> None:
     tube.estimate_tube.cache_clear()
     AccuracyWatch(CONFIG, LOOP)
-    monkeypatch.setattr(tube, "_after_a_push", lambda *_: pytest.fail("worked out in flight"))
+    monkeypatch.setattr(tube, "after_a_push", lambda *_: pytest.fail("worked out in flight"))
     assert len(seen(60, [0.01])) == 1
 
 

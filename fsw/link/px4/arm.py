@@ -1,0 +1,151 @@
+"""The arm beside PX4: on a link of its own, or as servos of PX4 that say nothing.
+
+On its own link an arm sends ARM_JOINT_STATE or JOINT_ENCODERS, and is sent ARM_JOINT_SETPOINT. What
+else comes there is for the inbox: the programs that know the trajectory and the safe set may speak
+there too. Without that link joints are PX4's servos, moved by DO_SET_ACTUATOR, and are believed
+where they were sent.
+"""
+
+from __future__ import annotations
+
+from typing import Final, cast
+
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.ports import Clock
+from fsw.autopilot.signals import CommandAck, JointVector, MessageSource, Mode, TickOutputs
+from fsw.link.endpoints import open_endpoint
+from fsw.link.inbox import Inbox
+from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.message_ids import PANDION, SYSTEM_ID
+from fsw.link.wire.px4_mode import custom_mode
+from messages.addresses import LinkAddress
+from messages.frames import FrameWriter, Losses
+from messages.joint_arrays import ENCODERS_AT, STATE_AT, base, joined, more
+
+SILENT_US: Final = 100_000  # an arm that says nothing for so long is not there
+_BANDWIDTH: Final = 60.0  # rad/s, of rates that are found from angles
+_SERVO: Final = 15.0  # rad/s, with which a servo that says nothing is believed to follow
+_REPORT_US: Final = 200_000
+_ARMED, _CUSTOM_MODE = 128, 1  # MAV_MODE_FLAG
+_GENERIC, _PX4_MODES, _ACTIVE = 0, 12, 4  # MAV_TYPE, MAV_AUTOPILOT, MAV_STATE
+
+
+class Joints:
+    """Angles and rates of the joints, as far as they are known."""
+
+    def __init__(self, rest: JointVector) -> None:
+        self.q = rest
+        self.qd: JointVector = (0.0,) * len(rest)
+        self._stamp_us = -1
+
+    def measured(self, stamp_us: int, q: JointVector, qd: JointVector | None) -> None:
+        """Believe angles [rad] of a time; rates [rad/s] that are not measured are found."""
+        dt = 1e-6 * (stamp_us - self._stamp_us)
+        if qd is None and 0.0 < dt < 0.2 and self._stamp_us >= 0:
+            share = min(_BANDWIDTH * dt, 1.0)
+            qd = tuple(
+                [r + share * ((a - b) / dt - r) for a, b, r in zip(q, self.q, self.qd, strict=True)]
+            )
+        self.q, self._stamp_us = q, stamp_us
+        self.qd = (0.0,) * len(q) if qd is None else qd
+
+    def sent(self, q: JointVector, seconds: float) -> None:
+        """Believe that servos go to angles [rad] for ``seconds`` [s]."""
+        self.qd = tuple([_SERVO * (a - b) for a, b in zip(q, self.q, strict=True)])
+        self.q = tuple(
+            [b + min(seconds, 1.0 / _SERVO) * r for b, r in zip(self.q, self.qd, strict=True)]
+        )
+
+
+class ArmLink:
+    """The link of an arm, and of who stands beside it."""
+
+    def __init__(self, address: LinkAddress, joints: Joints, inbox: Inbox, clock: Clock) -> None:
+        """Begin to listen at ``address``, or to look for who is there; the clock is wall time.
+
+        Raises:
+            LinkError: It listens, and cannot.
+        """
+        local_port = address[1] if isinstance(address, tuple) else 0
+        self._endpoint, self._peer = open_endpoint(address, clock, local_port)
+        self._joints, self._inbox, self._clock = joints, inbox, clock
+        self._writer = FrameWriter(SYSTEM_ID, PANDION)
+        self._losses = Losses()
+        self._heard_us = -1
+        self._reported_us = 0
+        self._mode: Mode | None = None
+        self._known = False  # who is there
+
+    @property
+    def silent(self) -> bool:
+        """Whether the arm has said nothing for long."""
+        return self._heard_us < 0 or self._clock() - self._heard_us > SILENT_US
+
+    def poll(self) -> None:
+        """Read what is there."""
+        while (received := self._endpoint.receive_waiting()) is not None:
+            data, peer = received
+            for frame, _ in self._endpoint.cut(data, self._losses):
+                self._peer, self._known = peer, True
+                values = cast(Numbers, frame.payload_values)
+                count = len(self._joints.q)
+                if frame.message_id == message_ids.ARM_JOINT_STATE:
+                    position, velocity, _ = STATE_AT
+                    q, qd = joined(values, *position, count), joined(values, *velocity, count)
+                    self._heard(int(values[0]), q, qd)
+                elif frame.message_id == message_ids.JOINT_ENCODERS:
+                    self._heard(int(values[0]), joined(values, *ENCODERS_AT, count), None)
+                else:
+                    source = MessageSource(frame.system_id, frame.component_id, "arm")
+                    self._inbox.accept(frame, source)
+
+    def send(self, t_us: int, outputs: TickOutputs, q: JointVector | None) -> None:
+        """Send where joints are to be [rad] at ``t_us`` [us], and which mode is flown."""
+        if not self._known:
+            return
+        if q is not None:
+            rest = (0.0,) * len(q)
+            arrays = (*base(q), *base(rest), *base(rest), SYSTEM_ID, 0, len(q))
+            values = (t_us, *arrays, *more(q), *more(rest), *more(rest))
+            self._send(message_ids.ARM_JOINT_SETPOINT, *values)
+        if outputs.mode is not self._mode or t_us - self._reported_us >= _REPORT_US:
+            self._mode, self._reported_us = outputs.mode, t_us
+            flags = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
+            values = (custom_mode(outputs.mode), _GENERIC, _PX4_MODES, flags, _ACTIVE, 3)
+            self._send(message_ids.HEARTBEAT, *values)
+
+    def acknowledge(self, ack: CommandAck) -> None:
+        """Answer a command that came here."""
+        if self._known:
+            self._send(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._endpoint.close()
+
+    def _heard(self, stamp_us: int, q: JointVector, qd: JointVector | None) -> None:
+        self._heard_us = self._clock()
+        self._joints.measured(stamp_us, q, qd)
+
+    def _send(self, message_id: int, *values: float | bytes) -> None:
+        self._endpoint.send(self._writer.frame(message_id, *values), self._peer)
+
+
+def servo_ranges(airframe: Airframe) -> tuple[tuple[float, float], ...]:
+    """Least and most angle [rad] of each joint with the others at zero; half around without one."""
+    limits, count = airframe.angle_limits, airframe.bodies.joints
+    width = len(limits.row) // len(limits.low)
+    ranges = []
+    for k in range(count):
+        least, most = -_HALF_TURN, _HALF_TURN
+        for i in range(limits.rows):
+            share = limits.row[i * width + k]
+            if share != 0.0:
+                ends = sorted((limits.low[i] / share, limits.high[i] / share))
+                least, most = max(least, ends[0]), min(most, ends[1])
+        ranges.append((least, most))
+    return tuple(ranges)
+
+
+_HALF_TURN: Final = 3.141592653589793

@@ -1,0 +1,161 @@
+"""The planner above the stand-in for PX4: handing over, walls, and what can be lost on the way.
+
+The stand-in is checked against recorded conversations in what it says; its control is a model of
+PX4's. What a real PX4 flies is on the page docs/tutorials/fly-your-px4-vehicle.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsw.autopilot.signals import Command, CommandRequest, GoTo, Mode, Place
+from sitl.scenario import Scenario
+from sitl.scenario_file import load_scenario
+from tests.above_px4.flight import TRAJECTORY, AbovePx4
+from tests.closed_loop.harness import command, hover
+from tests.px4_companion_stand_in import HOLD, OFFBOARD, POSITION, SET_MODE
+
+
+def still(yaw_deg: float = 0.0) -> Scenario:
+    """Hovering in calm air, measured by motion capture."""
+    suite = load_scenario("ground", "mocap").sensors
+    return replace(hover(yaw_deg=yaw_deg), sensors=suite)
+
+
+def handed_over(flight: AbovePx4) -> AbovePx4:
+    """A flight that PX4's pilot has given to the planner."""
+    flight.run(0.5)
+    assert flight.mode is Mode.DISARMED
+    assert flight.px4.targets > 20, "set-points stream before PX4 follows them"
+    assert flight.px4.switch(OFFBOARD)
+    flight.run(0.3)
+    assert flight.mode is Mode.HOLD
+    return flight
+
+
+def test_px4_is_taken_over_without_a_jump_and_taken_back_at_once() -> None:
+    flight = AbovePx4(still())
+    before = np.array(flight.sim.truth().p_WB)
+    handed_over(flight)
+    flight.run(2.0)
+    assert np.linalg.norm(np.array(flight.sim.truth().p_WB) - before) < 0.06
+    assert "PX4 gives the vehicle: it follows the plan" in flight.texts
+    flight.px4.switch(POSITION)
+    flight.run(0.05)
+    assert flight.mode is Mode.DISARMED
+    assert "PX4 flies Position: the plan is not followed any more" in flight.texts
+    # Whatever follows, nobody asks PX4 for Offboard but its pilot.
+    flight.run(1.0)
+    assert not [one for one in flight.px4.commands if one[0] == SET_MODE]
+    assert flight.mode is Mode.DISARMED
+    flight.px4.switch(OFFBOARD)
+    flight.run(0.3)
+    assert flight.mode is Mode.HOLD
+
+
+def test_our_operator_asks_px4_for_offboard_and_gives_it_back() -> None:
+    flight = AbovePx4(still())
+    flight.run(0.5)
+    flight.commands.append(command(400, 1.0))
+    flight.run(1.0)
+    assert flight.px4.mode == OFFBOARD
+    assert flight.mode is Mode.HOLD
+    flight.commands.append(command(400, 0.0))
+    flight.run(0.5)
+    assert flight.px4.mode == HOLD
+    assert "given back to PX4, which is asked to hold" in flight.texts
+    assert flight.mode is Mode.DISARMED
+
+
+def test_a_px4_that_refuses_offboard_is_not_pressed() -> None:
+    flight = AbovePx4(still())
+    flight.px4.accepts_offboard = False
+    flight.run(0.5)
+    flight.commands.append(command(400, 1.0))
+    flight.run(3.0)
+    assert flight.mode is Mode.DISARMED
+    assert "PX4 stays in Hold and does not enter Offboard" in flight.texts
+    assert 1 <= sum(one[0] == SET_MODE for one in flight.px4.commands) <= 5
+
+
+def test_walls_are_kept_in_calm_air() -> None:
+    flight = handed_over(AbovePx4(load_scenario("walls-calm", "mocap")))
+    flight.commands.append(TRAJECTORY)
+    flight.run(31.0)
+    result = flight.sim.result()
+    assert flight.mode is Mode.TRAJECTORY, flight.texts
+    assert result.min_margin_m is not None
+    assert result.min_margin_m > 0.02
+    assert result.tracking_error_rms_m is not None
+    assert result.tracking_error_rms_m < 0.11
+    assert flight.state.plan.counters.missed_deadlines == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_walls_are_kept_while_it_is_pushed(seed: int) -> None:
+    flight = handed_over(AbovePx4(load_scenario("walls", "mocap"), seed))
+    flight.commands.append(TRAJECTORY)
+    flight.run(60.0)
+    result = flight.sim.result()
+    assert result.min_margin_m is not None
+    assert result.min_margin_m > 0.0
+    assert not [text for text in flight.texts if "tube" in text]
+
+
+def test_a_stream_that_is_lost_ends_offboard_and_ours() -> None:
+    """What we send gets lost: PX4 leaves Offboard by itself, and that is respected."""
+    flight = handed_over(AbovePx4(still()))
+    flight.px4.deaf = True
+    flight.run(1.5)
+    assert flight.px4.texts == ["Failsafe activated"]
+    assert flight.px4.mode == HOLD
+    assert flight.mode is Mode.DISARMED
+    assert "PX4: Failsafe activated" in flight.texts
+    assert "PX4 flies Hold: the plan is not followed any more" in flight.texts
+    flight.px4.deaf = False
+    flight.run(2.0)
+    assert flight.px4.mode == HOLD, "nobody has given the vehicle again"
+
+
+def test_a_px4_that_falls_silent_is_told_and_gets_no_more_set_points() -> None:
+    flight = handed_over(AbovePx4(still()))
+    flight.px4.mute = True
+    flight.run(0.9)
+    assert [text for text in flight.texts if text.startswith("PX4 is silent for ")]
+    assert flight.mode is Mode.DISARMED
+    sent = flight.px4.targets
+    flight.run(1.2)
+    assert flight.px4.targets == sent, "it may not be heard: PX4 is left to its failsafe"
+    assert flight.px4.mode == HOLD
+    flight.px4.mute = False
+    flight.run(1.0)
+    assert "PX4 is heard" in flight.texts
+    assert flight.mode is Mode.DISARMED
+    flight.run(0.5)
+    assert flight.px4.switch(OFFBOARD)
+    flight.run(0.5)
+    assert flight.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("child_frame", [1, 12])
+def test_both_conventions_of_velocities_fly_with_the_yaw_turned(child_frame: int) -> None:
+    flight = AbovePx4(still(yaw_deg=90.0), child_frame=child_frame)
+    handed_over(flight)
+    flight.run(1.0)
+    # A metre to the north, with the nose to the east.
+    north, east, _ = flight.sim.truth().p_WB
+    there = GoTo(Place((north + 0.8, east)))
+    flight.commands.append(Command(there, CommandRequest(192, (0.0,) * 7, 255, 190)))
+    worst = 0.0
+    for _ in range(round(4.0 / 0.004)):
+        flight.exchange()
+        estimate, truth = flight.state.estimate, flight.sim.truth()
+        assert estimate is not None
+        worst = max(worst, math.dist(estimate.v_WB, truth.v_WB))
+    assert worst < 0.2, "taken for the other one it is wrong by half a metre a second"
+    assert flight.sim.truth().p_WB[0] > north + 0.5
