@@ -46,7 +46,10 @@ class Grip(NamedTuple):
 
 
 def grip(airframe: Airframe, tuning: PressTuning, normal: Vec3, disturbance: float) -> Grip:
-    """The grip of the home posture, level, along a ``normal`` [1, B] out of the surface."""
+    """The grip of the home posture, level, along a ``normal`` [1, B] out of the surface.
+
+    The base is pushed by a ``disturbance`` [m/s^2] on each axis.
+    """
     n = airframe.bodies.joints
     home = tuple(airframe.home_posture[:n])
     m, levers = posture(airframe.bodies, home), _levers(airframe, home)
@@ -118,7 +121,7 @@ def against_touching(config: FlightConfig, zone: Zone, loop: Tube) -> str:
     )
 
 
-def most_force(config: FlightConfig, zone: Zone, loop: Tube) -> float:
+def max_force(config: FlightConfig, zone: Zone, loop: Tube) -> float:
     """The largest force [N] that can be asked for at a surface that may be touched."""
     touch, tuning = zone.touch, config.tuning.press
     if touch is None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from enum import Enum
 from typing import Final
 
@@ -63,6 +64,13 @@ def _always(action: Action) -> Callable[[FailsafeContext], Action]:
 
 _SLOWLY: Final = SLOW_US + AT_ONCE_US
 _TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
+_of_contact = partial(
+    Failsafe,
+    action=_always(Action.RETREAT),
+    severity=Severity.CRITICAL,
+    slow=True,
+    within_us=_SLOWLY,
+)
 
 FAILSAFES: Final = (
     Failsafe(
@@ -256,42 +264,20 @@ FAILSAFES: Final = (
         within_us=_TWICE,
         parameters=("SAFE_SIGMAS", "COM_AID_LOSS_T", "COM_POS_LOW_EPH"),
     ),
-    Failsafe(
-        Condition.FORCE_HIGH,
-        evidence.presses_too_hard,
-        _always(Action.RETREAT),
-        Severity.CRITICAL,
-        wording.force,
-        of_vehicle=True,
-        slow=True,
-        within_us=_SLOWLY,
+    _of_contact(
+        Condition.FORCE_HIGH, evidence.presses_too_hard, detail=wording.force, of_vehicle=True
     ),
-    Failsafe(
+    _of_contact(
         Condition.CONTACT_LOST,
         evidence.has_lost_contact,
-        _always(Action.RETREAT),
-        Severity.CRITICAL,
-        lambda c: f" for {c.state.cascade.pressing.lost_for:.1f} s",
-        slow=True,
-        within_us=_SLOWLY,
+        detail=lambda c: f" for {c.state.cascade.pressing.lost_for:.1f} s",
     ),
-    Failsafe(
+    _of_contact(
         Condition.SURFACE_MOVED,
         evidence.surface_has_moved,
-        _always(Action.RETREAT),
-        Severity.CRITICAL,
-        lambda c: wording.by_mm(abs(c.state.cascade.pressing.distance)),
-        slow=True,
-        within_us=_SLOWLY,
+        detail=lambda c: wording.by_mm(abs(c.state.cascade.pressing.distance)),
     ),
-    Failsafe(
-        Condition.TOOL_SLIPS,
-        evidence.tool_slips,
-        _always(Action.RETREAT),
-        Severity.CRITICAL,
-        slow=True,
-        within_us=_SLOWLY,
-    ),
+    _of_contact(Condition.TOOL_SLIPS, evidence.tool_slips),
     Failsafe(
         Condition.TUBE_LEFT,
         lambda c: c.state.safety.off_plan_us >= 0,
