@@ -84,7 +84,7 @@ class SitlOptions(RunOptions):
     rate_hz: int = option("--rate HZ", "for px4: steps a second, 250 or 500", rate, default=250)
     companion: str | None = option(
         "--companion udp:HOST:PORT",
-        "for px4: the --arm-link of a planner above it, which is told the joints' angles, the "
+        "for px4: the arm's link of a planner above it, which is told the joints' angles, the "
         "trajectory and the safe set",
     )
     wait_s: float = option(

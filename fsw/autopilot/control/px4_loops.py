@@ -15,7 +15,7 @@ it where
 u being the plan's input and s the share of the observed disturbance that is cancelled here, sooner
 than the integral z does. The safety filter knows what PX4 makes of it and adds its push.
 
-Source: docs/decisions/0045-the-planner-above-px4.md.
+Source: docs/decisions/0046-the-planner-above-px4.md.
 """
 
 from __future__ import annotations

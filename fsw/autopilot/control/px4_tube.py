@@ -8,7 +8,7 @@ errors from the plan, with what PX4 commands
 and :math:`\dot v = a + d`; a follows c with the lag and the delay of ``Px4Tuning``. Nothing is
 taken over from our own cascade, and its limits are not in it: what is bounded is the linear loop.
 
-Source: docs/decisions/0045-the-planner-above-px4.md.
+Source: docs/decisions/0046-the-planner-above-px4.md.
 """
 
 from __future__ import annotations
