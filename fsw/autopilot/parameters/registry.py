@@ -556,6 +556,7 @@ _CHOICES: Final[dict[str, Choices]] = {
 
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.
 NO_PARAMETERS: Final[dict[str, str]] = {
+    "planner.weights.home_to_touch": "of a vehicle that presses, whose bound is not shown with another",
     "estimator.accel_range": "range of the inertial unit",
     "estimator.gyro_range": "range of the inertial unit",
     "estimator.accel_jump": "what the airframe can do from one reading to the next",
