@@ -99,7 +99,8 @@ def look_for_surface(
 ) -> None:
     """The surface that the tool's ball of ``radius`` [m] may touch, the nearest of ``zones``.
 
-    ``zones`` (zones, k) [SI] are those of ``moving_zones``. Reads estimate, bodies; writes pressing.
+    ``zones`` (zones, k) [SI] are those of ``moving_zones``. Reads estimate, bodies;
+    writes pressing.
     """
     k, estimate, found = r.pressing, r.estimate, False
     nearest = tuning.near

@@ -556,7 +556,9 @@ _CHOICES: Final[dict[str, Choices]] = {
 
 # Numbers of FlightConfig that are no parameters, by the beginning of their path, and why.
 NO_PARAMETERS: Final[dict[str, str]] = {
-    "planner.weights.home_to_touch": "of a vehicle that presses, whose bound is not shown with another",
+    "planner.weights.home_to_touch": "part of the law of pressing",
+    "tuning.press": "the law of pressing, whose bound is judged with these",
+    "tuning.compensation_near": "the law of pressing, whose bound is judged with these",
     "estimator.accel_range": "range of the inertial unit",
     "estimator.gyro_range": "range of the inertial unit",
     "estimator.accel_jump": "what the airframe can do from one reading to the next",

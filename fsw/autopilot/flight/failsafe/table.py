@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from enum import Enum
+from functools import partial
 from typing import Final
 
 from fsw.autopilot.estimation.faults.redundancy import UNDECIDED
