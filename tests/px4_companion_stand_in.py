@@ -2,7 +2,7 @@
 
 What it accepts and answers is what a real one did, PX4 v1.17 at a70a558393: DO_SET_MODE gets two
 answers, HEARTBEAT comes once a second and CURRENT_MODE when it changes, Offboard needs a stream and
-is left 1 s after the last set-point with "Failsafe activated", SET_MESSAGE_INTERVAL is answered 0,
+is left 1 s after the last setpoint with "Failsafe activated", SET_MESSAGE_INTERVAL is answered 0,
 ODOMETRY comes 125 times a second at most with its velocity in NED (child frame 1), DO_SET_ACTUATOR
 acts at once.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from sitl.plant.aerial_manipulator import Plant, first_angle, place_bodies
 from sitl.plant.integrator import Held
-from sitl.plant.mass_matrix import mass_matrix_into
+from sitl.plant.mass_matrix import mass_matrix
 from sitl.plant.state import V_WB, W_WB_B
 from sitl.plant.vector import Array
 
@@ -29,9 +29,7 @@ def seize(plant: Plant, blocks: Sequence[Held], state: Array, locked: tuple[bool
     stop = [6 + i for i in range(joints) if locked[i]]
     free = [k for k in range(6 + joints) if k not in stop]
     place_bodies(plant, state, work)
-    mass_matrix_into(plant.chain, work.posture, work.mass)
-    lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
-    mass = lower + np.tril(lower, -1).T
+    mass = mass_matrix(plant.chain, work.posture, work.mass)
     stopped = rates[[k - 6 for k in stop]].copy()
     change = np.zeros(6 + joints)
     change[free] = np.linalg.solve(mass[np.ix_(free, free)], mass[np.ix_(free, stop)] @ stopped)

@@ -65,6 +65,14 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
     out[4, 3], out[5, 3], out[5, 4] = xy, xz, yz
 
 
+def mass_matrix(chain: Chain, at: Posture, out: Array) -> Array:
+    """The whole of it (6 + j, 6 + j) [SI], by way of ``out`` (12, 12) [SI]."""
+    mass_matrix_into(chain, at, out)
+    lower = np.tril(out[: 6 + chain.joints, : 6 + chain.joints])
+    whole: Array = lower + np.tril(lower, -1).T
+    return whole
+
+
 @kernel
 def solve_in_place(m: Array, b: Array, n: int) -> None:
     """Solve m (n, n) [any unit] x = b (n,) [any unit] by Cholesky; both are overwritten.

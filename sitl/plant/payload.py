@@ -9,7 +9,7 @@ import numpy as np
 
 from sitl.plant.aerial_manipulator import Plant, first_angle, place_bodies
 from sitl.plant.integrator import Held
-from sitl.plant.mass_matrix import mass_matrix_into
+from sitl.plant.mass_matrix import mass_matrix
 from sitl.plant.parameters import joint_axes
 from sitl.plant.state import V_WB, W_WB_B
 from sitl.plant.vector import V3, Array
@@ -95,8 +95,6 @@ def take_up(
 
 def _mass(plant: Plant, work: Any, joints: int) -> Array:
     """The mass matrix (6 + j, 6 + j) [SI] of what is placed, with the motors that joints carry."""
-    mass_matrix_into(plant.chain, work.posture, work.mass)
-    lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
-    whole: Array = lower + np.tril(lower, -1).T
+    whole = mass_matrix(plant.chain, work.posture, work.mass)
     whole[6:, 6:] += np.diag(plant.gears.carried[:joints])
     return whole

@@ -12,7 +12,7 @@ import numpy as np
 from sitl.plant.actuators import SLOW
 from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace, place_bodies
 from sitl.plant.contact import SLIP_RATE
-from sitl.plant.mass_matrix import mass_matrix_into
+from sitl.plant.mass_matrix import mass_matrix
 from sitl.plant.parameters import GRAVITY, Effects, Surface, plant
 from sitl.plant.state import THRUST, at_rest
 from sitl.plant.vector import Array
@@ -165,12 +165,9 @@ def _mobility(vehicle: Vehicle, numbers: Plant, state: Array, work: Workspace) -
     """Inverse of the mass matrix (6 + j, 6 + j) [SI] at a state (n,) [SI], which it places."""
     joints = len(vehicle.joints)
     place_bodies(numbers, state, work)
-    mass_matrix_into(numbers.chain, work.posture, work.mass)
-    lower = np.tril(work.mass[: 6 + joints, : 6 + joints])
-    mass = lower + np.tril(lower, -1).T
+    mass = mass_matrix(numbers.chain, work.posture, work.mass)
     mass[6:, 6:] += np.diag(numbers.gears.inertia[:joints])
-    inverse = np.empty((6 + joints, 6 + joints))
-    inverse[:] = np.linalg.inv(mass)
+    inverse: Array = np.array(np.linalg.inv(mass), dtype=float)
     return inverse
 
 

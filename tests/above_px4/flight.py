@@ -26,7 +26,7 @@ from studies.flight.closed_loop import InlinePlanner
 from studies.flight.mission import announced, target
 from tests.closed_loop.harness import command, real_planner
 from tests.px4_companion_stand_in import Gains, Px4Companion
-from tests.px4_stand_in import Airframe
+from tests.sitl.px4_flight import airframe
 
 TRAJECTORY = command(176, 1.0, 4.0, 11.0)
 TARGET_US = 100_000
@@ -78,18 +78,6 @@ class Encoders:
         pass
 
 
-def px4_airframe(simulation: Simulation) -> Airframe:
-    vehicle = simulation.vehicle
-    return Airframe(
-        mass=vehicle.mass,
-        inertia=vehicle.base.inertia[:3],
-        arm=vehicle.rotors[2].position[0],
-        yaw_ratio=vehicle.rotors[0].torque_per_thrust,
-        thrust_max=vehicle.rotors[0].thrust_max,
-        joints=len(vehicle.joints),
-    )
-
-
 @dataclass
 class AbovePx4:
     """One flight, exchange by exchange of 4 ms, from the air, where PX4 holds."""
@@ -108,9 +96,7 @@ class AbovePx4:
         if self.config is None:
             base = flight_config(body=self.scenario.body, vehicle=vehicle_of(self.scenario))
             self.config = above_px4(base)
-        self.px4 = Px4Companion(
-            px4_airframe(self.sim), gains=self.gains, child_frame=self.child_frame
-        )
+        self.px4 = Px4Companion(airframe(self.sim), gains=self.gains, child_frame=self.child_frame)
         self.px4.airborne()
         self.loop = TunedAutopilot(self.config)
         self.state = first_state(self.config.airframe)

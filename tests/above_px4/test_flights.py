@@ -30,7 +30,7 @@ def handed_over(flight: AbovePx4) -> AbovePx4:
     """A flight that PX4's pilot has given to the planner."""
     flight.run(0.5)
     assert flight.mode is Mode.DISARMED
-    assert flight.px4.targets > 20, "set-points stream before PX4 follows them"
+    assert flight.px4.targets > 20, "setpoints stream before PX4 follows them"
     assert flight.px4.switch(OFFBOARD)
     flight.run(0.3)
     assert flight.mode is Mode.HOLD

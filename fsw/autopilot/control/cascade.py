@@ -290,19 +290,38 @@ def keep_off_zones(
     asked = asked[0] + known[0], asked[1] + known[1], asked[2] + known[2]
     wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
     a = add_scaled(motion.a, r.observed.d, 1.0)
+    safe, changed = filter_asked(r, law, zones, probes, a, wanted)
+    if changed:
+        push = subtract(safe, asked)
+        for axis in range(2):
+            r.flown.a[axis] += push[axis]
+        for axis in range(3):
+            r.flown_u.a[axis] += push[axis]
+
+
+@compilable
+def filter_asked(
+    r: Tick,
+    law: CascadeLaw,
+    zones: NDArray[np.float64],
+    probes: NDArray[np.float64],
+    a: Vec3,
+    asked: Vec3,
+) -> tuple[Vec3, bool]:
+    """What the safety filter makes of an acceleration ``asked`` for [m/s^2, NED]; is it another.
+
+    The base accelerates by ``a`` [m/s^2, NED] now; ``zones`` (zones, k) [SI] and ``probes``
+    (probes, 12) [SI] as of ``close_loops``. Reads estimate, observed; writes margin, flags.
+    """
     safe, changed, margin = filtered(
-        law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, wanted
+        law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, asked
     )
     r.margin = margin
     if not margin >= 0.0:
         r.flags |= BREACH
     if changed:
         r.flags |= FILTER_ACTED
-        push = subtract(safe, asked)
-        for axis in range(2):
-            r.flown.a[axis] += push[axis]
-        for axis in range(3):
-            r.flown_u.a[axis] += push[axis]
+    return safe, changed
 
 
 @compilable

@@ -37,7 +37,7 @@ class Pushed(NamedTuple):
     """One instant of the manoeuvre."""
 
     t: float  # s
-    asked: tuple[Vec3, Vec3, Vec3]  # m, m/s, m/s^2: the set-point
+    asked: tuple[Vec3, Vec3, Vec3]  # m, m/s, m/s^2: the setpoint
     p: Vec3  # m
     v: Vec3  # m/s
     lean: tuple[float, float]  # m/s^2, the acceleration that the attitude says
@@ -163,7 +163,7 @@ def _commanded(
     seen: list[Pushed], px4: Px4Tuning, axis: int, times: Array, grid: Array, lean: Array
 ) -> Array:
     """What PX4's position loop commands on an ``axis`` [m/s^2] at times of the ``grid`` [s]."""
-    held = np.searchsorted(times, grid, side="right") - 1  # a set-point holds until the next
+    held = np.searchsorted(times, grid, side="right") - 1  # a setpoint holds until the next
     asked = np.array([[part[axis] for part in one.asked] for one in seen])[held]
     p = np.interp(grid, times, [one.p[axis] for one in seen])
     v = np.interp(grid, times, [one.v[axis] for one in seen])

@@ -32,11 +32,12 @@ from fsw.autopilot.control.cascade import (
     CascadeLaw,
     KeepClear,
     compare_with_plan,
+    filter_asked,
     refer_joints,
     settle_rotors,
 )
 from fsw.autopilot.control.gains import LoopGains, TrackingGains
-from fsw.autopilot.control.safety_filter import filter_law, filter_probes, filtered
+from fsw.autopilot.control.safety_filter import filter_law, filter_probes
 from fsw.autopilot.control.tracking import TrackingLaw, observe
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
@@ -47,8 +48,8 @@ from fsw.autopilot.model.body import body_of, reaches, tool_radius
 from fsw.autopilot.model.multibody import move_bodies
 from fsw.autopilot.model.rotors import MotionState, motion_state, rotor_decay
 from fsw.autopilot.shapes.zones import NO_ZONES
-from fsw.autopilot.signals import Setpoint, Vec3
-from fsw.autopilot.tick_record import BREACH, FILTER_ACTED, Tick
+from fsw.autopilot.signals import Setpoint, Vec2, Vec3
+from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable, compiled, machine_code, packed
 
 
@@ -84,7 +85,7 @@ def airframe_above_px4(airframe: Airframe, px4: Px4Tuning) -> Airframe:
 
 
 class Px4Loops(Cascade):
-    """What the tick has in place of the cascade: the same record in, a set-point out."""
+    """What the tick has in place of the cascade: the same record in, a setpoint out."""
 
     def __init__(
         self,
@@ -206,14 +207,8 @@ def keep_off_zones(
     """
     a = add_scaled(motion.a, r.observed.d, 1.0)
     asked = asked_by_px4(r, px4, a)
-    safe, changed, margin = filtered(
-        law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, asked
-    )
-    r.margin = margin
-    if not margin >= 0.0:
-        r.flags |= BREACH
+    safe, changed = filter_asked(r, law, zones, probes, a, asked)
     if changed:
-        r.flags |= FILTER_ACTED
         push = subtract(safe, asked)
         for axis in range(3):
             r.flown_u.a[axis] += clamp_magnitude(push[axis], _MOST_PUSHED)
@@ -221,23 +216,25 @@ def keep_off_zones(
 
 @compilable
 def asked_by_px4(r: Tick, px4: Px4Tuning, a: Vec3) -> Vec3:
-    """The acceleration [m/s^2, NED] that PX4's position loop makes of a set-point.
+    """The acceleration [m/s^2, NED] that PX4's position loop makes of a setpoint.
 
     It accelerates by ``a`` [m/s^2, NED] now. Without its integral, which is for what lasts.
     """
-    p, v, plan, u = r.estimate.p_WB, r.observed.v, r.flown, r.flown_u
-    x = (
-        u.a[0]
-        - px4.acceleration_gain * a[0]
-        + px4.velocity_gain * (plan.v[0] - v[0] + px4.position_gain * (plan.p[0] - p[0]))
+    aside = px4.position_gain, px4.velocity_gain
+    return (
+        _asked_along(r, 0, aside) - px4.acceleration_gain * a[0],
+        _asked_along(r, 1, aside) - px4.acceleration_gain * a[1],
+        _asked_along(r, 2, (px4.height_gain, px4.climb_gain)),
     )
-    y = (
-        u.a[1]
-        - px4.acceleration_gain * a[1]
-        + px4.velocity_gain * (plan.v[1] - v[1] + px4.position_gain * (plan.p[1] - p[1]))
-    )
-    z = u.a[2] + px4.climb_gain * (plan.v[2] - v[2] + px4.height_gain * (plan.p[2] - p[2]))
-    return x, y, z
+
+
+@compilable
+def _asked_along(r: Tick, axis: int, gains: Vec2) -> float:
+    """By position and velocity on an axis, with the ``gains`` [1/s] of both."""
+    off = r.flown.p[axis] - r.estimate.p_WB[axis]
+    wanted: float = r.flown.v[axis] + gains[0] * off
+    asked: float = r.flown_u.a[axis] + gains[1] * (wanted - r.observed.v[axis])
+    return asked
 
 
 @compiled

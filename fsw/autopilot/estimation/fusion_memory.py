@@ -22,9 +22,8 @@ _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for lon
 # N m of each joint. Friction and noise: 0.025 of the joint that has less, where both repeat
 # themselves; three times the friction holds 0.03. Stuck encoders: more within 0.1 to 0.4 s.
 _HELD: Final = 0.1
-_FELT: Final = (
-    0.5  # of that; 0.7 and more of joints that move unseen, less than 0 of ones that fail
-)
+# Of that; 0.7 and more of joints that move unseen, less than 0 of ones that fail.
+_FELT: Final = 0.5
 _REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 

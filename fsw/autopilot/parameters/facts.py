@@ -47,14 +47,6 @@ def _cells(airframe: Airframe) -> int:
     return round(airframe.battery.full / 4.2)
 
 
-def _per_cell(name: str) -> Callable[[Airframe], float]:
-    return lambda airframe: getattr(airframe.battery, name) / _cells(airframe)
-
-
-def _milliampere_hours(airframe: Airframe) -> float:
-    return 1000.0 * airframe.battery.capacity
-
-
 def _all(
     labels: Mapping[str, str], meaning: str, value: float = 0, choices: Choices = ()
 ) -> list[Fact]:

@@ -171,7 +171,7 @@ _ROWS: Final[dict[str, list[_Row]]] = {
         ("PX4_OBS_BW", "px4.observer", "rad/s", 1.0, 60.0,
          "Disturbance observer bandwidth above PX4"),
         ("PX4_CANCEL", "px4.cancelled", "", 0.0, 1.0,
-         "Share of the observed disturbance that acceleration set-points cancel"),
+         "Share of the observed disturbance that acceleration setpoints cancel"),
     ],
     "Inner loops": [
         *_pid("PID_ATT", "tuning.attitude", "rad/s^2", (500.0, 500.0, 100.0, 200.0),

@@ -8,6 +8,7 @@ where they were sent.
 
 from __future__ import annotations
 
+import math
 from typing import Final, cast
 
 from fsw.autopilot.model.airframe import Airframe
@@ -138,7 +139,7 @@ def servo_ranges(airframe: Airframe) -> tuple[tuple[float, float], ...]:
     width = len(limits.row) // len(limits.low)
     ranges = []
     for k in range(count):
-        least, most = -_HALF_TURN, _HALF_TURN
+        least, most = -math.pi, math.pi
         for i in range(limits.rows):
             share = limits.row[i * width + k]
             if share != 0.0:
@@ -146,6 +147,3 @@ def servo_ranges(airframe: Airframe) -> tuple[tuple[float, float], ...]:
                 least, most = max(least, ends[0]), min(most, ends[1])
         ranges.append((least, most))
     return tuple(ranges)
-
-
-_HALF_TURN: Final = 3.141592653589793

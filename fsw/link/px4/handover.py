@@ -1,7 +1,7 @@
 """Who flies: PX4's pilot gives the vehicle by Offboard, and takes it back by any other mode.
 
 PX4 arms, takes off, lands and has failsafes of its own. The plan is followed only while PX4 is in
-Offboard and in the air. Set-points stream before that, at the place where the vehicle is, because
+Offboard and in the air. Setpoints stream before that, at the place where the vehicle is, because
 PX4 enters Offboard only with a stream. What PX4 or its pilot chooses is never undone: out of
 Offboard for whatever reason, planning ends, it is said, and nothing begins again until the vehicle
 is given anew. An operator of ours who arms asks PX4 for Offboard, and who disarms gives it back.
@@ -38,7 +38,7 @@ class Px4Seen(NamedTuple):
 
     @property
     def gives(self) -> bool:
-        """Whether it follows set-points, and flies."""
+        """Whether it follows setpoints, and flies."""
         return self.heard and self.armed and self.mode == OFFBOARD and not self.landed
 
 
@@ -73,7 +73,7 @@ class Handover:
 
     @property
     def streams(self) -> bool:
-        """Whether set-points are sent: not to a PX4 that is not heard, nor after giving back."""
+        """Whether setpoints are sent: not to a PX4 that is not heard, nor after giving back."""
         return not (self.silent or self.spent)
 
     def _decide(self, px4: Px4Seen, now_us: int, *, flies: bool) -> Wish:
@@ -135,7 +135,7 @@ class Handover:
     def _tell_of_link(self, px4: Px4Seen) -> None:
         self.silent = not px4.heard
         if self.silent:
-            why = f"PX4 is silent for {1e-6 * px4.silent_us:.1f} s: set-points end"
+            why = f"PX4 is silent for {1e-6 * px4.silent_us:.1f} s: setpoints end"
             self._say(Severity.CRITICAL, why)
         else:
             self._say(Severity.INFO, "PX4 is heard")

@@ -1,9 +1,9 @@
-"""The link to PX4 as the vehicle: its estimate in, set-points out.
+"""The link to PX4 as the vehicle: its estimate in, setpoints out.
 
 A tick runs on every ATTITUDE_QUATERNION. While PX4 is silent ticks go on by our own clock without
-readings, so that ground stations are told. Set-points stream 50 times a second.
+readings, so that ground stations are told. Setpoints stream 50 times a second.
 
-Stamps of set-points and of the joints' readings are of the vehicle's time, which is PX4's.
+Stamps of setpoints and of the joints' readings are of the vehicle's time, which is PX4's.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ _STREAMS: Final = {  # asked for, with its period [us]
 _STEADY: Final = (message_ids.ATTITUDE_QUATERNION, message_ids.ODOMETRY)
 MIN_BYTES_PER_S: Final = 46_080  # of 460,800 baud: the streams take 42,000
 PX4_PORT: Final = 14540  # to which PX4 sends what a companion hears, before it has heard one
-STREAM_US: Final = 20_000  # of set-points
+STREAM_US: Final = 20_000  # of setpoints
 _HEARTBEAT_US: Final = 1_000_000
 _WHOLE_PIECE, _PIECES = 50, 5  # bytes of a STATUSTEXT, and pieces of a sentence
 _PATIENCE_S: Final = 0.02
@@ -307,7 +307,7 @@ class Px4Link:
                 Severity.WARNING, f"PX4 refused a command about {_SPOKEN[command]}: result {result}"
             )
 
-    # ------------------------------------------------------------------ set-points
+    # ------------------------------------------------------------------ setpoints
 
     def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Hand the vehicle over or take it, and stream where it is to be."""

@@ -82,7 +82,7 @@ def test_silence_ends_set_points_and_what_was_given_then_does_not_count() -> Non
     handover = Handover(flies=True, mode=OFFBOARD)
     wish = handover.step(SILENT, 0, flies=True)
     assert wish.disarm
-    assert said(wish) == ["PX4 is silent for 0.5 s: set-points end"]
+    assert said(wish) == ["PX4 is silent for 0.5 s: setpoints end"]
     assert not handover.streams
     assert said(handover.step(OFF, 1_000_000, flies=False)) == ["PX4 is heard"]
     assert not handover.step(OFF, 3_000_000, flies=False).arm
