@@ -35,12 +35,13 @@ def _zone(one: SimulatedZone, t_us: int) -> Zone:
     place = one.at(1e-6 * (t_us - START_US))
     shape = Shape(BY_NUMBER[one.kind.number].name, place.numbers)
     since_us = t_us if any(place.velocity) else 0
-    touch = getattr(one.table, "touch", None)
+    touch = one.table.touch
+    known = None
     if touch is not None:
         low, high = touch.stiffness_range_n_m
-        touch = Touch(touch.force_max_n, low, high, touch.dissipation_s_m, touch.friction)
+        known = Touch(touch.force_max_n, low, high, touch.dissipation_s_m, touch.friction)
     table = one.table
-    return Zone(shape, table.clearance_m, table.keep_in, place.velocity, since_us, touch)
+    return Zone(shape, table.clearance_m, table.keep_in, place.velocity, since_us, known)
 
 
 def announced(scenario: Scenario, t_us: int = START_US) -> tuple[SafeSetAnnouncement, ...]:
@@ -53,5 +54,4 @@ def target(clock: MissionClock, t_us: int) -> EndEffectorTarget:
     """The end-effector reference at a time stamp."""
     time_s = 1e-6 * (t_us - START_US)
     point = clock.target_at(time_s)
-    force = getattr(point, "force", 0.0)
-    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s), force)
+    return EndEffectorTarget(t_us, point.p, point.v, point.a, clock.yaw_at(time_s), point.force)

@@ -57,6 +57,6 @@ def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffnes
     error = seen[held, 0] - 5.0
     assert math.sqrt(float((error**2).mean())) < 1.0  # 20 %
     observed = np.abs(seen[held, 1] - seen[held, 0])
-    assert float(np.quantile(observed, 0.95)) < 0.7
+    assert np.mean(observed < seen[held, 2]) > 0.85
     assert flight.mode is Mode.TRAJECTORY, flight.texts
     assert flight.snapshot.safety.breaches == 0

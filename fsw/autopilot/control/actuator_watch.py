@@ -213,13 +213,9 @@ def _observe_base(r: Tick, law: WatchLaw, decay: float, dt: float, sent: Sent) -
         s.thrust[i] = lag_rotor(before, sent.rotor_thrust[i], decay)
         r.mixer.mean[i] = 0.5 * (before + s.thrust[i])
     force, turn = rotor_wrench(airframe, r.mixer.mean)
-    if r.pressing.near > 0:
-        pushed, turned = load_of_tip(r, airframe.bodies, sent.joint_torque)
-        load = load_on_base(r.bodies, airframe.bodies, add(force, pushed), r.pressing.load)
-        load = subtract(load, turned)
-    else:
-        load = load_on_base(r.bodies, airframe.bodies, force, sent.joint_torque)
-    modelled = subtract(turn, load)
+    pushed, turned = load_of_tip(r, airframe.bodies, sent.joint_torque)
+    load = load_on_base(r.bodies, airframe.bodies, add(force, pushed), r.pressing.load)
+    modelled = subtract(add(turn, turned), load)
     grown = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
     for i in range(2):
         gained = J[3 * i] * grown[0] + J[3 * i + 1] * grown[1] + J[3 * i + 2] * grown[2]

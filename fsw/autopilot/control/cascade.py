@@ -24,7 +24,7 @@ from fsw.autopilot.control.joints import (
     rest_joints,
     torques_of_failed,
 )
-from fsw.autopilot.control.press import look_for_surface, watch_contact, weigh_tool
+from fsw.autopilot.control.press import look_for_surface, weigh_tool
 from fsw.autopilot.control.safety_filter import (
     FilterLaw,
     FilterTuning,
@@ -225,13 +225,10 @@ def close_loops(
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     estimate = r.estimate
     settle_rotors(r, law, ticks)
-    lift = 0.0
-    if r.pressing.near > 0:
-        lift = -rotate_back(estimate.R_WB, r.pressing.force)[2]
+    lift = -rotate_back(estimate.R_WB, r.pressing.force)[2]
     r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks, lift)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
-    look_for_surface(r, airframe.bodies, tuning.press, law.tool_radius, zones)
-    watch_contact(r, airframe.bodies, tuning.press, dt * ticks)
+    look_for_surface(r, airframe.bodies, tuning.press, law.tool_radius, zones, dt * ticks)
     motion = motion_state(airframe, r, r.rotors, r.sent.joint_torque)
     v = velocity_of_mass(estimate, r.bodies.swing)
     for _ in range(ticks):
@@ -244,13 +241,9 @@ def close_loops(
     turn = limited_turn(airframe, estimate, motion.turning, turn)
     refer_joints(r, law, dt * ticks)
     drive_joints(r, law, motion, ticks)
-    lifted = (0.0, 0.0, -thrust)
-    if r.pressing.near > 0:
-        pushed, turned = load_of_tip(r, airframe.bodies, r.wanted.joint_torque)
-        load = load_on_base(r.bodies, airframe.bodies, add(lifted, pushed), r.pressing.load)
-        load = subtract(load, turned)
-    else:
-        load = load_on_base(r.bodies, airframe.bodies, lifted, r.wanted.joint_torque)
+    pushed, turned = load_of_tip(r, airframe.bodies, r.wanted.joint_torque)
+    lifted = add(pushed, (0.0, 0.0, -thrust))
+    load = subtract(load_on_base(r.bodies, airframe.bodies, lifted, r.pressing.load), turned)
     torque = torque_to_turn(r.bodies, airframe.bodies, turn, load, knows_arm=law.follows_plan)
     allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit)
     send(r, airframe)
@@ -376,10 +369,8 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
     for _ in range(ticks):
         torque = r.sent.joint_torque
         observe_disturbance(r.joints, r.bodies, airframe, torque, field, law.dt)
-        if r.pressing.near > 0:
-            observe_contact(r, airframe, torque, field, law.dt)
-    if r.pressing.near > 0:
-        weigh_tool(r, airframe, law.tuning.press)
+        observe_contact(r, airframe, torque, field, law.dt)
+    weigh_tool(r, airframe, law.tuning.press)
     # Not what is commanded: the rotors take 40 ms to give it.
     joint_torques(
         r, airframe, law.arm, law.tuning.joint, law.tuning.press, field, motion.turning, law.dt

@@ -107,6 +107,8 @@ def observe_contact(r: Tick, airframe: Airframe, torque: Floats, field: Vec3, dt
     ``torque`` (j,) [N m], ``field`` [m/s^2, B] and ``dt`` [s] as of ``observe_disturbance``.
     """
     k = r.pressing
+    if k.near == 0:
+        return
     _observe(k.momentum, k.external, 1.0, r.bodies, airframe, torque, field, dt)
 
 

@@ -95,12 +95,13 @@ class PressTuning:
 
 @compilable
 def look_for_surface(
-    r: Tick, bodies: Bodies, tuning: PressTuning, radius: float, zones: Array
+    r: Tick, bodies: Bodies, tuning: PressTuning, radius: float, zones: Array, dt: float
 ) -> None:
     """The surface that the tool's ball of ``radius`` [m] may touch, the nearest of ``zones``.
 
-    ``zones`` (zones, k) [SI] are those of ``moving_zones``. Reads estimate, bodies;
-    writes pressing.
+    ``zones`` (zones, k) [SI] are those of ``moving_zones``; how long the tool has missed it, and
+    how it slips, is looked at ``dt`` [s] after the last time. Reads u, estimate, bodies; writes
+    pressing.
     """
     k, estimate, found = r.pressing, r.estimate, False
     nearest = tuning.near
@@ -118,23 +119,19 @@ def look_for_surface(
             put_three(k.normal, 0, n)
             k.surface_speed = dot(n, velocity_of(zones, zone, estimate.t_us))
             k.most, k.stiffness = zones[zone, FORCE_MAX], zones[zone, STIFF]
-    if not found:
-        if k.near > 0:
-            _forget(r)
-        return
-    k.distance = nearest
-    if k.near == 0:
-        k.near = 1
-        for i in range(int(bodies.joints)):
-            k.momentum[i], k.external[i] = r.bodies.momentum[i], r.joints.disturbance[i]
+    if found:
+        k.distance = nearest
+        if k.near == 0:
+            k.near = 1
+            for i in range(int(bodies.joints)):
+                k.momentum[i], k.external[i] = r.bodies.momentum[i], r.joints.disturbance[i]
+    elif k.near > 0:
+        _forget(r)
+    _watch_contact(r, bodies, tuning, dt)
 
 
 @compilable
-def watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> None:
-    """How long the tool has missed the surface, and how it slips, a tick of ``dt`` [s] later.
-
-    Reads u, estimate, bodies; writes pressing.
-    """
+def _watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> None:
     k = r.pressing
     if not r.u.force > 0.0:
         if k.met > 0:
@@ -174,6 +171,8 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     Reads estimate, bodies, pressing.external; writes pressing, observed.known.
     """
     k, m, b, n = r.pressing, r.bodies, airframe.bodies, int(airframe.bodies.joints)
+    if k.near == 0:
+        return
     R, normal = r.estimate.R_WB, three(k.normal, 0)
     along, tip = rotate_back(R, normal), place_of_tip(m, b)
     shape = _levers(r, tip, n)

@@ -105,6 +105,10 @@ def load_of_tip(r: Tick, b: Bodies, torque: JointVector | Floats) -> tuple[Vec3,
     estimate, bodies.
     """
     k, m = r.pressing, r.bodies
+    if k.near == 0:
+        for i in range(int(b.joints)):
+            k.load[i] = torque[i]
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     force = rotate_back(r.estimate.R_WB, k.force)
     tip = place_of_tip(m, b)
     for i in range(int(b.joints)):
@@ -126,13 +130,10 @@ def motion_state(
     force, turn = rotor_wrench(airframe, rotors)
     thrust = -force[2]
     f = thrust / r.mass
-    if r.pressing.near > 0:
-        pushed, turned = load_of_tip(r, airframe.bodies, torque)
-        turning = base_acceleration(
-            r.bodies, airframe.bodies, add(turn, turned), add(force, pushed), r.pressing.load
-        )
-    else:
-        turning = base_acceleration(r.bodies, airframe.bodies, turn, force, torque)
+    pushed, turned = load_of_tip(r, airframe.bodies, torque)
+    turning = base_acceleration(
+        r.bodies, airframe.bodies, add(turn, turned), add(force, pushed), r.pressing.load
+    )
     wdx, wdy = turning[0], turning[1]
     return MotionState(
         thrust,

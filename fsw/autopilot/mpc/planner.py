@@ -142,10 +142,9 @@ class Planner:
             )
         if not math.isfinite(sum(map(sum, request.joint_targets))):
             return "a joint target is not finite"
-        if len(request.pushes) not in (0, self._config.horizon):
-            return f"{len(request.pushes)} pushes given for {self._config.horizon} steps"
-        if not math.isfinite(sum(map(sum, request.pushes))):
-            return "a push is not finite"
+        given, finite = len(request.pushes), math.isfinite(sum(map(sum, request.pushes)))
+        if given not in (0, self._config.horizon) or not finite:
+            return f"{given} pushes for {self._config.horizon} steps, or one is not finite"
         return None
 
     def _retune(self, tuning: Tuning) -> None:
@@ -181,11 +180,8 @@ def _timings(search: Search, total_us: float) -> PlanTimings:
 
 
 def _as_plan_inputs(inputs: Array, request: PlanRequest) -> tuple[PlanInput, ...]:
-    found = [PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:])) for u in inputs.tolist()]
-    if request.pushes:
-        forces = [target.force for target in request.targets]
-        found = [
-            u._replace(push=push, force=force)
-            for u, push, force in zip(found, request.pushes, forces, strict=False)
-        ]
-    return tuple(found)
+    pushes = request.pushes or ((0.0, 0.0, 0.0),) * len(inputs)
+    return tuple(
+        PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:]), push, target.force)
+        for u, push, target in zip(inputs.tolist(), pushes, request.targets, strict=False)
+    )

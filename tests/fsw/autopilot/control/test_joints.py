@@ -20,6 +20,7 @@ from fsw.autopilot.control.joints import (
     rest_joints,
 )
 from fsw.autopilot.control.pid import PidGains
+from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.prediction import Array
@@ -77,7 +78,9 @@ def hold(q: Vec2, q_ref: Vec2, thrust: float = 9.81, pitch: float = 0.0) -> tupl
 
 def asked(r: Tick, airframe: Airframe, gains: PidGains, field: Vec3, pitch: float = 0.0) -> Vec2:
     """Torques of the joints in a field, the base having an angular acceleration in pitch."""
-    joint_torques(r, airframe, arm_coordinates(airframe), gains, field, (0.0, pitch, 0.0), DT)
+    joint_torques(
+        r, airframe, arm_coordinates(airframe), gains, PressTuning(), field, (0.0, pitch, 0.0), DT
+    )
     return pair(r.wanted.joint_torque)
 
 

@@ -80,7 +80,7 @@ def at_surface(airframe: Airframe, seen: StateEstimate, normal: Vec3) -> Tick:
     move_bodies(r.bodies, airframe.bodies, 0.0, seen)
     zones = moving_zones(SafeSet((replace(wall(normal, -9.0, 0.0), touch=TOUCH),)), None)
     r.pressing.near = 0
-    look_for_surface(r, airframe.bodies, replace(TUNING, near=20.0), 0.0, zones)
+    look_for_surface(r, airframe.bodies, replace(TUNING, near=20.0), 0.0, zones, 0.002)
     assert r.pressing.near == 1
     return r
 
