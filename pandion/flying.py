@@ -75,12 +75,12 @@ def fly(
     Args:
         scenario: Name, path of a ``.toml`` file, or a ``Scenario``.
         seed: Root of all randomness, 0 or more.
-        sensors: ``perfect``, ``mocap``, ``vio`` or ``rtk``; None: the scenario's.
+        sensors: ``perfect``, ``mocap``, ``vio``, ``rtk`` or ``gnss``; None: the scenario's.
         duration_s: How long it is flown [s]; None: as the scenario says.
         params: Parameters by name, or the path of a ``.params`` file.
         planner: An object with ``plan(request)``, a class of them, or ``"module:Name"``.
-        controller: Predictive controller ``blf``, ``hc``, ``sc`` or ``naive``; or an own law, which
-            maps an ``Observation`` to thrusts (4,) [N] and joint torques (2,) [N m], every 2 ms.
+        controller: Predictive controller ``blf``, ``hc``, ``sc`` or ``naive``; or an own law: every
+            2 ms an ``Observation`` to thrusts (rotors,) [N] and joint torques (joints,) [N m].
         reference: Of the end-effector: a callable of time [s] or a table; see
             ``pandion.references``.
         disturbance: Acceleration (3,) [m/s², NED] of the base at a time [s], on top of the

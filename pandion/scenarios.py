@@ -26,7 +26,7 @@ def load_scenario(
 
     Args:
         scenario: ``"walls"``, ``"my/scenario.toml"`` or a ``Scenario``.
-        sensors: Suite to fly it with: ``perfect``, ``mocap``, ``vio`` or ``rtk``; None: its own.
+        sensors: ``perfect``, ``mocap``, ``vio``, ``rtk`` or ``gnss``; None: the scenario's.
         duration_s: How long it is flown [s]; None: as it says.
         vehicle: One that comes with Pandion, or the path of a ``.toml`` file; None: its own.
 

@@ -22,14 +22,14 @@ def seize(plant: Plant, blocks: Sequence[Held], state: Array, locked: tuple[bool
 
     .. math:: M (v^+ - v^-) = \sum_i e_i λ_i, \quad v_i^+ = 0
 
-    with the velocities v of base, in B, and joints.
+    with the velocities v of base, in B, and joints, and the motors' inertia in M.
     """
     joints, work = len(locked), blocks[0].memory.work
     rates = state[first_angle(plant) + joints :]
     stop = [6 + i for i in range(joints) if locked[i]]
     free = [k for k in range(6 + joints) if k not in stop]
     place_bodies(plant, state, work)
-    mass = mass_matrix(plant.chain, work.posture, work.mass)
+    mass = mass_matrix(plant.chain, work.posture, plant.gears.carried, work.mass)
     stopped = rates[[k - 6 for k in stop]].copy()
     change = np.zeros(6 + joints)
     change[free] = np.linalg.solve(mass[np.ix_(free, free)], mass[np.ix_(free, stop)] @ stopped)

@@ -65,11 +65,16 @@ def mass_matrix_into(chain: Chain, at: Posture, out: Array) -> None:
     out[4, 3], out[5, 3], out[5, 4] = xy, xz, yz
 
 
-def mass_matrix(chain: Chain, at: Posture, out: Array) -> Array:
-    """The whole of it (6 + j, 6 + j) [SI], by way of ``out`` (12, 12) [SI]."""
+def mass_matrix(chain: Chain, at: Posture, motors: Array, out: Array) -> Array:
+    """The whole of it (6 + j, 6 + j) [SI], by way of ``out`` (12, 12) [SI].
+
+    With the inertia of ``motors`` (j,) [kg·m²] behind the joints' gears; there is room for more.
+    """
+    joints = chain.joints
     mass_matrix_into(chain, at, out)
-    lower = np.tril(out[: 6 + chain.joints, : 6 + chain.joints])
+    lower = np.tril(out[: 6 + joints, : 6 + joints])
     whole: Array = lower + np.tril(lower, -1).T
+    whole[6:, 6:] += np.diag(motors[:joints])
     return whole
 
 

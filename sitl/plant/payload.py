@@ -81,20 +81,13 @@ def take_up(
     before = np.concatenate(
         [work.rotation.T @ state[V_WB : V_WB + 3], state[W_WB_B : W_WB_B + 3], rates]
     )
-    momentum = _mass(plant, work, joints) @ before
+    momentum = mass_matrix(plant.chain, work.posture, plant.gears.carried, work.mass) @ before
     put_link(plant, link, joints)
     place_bodies(plant, state, work)
-    mass = _mass(plant, work, joints)
+    mass = mass_matrix(plant.chain, work.posture, plant.gears.carried, work.mass)
     free = [k for k in range(6 + joints) if k < 6 or not plant.locked[k - 6] > 0.0]
     after = np.zeros(6 + joints)
     after[free] = np.linalg.solve(mass[np.ix_(free, free)], momentum[free])
     state[V_WB : V_WB + 3] = work.rotation @ after[:3]
     state[W_WB_B : W_WB_B + 3] = after[3:6]
     rates[:] = after[6:]
-
-
-def _mass(plant: Plant, work: Any, joints: int) -> Array:
-    """The mass matrix (6 + j, 6 + j) [SI] of what is placed, with the motors that joints carry."""
-    whole = mass_matrix(plant.chain, work.posture, work.mass)
-    whole[6:, 6:] += np.diag(plant.gears.carried[:joints])
-    return whole

@@ -106,7 +106,7 @@ def fastest_rates(vehicle: Vehicle, motor_inertia: float = 0.0) -> tuple[float, 
     worst, mobility = [0.0, 0.0], np.eye(6 + joints)
     for angles in _postures(vehicle):
         state[arm : arm + joints] = angles
-        mobility[:] = _mobility(vehicle, numbers, state, work)
+        mobility[:] = _mobility(numbers, state, work)
         of_joints = mobility[6:, 6:]
         worst[0] = max(worst[0], _fastest(of_joints, friction, np.zeros_like(friction)))
         worst[1] = max(worst[1], _fastest(of_joints, damping, stiffness))
@@ -129,7 +129,7 @@ def steps_of_touch(
     arm, fastest = THRUST + len(vehicle.rotors), 0.0
     for angles in _postures(vehicle):
         state[arm : arm + last] = angles
-        mobility = _mobility(vehicle, numbers, state, work)
+        mobility = _mobility(numbers, state, work)
         x, y, z = work.posture.origin[last + 1]
         to_tip = np.zeros((3, 6 + last))
         to_tip[:, :6] = [[1, 0, 0, 0, z, -y], [0, 1, 0, -z, 0, x], [0, 0, 1, y, -x, 0]]
@@ -161,12 +161,10 @@ def _postures(vehicle: Vehicle) -> list[Array]:
     return [*(least + shares * (most - least)), *ends]
 
 
-def _mobility(vehicle: Vehicle, numbers: Plant, state: Array, work: Workspace) -> Array:
+def _mobility(numbers: Plant, state: Array, work: Workspace) -> Array:
     """Inverse of the mass matrix (6 + j, 6 + j) [SI] at a state (n,) [SI], which it places."""
-    joints = len(vehicle.joints)
     place_bodies(numbers, state, work)
-    mass = mass_matrix(numbers.chain, work.posture, work.mass)
-    mass[6:, 6:] += np.diag(numbers.gears.inertia[:joints])
+    mass = mass_matrix(numbers.chain, work.posture, numbers.gears.inertia, work.mass)
     inverse: Array = np.array(np.linalg.inv(mass), dtype=float)
     return inverse
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from sitl.faults.active import Faults
@@ -17,6 +18,8 @@ from sitl.scenario import ActuatorKeys, Scenario
 from sitl.scenario_file import load_scenario
 from sitl.simulation import Simulation
 from tests.sitl.free_motion import tumbling
+from tests.sitl.pinocchio_model import configuration, pinocchio_model
+from tests.sitl.state_view import StateView
 from tests.sitl.test_conservation import weigh
 from tests.sitl.test_simulation import _trimmed
 from tests.sitl.vehicles import PAPER, frictionless, inputs
@@ -106,6 +109,27 @@ def test_a_joint_that_seizes_keeps_momentum_and_gains_no_energy(locked: tuple[bo
     assert np.abs(kept - momentum).max() <= 1e-12 * np.abs(momentum).max()
     rates = state[-2:]
     assert [rate == 0.0 for rate in rates] == list(locked)
+
+
+def test_the_motor_of_a_free_joint_takes_up_its_share_when_another_joint_seizes() -> None:
+    """Momentum that belongs to what is free is kept, by Pinocchio's inertia of a motor."""
+    inertia, state = 0.02, tumbling(PAPER)
+    before = StateView(state.copy(), 2)
+    seize(plant(PAPER, Effects(motor_inertia=inertia)), held(), state, (True, False))
+    model, view = pinocchio_model(PAPER, 0.0), StateView(state, 2)
+    model.armature[6:] = inertia
+    q = configuration(view.p_WB, view.q_WB, view.q_arm)
+    R = pin.Quaternion(q[3:7]).toRotationMatrix()
+    jump = np.concatenate(
+        [
+            R.T @ (view.v_WB - before.v_WB),
+            view.w_WB_B - before.w_WB_B,
+            view.qd_arm - before.qd_arm,
+        ]
+    )
+    gained = np.delete(pin.crba(model, model.createData(), q) @ jump, 6)
+    assert np.abs(jump).max() > 0.1
+    assert np.abs(gained).max() < 1e-12
 
 
 def test_a_flight_with_a_stuck_joint_keeps_energy_and_momentum() -> None:
