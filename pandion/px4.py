@@ -27,6 +27,9 @@ from sitl.scenario_file import (
 DONE: Final = 0  # exit codes
 FAILED: Final = 1
 NOISY: Final = "mocap"
+# PX4 reads its environment before the defaults of its airframe, and does not keep a value that is
+# its own default: a rotor at 0 would get the airframe's place. So no value is exactly a default.
+_BESIDE: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +159,8 @@ def _print_environment(options: _Plant) -> int:
 
     print(f"PX4_SYS_AUTOSTART={AIRFRAME}\nPX4_SIM_MODEL={MODEL}")
     for name, value in parameters(options).items():
-        print(f"PX4_PARAM_{name}={as_text(value)}")
+        beside = _BESIDE * max(1.0, abs(value)) if isinstance(value, float) else 0
+        print(f"PX4_PARAM_{name}={as_text(value + beside)}")
     return DONE
 
 

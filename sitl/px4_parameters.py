@@ -18,6 +18,11 @@ from vehicles.description import Vehicle
 _MOTOR, _ACTUATOR_SET = 101, 301  # output functions: Motor 1, Offboard Actuator Set 1
 _UP: Final = (0.0, 0.0, -1.0)  # PX4's default of a rotor's axis
 _RATE_BANDWIDTH: Final = 17.0  # rad/s, of roll and pitch rates: MC_ROLLRATE_P of 0.7
+_YAW_BANDWIDTH: Final = 5.0  # rad/s, of the yaw rate: below the 12.6 at which PX4 cuts its torque
+_YAW_INTEGRAL: Final = 0.5  # 1/s, share of the gain: PX4's default
+# Off, its default, PX4 gives up thrust for torque that the rotors cannot give: a step of 11 deg in
+# tilt left 40 % of the thrust, and the vehicle fell. On, thrust stays and torque is cut.
+_AIRMODE: Final = 1  # of roll and pitch
 _NO_MAGNETOMETER: Final = 5  # EKF2_MAG_TYPE
 _VISION: Final = 3  # EKF2_HGT_REF
 _POSE: Final = 11  # EKF2_EV_CTRL: horizontal and vertical position, yaw; no velocity is measured
@@ -65,17 +70,19 @@ def _outputs(vehicle: Vehicle) -> dict[str, int | float]:
 def _control(vehicle: Vehicle) -> dict[str, int | float]:
     """Hover thrust, and gains that carry over to other sizes.
 
-    The rate loop has the bandwidth torque / inertia times its gain, with the torque that PX4's
-    mixer makes of a roll or pitch of 1; its derivative cancels the rotors' lag. With PX4's own
-    gains the same vehicle follows as well, with larger errors.
+    A rate loop has the bandwidth torque / inertia times its gain, with the torque that PX4's mixer
+    makes of a 1 on that axis; the derivative of roll and pitch cancels the rotors' lag. PX4's own
+    gain of the yaw rate would be one of 0.4 rad/s here, and the yaw swings by 0.3 rad.
     """
     full = np.array([rotor.thrust_max for rotor in vehicle.rotors])
     effect = effectiveness(vehicle) * full
-    # As its ControlAllocationPseudoInverse scales the columns of roll and pitch.
-    mix = np.linalg.pinv(effect[2:])[:, 1:3]
-    mix[np.abs(mix) < 1e-9 * np.abs(mix).max()] = 0.0
-    mix /= np.sqrt(2.0 * (mix**2).sum(axis=0) / np.count_nonzero(mix, axis=0)).max()
-    torques = (effect[3:5] @ mix).diagonal()
+    # As its ControlAllocationPseudoInverse scales the columns of roll, pitch and yaw.
+    mix = np.linalg.pinv(effect[2:])[:, 1:4]
+    mix[np.abs(mix) < 1e-9 * np.abs(mix).max(axis=0)] = 0.0
+    tilts = mix[:, :2]
+    mix[:, :2] /= np.sqrt(2.0 * (tilts**2).sum(axis=0) / np.count_nonzero(tilts, axis=0)).max()
+    mix[:, 2] /= mix[:, 2].max()
+    torques = (effect[3:] @ mix).diagonal()
     lag = max(rotor.lag for rotor in vehicle.rotors)
     hover = vehicle.mass * GRAVITY / full.sum()
     found: dict[str, int | float] = {
@@ -84,8 +91,9 @@ def _control(vehicle: Vehicle) -> dict[str, int | float]:
         "MPC_XY_VEL_P_ACC": 4.0,
         "MPC_XY_VEL_I_ACC": 1.0,
         "MPC_Z_P": 1.5,
+        "MC_AIRMODE": _AIRMODE,
     }
-    both = zip(("ROLL", "PITCH"), vehicle.base.inertia[:2], torques.tolist(), strict=True)
+    both = zip(("ROLL", "PITCH"), vehicle.base.inertia[:2], torques[:2].tolist(), strict=True)
     for axis, inertia, torque in both:
         gain = round(_RATE_BANDWIDTH * inertia / torque, 3)
         found |= {
@@ -93,7 +101,12 @@ def _control(vehicle: Vehicle) -> dict[str, int | float]:
             f"MC_{axis}RATE_P": gain,
             f"MC_{axis}RATE_D": round(gain * lag, 4),
         }
-    return found
+    gain = round(float(_YAW_BANDWIDTH * vehicle.base.inertia[2] / torques[2]), 3)
+    return found | {
+        "MC_YAW_P": 1.5,
+        "MC_YAWRATE_P": gain,
+        "MC_YAWRATE_I": round(_YAW_INTEGRAL * gain, 3),
+    }
 
 
 def _estimation(sensors: MeasuredSensors) -> dict[str, int | float]:

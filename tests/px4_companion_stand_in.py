@@ -7,7 +7,9 @@ ODOMETRY comes 125 times a second at most with its velocity in NED (child frame 
 acts at once.
 
 Its control is PX4's in structure, with the gains that it has: position P, velocity P, I and D on
-the measured acceleration, thrust vector, attitude P, rates PID; the outer loop every second step.
+the measured acceleration, thrust vector, attitude P, rates PID, yaw torque through a low-pass;
+the outer loop every second step. Rotors that cannot give all keep the thrust first, then roll and
+pitch, then yaw, as PX4's with airmode do.
 Pushed as `pandion px4 identify` pushes, it was found to be 55 1/s^2, 8.7 1/s and 40 ms, and a real
 PX4 with the same gains 56, 9.5 and 51.
 """
@@ -33,6 +35,7 @@ CURRENT_MODE = 436
 KNOWN = (CURRENT_MODE, ATTITUDE_QUATERNION, ODOMETRY, EXTENDED_SYS_STATE, BATTERY_STATUS)
 FASTEST_US = {ODOMETRY: 8000, ATTITUDE_QUATERNION: 4000}
 SINKS = 0.75  # m/s, in Position without sticks
+YAW_MARGIN = 1.15  # of full thrust: so much may yaw ask before it is cut, at the cost of thrust
 
 
 @dataclass(frozen=True)
@@ -47,10 +50,13 @@ class Gains:
     z_vel_p: float = 4.0
     z_vel_i: float = 2.0
     tilt_p: float = 7.0
-    yaw_p: float = 2.8
+    yaw_p: float = 1.5
     rate: float = 17.0  # rad/s, bandwidth of roll and pitch rates
     rate_i: float = 4.9  # 1/s^2
-    yaw_rate: float = 5.0
+    yaw_rate: float = 5.0  # rad/s
+    yaw_rate_i: float = 2.5  # 1/s^2
+    yaw_cutoff: float = 12.6  # rad/s, of its torque
+    most_integral: tuple[float, float, float] = (7.3, 7.3, 0.55)  # rad/s^2: 0.3 of full torque
     lag: float = 0.04  # s, of the rotors, which the derivative cancels
 
 
@@ -99,6 +105,7 @@ class Px4Companion(Px4StandIn):
         self._rate_i = np.zeros(3)
         self._last_rate = np.zeros(3)
         self._rate_dot = np.zeros(3)
+        self._yaw_torque = 0.0  # rad/s^2
         self._force = np.array([0.0, 0.0, -GRAVITY])
         self._wanted_R, self._thrust = np.eye(3), 0.0
         self._acc = np.zeros(3)
@@ -279,20 +286,39 @@ class Px4Companion(Px4StandIn):
             self._rate_dot += 0.5 * ((self._rate - self._last_rate) / dt - self._rate_dot)
         self._last_rate = self._rate
         error = wanted - self._rate
-        self._rate_i = np.clip(self._rate_i + g.rate_i * error * dt, -2.0, 2.0)
+        more = np.array([g.rate_i, g.rate_i, g.yaw_rate_i]) * error * dt
+        self._rate_i = np.clip(self._rate_i + more, *np.outer((-1.0, 1.0), g.most_integral))
         bandwidth = np.array([g.rate, g.rate, g.yaw_rate])
         lead = np.array([g.rate * g.lag, g.rate * g.lag, 0.0])
-        turning = (
-            bandwidth * error + self._rate_i * np.array([1.0, 1.0, 0.2]) - lead * self._rate_dot
-        )
+        turning = bandwidth * error + self._rate_i - lead * self._rate_dot
+        self._yaw_torque += dt / (dt + 1.0 / g.yaw_cutoff) * (turning[2] - self._yaw_torque)
+        turning[2] = self._yaw_torque
         return np.array(self.airframe.inertia) * turning
 
     def _allocate(self, torque: Vector) -> list[float]:
         air = self.airframe
-        x, y, z = torque / np.array([2.0 * air.arm, 2.0 * air.arm, 4.0 * air.yaw_ratio])
-        quarter = self._thrust / 4.0
-        forces = (quarter - y + z, quarter + x - z, quarter + y + z, quarter - x - z)
-        return [min(max(force / air.thrust_max, 0.0), 1.0) for force in forces]
+        arms = np.array([2.0 * air.arm, 2.0 * air.arm, 4.0 * air.yaw_ratio]) * air.thrust_max
+        shares = allocated(self._thrust / (4.0 * air.thrust_max), *(torque / arms))
+        return [float(one) for one in shares]
+
+
+def allocated(thrust: float, roll: float, pitch: float, yaw: float) -> Vector:
+    """Shares of full thrust of the rotors rear, left, front, right of shares on each axis.
+
+    What is beyond both ends is split between them, and cut; yaw has what is left.
+    """
+    shares = thrust + np.array([-pitch, roll, pitch, -roll])
+    for share in (1.0, 0.5):
+        shares = shares + share * (max(-shares.min(), 0.0) - max(shares.max() - 1.0, 0.0))
+    shares = np.clip(shares, 0.0, 1.0)
+    turn_by = np.array([1.0, -1.0, 1.0, -1.0])
+    for share in (1.0, 0.5):
+        shares, yaw = shares + yaw * turn_by, 0.0
+        beyond = np.minimum(shares, 0.0) + np.maximum(shares - YAW_MARGIN, 0.0)
+        most, least = (beyond * turn_by).max(), (beyond * turn_by).min()
+        shares = shares - share * (max(most, 0.0) + min(least, 0.0)) * turn_by
+    shares = shares - max(shares.max() - 1.0, 0.0)
+    return np.clip(shares, 0.0, 1.0)
 
 
 def quaternion(R: Vector) -> tuple[float, float, float, float]:

@@ -70,6 +70,8 @@ def test_the_papers_vehicle_has_the_values_that_were_flown_with_px4(
         "MC_ROLLRATE_P": "0.7",
         "MC_PITCHRATE_D": "0.028",
         "MC_PITCH_P": "7",
+        "MC_YAWRATE_P": "2.73",
+        "MC_AIRMODE": "1",
         "MPC_XY_P": "1.8",
         "MPC_XY_VEL_P_ACC": "4",
         "MPC_THR_HOVER": "0.5",
@@ -84,7 +86,7 @@ def test_the_papers_vehicle_has_the_values_that_were_flown_with_px4(
 
 
 def test_the_rate_loop_keeps_its_bandwidth_on_another_vehicle() -> None:
-    """A roll of 1 changes the thrust of two rotors of a '+' by 0.707 of the full one."""
+    """What a 1 does to a '+': roll two rotors by 0.707 of the full thrust, yaw all four by all."""
     paper = VEHICLES[0]
     small = [
         replace(one, position=tuple(0.58 * x for x in one.position), thrust_max=8.55, lag=0.02)
@@ -97,6 +99,8 @@ def test_the_rate_loop_keeps_its_bandwidth_on_another_vehicle() -> None:
         assert values["MC_ROLLRATE_D"] / values["MC_ROLLRATE_P"] == pytest.approx(
             rotor.lag, rel=0.01
         )
+        lever = 4.0 * rotor.torque_per_thrust * rotor.thrust_max / vehicle.base.inertia[2]
+        assert values["MC_YAWRATE_P"] * lever == pytest.approx(5.0, rel=0.01)
 
 
 def test_a_heavier_vehicle_hovers_at_more_thrust(
@@ -137,8 +141,24 @@ def test_the_environment_says_the_same_to_px4s_own_start_script(
     assert main(["env", "walls", "--sensors", "gnss"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == ["PX4_SYS_AUTOSTART=10016", "PX4_SIM_MODEL=none_iris"]
-    assert lines[2:] == [f"PX4_PARAM_{name}={value}" for name, value in values.items()]
     assert not any(" " in line for line in lines)  # env $(pandion px4 env)
+    said = dict(line.removeprefix("PX4_PARAM_").split("=") for line in lines[2:])
+    assert list(said) == list(values)
+    for name, value in values.items():
+        assert float(said[name]) == pytest.approx(float(value), rel=2e-6, abs=2e-6)
+
+
+def test_the_environment_has_no_value_that_px4_would_take_for_its_default(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """PX4 drops such a value, and its airframe's default is flown: rotors in other places."""
+    assert main(["env", "walls", "--sensors", "gnss"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    said = dict(line.split("=") for line in lines)
+    assert float(said["PX4_PARAM_CA_ROTOR0_PY"]) == pytest.approx(1e-6)
+    values = px4_parameters(load_vehicle("paper"), sensors("gnss"), 250)
+    assert [name for name, value in values.items() if isinstance(value, float)
+            and np.float32(said[f"PX4_PARAM_{name}"]) == np.float32(value)] == []  # fmt: skip
 
 
 def test_the_file_is_one_that_qgroundcontrol_loads(

@@ -7,7 +7,6 @@ import os
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -42,6 +41,7 @@ class Operator:
     armed: bool = False
     landed: bool = True
     p: tuple[float, ...] = (0.0, 0.0, 0.0)
+    t_s: float = 0.0  # since PX4 has started, by its own clock
     texts: list[str] = field(default_factory=list)
     acks: list[tuple[int, int]] = field(default_factory=list)
 
@@ -79,7 +79,7 @@ class Operator:
         elif frame.message_id == 245:
             self.landed = values[1] <= 1
         elif frame.message_id == 32:
-            self.p = values[1:4]
+            self.t_s, self.p = 1e-3 * values[0], values[1:4]
         elif frame.message_id == 77:
             self.acks.append((values[0], values[1]))
         elif frame.message_id == 253:
@@ -98,6 +98,11 @@ class Operator:
                 return True
             time.sleep(0.01)
         return False
+
+    def wait(self, seconds: float) -> None:
+        """Let PX4's time pass, at most ten times as long by the wall's."""
+        end_s = self.t_s + seconds
+        self.until(lambda: self.t_s >= end_s, 10.0 * seconds)
 
     def set_origin(self) -> None:
         self.send(48, *ORIGIN, 1, 0)
@@ -120,12 +125,21 @@ class Operator:
         self.set_mode(HOLD)
         assert self.until(lambda: self.mode == HOLD, 10.0)
 
-    def fold(self, seconds: float) -> None:
+    def fold(self) -> None:
         """Bring the arm to its home posture, from where plans begin."""
         joints = AIRFRAME.bodies.joints
         shares = shares_of(servo_ranges(AIRFRAME), tuple(AIRFRAME.home_posture[:joints]))
-        rest = (float("nan"),) * (6 - joints)
-        self.until(lambda: False, seconds, lambda: self.command(SET_ACTUATOR, *shares, *rest))
+        for _ in range(4):
+            self.move_joints(shares)
+            self.wait(1.0)
+
+    def move_joints(self, shares: tuple[float, ...]) -> None:
+        """Send servos to shares of their ranges."""
+        self.command(SET_ACTUATOR, *shares, *(float("nan"),) * (6 - len(shares)))
+
+    def give(self) -> bool:
+        """Give the vehicle to the planner; whether PX4 accepts it."""
+        return self.until(lambda: self.mode == OFFBOARD, 20.0, lambda: self.set_mode(OFFBOARD))
 
 
 @contextmanager
@@ -190,7 +204,8 @@ def flying(
         told = {f"PX4_PARAM_{k}": str(v) for k, v in {**WITHOUT_RADIO, **(px4 or {})}.items()}
         environment = {**os.environ, **dict(one.split("=", 1) for one in lines), **told}
         _until_said(folder / "sitl.log", "ready", 240.0)
-        root = stack.enter_context(tempfile.TemporaryDirectory())
+        root = str(folder / "px4")  # its log stays there
+        Path(root).mkdir()
         build = Path(BUILD).resolve()
         flown = stack.enter_context(
             started(
