@@ -402,6 +402,13 @@ class InjectFailure:
     instance: int  # 0: all
 
 
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """Close the gripper and hold what is in it, or open it."""
+
+    closes: bool
+
+
 class Order(Enum):
     """Commands without parameters."""
 
@@ -435,6 +442,7 @@ CommandAction = (
     | StartMission
     | SetMissionStep
     | InjectFailure
+    | Grip
     | Order
     | Rejected
 )
@@ -1000,6 +1008,7 @@ class TickOutputs:
     texts: tuple[StatusText, ...] = ()
     tuning_taken: bool | None = None  # whether the requested one is in use; None: none was
     setpoint: Setpoint | None = None  # for an autopilot with loops of its own; None: nothing flown
+    gripper: float = 0.0  # 1: closes and holds, -1: opens, 0: was never told
 
     @property
     def snapshot(self) -> FlightSnapshot:

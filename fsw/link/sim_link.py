@@ -106,12 +106,15 @@ class SimLink:
         )
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
         self._controls_frames = {
-            armed: LockstepFrame(
+            (armed, gripper): LockstepFrame(
                 self._writer,
                 message_ids.HIL_ACTUATOR_CONTROLS,
-                *encode_replies.end_of_controls(airframe.rotors + joints, armed=armed),
+                *encode_replies.end_of_controls(
+                    airframe.rotors + joints, armed=armed, gripper=gripper
+                ),
             )
             for armed in (False, True)
+            for gripper in (0.0, 1.0, -1.0)
         }
         self._airframe = airframe
         self._steps = SensorClock(
@@ -352,7 +355,7 @@ class SimLink:
     def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
         values = encode_replies.hil_actuator_controls(self._airframe, stamp_us, outputs.actuators)
-        return self._controls_frames[outputs.armed](*values)
+        return self._controls_frames[outputs.armed, outputs.gripper](*values)
 
     def _mode(self, t_us: int, outputs: TickOutputs) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""

@@ -132,7 +132,9 @@ class ClosedLoop:
         outputs = self.respond(inputs)
         if before_advancing is not None:
             before_advancing(outputs)
-        self.simulation.advance(self.controls(outputs.actuators, armed=outputs.mode.armed))
+        self.simulation.advance(
+            self.controls(outputs.actuators, armed=outputs.mode.armed, gripper=outputs.gripper)
+        )
         return outputs
 
     def respond(self, inputs: TickInputs) -> TickOutputs:
@@ -142,9 +144,9 @@ class ClosedLoop:
             self.planner.submit(outputs.plan_request)
         return outputs
 
-    def controls(self, command: ActuatorCommand, *, armed: bool) -> Controls:
+    def controls(self, command: ActuatorCommand, *, armed: bool, gripper: float = 0.0) -> Controls:
         """See :func:`controls`."""
-        return controls(self.airframe, command, armed=armed)
+        return controls(self.airframe, command, armed=armed, gripper=gripper)
 
 
 def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
@@ -167,9 +169,11 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
     return frame, ()
 
 
-def controls(airframe: Airframe, command: ActuatorCommand, *, armed: bool) -> Controls:
-    """The shares of full thrust and torque that a ``command`` [N, N m] is."""
-    return Controls(*airframe.shares(command), armed=armed)
+def controls(
+    airframe: Airframe, command: ActuatorCommand, *, armed: bool, gripper: float = 0.0
+) -> Controls:
+    """The shares of full thrust and torque that a ``command`` [N, N m] is, and the gripper's."""
+    return Controls(*airframe.shares(command), armed=armed, gripper=gripper)
 
 
 class CalmStretch:
@@ -196,7 +200,9 @@ class CalmStretch:
             if after is None:
                 break
             r, flown = after, flown + 1
-            simulation.advance(loop.controls(r.commanded, armed=True))
+            simulation.advance(
+                loop.controls(r.commanded, armed=True, gripper=before.vehicle.gripper)
+            )
             if simulation.ended is not None:
                 break
         if flown:
@@ -272,7 +278,9 @@ class ScenarioFlight:
     def step(self) -> None:
         """All of one step."""
         outputs, loop = self.respond(), self.loop
-        loop.simulation.advance(loop.controls(outputs.actuators, armed=outputs.mode.armed))
+        loop.simulation.advance(
+            loop.controls(outputs.actuators, armed=outputs.mode.armed, gripper=outputs.gripper)
+        )
         self.conclude(outputs)
 
     def respond(self) -> TickOutputs:

@@ -177,8 +177,8 @@ def watch(
         for i in range(rotors):
             s.thrust[i] = s.slow[i] = sent.rotor_thrust[i]
     _observe_base(r, law, decay, dt, sent)
-    # At a surface it is not known what the joints are to do.
-    if angles_known and r.pressing.near == 0:
+    # At a surface, or with something in the gripper, it is not known what the joints are to do.
+    if angles_known and r.pressing.near == 0 and s.gripped == 0.0:
         _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
     else:

@@ -194,8 +194,9 @@ class Autopilot:
         calm = self.calm.fly(state, inputs)
         if calm is not None:
             r, fusion, estimate = calm
+            asked, vehicle = self._cascade.setpoint(r), state.vehicle
             outputs = TickOutputs(
-                r.commanded, state.vehicle.mode, True, setpoint=self._cascade.setpoint(r)
+                r.commanded, vehicle.mode, True, setpoint=asked, gripper=vehicle.gripper
             )
             return Controlled(
                 outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
@@ -237,8 +238,9 @@ class Autopilot:
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
         wanted = self._cascade.setpoint(r) if flown else None
         outputs = TickOutputs(
-            sent, vehicle.mode, armed, acks=tuple(acks), texts=tuple(texts), setpoint=wanted
-        )
+            *(sent, vehicle.mode, armed, None, None, tuple(acks), tuple(texts)),
+            setpoint=wanted, gripper=vehicle.gripper,
+        )  # fmt: skip
         return Controlled(
             outputs, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
         )
@@ -679,6 +681,7 @@ class Autopilot:
         if not watches or self._jumped(state, controlled.inputs.sensors.t_us):
             pause(r.watch)
             return state.damage
+        r.watch.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0
         return self._damage.see(
             state.damage,
             state.cascade,

@@ -304,8 +304,9 @@ class Commander:
             vehicle = replace(vehicle, speed=decision.speed.speed)
             flight = replace(state.mission.flight, speed=decision.speed.speed)
             state = replace(state, mission=replace(state.mission, flight=flight))
-        if decision.restart:
-            vehicle = replace(vehicle, restarts=True)
+        if decision.restart or decision.gripper is not None:
+            gripper = decision.gripper or vehicle.gripper
+            vehicle = replace(vehicle, restarts=decision.restart, gripper=gripper)
         if vehicle is not state.vehicle:
             state = replace(state, vehicle=vehicle)
         if decision.look_at is not None:

@@ -79,6 +79,7 @@ class VehicleMemory:
     look_at: Vec3 | None = None  # m, where the nose is to point
     speed: float | None = None  # m/s, on the way to places; None: as usual
     restarts: bool = False  # the next tick begins anew
+    gripper: float = 0.0  # 1 closed, -1 open, 0 never told
 
     @property
     def armed(self) -> bool:

@@ -24,6 +24,7 @@ from fsw.autopilot.signals import (
     Facing,
     FlyOrbit,
     GoTo,
+    Grip,
     InjectFailure,
     LookAt,
     Mode,
@@ -197,6 +198,16 @@ def _set_actuator(request: CommandRequest, _: Locate) -> CommandAction:
     return MoveJoints(tuple([_or_none(value) for value in shares]))
 
 
+def _grip(request: CommandRequest, _: Locate) -> CommandAction:
+    """There is one gripper, whatever its number."""
+    wish = request.params[1]
+    if wish == 2.0:
+        return Order.NOTHING  # to hold what it holds
+    if wish not in (0.0, 1.0):
+        raise _InvalidError(f"gripper not moved: param2 = {wish:g}; 0 releases, 1 grabs, 2 holds")
+    return Grip(closes=wish == 1.0)
+
+
 def _set_home(request: CommandRequest, locate: Locate) -> CommandAction:
     if request.params[0] == 1.0:
         return SetHome(None)
@@ -324,6 +335,7 @@ _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = 
     197: _look_away,  # DO_SET_ROI_NONE
     201: _look,  # DO_SET_ROI
     209: _test_actuator,  # DO_MOTOR_TEST
+    211: _grip,  # DO_GRIPPER
     224: _set_mission_step,  # DO_SET_MISSION_CURRENT
     241: _calibrate,  # PREFLIGHT_CALIBRATION
     246: _restart,  # PREFLIGHT_REBOOT_SHUTDOWN

@@ -30,6 +30,10 @@ def hil_actuator_controls(
     return (t_us, _LOCKSTEP, *thrust, *torque)
 
 
-def end_of_controls(used: int, *, armed: bool) -> tuple[float, ...]:
-    """The rest of HIL_ACTUATOR_CONTROLS after the ``used`` controls, and the mode."""
-    return (*(0.0,) * (_CONTROLS - used), _CUSTOM_MODE | (_ARMED if armed else 0))
+def end_of_controls(used: int, *, armed: bool, gripper: float = 0.0) -> tuple[float, ...]:
+    """The rest of HIL_ACTUATOR_CONTROLS after the ``used`` controls, and the mode.
+
+    The last control is the ``gripper``: 1 closes, -1 opens.
+    """
+    unused = (0.0,) * (_CONTROLS - 1 - used)
+    return (*unused, gripper, _CUSTOM_MODE | (_ARMED if armed else 0))

@@ -54,7 +54,7 @@ _MISSING: Final[dict[int, str]] = {
     187: "the joints follow from where the end-effector is to be",
     207: "the fence is always in force",
     208: "this vehicle has no parachute",
-    211: "this vehicle has no gripper",
+    211: "the gripper is moved by commands alone",
     42600: "this vehicle has no winch",
 }
 

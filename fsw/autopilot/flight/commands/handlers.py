@@ -27,6 +27,7 @@ from fsw.autopilot.signals import (
     Disarm,
     FlyOrbit,
     GoTo,
+    Grip,
     Home,
     InjectFailure,
     JointVector,
@@ -52,7 +53,7 @@ LATER: Final = CommandResult.TEMPORARILY_REJECTED
 MIN_SPEED: Final = 0.01  # m/s
 _CIRCLE_PLACES: Final = 64  # looked at, before the nearest is sought
 _CLIMB_TOLERANCE: Final = 0.05  # m: a ground station rounds, and starts from its last altitude
-_SETTINGS: Final = ("home", "mission_step", "look_at", "speed")  # of a decision
+_SETTINGS: Final = ("home", "mission_step", "look_at", "speed", "gripper")  # of a decision
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,7 @@ class Decision:
     look_at: NewHeading | None = None
     speed: ChangeSpeed | None = None
     restart: bool = False
+    gripper: float | None = None  # 1 closes, -1 opens
 
     @property
     def changes(self) -> frozenset[str]:
@@ -324,6 +326,12 @@ def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes
     return Decision(CommandResult.IN_PROGRESS)
 
 
+def _grip(action: Grip, context: CommandContext, modes: Modes) -> Decision:
+    if context.above_px4:
+        return Decision(DENIED, "gripper not moved: above PX4 it is PX4's; ask PX4 for it")
+    return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
+
+
 def _order(action: Order, context: CommandContext, modes: Modes) -> Decision:
     return _ORDERS[action](context, modes)
 
@@ -399,6 +407,7 @@ COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
     StartMission: _start_mission,
     SetMissionStep: _set_mission_step,
     InjectFailure: _inject_failure,
+    Grip: _grip,
     Order: _order,
     Rejected: _reject,
 }

@@ -267,16 +267,8 @@ FAILSAFES: Final = (
     _of_contact(
         Condition.FORCE_HIGH, evidence.presses_too_hard, detail=wording.force, of_vehicle=True
     ),
-    _of_contact(
-        Condition.CONTACT_LOST,
-        evidence.has_lost_contact,
-        detail=lambda c: f" for {c.state.cascade.pressing.lost_for:.1f} s",
-    ),
-    _of_contact(
-        Condition.SURFACE_MOVED,
-        evidence.surface_has_moved,
-        detail=lambda c: wording.by_mm(abs(c.state.cascade.pressing.distance)),
-    ),
+    _of_contact(Condition.CONTACT_LOST, evidence.has_lost_contact, detail=wording.without_contact),
+    _of_contact(Condition.SURFACE_MOVED, evidence.surface_has_moved, detail=wording.surface_moved),
     _of_contact(Condition.TOOL_SLIPS, evidence.tool_slips),
     Failsafe(
         Condition.TUBE_LEFT,

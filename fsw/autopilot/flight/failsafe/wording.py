@@ -110,6 +110,16 @@ def force(context: FailsafeContext) -> str:
     return f": {pressing.pressed:.1f} N of {pressing.most:.1f} N"
 
 
+def without_contact(context: FailsafeContext) -> str:
+    """For how long the tool has missed its surface."""
+    return f" for {context.state.cascade.pressing.lost_for:.1f} s"
+
+
+def surface_moved(context: FailsafeContext) -> str:
+    """How far a surface is from where it was announced."""
+    return by_mm(abs(context.state.cascade.pressing.distance))
+
+
 def carried(context: FailsafeContext) -> str:
     """What tells that the ground carries the vehicle, and for how long it has."""
     since_us = context.state.safety.light_us

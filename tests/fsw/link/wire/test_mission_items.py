@@ -175,7 +175,7 @@ def test_an_item_of_a_camera_is_skipped_whatever_it_says(command: int) -> None:
 
 def test_an_item_that_a_mission_relies_on_is_refused_by_its_name() -> None:
     wrong = refused(item(211, MISSION, (1.0, 0.0, NAN, NAN)))
-    assert (wrong.result, wrong.reason) == (3, "DO_GRIPPER: this vehicle has no gripper")
+    assert (wrong.result, wrong.reason) == (3, "DO_GRIPPER: the gripper is moved by commands alone")
     wrong = refused(item(82, MISSION, (0.0, 0.0, NAN, NAN)))
     assert wrong.reason.startswith("NAV_SPLINE_WAYPOINT: it is not one of")
     wrong = refused(item(9999, MISSION, (0.0, 0.0, NAN, NAN)))
