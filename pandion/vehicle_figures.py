@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from fsw.autopilot.control.actuator_watch import UNDONE, torques_by_friction
 from fsw.autopilot.control.tube import limits_used
-from fsw.autopilot.model.airframe import GRAVITY, wrench_of
+from fsw.autopilot.model.airframe import GRAVITY, airframe_of, wrench_of
 from fsw.autopilot.model.multibody import Bodies, bodies_of, posture
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig, of_vehicle
@@ -98,6 +99,14 @@ def warnings(vehicle: Vehicle, found: Figures) -> list[str]:
             told.append(
                 f"joint {joint.name} cannot hold its own arm: that takes {load:.3g} N m in some "
                 f"posture, torque_max is {most:.3g} N m"
+            )
+    scales = torques_by_friction(airframe_of(vehicle))
+    for joint, scale in zip(vehicle.joints, scales, strict=False):
+        if scale * UNDONE > joint.torque_max:
+            told.append(
+                f"a drive of joint {joint.name} that fails is not found: friction takes up to "
+                f"{joint.coulomb + joint.viscous * joint.rate_max:.3g} N m, and torque_max is "
+                f"{joint.torque_max:.3g} N m"
             )
     sideways = [i for i, rotor in enumerate(vehicle.rotors) if rotor.axis[2] > -0.999]
     if sideways:

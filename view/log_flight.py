@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.model.arm_coordinates import angle_rows
-from fsw.autopilot.model.body import BODIES, body_of
+from fsw.autopilot.model.body import BODIES, BodyName, body_of
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import (
     MissionUpdate,
@@ -45,7 +45,6 @@ GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # PANDION_RATE_GR
 _FACTS: Final = (
     "scenario", "seed", "controller", "inner", "solver", "body", "pacing", "ver_sw",
 )  # fmt: skip
-_POINTS: Final = ("base", "joint2", "end_effector")
 _CURVE_POINTS: Final = 1500
 _NO_TABLE: Final = Table("", np.empty(0), {})
 
@@ -373,8 +372,8 @@ class LogFlight:
     @cached_property
     def _parts(self) -> tuple[str, ...]:
         body = self.data.information.get("body", "points")
-        known = [name for name in BODIES if name == body]
-        return tuple(p.name for p in body_of(known[0], self.airframe).parts) if known else _POINTS
+        known: list[BodyName] = [name for name in BODIES if name == body]
+        return tuple(p.name for p in body_of((*known, "points")[0], self.airframe).parts)
 
     def _name(self, k: int) -> str:
         """Of a margin's place in the record."""

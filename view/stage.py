@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.signals import RotorVector, SafeSet, Vec3, Vec4
 from view import colours
 from view.colours import Rgb
@@ -27,7 +28,6 @@ _STRAIGHT: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 _ARROW: Final = 0.32  # m, of a rotor's full thrust
 _SIGMAS: Final = 3.0
 _EDGE: Final[Rgb] = (232, 150, 156)
-_PARTS: Final = ("base", "joint2", "end_effector")
 
 
 class VehicleFigure:
@@ -92,15 +92,22 @@ class VehicleFigure:
 
     def colour(self, margins: tuple[Margin, ...]) -> None:
         """Give the parts that are kept clear the colour of their least margin."""
-        least = dict.fromkeys(_PARTS, math.nan)
+        points = self._airframe.points
+        least = dict.fromkeys((one.name for one in points), math.nan)
         for one in margins:
             part = one.name.rpartition("/")[2]
             if part in least:
                 least[part] = float(np.fmin(least[part], one.margin))
-        for part, handle in zip(_PARTS, (self._hull, self._joint, self._tool), strict=True):
-            colour = colours.of_margin(least[part])
-            if self._colours.get(part) != colour:
-                self._colours[part] = colour
+        # What is on the last link colours the tool, what is on a link before it the last joint.
+        last = self._airframe.bodies.joints
+        for handle, first, end in (
+            (self._hull, ON_BASE, ON_BASE + 1), (self._joint, ON_BASE + 1, last),
+            (self._tool, last, last + 1),
+        ):  # fmt: skip
+            seen = [least[one.name] for one in points if first <= one.on < end]
+            colour = colours.of_margin(float(np.fmin.reduce(seen)) if seen else math.nan)
+            if self._colours.get(handle.name) != colour:
+                self._colours[handle.name] = colour
                 handle.color = colour
 
     def _add_hull(self) -> None:

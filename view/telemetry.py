@@ -234,7 +234,8 @@ class Telemetry:
         if values is None:
             return (), math.nan, math.nan, Safety(refusals=refusals)
         count = min(int(values[37]), 16)
-        names = [_margin_name(k, count, self._safe_set) for k in range(count)]
+        points = tuple(one.name for one in self.airframe.points)
+        names = [_margin_name(k, count, self._safe_set, points) for k in range(count)]
         margins = tuple(Margin(n, values[1 + k], values[17 + k]) for k, n in enumerate(names))
         added = max(values[42:58], default=0.0)
         breaches, departures, interventions = values[39:42]
@@ -406,9 +407,8 @@ def result_name(result: int) -> str:
     return CommandResult(result).name.lower().replace("_", " ") if known else f"result {result}"
 
 
-def _margin_name(k: int, count: int, safe_set: SafeSet | None) -> str:
+def _margin_name(k: int, count: int, safe_set: SafeSet | None, points: tuple[str, ...]) -> str:
     zones = safe_set.zones if safe_set is not None else ()
-    points = ("base", "joint2", "end_effector")
     if zones and count == len(zones):
         return f"{zones[k].shape.kind} {k + 1}"
     if count % len(points) == 0:

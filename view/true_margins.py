@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.body import parts_of
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario, vehicle_of
 from sitl.scenario_file import ScenarioError, load_scenario, scenario_digest
@@ -25,7 +26,11 @@ class TrueMargins:
     keys: tuple[str, ...]  # zone/part, as in result.json
     t: Array  # (samples,) s, sensor time
     values: Array  # (samples, keys) m; infinite while a zone does not apply
-    places: Array  # (samples, 4, 3) m, NED: base, joint 1, joint 2, end-effector
+    places: Array  # (samples, rows, 3) m, NED: rows of ``sitl.plant.places``
+    tip: int  # the end-effector's row
+    near: dict[
+        str, int
+    ]  # row of each part: a link's is at its end, what is on the base at its origin
 
     def of_zones(self) -> dict[str, Array]:
         """The least over the parts of each zone (samples,) [m], by zone."""
@@ -70,7 +75,10 @@ def true_margins(flight: FlightData, scenario: Scenario) -> TrueMargins | None:
     for row, time_s, places in zip(values, since.tolist(), placed, strict=True):
         target = clock.target_at(time_s).p if world.follows and clock.counts(time_s) else None
         row[:] = world.margins(places, time_s, target)
-    return TrueMargins(world.keys, truth.t, values, placed[:, :4])
+    vehicle = vehicle_of(scenario)
+    near = {one.name: (one.end or one.begin)[0] for one in parts_of(scenario.body, vehicle)}
+    tip = 1 + len(vehicle.joints)
+    return TrueMargins(world.keys, truth.t, values, placed[:, :-3], tip, near)
 
 
 def _placed(truth: Table, scenario: Scenario) -> Array:

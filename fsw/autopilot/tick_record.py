@@ -256,6 +256,7 @@ class ArmTask(Record):
     gram: _Matrix
     factor: _Matrix
     slope: PerJoint
+    swung: PerJoint  # m^2/rad^2, how much farther a coordinate moves a joint than the end-effector
     low: PerJoint
     high: PerJoint
     step: PerJoint

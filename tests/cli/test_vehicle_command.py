@@ -55,6 +55,15 @@ def test_the_figures_of_paper_are_those_of_a_plus_quadrotor() -> None:
     assert not warnings(PAPER, found)
 
 
+def test_friction_that_hides_a_drive_that_fails_is_said() -> None:
+    rough = tuple(replace(joint, coulomb=0.1, viscous=0.1) for joint in PAPER.joints)
+    small = replace(rough[1], torque_max=0.3)
+    vehicle = replace(PAPER, joints=(rough[0], small))
+    told = [line for line in warnings(vehicle, figures(vehicle)) if "is not found" in line]
+    assert len(told) == 2
+    assert "friction takes up to 0.6 N m, and torque_max is 0.3 N m" in told[1]
+
+
 def test_as_json_the_figures_are_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "show", "paper", "--json")
     table = json.loads(out)

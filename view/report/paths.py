@@ -20,8 +20,6 @@ Array = NDArray[Any]
 _MOST: Final = 1500  # points of a path
 _AROUND_M: Final = 0.35  # of the paths that a wall is drawn
 _BODY_OPACITY, _CLEARANCE_OPACITY = 0.3, 0.1
-# Row of the places at which a part is marked; rotors and legs at the base.
-_NEAR: Final = {"link1": 2, "joint2": 2, "link2": 3, "end_effector": 3}
 _AXIS: Final = "#6e7781"  # seen on white and on a dark screen: a scene is not recoloured for paper
 _MAX_TRIANGLES: Final = 30_000  # of all zones: half a megabyte of the page
 
@@ -74,7 +72,9 @@ def _lines(flight: Reported) -> list[tuple[str, Array, str, float]]:
     effector = flight.table("end_effector")
     if flight.margins is not None:
         found.append(("base", flight.margins.places[:, 0], COLOURS[0], 3.0))
-        found.append(("end-effector", flight.margins.places[:, 3], COLOURS[1], 3.0))
+        found.append(
+            ("end-effector", flight.margins.places[:, flight.margins.tip], COLOURS[1], 3.0)
+        )
     elif own is not None:
         estimated = np.stack([own[name] for name in ("x", "y", "z")], axis=1)
         found.append(("base", estimated, COLOURS[0], 3.0))
@@ -101,7 +101,7 @@ def _worst(flight: Reported, name: str) -> list[Trace]:
     if worst is None or flight.margins is None:
         return []
     k = int(np.abs(flight.since(flight.margins.t) - worst.t).argmin())
-    row = _NEAR.get(worst.key.partition("/")[2], 0)
+    row = flight.margins.near.get(worst.key.partition("/")[2], 0)
     return [{
         "type": "scatter3d", "mode": "markers", "name": name,
         **_enu(flight.margins.places[k, row][None]),

@@ -79,7 +79,8 @@ ASTRAY: Final = 1.2  # N, root mean square of what no effectiveness explains
 SMOOTHED: Final = 0.05  # s, of what a rotor gives that does not obey
 LEAST_EFFECTIVE: Final = 0.25  # the command grows by four at most
 EFFECT_RATE: Final = 2.0  # 1/s, by which allocation follows
-# Joints.
+# Joints. Torques are those of a drive with the friction of the paper's, and grow with it: friction
+# undoes what a drive is asked for as well, and hides a drive that fails.
 UNDONE: Final = 0.12  # N m, root mean square of what undoes the torque
 UNDOING: Final = 0.5  # share of the torque that it undoes
 ODD: Final = 0.2  # N m, root mean square of what base and arm do not feel of each other
@@ -112,6 +113,7 @@ _OF_FAILED: Final = (
 _HOVER: Final = 8.584  # N
 _TURNING: Final = 8.584  # rad/s^2, that the loss of a rotor in hover turns it by
 _INERTIA: Final = 1.02  # kg m, over the rotors' lever: the gyro's noise in newtons of a rotor
+_FRICTION: Final = 0.035  # N m, of a drive at its largest rate
 _QUICKEST: Final = 0.35  # of those times; rotors and observer have lags of their own
 
 
@@ -123,6 +125,7 @@ class WatchLaw:
     thrusts: float  # with the thrust of a rotor in hover, or with the gyro's noise
     times: float  # with the time in which a vehicle tilts that has lost a rotor
     spares: Several  # (ROTORS,) 1 for a rotor without which the others fly, else 0
+    torques: Several  # (JOINTS,) scale those of a joint, with its drive's friction
 
 
 def watch_law(airframe: Airframe) -> WatchLaw:
@@ -138,7 +141,14 @@ def watch_law(airframe: Airframe) -> WatchLaw:
         spares=padded(
             tuple([float(flies_without(airframe, k)) for k in range(airframe.rotors)]), ROTORS
         ),
+        torques=torques_by_friction(airframe),
     )
+
+
+def torques_by_friction(airframe: Airframe) -> Several:
+    """What scales the torques that the watch looks for in each joint (JOINTS,) [1]."""
+    friction = zip(airframe.joint_friction, airframe.joint_drag, strict=True)
+    return tuple([round(max((slow + fast) / _FRICTION, 1.0), 3) for slow, fast in friction])
 
 
 Law = NDArray[Any]
@@ -191,7 +201,7 @@ def watch(
     _judge_rotors(r, law, dt, settled)
     found = s.failed >= 0
     for k in range(joints):
-        _judge_joint(s, k, dt, settled and s.arm_seen > SETTLING, x.q_arm[k])
+        _judge_joint(s, k, law.torques[k], dt, settled and s.arm_seen > SETTLING, x.q_arm[k])
         found = found or s.joint[k] != SOUND
     return bool(found)
 
@@ -358,7 +368,7 @@ def _judge_rotors(r: Tick, law: WatchLaw, dt: float, settled: bool) -> None:
 
 @compilable
 def _a_drive_does_this(r: Tick, airframe: Airframe, pattern: Vec3) -> bool:
-    """Whether a joint's drive that is dead turns the base about the axis of this pattern."""
+    """Whether a drive that is dead, or its friction, turns the base about this pattern's axis."""
     s, m = r.watch, r.bodies
     for k in range(int(airframe.bodies.joints)):
         x, y = m.reaction[3 * k], m.reaction[3 * k + 1]
@@ -477,13 +487,16 @@ def _forget_arm(s: Watched) -> None:
 
 
 @compilable
-def _judge_joint(s: Watched, k: int, dt: float, settled: bool, angle: float) -> None:
+def _judge_joint(
+    s: Watched, k: int, torques: float, dt: float, settled: bool, angle: float
+) -> None:
     if s.joint[k] == STUCK and abs(angle - s.stood_at[k]) > MOVED:
         s.joint[k] = LIMP
     if s.joint[k] != SOUND:
         return
-    undone = s.undone2[k] > UNDONE * UNDONE and s.undoing[k] < -UNDOING * s.asked2[k]
-    plainly = s.undone2[k] > PLAINLY * PLAINLY and s.undoing[k] < -PLAIN_SHARE * s.asked2[k]
+    seen2 = s.undone2[k] / (torques * torques)
+    undone = seen2 > UNDONE * UNDONE and s.undoing[k] < -UNDOING * s.asked2[k]
+    plainly = seen2 > PLAINLY * PLAINLY and s.undoing[k] < -PLAIN_SHARE * s.asked2[k]
     behind = s.behind2[k] > BEHIND * BEHIND or plainly
     undone = undone and s.odd2 < ODD * ODD + ODD_SHARE * ODD_SHARE * s.undone2[k]
     s.joint_for[k] = s.joint_for[k] + dt if settled and undone and behind else 0.0

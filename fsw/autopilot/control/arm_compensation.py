@@ -8,9 +8,13 @@ it. With e what is left and J the end-effector's Jacobian in the arm's coordinat
 
 .. math:: \min_{\delta c} |J \delta c - e|^2 + (\epsilon^2 + |e|^2) |\delta c|^2
           + \sum_k \max(-e^T \partial_k J_k, 0) \delta c_k^2
+          + \sum_k s_k (c_k + \delta c_k - c^*_k)^2
 
-within the bounds of c from the plan's pose find them, on its side of every singularity. The rates
-are those at which this pose moves, from the same problem.
+within the bounds of c from the plan's pose c* find them, on its side of every singularity. A
+coordinate may swing a joint behind it farther than the end-effector, as that of a turntable above
+a folded arm does: s is by how much the largest square of such a motion is beyond that of J_k, and
+no coordinate alone moves a joint farther than the end-effector is to go. The rates are those at
+which this pose moves, from the same problem.
 
 Source: docs/equations.md T3; J. Nocedal, S. Wright, Numerical Optimization, 2006, ch. 10 (damping
 by the residual) and 16.7 (bounds).
@@ -104,6 +108,8 @@ def compensate(
     to_coordinates(arm, a.q, a.c)
     to_coordinates(arm, a.qd, a.rate)
     _reach(a, bodies, arm)
+    for i in range(n):
+        a.goal[i], a.swung[i] = a.c[i], _swing(a, arm, i)
     planned, moving = (a.tip[0], a.tip[1], a.tip[2]), _moved(a, a.rate, n)
     off, drifting = _seen_from_base(estimate, plan, planned, moving)
     _align(a, n)
@@ -119,6 +125,7 @@ def compensate(
             low, high = bounds_of(arm, i, joint_limits.margin)
             a.low[i] = clamp(low - a.c[i], -_LONGEST, _LONGEST)
             a.high[i] = clamp(high - a.c[i], -_LONGEST, _LONGEST)
+            a.slope[i] = a.swung[i] * (a.goal[i] - a.c[i])
         _solve_within(a, n, left, left)
         for i in range(n):
             a.c[i] += a.step[i]
@@ -129,6 +136,7 @@ def compensate(
         held = a.c[i] <= low + _ROUNDING or a.c[i] >= high - _ROUNDING
         a.low[i] = -a.rate[i] if held else -math.inf
         a.high[i] = -a.rate[i] if held else math.inf
+        a.slope[i] = 0.0
     _solve_within(a, n, subtract(wanted, _moved(a, a.rate, n)), left)
     for i in range(n):
         a.rate[i] += a.step[i]
@@ -195,6 +203,22 @@ def _reach(a: ArmTask, b: Bodies, arm: ArmCoordinates) -> None:
 
 
 @compilable
+def _swing(a: ArmTask, arm: ArmCoordinates, k: int) -> float:
+    """How much farther coordinate ``k`` moves a joint than the end-effector [m^2/rad^2]."""
+    w: Vec3 = (0.0, 0.0, 0.0)
+    v: Vec3 = (0.0, 0.0, 0.0)
+    n, farthest = int(arm.joints), 0.0
+    for i in range(k, n):
+        w = add_scaled(w, three(a.axis, 3 * i), arm.column[JOINTS * k + i])
+        behind = (a.tip[0], a.tip[1], a.tip[2])
+        if i < n - 1:
+            behind = three(a.origin, 3 * i + 3)
+        v = add(v, cross(w, subtract(behind, three(a.origin, 3 * i))))
+        farthest = max(farthest, dot(v, v))
+    return farthest - dot(v, v)
+
+
+@compilable
 def _moved(a: ArmTask, change: Floats, n: int) -> Vec3:
     """What a change of the coordinates (j,) [rad] does to the end-effector [m, B], or a rate."""
     total: Vec3 = (0.0, 0.0, 0.0)
@@ -235,13 +259,14 @@ def _solve_within(a: ArmTask, n: int, off: Vec3, left: Vec3) -> None:
     """Changes of the coordinates, within bounds, that move the end-effector by ``off``.
 
     What is ``left`` [m, B] to its place damps them, most where a turn bends the way from it.
-    Reads axis, jacobian, low, high; writes step.
+    Reads axis, jacobian, swung, low, high, and of slope what draws back to the plan; writes step.
     """
     _set_up(a, n)
     for i in range(n):
-        a.slope[i] = dot(three(a.jacobian, 3 * i), off)
+        a.slope[i] += dot(three(a.jacobian, 3 * i), off)
         bend = -dot(left, cross(three(a.axis, 3 * i), three(a.jacobian, 3 * i)))
-        a.gram[JOINTS * i + i] += _DAMPING * _DAMPING + dot(left, left) + max(bend, 0.0)
+        damping = _DAMPING * _DAMPING + dot(left, left) + max(bend, 0.0)
+        a.gram[JOINTS * i + i] += damping + a.swung[i]
     factorise(a.factor, a.gram, n)
     for i in range(n):
         a.step[i] = a.slope[i]

@@ -56,6 +56,7 @@ class Airframe:
     joint_torque_max: Several  # (JOINTS,) N m
     joint_rate_max: Several  # (JOINTS,) rad/s
     joint_friction: Several  # (JOINTS,) N m, of a drive that turns slowly
+    joint_drag: Several  # (JOINTS,) N m, more of one that turns at its largest rate
     angle_limits: AngleLimits
     home_posture: Several  # (JOINTS,) rad, to fly in
     points: tuple[Part, ...]  # the critical points
@@ -116,6 +117,9 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         joint_torque_max=padded(tuple([joint.torque_max for joint in vehicle.joints]), JOINTS),
         joint_rate_max=padded(tuple([joint.rate_max for joint in vehicle.joints]), JOINTS),
         joint_friction=padded(tuple([joint.coulomb for joint in vehicle.joints]), JOINTS),
+        joint_drag=padded(
+            tuple([joint.viscous * joint.rate_max for joint in vehicle.joints]), JOINTS
+        ),
         angle_limits=_angle_limits(vehicle),
         home_posture=padded(vehicle.home_posture, JOINTS),
         points=points_of(vehicle),

@@ -31,6 +31,7 @@ class ArmCoordinates:
 
     joints: int
     row: Several  # (JOINTS,) [1] a coordinate: L
+    column: Several  # (JOINTS,) [1] a coordinate: how the joints turn with it alone, of L's inverse
     low: Several  # (JOINTS,) rad, minus infinity where there is no limit
     high: Several  # (JOINTS,) rad
     others: int  # limits beside those
@@ -52,10 +53,13 @@ def arm_coordinates(airframe: Airframe) -> ArmCoordinates:
     left = [i for i in range(limits.rows) if i not in chosen.values()]
     low = [limits.low[chosen[k]] if k in chosen else -math.inf for k in range(n)]
     high = [limits.high[chosen[k]] if k in chosen else math.inf for k in range(n)]
+    L = [rows[chosen[k]] if k in chosen else own[k] for k in range(n)]
+    inverse = np.linalg.inv(np.array([row[:n] for row in L]))
     return ArmCoordinates(
         joints=n,
-        row=padded_rows(
-            [rows[chosen[k]] if k in chosen else own[k] for k in range(n)], JOINTS * JOINTS
+        row=padded_rows(L, JOINTS * JOINTS),
+        column=padded_rows(
+            [padded(tuple(one), JOINTS) for one in inverse.T.tolist()], JOINTS * JOINTS
         ),
         low=padded(tuple(low), JOINTS),
         high=padded(tuple(high), JOINTS),

@@ -20,7 +20,8 @@ from fsw.autopilot.model.arm_coordinates import (
     to_joints,
     within_limits,
 )
-from fsw.autopilot.model.kinematics import end_effector
+from fsw.autopilot.model.kinematics import end_effector, level_frame, position
+from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import JointVector, PredictionState, StateEstimate
 from fsw.autopilot.tick_record import ArmTask
 from fsw.record import ANGLE_LIMITS, JOINTS, padded
@@ -104,6 +105,52 @@ def test_the_end_effector_is_moved_to_its_place_as_far_as_joints_can(name: str, 
         if reach > 0.05:
             assert abs(left @ way) < 0.1 * np.linalg.norm(idle) * reach
     assert np.linalg.norm(left) < np.linalg.norm(idle)
+
+
+FOLDED = (0.3, -0.9, 1.53)  # of hexa-3r: the end-effector 30 mm beside the turntable's axis
+
+
+def joints_of(airframe: Airframe, q_arm: JointVector) -> list[Array]:
+    """Where the joints are [m, B], and the end-effector."""
+    b, frame = airframe.bodies, level_frame(airframe.bodies, q_arm, 0.0)
+    places = [(k + 1, (0.0, 0.0, 0.0)) for k in range(b.joints)] + [(b.joints, b.tip)]
+    return [np.array(position(frame, on, local)) for on, local in places]
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("name", VEHICLES)
+def test_no_joint_is_swung_farther_than_the_end_effector_has_to_go(name: str, seed: int) -> None:
+    airframe, random = VEHICLES[name], np.random.default_rng(seed)
+    plan = planned(random, airframe)
+    if name == "hexa-3r":
+        plan = plan._replace(q_arm=FOLDED)
+    off = 0.01
+    estimate = seen(plan, off, random)
+    q_arm, _ = compensated_joints(airframe, LIMITS, JOINT_LIMITS, 0.0, estimate, plan)
+    before, after = joints_of(airframe, plan.q_arm), joints_of(airframe, q_arm)
+    # Each of up to two directions that joints leave to others adds its own.
+    most = max(math.dist(a, b) for a, b in zip(before, after, strict=True))
+    assert most < 1.2 * math.sqrt(3.0) * off
+
+
+def test_rates_of_an_arm_that_is_not_swung_are_those_of_its_angles() -> None:
+    airframe, random = VEHICLES["hexa-3r"], np.random.default_rng(1)
+    plan = planned(random, airframe)._replace(q_arm=FOLDED, j=(0.0, 0.0), yaw_rate=0.0)
+    estimate = seen(plan, 0.006, random)._replace(w_WB_B=(0.0, 0.0, 0.0), v_WB=(0.05, 0.0, 0.02))
+    _, rates = compensated_joints(airframe, LIMITS, JOINT_LIMITS, 0.0, estimate, plan)
+    moment, angles = 1e-5, []
+    for t in (-moment, moment):
+        ahead = plan._replace(
+            p=vec3(np.array(plan.p) + t * np.array(plan.v)),
+            q_arm=tuple(q + t * qd for q, qd in zip(plan.q_arm, plan.qd_arm, strict=True)),
+        )
+        moved = estimate._replace(p_WB=vec3(np.array(estimate.p_WB) + t * np.array(estimate.v_WB)))
+        angles.append(
+            np.array(compensated_joints(airframe, LIMITS, JOINT_LIMITS, 0.0, moved, ahead)[0])
+        )
+    expected = (angles[1] - angles[0]) / (2.0 * moment)
+    # Left out is how what swings changes with the pose.
+    np.testing.assert_allclose(rates, expected, atol=0.1)
 
 
 def test_coordinates_are_sums_that_end_where_their_limits_do() -> None:

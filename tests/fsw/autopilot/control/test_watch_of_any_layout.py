@@ -1,4 +1,4 @@
-"""The watch over the actuators finds a rotor of any layout by the columns of the effectiveness."""
+"""The watch over the actuators of any vehicle: rotors by their columns, joints by their drives."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.actuator_watch import watch, watch_law
+from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe, airframe_of
 from fsw.autopilot.model.multibody import base_acceleration, move_bodies
 from fsw.autopilot.model.rotors import rotor_decay, rotor_wrench
 from fsw.autopilot.tick_record import NO_ROTOR, Tick
+from fsw.record import JOINTS
 from tests.fsw.random_states import estimate_of, vec3
 from tests.fsw.records import allocated, placed
 from tests.vehicles.random_vehicles import rotor_ring
+from vehicles.description import Vehicle
 from vehicles.vehicle_file import load_vehicle
 
 DT = 0.004
@@ -62,3 +65,25 @@ def test_a_weak_rotor_is_found_and_no_other_one(rotors: int) -> None:
 
 def test_of_a_vehicle_that_is_heavier_than_believed_no_rotor_is_found() -> None:
     assert watched(ring(6), np.full(6, 0.8), 1.7).watch.failed == NO_ROTOR
+
+
+def held_still(vehicle: Vehicle, seconds: float) -> Tick:
+    """A vehicle whose first joint is asked for torque, and does not move."""
+    airframe = airframe_of(vehicle)
+    hover = airframe.mass * GRAVITY / airframe.rotors
+    r = placed(airframe, estimate_of(Rotation.identity())._replace(specific_force=GRAVITY))
+    r.sent.rotor_thrust[: airframe.rotors] = hover
+    r.sent.joint_torque[0], r.joints.reference[0] = 0.25, 0.1
+    law = watch_law(airframe)
+    for _ in range(round(seconds / DT)):
+        WATCH([r], [r], [law], rotor_decay(airframe, DT), DT, True)
+    return r
+
+
+def test_what_a_drives_own_friction_holds_is_no_joint_that_failed() -> None:
+    paper = load_vehicle("paper")
+    assert watch_law(airframe_of(paper)).torques == (1.0,) * JOINTS
+    assert held_still(paper, 2.0).watch.joint[0] == STUCK
+    # As in public files of small drives.
+    rough = tuple(replace(one, coulomb=0.1, viscous=0.1) for one in paper.joints)
+    assert held_still(replace(paper, joints=rough), 2.0).watch.joint[0] == SOUND
