@@ -17,7 +17,8 @@ from vehicles.description import Vehicle
 
 _MOTOR, _ACTUATOR_SET = 101, 301  # output functions: Motor 1, Offboard Actuator Set 1
 _UP: Final = (0.0, 0.0, -1.0)  # PX4's default of a rotor's axis
-_RATE_BANDWIDTH: Final = 17.0  # rad/s, of roll and pitch rates: MC_ROLLRATE_P of 0.7
+_RATE_GAIN: Final = 25.0  # 1/s, from an error of roll and pitch rates to angular acceleration
+_RATE_DAMPING: Final = 0.85  # of those loops with the rotors' lag
 _YAW_BANDWIDTH: Final = 5.0  # rad/s, of the yaw rate: below the 12.6 at which PX4 cuts its torque
 _YAW_INTEGRAL: Final = 0.5  # 1/s, share of the gain: PX4's default
 # Off, its default, PX4 gives up thrust for torque that the rotors cannot give: a step of 11 deg in
@@ -70,9 +71,10 @@ def _outputs(vehicle: Vehicle) -> dict[str, int | float]:
 def _control(vehicle: Vehicle) -> dict[str, int | float]:
     """Hover thrust, and gains that carry over to other sizes.
 
-    A rate loop has the bandwidth torque / inertia times its gain, with the torque that PX4's mixer
-    makes of a 1 on that axis; the derivative of roll and pitch cancels the rotors' lag. PX4's own
-    gain of the yaw rate would be one of 0.4 rad/s here, and the yaw swings by 0.3 rad.
+    A rate loop has torque / inertia times its gain, with the torque that PX4's mixer makes of a 1
+    on that axis. Of roll and pitch it is with the rotors' lag T, and D for gain and derivative,
+    T s^2 + (1 + D) s + gain, whose damping is chosen. PX4's own gain of the yaw rate would be one
+    of 0.4 rad/s here, and the yaw swings by 0.3 rad.
     """
     full = np.array([rotor.thrust_max for rotor in vehicle.rotors])
     effect = effectiveness(vehicle) * full
@@ -88,18 +90,21 @@ def _control(vehicle: Vehicle) -> dict[str, int | float]:
     found: dict[str, int | float] = {
         "MPC_THR_HOVER": round(float(hover), 3),
         "MPC_XY_P": 1.8,
-        "MPC_XY_VEL_P_ACC": 4.0,
+        "MPC_XY_VEL_P_ACC": 5.0,
+        "MPC_XY_VEL_D_ACC": 0.4,
+        "MPC_VELD_LP": 15.0,
         "MPC_XY_VEL_I_ACC": 1.0,
         "MPC_Z_P": 1.5,
         "MC_AIRMODE": _AIRMODE,
     }
+    derivative = max(2.0 * _RATE_DAMPING * math.sqrt(lag * _RATE_GAIN) - 1.0, 0.0) / _RATE_GAIN
     both = zip(("ROLL", "PITCH"), vehicle.base.inertia[:2], torques[:2].tolist(), strict=True)
     for axis, inertia, torque in both:
-        gain = round(_RATE_BANDWIDTH * inertia / torque, 3)
+        gain = round(_RATE_GAIN * inertia / torque, 3)
         found |= {
             f"MC_{axis}_P": 7.0,
             f"MC_{axis}RATE_P": gain,
-            f"MC_{axis}RATE_D": round(gain * lag, 4),
+            f"MC_{axis}RATE_D": round(gain * derivative, 4),
         }
     gain = round(float(_YAW_BANDWIDTH * vehicle.base.inertia[2] / torques[2]), 3)
     return found | {

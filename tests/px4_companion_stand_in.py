@@ -1,8 +1,9 @@
 """A stand-in for PX4 as a companion computer sees it: modes, streams, and a model of its control.
 
 What it accepts and answers is what a real one did, PX4 v1.17 at a70a558393: DO_SET_MODE gets two
-answers, HEARTBEAT comes once a second and CURRENT_MODE when it changes, Offboard needs a stream and
-is left 1 s after the last setpoint with "Failsafe activated", SET_MESSAGE_INTERVAL is answered 0,
+answers, HEARTBEAT comes once a second and CURRENT_MODE when it changes, Offboard needs a stream, is
+left 1 s after the last setpoint with "Failsafe activated" and entered again by the next one, unless
+its pilot has chosen another mode, SET_MESSAGE_INTERVAL is answered 0,
 ODOMETRY comes 125 times a second at most with its velocity in NED (child frame 1), DO_SET_ACTUATOR
 acts at once.
 
@@ -10,8 +11,8 @@ Its control is PX4's in structure, with the gains that it has: position P, veloc
 the measured acceleration, thrust vector, attitude P, rates PID, yaw torque through a low-pass;
 the outer loop every second step. Rotors that cannot give all keep the thrust first, then roll and
 pitch, then yaw, as PX4's with airmode do.
-Pushed as `pandion px4 identify` pushes, it was found to be 55 1/s^2, 8.7 1/s and 40 ms, and a real
-PX4 with the same gains 56, 9.5 and 51.
+Pushed as `pandion px4 identify` pushes, it was found to be 66 1/s^2, 11.4 1/s and 45 ms, and a real
+PX4 with the same gains 73, 12.5 and 46.
 """
 
 from __future__ import annotations
@@ -43,24 +44,21 @@ class Gains:
     """PX4's parameters, as `pandion px4 params` sets them."""
 
     xy_p: float = 1.8
-    xy_vel_p: float = 4.0
+    xy_vel_p: float = 5.0
     xy_vel_i: float = 1.0
-    xy_vel_d: float = 0.2
+    xy_vel_d: float = 0.4
     z_p: float = 1.5
     z_vel_p: float = 4.0
     z_vel_i: float = 2.0
     tilt_p: float = 7.0
     yaw_p: float = 1.5
-    rate: float = 17.0  # rad/s, bandwidth of roll and pitch rates
+    rate: float = 25.0  # 1/s, from an error of roll and pitch rates to angular acceleration
     rate_i: float = 4.9  # 1/s^2
     yaw_rate: float = 5.0  # rad/s
     yaw_rate_i: float = 2.5  # 1/s^2
     yaw_cutoff: float = 12.6  # rad/s, of its torque
     most_integral: tuple[float, float, float] = (7.3, 7.3, 0.55)  # rad/s^2: 0.3 of full torque
-    lag: float = 0.04  # s, of the rotors, which the derivative cancels
-
-
-DEFAULT = Gains(xy_p=0.95, xy_vel_p=1.8, xy_vel_i=0.4, tilt_p=6.5, rate=4.0, z_p=1.0)
+    rate_d: float = 0.7  # from angular acceleration to the same
 
 
 @dataclass
@@ -96,6 +94,7 @@ class Px4Companion(Px4StandIn):
         self.joints: tuple[float, ...] = (0.0,) * self.airframe.joints
         self.hold: tuple[Vector, float] | None = None
         self.takeoff_to = 1.5  # m
+        self.failsafe = False  # Offboard is meant, and the stream is lost
         self.deaf = False  # what the companion sends gets lost
         self.mute = False  # what it sends to the companion does
         self.commands: list[tuple[int, tuple[float, ...]]] = []
@@ -122,6 +121,7 @@ class Px4Companion(Px4StandIn):
         """What its pilot does; False where it does not accept it."""
         if mode == OFFBOARD and not (self.accepts_offboard and self._streams()):
             return False
+        self.failsafe = False
         if mode != self.mode:
             self.mode, self.hold = mode, None
             if CURRENT_MODE in self.intervals:
@@ -222,6 +222,9 @@ class Px4Companion(Px4StandIn):
         if self.mode == OFFBOARD and self.armed and not self._streams():
             self._text(2, "Failsafe activated")
             self.switch(self.loss_mode)
+            self.failsafe = True
+        elif self.failsafe and self._streams():
+            self.switch(OFFBOARD)
         self._speak(self._last_us)
         return answer
 
@@ -289,7 +292,7 @@ class Px4Companion(Px4StandIn):
         more = np.array([g.rate_i, g.rate_i, g.yaw_rate_i]) * error * dt
         self._rate_i = np.clip(self._rate_i + more, *np.outer((-1.0, 1.0), g.most_integral))
         bandwidth = np.array([g.rate, g.rate, g.yaw_rate])
-        lead = np.array([g.rate * g.lag, g.rate * g.lag, 0.0])
+        lead = np.array([g.rate_d, g.rate_d, 0.0])
         turning = bandwidth * error + self._rate_i - lead * self._rate_dot
         self._yaw_torque += dt / (dt + 1.0 / g.yaw_cutoff) * (turning[2] - self._yaw_torque)
         turning[2] = self._yaw_torque
@@ -305,20 +308,26 @@ class Px4Companion(Px4StandIn):
 def allocated(thrust: float, roll: float, pitch: float, yaw: float) -> Vector:
     """Shares of full thrust of the rotors rear, left, front, right of shares on each axis.
 
-    What is beyond both ends is split between them, and cut; yaw has what is left.
+    Beyond an end, thrust is moved first, then yaw, then thrust is taken; the rest is cut.
     """
+    level, turn_by = np.ones(4), np.array([1.0, -1.0, 1.0, -1.0])
     shares = thrust + np.array([-pitch, roll, pitch, -roll])
     for share in (1.0, 0.5):
-        shares = shares + share * (max(-shares.min(), 0.0) - max(shares.max() - 1.0, 0.0))
-    shares = np.clip(shares, 0.0, 1.0)
-    turn_by = np.array([1.0, -1.0, 1.0, -1.0])
+        shares = shares + share * moved_inside(shares, level, 1.0)
+    shares = shares + yaw * turn_by
     for share in (1.0, 0.5):
-        shares, yaw = shares + yaw * turn_by, 0.0
-        beyond = np.minimum(shares, 0.0) + np.maximum(shares - YAW_MARGIN, 0.0)
-        most, least = (beyond * turn_by).max(), (beyond * turn_by).min()
-        shares = shares - share * (max(most, 0.0) + min(least, 0.0)) * turn_by
-    shares = shares - max(shares.max() - 1.0, 0.0)
-    return np.clip(shares, 0.0, 1.0)
+        shares = shares + share * moved_inside(shares, turn_by, YAW_MARGIN)
+    taken = moved_inside(shares, level, 1.0)
+    if taken.max() <= 0.0:
+        shares = shares + taken
+        shares = shares + 0.5 * moved_inside(shares, level, 1.0)
+    return cast("Vector", np.clip(shares, 0.0, 1.0))
+
+
+def moved_inside(shares: Vector, along: Vector, most: float) -> Vector:
+    """How far to go along a direction of ones so that both ends are passed by as much."""
+    beyond = along * (np.maximum(-shares, 0.0) - np.maximum(shares - most, 0.0))
+    return cast("Vector", (min(beyond.min(), 0.0) + max(beyond.max(), 0.0)) * along)
 
 
 def quaternion(R: Vector) -> tuple[float, float, float, float]:

@@ -98,7 +98,7 @@ def test_the_stand_ins_loops_are_identified_in_flight() -> None:
               gains.z_vel_p, gains.z_vel_i)  # fmt: skip
     found = flight.identifier.found(dict(zip(GAINS, values, strict=True)))
     assert found.unexplained < 0.2
-    # A real PX4 with these gains was found to be 56, 9.5 and 51 ms.
-    assert found.px4.tilt_kp == pytest.approx(56.0, rel=0.2)
-    assert found.px4.tilt_kd == pytest.approx(9.5, rel=0.2)
-    assert found.px4.delay == pytest.approx(0.05, abs=0.015)
+    # A real PX4 with these gains was found to be 73, 12.5 and 46 ms.
+    assert found.px4.tilt_kp == pytest.approx(73.0, rel=0.2)
+    assert found.px4.tilt_kd == pytest.approx(12.5, rel=0.2)
+    assert found.px4.delay == pytest.approx(0.046, abs=0.015)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, cast
 
 import pytest
@@ -19,6 +20,7 @@ from tests.px4_companion_stand_in import (
     TARGET,
     TIMESYNC,
     Px4Companion,
+    allocated,
 )
 
 COMPANION = FrameWriter(1, 191)
@@ -79,3 +81,23 @@ def test_it_echoes_times_in_its_own() -> None:
     px4.hear_companion(COMPANION.frame(TIMESYNC, 0, 123456789))
     (answer,) = split(px4.said)
     assert answer.payload_values == (20_000_000_000, 123456789)
+
+
+@pytest.mark.parametrize(
+    ("asked", "motors"),
+    [
+        ((0.512, 0.484, 0.781, 0.014), (0.0, 0.738, 1.0, 0.053)),
+        ((0.506, -0.307, -0.695, 0.017), (1.0, 0.258, 0.017, 0.692)),
+        ((0.518, -0.282, 0.81, 0.002), (0.0, 0.155, 1.0, 0.554)),
+        ((0.594, 0.011, 1.63, -0.111), (0.0, 0.358, 1.0, 0.342)),
+        ((0.511, -1.476, -0.078, 0.014), (0.405, 0.0, 0.295, 1.0)),
+        ((0.557, -0.218, -0.143, -0.083), (0.575, 0.486, 0.373, 0.794)),
+    ],
+)
+def test_rotors_are_asked_for_what_px4s_log_has(
+    asked: tuple[float, ...], motors: tuple[float, ...]
+) -> None:
+    """Thrust and torques as its log has them: a roll or pitch of 1 is 0.707 of two rotors."""
+    thrust, roll, pitch, yaw = asked
+    shares = allocated(thrust, math.sqrt(0.5) * roll, math.sqrt(0.5) * pitch, yaw)
+    assert shares == pytest.approx(motors, abs=2e-3)

@@ -67,13 +67,13 @@ def test_the_papers_vehicle_has_the_values_that_were_flown_with_px4(
 ) -> None:
     values = printed(capsys, "ground")
     flown = {
-        "MC_ROLLRATE_P": "0.7",
-        "MC_PITCHRATE_D": "0.028",
+        "MC_ROLLRATE_P": "1.03",
+        "MC_PITCHRATE_D": "0.0288",
         "MC_PITCH_P": "7",
         "MC_YAWRATE_P": "2.73",
         "MC_AIRMODE": "1",
         "MPC_XY_P": "1.8",
-        "MPC_XY_VEL_P_ACC": "4",
+        "MPC_XY_VEL_P_ACC": "5",
         "MPC_THR_HOVER": "0.5",
         "EKF2_HGT_REF": "3",
         "EKF2_GPS_CTRL": "0",
@@ -95,10 +95,10 @@ def test_the_rate_loop_keeps_its_bandwidth_on_another_vehicle() -> None:
     for vehicle in (paper, replace(paper, rotors=tuple(small))):
         values, rotor = px4_parameters(vehicle, sensors("mocap"), 250), vehicle.rotors[3]
         lever = math.sqrt(2.0) * rotor.position[1] * rotor.thrust_max / vehicle.base.inertia[0]
-        assert values["MC_ROLLRATE_P"] * lever == pytest.approx(17.0, rel=0.01)
-        assert values["MC_ROLLRATE_D"] / values["MC_ROLLRATE_P"] == pytest.approx(
-            rotor.lag, rel=0.01
-        )
+        gain, slowed = values["MC_ROLLRATE_P"] * lever, 1.0 + values["MC_ROLLRATE_D"] * lever
+        assert gain == pytest.approx(25.0, rel=0.01)
+        poles = np.roots([rotor.lag, slowed, gain])
+        assert -poles.real / np.abs(poles) == pytest.approx(0.85, rel=0.01)
         lever = 4.0 * rotor.torque_per_thrust * rotor.thrust_max / vehicle.base.inertia[2]
         assert values["MC_YAWRATE_P"] * lever == pytest.approx(5.0, rel=0.01)
 

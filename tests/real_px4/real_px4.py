@@ -222,7 +222,7 @@ def flying(
                     folder / "fsw.log",
                 )
             )  # fmt: skip
-            _until_said(folder / "fsw.log", "looking for PX4", 400.0)
+            _until_said(folder / "fsw.log", "looking for PX4", 900.0)
         yield Loop(Operator(), sitl, flown, fsw, folder)
 
 

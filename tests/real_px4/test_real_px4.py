@@ -16,7 +16,7 @@ from sitl.px4_parameters import px4_parameters
 from sitl.scenario_file import load_scenario
 from sitl.sensors.keys import MeasuredSensors
 from sitl.start import flown_vehicle
-from tests.real_px4.real_px4 import HOLD, LAND, NO_BUILD, Loop, flying, there_is_one
+from tests.real_px4.real_px4 import HOLD, LAND, NO_BUILD, OFFBOARD, Loop, flying, there_is_one
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(not there_is_one(), reason=NO_BUILD)]
 
@@ -35,7 +35,7 @@ def test_px4_has_every_parameter_of_the_vehicle(tmp_path: Path) -> None:
         assert operator.until(lambda: operator.mode != (0, 0), 60.0), loop.said("px4")
         with ParameterClient(parse_link_address("udp:127.0.0.1:14580")) as client:
             found = {name: client.read(name) for name in wanted}
-    assert found == pytest.approx(wanted, abs=2e-6)
+    assert found == pytest.approx(wanted, rel=2e-6, abs=2e-6)
 
 
 @pytest.mark.parametrize("vehicle", ["paper", "x500-2r"])
@@ -57,7 +57,8 @@ def test_the_plant_hovers_folds_its_arm_and_lands(tmp_path: Path, vehicle: str) 
         result = loop.result()
     times, places, joints = truth(tmp_path)
     hover = places[(times > begun_s) & (times < hovered_s)]
-    folding = places[(times > hovered_s) & (times < folded_s)]
+    folds = (times > hovered_s) & (times < folded_s)
+    folding = places[folds]
     moved = np.linalg.norm(folding - hover.mean(axis=0), axis=1).max()
     print(
         f"{vehicle}: sd {1e3 * hover.std(axis=0)} mm, the base moves {1e3 * moved:.0f} mm with "
@@ -65,7 +66,7 @@ def test_the_plant_hovers_folds_its_arm_and_lands(tmp_path: Path, vehicle: str) 
     )
     assert hover.std(axis=0).max() < 0.005
     assert moved < 0.1
-    assert np.abs(joints[-1]).max() > 0.3
+    assert np.abs(joints[folds][-1]).min() > 0.3
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -74,14 +75,14 @@ def test_walls_are_kept_by_the_planner_above_px4(tmp_path: Path, seed: int) -> N
         given(loop)
         operator = loop.operator
         operator.wait(90.0)
-        assert operator.mode == (6, 0), (operator.texts[-5:], loop.said("fsw"))
+        assert operator.mode == OFFBOARD, (operator.texts[-5:], loop.said("fsw"))
         result = loop.result()
     print(
         f"seed {seed}: minimum margin {1e3 * result['min_margin_m']:.1f} mm, tracking error "
         f"{1e3 * result['tracking_error_rms_m']:.1f} mm"
     )
-    assert result["min_margin_m"] > 0.0
-    assert result["tracking_error_rms_m"] < 0.12
+    assert result["min_margin_m"] > 0.02
+    assert result["tracking_error_rms_m"] < 0.1
 
 
 def test_a_planner_that_is_killed_leaves_px4_to_its_failsafe(tmp_path: Path) -> None:
@@ -98,7 +99,8 @@ def test_a_planner_that_is_killed_leaves_px4_to_its_failsafe(tmp_path: Path) -> 
         assert loop.px4.poll() is None
 
 
-def test_a_stream_that_stops_ends_offboard_and_is_not_taken_up_again(tmp_path: Path) -> None:
+def test_a_stream_that_stops_ends_offboard_until_px4_hears_it_again(tmp_path: Path) -> None:
+    """PX4 gives the vehicle again by itself, as its pilot still means Offboard: it is held."""
     with flying("walls-calm", tmp_path, seed=23, planner=POINTS) as loop:
         given(loop)
         operator = loop.operator
@@ -106,10 +108,15 @@ def test_a_stream_that_stops_ends_offboard_and_is_not_taken_up_again(tmp_path: P
         assert loop.fsw is not None
         loop.fsw.send_signal(signal.SIGSTOP)
         assert operator.until(lambda: operator.mode == HOLD, 10.0), operator.texts[-5:]
+        operator.wait(2.0)
+        place = operator.p
         loop.fsw.send_signal(signal.SIGCONT)
+        assert operator.until(lambda: operator.mode == OFFBOARD, 10.0), operator.texts[-5:]
         operator.wait(5.0)
-        assert operator.mode == HOLD
-        assert "the plan is not followed any more" in loop.said("fsw")
+        assert operator.p == pytest.approx(place, abs=0.3)
+    (log,) = (tmp_path / "fsw").glob("*.ulg")
+    told = [one.message for one in ULog(str(log)).logged_messages]
+    assert any(" to disarmed: " in one for one in told), "planning ended"
 
 
 def test_a_px4_that_is_killed_ends_both_others_with_a_sentence(tmp_path: Path) -> None:

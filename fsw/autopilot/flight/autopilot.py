@@ -6,6 +6,7 @@ No clock, socket, thread or random number: real time, lockstep, replay and tests
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +54,7 @@ from fsw.autopilot.flight.setpoints.pressed_reference import pressed_reference
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
+from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.measurements import RangeSample
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
@@ -535,6 +537,11 @@ class Autopilot:
         )
         if safety.replan:
             safety = replace(safety, replan=False)
+        elif not from_nominal and config.follows_plan:
+            away = 1e3 * math.dist(nominal.p, measured.p)
+            turned = math.degrees(abs(wrap_angle(nominal.yaw - measured.yaw)))
+            what = f"off the plan by {away:.0f} mm and {turned:.0f} deg: replanning"
+            texts.append(StatusText(Severity.WARNING, what))
         return replace(state, plan=requested(plan, apply_us), safety=safety), request
 
     def _see_accuracy(

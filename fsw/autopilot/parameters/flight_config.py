@@ -231,8 +231,8 @@ def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
     """
     planner = replace(
         config.planner,
-        walls=replace(config.planner.walls, alpha=1.63, lambda_=0.5),
-        workspace=replace(config.planner.workspace, alpha=1.56, lambda_=0.5),
+        walls=replace(config.planner.walls, alpha=2.0, lambda_=0.37),
+        workspace=replace(config.planner.workspace, alpha=1.88, lambda_=0.37),
         lambda_min=0.0,
     )
     limits = replace(config.limits, watches_actuators=0, clearance_sigmas=0.0)
