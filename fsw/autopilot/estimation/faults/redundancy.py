@@ -243,19 +243,18 @@ def look(
     for i in range(WITNESS):
         row[1 + i] = x.witness[i]
     s.count += 1
-    _take(s, 0, pose)
-    _take(s, 1, fix)
-    _take(s, 2, field)
+    posed, fixed, fielded = _take(s, 0, pose), _take(s, 1, fix), _take(s, 2, field)
     if now - s.began < _SETTLING:
         return
     bias, lasting = vec3(x.baseline, 3), vec3(x.baseline, 6)
-    for k in range(4):
-        _unit_and_model(s, now, k, lasting, learns)
-        _with_aids(s, now, k, pose, fix, field, bias, learns)
-    if pose[0]:
-        _over_long(s, now, 0, pose[5], bias)
-    if field[0]:
-        _over_long(s, now, 2, field[4], bias)
+    _with_model(s, now, lasting, learns)
+    # What waits is compared with nothing: the one before it would count a second time.
+    if posed:
+        _with_pose(s, now, pose, bias, learns)
+    if fixed:
+        _with_fix(s, now, fix, learns)
+    if fielded:
+        _with_field(s, now, field[4], bias, learns)
     _note_bias(s, x, now, 0, AA, _ACCEL_BIAS)
     _note_bias(s, x, now, 1, GG, _GYRO_BIAS)
     for k in range(COUNT):
@@ -302,15 +301,29 @@ def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> No
 
 
 @compilable
-def _with_aids(
-    s: Any, now: float, k: int, pose: Aid, fix: Aid, field: Aid, bias: Vec3, learns: bool
-) -> None:
-    if pose[0]:
-        _unit_and_pose(s, now, k, pose[4], pose[5], bias, learns)
-    if fix[0]:
+def _with_model(s: Any, now: float, lasting: Vec3, learns: bool) -> None:
+    for k in range(4):
+        _unit_and_model(s, now, k, lasting, learns)
+
+
+@compilable
+def _with_fix(s: Any, now: float, fix: Aid, learns: bool) -> None:
+    for k in range(4):
         _unit_and_fix(s, now, k, fix[4], fix[5], learns)
-    if field[0]:
-        _unit_and_field(s, now, k, field[4], bias, learns)
+
+
+@compilable
+def _with_pose(s: Any, now: float, pose: Aid, bias: Vec3, learns: bool) -> None:
+    for k in range(4):
+        _unit_and_pose(s, now, k, pose[4], pose[5], bias, learns)
+    _over_long(s, now, 0, pose[5], bias)
+
+
+@compilable
+def _with_field(s: Any, now: float, noise: float, bias: Vec3, learns: bool) -> None:
+    for k in range(4):
+        _unit_and_field(s, now, k, noise, bias, learns)
+    _over_long(s, now, 2, noise, bias)
 
 
 @compilable
@@ -351,16 +364,19 @@ def _integrals(s: Any, time: float, row: Array) -> bool:
 
 
 @compilable
-def _take(s: Any, kind: int, aid: Aid) -> None:
-    """Keep a measurement, unless it is far from the last one and nothing has confirmed it yet."""
+def _take(s: Any, kind: int, aid: Aid) -> bool:
+    """Keep a measurement, unless it is far from the last one and nothing has confirmed it yet.
+
+    Whether it is kept.
+    """
     there, time, place, q, sigma, about = aid
     new = s.waiting[kind]
     if not there:
-        return
+        return False
     n, first = s.aid_count[kind], s.aid_first[kind]
     last = s.aids[kind, (n - 1) % _AIDS]
     if n > first and time - last[0] < 0.9 * EVERY:
-        return
+        return False
     v, about_v = (0.0, 0.0, 0.0), _SPEED
     if kind != 2 and n - first >= 2:
         before = s.aids[kind, (n - 2) % _AIDS]
@@ -376,16 +392,17 @@ def _take(s: Any, kind: int, aid: Aid) -> None:
         new[_MEASURED + 3 + i] = q[i]
     s.waits[kind] = 0
     if not known:
-        return
+        return False
     if not near and not confirmed:
         s.waits[kind] = 1
-        return
+        return False
     if not near:  # the sensor has jumped: what it said before is of another frame
         s.aid_first[kind] = n
     row = s.aids[kind, n % _AIDS]
     for i in range(_AT + WITNESS):
         row[i] = new[i]
     s.aid_count[kind] = n + 1
+    return True
 
 
 @compilable
