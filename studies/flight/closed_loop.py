@@ -145,7 +145,7 @@ class ClosedLoop:
         return outputs
 
     def controls(self, command: ActuatorCommand, *, armed: bool, gripper: float = 0.0) -> Controls:
-        """See :func:`controls`."""
+        """See :func:`controls`, for ``gripper`` [1] too."""
         return controls(self.airframe, command, armed=armed, gripper=gripper)
 
 
@@ -172,7 +172,7 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
 def controls(
     airframe: Airframe, command: ActuatorCommand, *, armed: bool, gripper: float = 0.0
 ) -> Controls:
-    """The shares of full thrust and torque that a ``command`` [N, N m] is, and the gripper's."""
+    """The shares of full thrust and torque that a ``command`` [N, N m] is, and a ``gripper`` [1]."""
     return Controls(*airframe.shares(command), armed=armed, gripper=gripper)
 
 

@@ -33,7 +33,7 @@ def hil_actuator_controls(
 def end_of_controls(used: int, *, armed: bool, gripper: float = 0.0) -> tuple[float, ...]:
     """The rest of HIL_ACTUATOR_CONTROLS after the ``used`` controls, and the mode.
 
-    The last control is the ``gripper``: 1 closes, -1 opens.
+    The last control is the ``gripper`` [1]: 1 closes, -1 opens.
     """
     unused = (0.0,) * (_CONTROLS - 1 - used)
     return (*unused, gripper, _CUSTOM_MODE | (_ARMED if armed else 0))
