@@ -172,7 +172,7 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
 def controls(
     airframe: Airframe, command: ActuatorCommand, *, armed: bool, gripper: float = 0.0
 ) -> Controls:
-    """The shares of full thrust and torque that a ``command`` [N, N m] is, and a ``gripper`` [1]."""
+    """The shares of full thrust and torque of a ``command`` [N, N m], and a ``gripper`` [1]."""
     return Controls(*airframe.shares(command), armed=armed, gripper=gripper)
 
 
