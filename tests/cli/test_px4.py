@@ -207,6 +207,7 @@ def a_px4() -> Iterator[tuple[str, dict[str, float], list[tuple[float, ...]]]]:
     thread.start()
     with closing(server):
         yield f"tcp:127.0.0.1:{server.getsockname()[1]}", held, origins
+    thread.join(5.0)  # it has read all that was sent
 
 
 def test_a_running_px4_is_set_over_its_link_and_told_the_origin(
