@@ -175,7 +175,7 @@ class Watched(Record):
     failed_thrust2: float  # N^2, of the thrust
     failed_more2: float  # N^2, mean square of what it gives too much
     gives: float  # N, of the failed rotor
-    gripped: float  # 1: the gripper is closed, nobody knows on what
+    gripped: float  # 1: the gripper is closed, on what is not known
     lost_for: float  # s
     others_lost_for: PerRotor  # s, of each rotor beside the failed one
     lost: int

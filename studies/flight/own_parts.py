@@ -28,9 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.control.safety_gate import gate
-from fsw.autopilot.flight.autopilot import Autopilot, keep_clear
+from fsw.autopilot.flight.autopilot import Autopilot
+from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.airframe import GRAVITY
@@ -377,11 +377,8 @@ class WatchedController:
         self._pace = _Pace("controller", config.tick_period_us, allow_slow)
         self._last = ActuatorCommand((0.0,) * 4, (0.0,) * 2)
         self._ours_until_us = 0
-        tick = 1e-6 * config.tick_period_us
-        self._cascade = Cascade(
-            config.airframe, config.tuning, config.inner, tick, keep_clear(config)
-        )
-        self._tick_s, self._first = tick, True
+        self._cascade = loops_of(config)
+        self._tick_s, self._first = 1e-6 * config.tick_period_us, True
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """A tick of our autopilot, with the own command in place of its where that may fly.

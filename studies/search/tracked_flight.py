@@ -14,9 +14,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.control.cascade import Cascade, CascadeLaw, close_loops
+from fsw.autopilot.control.cascade import CascadeLaw, close_loops
 from fsw.autopilot.estimation.estimator import READINGS, read_into
-from fsw.autopilot.flight.autopilot import keep_clear
+from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.tick_record import FILTER_ACTED, Tick
@@ -58,8 +58,7 @@ class TrackedFlight:
     """Flies stretches of one record."""
 
     def __init__(self, scenario: Scenario, config: FlightConfig, flown: PlanRecord) -> None:
-        tick = config.tick_period_us * 1e-6
-        cascade = Cascade(config.airframe, config.tuning, config.inner, tick, keep_clear(config))
+        cascade = loops_of(config)
         self._law = np.asarray(packed(cascade.law))
         self._probes = cascade.probes
         self._plants = np.array([plant(flown_vehicle(scenario), effects(scenario))])

@@ -127,6 +127,31 @@ class CascadeLaw:
     dt: float  # s, tick length
 
 
+def cascade_law(
+    airframe: Airframe,
+    tuning: LoopGains,
+    tracking: TrackingLaw,
+    clear: KeepClear,
+    lag: float,
+    dt: float,
+    *,
+    follows_plan: bool,
+) -> CascadeLaw:
+    """The laws of a tick of ``dt`` [s], whose loops follow an acceleration with a ``lag`` [s]."""
+    level, reach = tracking.tuning.acceleration_limit, reaches(clear.body, airframe.bodies)[0]
+    return CascadeLaw(
+        airframe,
+        arm_coordinates(airframe),
+        tuning,
+        tracking,
+        follows_plan,
+        filter_law(clear.tuning, clear.barriers, reach, lag, level, clear.speed),
+        tool_radius(body_of("full", airframe)),
+        rotor_decay(airframe, dt),
+        dt,
+    )
+
+
 class Cascade:
     """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
 
@@ -144,24 +169,9 @@ class Cascade:
         """
         clear = keep_clear or KeepClear(body=body_of("points", airframe))
         gains = tracking_gains(tuning.tracking, airframe.rotor_lag, dt)
-        self.law = CascadeLaw(
-            airframe,
-            arm_coordinates(airframe),
-            tuning,
-            TrackingLaw(airframe.attitude_lag, tuning.tracking, gains),
-            inner == "tracking",
-            filter_law(
-                clear.tuning,
-                clear.barriers,
-                reaches(clear.body, airframe.bodies)[0],
-                gains.k[3] / gains.k[2],
-                tuning.tracking.acceleration_limit,
-                clear.speed,
-            ),
-            tool_radius(body_of("full", airframe)),
-            rotor_decay(airframe, dt),
-            dt,
-        )
+        loop = TrackingLaw(airframe.attitude_lag, tuning.tracking, gains)
+        lag, follows = gains.k[3] / gains.k[2], inner == "tracking"
+        self.law = cascade_law(airframe, tuning, loop, clear, lag, dt, follows_plan=follows)
         self.probes = filter_probes(clear.body)
         self.packed = packed(self.law)
         rest = NO_ZONES, self.probes, NO_TUBE

@@ -31,22 +31,22 @@ from fsw.autopilot.control.cascade import (
     Cascade,
     CascadeLaw,
     KeepClear,
+    cascade_law,
     compare_with_plan,
     filter_asked,
     refer_joints,
     settle_rotors,
 )
 from fsw.autopilot.control.gains import LoopGains, TrackingGains
-from fsw.autopilot.control.safety_filter import filter_law, filter_probes
+from fsw.autopilot.control.safety_filter import filter_probes
 from fsw.autopilot.control.tracking import TrackingLaw, observe
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.autopilot.model.airframe import GRAVITY, Airframe, AttitudeLag
-from fsw.autopilot.model.arm_coordinates import arm_coordinates
-from fsw.autopilot.model.body import body_of, reaches, tool_radius
+from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.multibody import move_bodies
-from fsw.autopilot.model.rotors import MotionState, motion_state, rotor_decay
+from fsw.autopilot.model.rotors import MotionState, motion_state
 from fsw.autopilot.shapes.zones import NO_ZONES
 from fsw.autopilot.signals import Setpoint, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
@@ -98,25 +98,11 @@ class Px4Loops(Cascade):
         """Of an airframe with PX4's lag, for a tick of ``dt`` [s]."""
         clear = keep_clear or KeepClear(body=body_of("points", airframe))
         tracking = replace(tuning.tracking, observer_bandwidth=px4.observer, wind_limit=0.0)
-        lag = airframe.attitude_lag
-        self.law = CascadeLaw(
-            airframe,
-            arm_coordinates(airframe),
-            replace(tuning, tracking=tracking),
-            TrackingLaw(lag, tracking, _NO_GAINS),
-            True,
-            filter_law(
-                clear.tuning,
-                clear.barriers,
-                reaches(clear.body, airframe.bodies)[0],
-                lag.kd / lag.kp + airframe.rotor_lag,
-                tracking.acceleration_limit,
-                clear.speed,
-            ),
-            tool_radius(body_of("full", airframe)),
-            rotor_decay(airframe, dt),
-            dt,
-        )
+        # The law of the tracking loop is not flown.
+        loop = TrackingLaw(airframe.attitude_lag, tracking, _NO_GAINS)
+        lag = loop.lag.kd / loop.lag.kp + airframe.rotor_lag
+        gains = replace(tuning, tracking=tracking)
+        self.law = cascade_law(airframe, gains, loop, clear, lag, dt, follows_plan=True)
         self.px4 = px4
         self.probes = filter_probes(clear.body)
         self.packed, self._packed_px4 = packed(self.law), packed(px4)
@@ -152,7 +138,6 @@ class Px4Loops(Cascade):
 _MOST_CANCELLED = 1.5  # m/s^2 an axis
 # m/s^2 an axis: what more takes from PX4's own law relies on a model of it that is late by then.
 _MOST_PUSHED = 3.0
-# The law of the tracking loop is not flown.
 _NO_GAINS = TrackingGains((0.0,) * 5, 0.0, (0.0,) * 3, 0.0)
 
 

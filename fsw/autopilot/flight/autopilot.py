@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fsw.autopilot.control.actuator_watch import pause
-from fsw.autopilot.control.cascade import Cascade, KeepClear, at_rest, in_hover
+from fsw.autopilot.control.cascade import at_rest, in_hover
 from fsw.autopilot.control.joints import arm_damping
-from fsw.autopilot.control.px4_loops import Px4Loops
 from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
@@ -30,6 +29,7 @@ from fsw.autopilot.flight.estimate.jump import moved_along
 from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.land_detector import is_light, with_range
+from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
 from fsw.autopilot.flight.plan_exchange import (
@@ -196,10 +196,7 @@ class Autopilot:
         calm = self.calm.fly(state, inputs)
         if calm is not None:
             r, fusion, estimate = calm
-            asked, vehicle = self._cascade.setpoint(r), state.vehicle
-            outputs = TickOutputs(
-                r.commanded, vehicle.mode, True, setpoint=asked, gripper=vehicle.gripper
-            )
+            outputs = self._commanded(state, r, r.commanded, flown=True)
             return Controlled(
                 outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
             )
@@ -238,14 +235,18 @@ class Autopilot:
         else:
             r.input = rest_input(r.joint_count)
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
-        wanted = self._cascade.setpoint(r) if flown else None
-        outputs = TickOutputs(
-            *(sent, vehicle.mode, armed, None, None, tuple(acks), tuple(texts)),
-            setpoint=wanted, gripper=vehicle.gripper,
-        )  # fmt: skip
+        outputs = self._commanded(state, r, sent, flown=flown)
+        outputs = replace(outputs, acks=tuple(acks), texts=tuple(texts))
         return Controlled(
             outputs, inputs, state, r, estimate, fusion, flown, plan, ticks, replaced, caught
         )
+
+    def _commanded(
+        self, state: FlightState, r: Tick, sent: ActuatorCommand, *, flown: bool
+    ) -> TickOutputs:
+        """What a tick commands: rotors and joints, gripper, and another autopilot's setpoint."""
+        asked, v = self._cascade.setpoint(r) if flown else None, state.vehicle
+        return TickOutputs(sent, v.mode, v.armed, setpoint=asked, gripper=v.gripper)
 
     def _estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -715,28 +716,6 @@ class Autopilot:
                 zones = moving_zones(kept.safe_set, target, kept.beyond)
             self._zones = (kept, target, zones)
         return zones
-
-
-def loops_of(config: FlightConfig) -> Cascade:
-    """The loops of a configuration: our own, or what asks PX4's."""
-    tick, clear = config.tick_period_us * 1e-6, keep_clear(config)
-    if config.inner == "px4":
-        return Px4Loops(config.airframe, config.tuning, config.px4, tick, clear)
-    return Cascade(config.airframe, config.tuning, config.inner, tick, clear)
-
-
-def keep_clear(config: FlightConfig) -> KeepClear:
-    """What the safety filter keeps off zones; it works where the planner has barriers to rely on.
-
-    Controllers that are flown for comparison are to show what they do without it.
-    """
-    enabled = config.safety_filter.enabled and config.controller == "blf" and not config.soft
-    return KeepClear(
-        body_of(config.planner.body, config.airframe),
-        config.planner.tunings,
-        replace(config.safety_filter, enabled=int(enabled)),
-        config.steering.speed,
-    )
 
 
 def freeze_arm(r: Tick, estimate: StateEstimate, kinds: JointVector) -> None:

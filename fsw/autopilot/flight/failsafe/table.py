@@ -65,9 +65,12 @@ def _always(action: Action) -> Callable[[FailsafeContext], Action]:
 _SLOWLY: Final = SLOW_US + AT_ONCE_US
 _TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
 _of_contact = partial(
-    Failsafe, action=_always(Action.RETREAT), severity=Severity.CRITICAL, slow=True,
+    Failsafe,
+    action=_always(Action.RETREAT),
+    severity=Severity.CRITICAL,
+    slow=True,
     within_us=_SLOWLY,
-)  # fmt: skip
+)
 
 FAILSAFES: Final = (
     Failsafe(

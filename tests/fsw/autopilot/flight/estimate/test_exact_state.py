@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
-from fsw.autopilot.flight.autopilot import keep_clear
 from fsw.autopilot.flight.estimate.exact_state import ExactState
+from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.state import AIDED, COMPLETE, FlightState, first_state
 from fsw.autopilot.signals import SensorFrame, StateEstimate, StatusText, TickInputs
@@ -20,9 +19,7 @@ from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
 from tests.fsw.records import with_record
 
 TICK_US = CONFIG.tick_period_us
-EXACT = ExactState(
-    Cascade(CONFIG.airframe, CONFIG.tuning, CONFIG.inner, 1e-6 * TICK_US, keep_clear(CONFIG))
-)
+EXACT = ExactState(loops_of(CONFIG))
 NOTHING = (math.nan,) * 3
 FAR = (0.0, 0.4, -3.0)
 
