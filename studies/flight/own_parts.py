@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.safety_gate import gate
+from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.state import FlightState
@@ -375,7 +375,7 @@ class WatchedController:
         self._law, self._autopilot, self._clock, self._recorder = law, autopilot, clock, recorder
         self._airframe = config.airframe
         self._pace = _Pace("controller", config.tick_period_us, allow_slow)
-        self._last = ActuatorCommand((0.0,) * 4, (0.0,) * 2)
+        self._last = stopped(config.airframe)
         self._ours_until_us = 0
         self._cascade = loops_of(config)
         self._tick_s, self._first = 1e-6 * config.tick_period_us, True
