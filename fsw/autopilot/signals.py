@@ -241,6 +241,11 @@ class SafeSet:
             return ConstraintKind.OBSTACLES
         return ConstraintKind.WALLS if kinds else ConstraintKind.NONE
 
+    @property
+    def touchable(self) -> bool:
+        """Whether the tool may touch one of them."""
+        return any(zone.touch is not None for zone in self.zones)
+
 
 @dataclass(frozen=True, slots=True)
 class MessageSource:

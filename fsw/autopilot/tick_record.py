@@ -125,6 +125,7 @@ class Pressing(Record):
     pressed: float  # N, of that along the normal
     unsure: float  # N, by which that may be wrong
     mass: float  # kg, of the tool along the normal
+    stroke: float  # share of a force that the arm gives, less where it is nearly straight
     speed: float  # m/s, of the tool into the surface
     mean_speed: float  # m/s, the same of late
     asked: float  # N, by the plan

@@ -90,7 +90,11 @@ class PressTuning:
     damping: float = 1.0  # N, at most, against speeds beside the mean
     disturbance: float = 0.8  # m/s^2, d_m
     wrong: float = 0.03  # mu, share by which masses may be wrong
-    heaviest: float = 5.0  # kg; a tool that is heavier cannot be moved along the normal
+    heaviest: float = 1.0  # kg; an arm that is nearly straight is not believed to be heavier
+    # m, levers along the normal of an arm that is nearly straight: it presses with all of the force
+    # above the first, and with none below the second
+    bent: float = 0.09
+    straight: float = 0.05
 
 
 @compilable
@@ -192,10 +196,9 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         normal, (v[0] + r.estimate.v_WB[0], v[1] + r.estimate.v_WB[1], v[2] + r.estimate.v_WB[2])
     )
     k.speed = k.surface_speed - speed
-    if not (eased * tuning.heaviest > 1.0 and whole > _WHOLE):
-        k.mass = math.inf  # the arm does not move along this normal
-        return
-    k.mass, k.pressed = 1.0 / eased, felt
+    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt
+    reach = math.sqrt(_DAMPED * whole / max(1.0 - whole, _DAMPED))
+    k.stroke = clamp((reach - tuning.straight) / (tuning.bent - tuning.straight), 0.0, 1.0)
     k.unsure = 0.0
     gravity = rotate_back(R, (0.0, 0.0, GRAVITY))
     for i in range(n):
@@ -215,7 +218,6 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
 
 
 _BLOCKED = 0.5  # share of the speed asked for below which something is in the way
-_WHOLE = 0.9  # of a force along the normal, that the joints must be able to give
 _DAMPED = 1e-4  # m^2, of levers without which a direction is left out
 
 
@@ -258,9 +260,7 @@ def _force_on_tool(r: Tick, shape: V6, tip: Vec3, n: int) -> Vec3:
 def presses(r: Tick, tuning: PressTuning) -> bool:
     """Whether the tool's motion along the normal is a matter of force now."""
     k = r.pressing
-    if k.near == 0 or not k.mass < tuning.heaviest:
-        return False
-    return k.contact > 0 or k.asked > 0.0 or k.distance < tuning.band
+    return k.near > 0 and (k.contact > 0 or k.asked > 0.0 or k.distance < tuning.band)
 
 
 @compilable
@@ -275,7 +275,7 @@ def press(
     """
     k, m, n = r.pressing, r.bodies, int(airframe.bodies.joints)
     normal, R = three(k.normal, 0), r.estimate.R_WB
-    k.asked = min(r.u.force, max(k.most - k.unsure - tuning.damping, 0.0))
+    k.asked = k.stroke * min(r.u.force, max(k.most - k.unsure - tuning.damping, 0.0))
     firm = k.mass * tuning.bandwidth
     most = max(k.most - k.unsure, 0.0)
     fastest = min(tuning.speed, tuning.share * most / math.sqrt(max(k.stiffness, 1.0) * k.mass))

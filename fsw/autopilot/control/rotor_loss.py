@@ -84,7 +84,7 @@ def _within_reach(airframe: Airframe) -> tuple[Several, ...]:
     joints, arm = airframe.bodies.joints, arm_coordinates(airframe)
     drawn = np.random.default_rng(0).uniform(-math.pi, math.pi, (_POSTURES, joints))
     inside = [within_limits(arm, tuple(angles), _INSIDE) for angles in drawn.tolist()]
-    return airframe.home_posture[:joints], *inside
+    return airframe.home, *inside
 
 
 def yaw_authority(airframe: Airframe, q: Several, without: tuple[int, ...] = ()) -> float:

@@ -207,7 +207,8 @@ class Commander:
         room = stand_off(config.planner.walls) + self._tube_radius
         safe_set = within_room(state.kept.safe_set, estimate, self._body)
         place = retreat_place(safe_set, estimate, self._body, config.airframe.bodies, room)
-        return self._towards(state, PositionGoal(MotionSetpoint(False, place)), estimate)
+        home = self._config.airframe.home if safe_set.touchable else None  # the arm has given way
+        return self._towards(state, PositionGoal(MotionSetpoint(False, place), home), estimate)
 
     def check_mode_completion(
         self, state: FlightState, estimate: StateEstimate, texts: list[StatusText]
@@ -335,7 +336,8 @@ class Commander:
         reference, last = state.setpoint.reference, state.setpoint.goal
         if reference is None or reference.of_end_effector:
             reference = self._generator.begin(estimate)
-        goal = replace(goal, joints=last.joints if last is not None else None)
+        if goal.joints is None and last is not None:
+            goal = replace(goal, joints=last.joints)
         if goal.orbit is not None:
             goal = replace(goal, motion=replace(goal.motion, yaw=reference.yaw))
         return SetpointMemory(reference, goal)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.model.parts import Part, parts_of, points_of
-from fsw.autopilot.signals import ActuatorCommand, Vec2
+from fsw.autopilot.signals import ActuatorCommand, JointVector, Vec2
 from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS, padded, padded_rows
 from vehicles.description import Battery, Rotor, Vehicle
 from vehicles.vehicle_file import load_vehicle
@@ -68,6 +68,11 @@ class Airframe:
     # kg m^2 of each joint's motor, times the square of its gear's ratio; beside the vehicle's own.
     joint_armature: float = 0.0
     attitude_lag: AttitudeLag = field(default_factory=AttitudeLag)
+
+    @property
+    def home(self) -> JointVector:
+        """Angles to fly in (j,) [rad]."""
+        return self.home_posture[: self.bodies.joints]
 
     @property
     def weakest_thrust(self) -> float:

@@ -131,7 +131,7 @@ class PostureCost:
     def __init__(self, weights: CostWeights, airframe: Airframe, *, touches: bool = False) -> None:
         """For a vehicle of this ``airframe``, which may touch something or not."""
         joints = airframe.bodies.joints
-        self._weights, self._home = weights, np.array([airframe.home_posture[:joints]])
+        self._weights, self._home = weights, np.array([airframe.home])
         self._redundant = touches or joints > _SETTLED
         self._home_weight = weights.home_to_touch if touches else weights.home
 

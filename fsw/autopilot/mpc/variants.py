@@ -108,7 +108,7 @@ def _split(safe_set: SafeSet) -> tuple[tuple[Zone, ...], SafeSet]:
 
 def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     weights, body = config.weights, body_of(config.body, model.airframe)
-    if may_touch(safe_set):
+    if safe_set.touchable:
         weights = replace(weights, arm_com=0.0, arm_com_terminal=0.0)
     costs = (TrackingCost(weights),)
     if not safe_set.zones:
@@ -124,11 +124,6 @@ def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Ocp
     return OcpTerms(costs, (barrier,), config.barrier_slack)
 
 
-def may_touch(safe_set: SafeSet) -> bool:
-    """Whether there is a surface that the tool may touch."""
-    return any(zone.touch is not None for zone in safe_set.zones)
-
-
 VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {
     "naive": _naive,
     "hc": _hard,
@@ -140,5 +135,5 @@ VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]
 def parts_of(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> OcpTerms:
     """The terms of the configured controller, and the cost of requested joints."""
     parts = VARIANTS[config.controller](config, model, safe_set)
-    posture = PostureCost(config.weights, model.airframe, touches=may_touch(safe_set))
+    posture = PostureCost(config.weights, model.airframe, touches=safe_set.touchable)
     return replace(parts, costs=(*parts.costs, posture))

@@ -51,7 +51,7 @@ def grip(airframe: Airframe, tuning: PressTuning, normal: Vec3, disturbance: flo
     The base is pushed by a ``disturbance`` [m/s^2] on each axis.
     """
     n = airframe.bodies.joints
-    home = tuple(airframe.home_posture[:n])
+    home = airframe.home
     m, levers = posture(airframe.bodies, home), _levers(airframe, home)
     along = np.array(normal)
     inertia = m.qq.reshape(JOINTS, JOINTS)[:n, :n]

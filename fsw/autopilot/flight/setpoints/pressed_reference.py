@@ -18,8 +18,13 @@ Pressed = tuple[tuple[EndEffectorTarget, ...], tuple[Vec3, ...]]
 """Targets at the nodes, and the push in each step [m/s^2, NED]; none where nothing is pressed."""
 
 
-def pressed_reference(targets: tuple[EndEffectorTarget, ...], r: Tick, p_WE: Vec3) -> Pressed:
-    """The targets of a horizon for a tool at ``p_WE`` [m, NED], and what they push the base by."""
+def pressed_reference(
+    targets: tuple[EndEffectorTarget, ...], r: Tick, p_WE: Vec3, rise: float
+) -> Pressed:
+    """The targets of a horizon for a tool at ``p_WE`` [m, NED], and what they push the base by.
+
+    The force that is given now rises by no more than ``rise`` [N/s].
+    """
     if not any(target.force > 0.0 for target in targets):
         return targets, ()
     k = r.pressing
@@ -32,5 +37,6 @@ def pressed_reference(targets: tuple[EndEffectorTarget, ...], r: Tick, p_WE: Vec
             off = clamp_magnitude(dot(n, subtract(p_WE, target.p_WE)), _MOST)
             target = replace(target, p_WE=add_scaled(target.p_WE, n, off))
         moved.append(target)
-        pushes.append(add_scaled(_NOTHING, n, min(target.force, k.most) / r.mass))
+        most = k.ramped + 1e-6 * (target.t_us - targets[0].t_us) * rise
+        pushes.append(add_scaled(_NOTHING, n, min(target.force, most) / r.mass))
     return tuple(moved), tuple(pushes[:-1])
