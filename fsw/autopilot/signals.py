@@ -891,7 +891,7 @@ class ContactReport(NamedTuple):
     commanded: float  # N, what the joints press with
     asked: float  # N, by the plan
     most: float  # N, that the surface allows
-    distance: float  # m, of the tool to where the surface was announced
+    distance: float  # m, of the tool to where the surface is
 
 
 @dataclass(frozen=True, slots=True)

@@ -115,7 +115,9 @@ class Pressing(Record):
     near: int  # 1: there is one within reach; else all that follows is 0
     contact: int  # 1: the tool is pressed on it
     normal: Three  # out of the surface, NED
-    distance: float  # m, of the tool's ball to where the surface is said to be
+    zone: int  # its number in the safe set
+    distance: float  # m, of the tool's ball to the surface
+    moved: float  # m, along its normal, from where it was announced to where it was felt
     surface_speed: float  # m/s, of the surface along the normal
     most: float  # N
     stiffness: float  # N/m, at most

@@ -177,7 +177,7 @@ TOOL_CONTACT: Final = Topic(
         *floats("commanded", note="N, what the joints press with"),
         *floats("asked", note="N, by the plan"),
         *floats("most", note="N, that the surface allows"),
-        *floats("distance", note="m, to where the surface was announced"),
+        *floats("distance", note="m, to where the surface is"),
         Field("contact", "bool"),
     ),
 )

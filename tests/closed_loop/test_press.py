@@ -1,4 +1,4 @@
-"""The tool presses on a wall in the plant: the scenario push, of any stiffness in its range."""
+"""The tool presses on a wall in the plant: the scenario probe, of any stiffness in its range."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ HOLD_S = 2.0
 
 
 def push(stiffness: float = 1000.0, disturbance: float = 0.8) -> Scenario:
-    """One place of the scenario ``push``, pressed on for a shorter time."""
-    whole = load_scenario("push")
+    """One place of the scenario ``probe``, pressed on for a shorter time."""
+    whole = load_scenario("probe")
     assert isinstance(whole.trajectory, Push)
     (panel,) = whole.zones
     assert panel.touch is not None
@@ -60,3 +60,17 @@ def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffnes
     assert np.mean(observed < seen[held, 2]) > 0.85
     assert flight.mode is Mode.TRAJECTORY, flight.texts
     assert flight.snapshot.safety.breaches == 0
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+def test_a_wall_that_comes_is_left_behind() -> None:
+    scenario = push()
+    (panel,) = scenario.zones
+    coming = replace(panel, velocity_m_s=(-0.1, 0.0, 0.0), starts_s=7.0)
+    flight, seen = flown(replace(scenario, zones=(coming,)), seed=2, seconds=10.0)
+    (use,) = flight.sim.touch.uses().values()
+    assert seen[:, 3].max() > 4.9  # it was pressed on
+    assert use.force_max_n < use.force_bound_n
+    assert any("surface not where announced" in text for text in flight.texts), flight.texts
+    assert flight.mode is Mode.HOLD
+    assert flight.sim.touch.normal() == 0.0

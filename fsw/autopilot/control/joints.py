@@ -171,21 +171,23 @@ def joint_torques(
 
 
 @compilable
-def _press_with(r: Tick, airframe: Airframe, force: float, qdd: Floats) -> None:
-    """Torques [N m] that press with a ``force`` [N], and beside it give ``qdd`` (j,) [rad/s^2].
+def _press_with(r: Tick, airframe: Airframe, into: float, qdd: Floats) -> None:
+    """Torques [N m] that press with the commanded force, and beside it give ``qdd`` (j,) [rad/s^2].
 
-    What is observed along the normal is not made up for: it is what is wanted. Reads bodies;
-    writes pressing.work.
+    Along the normal the tool accelerates ``into`` [m/s^2] the surface in place of that. What is
+    observed there is not made up for: it is what is wanted. Reads bodies; writes pressing.work.
     """
-    p, m, n, along = r.pressing, r.bodies, int(airframe.bodies.joints), 0.0
+    p, m, n, along = r.pressing, r.bodies, int(airframe.bodies.joints), into
+    for i in range(n):
+        along += p.along[i] * qdd[i]
+    for i in range(n):
+        qdd[i] -= p.share[i] * along
     for i in range(n):
         besides = p.external[i] - p.along[i] * p.pressed
         p.work[i] = -clamp_magnitude(besides, _DISTURBANCE * airframe.joint_torque_max[i])
+        p.work[i] -= p.along[i] * p.commanded
         for j in range(n):
             p.work[i] += m.qq[JOINTS * i + j] * qdd[j]
-        along += p.share[i] * p.work[i]
-    for i in range(n):
-        p.work[i] -= p.along[i] * (along + force)
 
 
 @compilable

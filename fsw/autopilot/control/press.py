@@ -7,10 +7,11 @@ mass matrix M and
 
 .. math:: \lambda = (J_n M^{-1} J_n^T)^{-1}, \qquad s = n^T (J J^T + \epsilon)^{-1} J
 
-the tool's mass along n and what joint torques give statically along n, the joint loop's torques
-lose their :math:`J_n^T s\tau`, the tool is kept still against the base's own acceleration, and
-:math:`-J_n^T f` presses. Whatever the wall's stiffness and wherever it moves, it then meets f, the
-tool's mass, and friction. What pushes the base is taken up by the arm.
+the tool's mass along n and what joint torques give statically along n, the accelerations that the
+joint loop asks for lose their :math:`s^T J_n \ddot q`, the tool is kept still against the base's own
+acceleration, and :math:`-J_n^T f` presses. Whatever the wall's stiffness and wherever it moves, it
+then meets f, the tool's mass, and friction. What pushes the base is taken up by the arm. An arm that
+is nearly straight presses less and less, and follows no further.
 
 The observer of the joints' generalised momentum gives the torques from outside, from which follow
 
@@ -82,10 +83,12 @@ class PressTuning:
     share: float = 0.3  # rho, of the largest force, that an impact may give
     search: float = 2.0  # N, at most, to move the tool in free air
     rise: float = 6.0  # N/s, of the force
-    fall: float = 150.0  # N/s, the same
+    fall: float = 10.0  # N/s, the same in contact: what leans on a surface is to be caught
+    drop: float = 150.0  # N/s, where there is none
     felt: float = 0.4  # N, from which on there is contact
     lost: float = 0.15  # N, below which there is none
-    slipping: float = 0.3  # s, over which the mean of a slip is taken
+    farthest: float = 0.3  # m, of a surface from where it was announced, that is believed
+    slipping: float = 0.5  # s, over which the mean of a slip is taken
     remember: float = 0.1  # s, in which the mean speed of a tool in contact follows
     damping: float = 1.0  # N, at most, against speeds beside the mean
     disturbance: float = 0.8  # m/s^2, d_m
@@ -116,15 +119,21 @@ def look_for_surface(
         p = estimate.p_WB[0] + tip[0], estimate.p_WB[1] + tip[1], estimate.p_WB[2] + tip[2]
         x, y, z = subtract(p, moved_by(zones, zone, estimate.t_us))
         at = surface_at(zones, zone, 0, x, y, z)
-        distance = at.distance + zones[zone, CLEARANCE] - radius
+        announced = at.distance + zones[zone, CLEARANCE] - radius
+        distance = announced - (k.moved if zone == k.zone else 0.0)
         if distance < nearest:
             found, nearest = True, distance
+            if zone != k.zone:
+                k.zone, k.moved = zone, 0.0
             n = (at.nx, at.ny, at.nz)
             put_three(k.normal, 0, n)
             k.surface_speed = dot(n, velocity_of(zones, zone, estimate.t_us))
             k.most, k.stiffness = zones[zone, FORCE_MAX], zones[zone, STIFF]
     if found:
         k.distance = nearest
+        if k.contact > 0:  # it is where it is felt
+            k.moved = clamp(k.moved + nearest, -tuning.farthest, tuning.farthest)
+            k.distance = 0.0
         if k.near == 0:
             k.near = 1
             for i in range(int(bodies.joints)):
@@ -147,8 +156,8 @@ def _watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> N
         k.met, k.lost_for = 1, 0.0
         v = rotate(r.estimate.R_WB, velocity_of_tip(r.bodies, bodies))
         normal = three(k.normal, 0)
-        base = r.estimate.v_WB
-        v = v[0] + base[0], v[1] + base[1], v[2] + base[2]
+        base, plan = r.estimate.v_WB, r.plan.v
+        v = v[0] + base[0] - plan[0], v[1] + base[1] - plan[1], v[2] + base[2] - plan[2]
         v = add_scaled(v, normal, -dot(normal, v))
         for i in range(3):
             k.slip[i] += min(dt / tuning.slipping, 1.0) * (v[i] - k.slip[i])
@@ -267,15 +276,15 @@ def presses(r: Tick, tuning: PressTuning) -> bool:
 def press(
     r: Tick, airframe: Airframe, tuning: PressTuning, field: Vec3, turning: Vec3, dt: float
 ) -> float:
-    """Force [N] with which joints bring the tool to the surface and press, a tick of ``dt`` [s].
+    """Acceleration [m/s^2] of the tool into the surface beside the base, for a tick of ``dt`` [s].
 
-    That is pressing.commanded and what carries the tool's mass along with the base; ``field``
-    [m/s^2, B] and ``turning`` [rad/s^2, B] are as of ``joint_torques``. Reads u, joints, estimate;
-    writes pressing.
+    It keeps the tool still against the base's own acceleration, and moves it in free air; the force
+    that joints press with besides is pressing.commanded. ``field`` [m/s^2, B] and ``turning``
+    [rad/s^2, B] are as of ``joint_torques``. Reads u, joints, estimate; writes pressing.
     """
     k, m, n = r.pressing, r.bodies, int(airframe.bodies.joints)
     normal, R = three(k.normal, 0), r.estimate.R_WB
-    k.asked = k.stroke * min(r.u.force, max(k.most - k.unsure - tuning.damping, 0.0))
+    k.asked = min(r.u.force, max(k.most - k.unsure - tuning.damping, 0.0))
     firm = k.mass * tuning.bandwidth
     most = max(k.most - k.unsure, 0.0)
     fastest = min(tuning.speed, tuning.share * most / math.sqrt(max(k.stiffness, 1.0) * k.mass))
@@ -287,14 +296,17 @@ def press(
     elif blocked and k.pressed > tuning.felt + k.unsure:
         k.contact, k.mean_speed = 1, 0.0
     wanted = k.asked if k.contact > 0 or blocked else 0.0
-    k.ramped = clamp(wanted, k.ramped - tuning.fall * dt, k.ramped + tuning.rise * dt)
-    if k.contact > 0 and k.asked > 0.0:
+    fall = tuning.fall if k.contact > 0 else tuning.drop
+    k.ramped = clamp(wanted, k.ramped - fall * dt, k.ramped + tuning.rise * dt)
+    force = min(k.stroke * k.ramped, most)
+    moving = 0.0
+    if k.contact > 0 and force > 0.0:
         k.mean_speed += min(dt / tuning.remember, 1.0) * (k.speed - k.mean_speed)
         damped = clamp(firm * (k.mean_speed - k.speed), -tuning.damping, tuning.damping)
-        force = clamp(k.ramped + damped, 0.0, most)
+        force = clamp(force + damped, 0.0, most)
     else:
         toward, lead = fastest, 0.0
-        if not k.asked > 0.0:
+        if not k.asked * k.stroke > 0.0:
             # The reference of the joints leads, which knows where the base really is.
             for i in range(n):
                 off = r.joints.reference[i] - r.estimate.q_arm[i]
@@ -303,10 +315,9 @@ def press(
             toward = k.speed + lead
             toward = clamp(toward, -tuning.back, fastest)
         top = min(tuning.share * most, tuning.search)
-        force = k.ramped + clamp(firm * (toward - k.speed), -3.0 * top, top)
-        force = min(force, most)
+        moving = clamp(firm * (toward - k.speed), -3.0 * top, min(top, most - force)) / k.mass
     k.commanded = force
     # What the tool does of itself: nothing, in the world.
     carried = GRAVITY * normal[2] - dot(rotate_back(R, normal), field)
     carried += dot(rotate_back(R, normal), cross(turning, place_of_tip(m, airframe.bodies)))
-    return float(force + k.mass * carried)
+    return float(moving + carried)

@@ -520,7 +520,7 @@ class Autopilot:
         if state.limited and state.limited != limited:
             texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
         p_WE, _ = end_effector(config.airframe.bodies, estimate)
-        targets, pushes = pressed_reference(targets, state.cascade, p_WE, config.tuning.press.rise)
+        targets, pushes = pressed_reference(targets, state.cascade, p_WE, config.tuning.press)
         plan, safety = state.plan, state.safety
         measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
         start, from_nominal = self._plans.start(plan, nominal, measured, now_us, safety.replan)

@@ -54,6 +54,7 @@ from fsw.frozen import replace
 
 _DISARMED = Mode.DISARMED  # ten times as fast as Mode.X
 _RESTARTS = "command refused: the flight software restarts; send it again"
+_AWAY = 0.3  # m, farther from a surface that is not as announced
 
 
 class Commander:
@@ -206,6 +207,8 @@ class Commander:
         config = self._config
         room = stand_off(config.planner.walls) + self._tube_radius
         safe_set = within_room(state.kept.safe_set, estimate, self._body)
+        if safe_set.touchable:  # one that comes is left behind
+            room += _AWAY + max(state.cascade.pressing.moved, 0.0)
         place = retreat_place(safe_set, estimate, self._body, config.airframe.bodies, room)
         home = self._config.airframe.home if safe_set.touchable else None  # the arm has given way
         return self._towards(state, PositionGoal(MotionSetpoint(False, place), home), estimate)

@@ -92,10 +92,9 @@ def move_plan(model: TickModel, x: PlanState, u: Accelerations, joints: int) -> 
     x.p[2], x.v[2], x.a[2] = _climb(model.vertical, x.p[2], x.v[2], x.a[2], u.a[2])
     dt = model.dt
     half = 0.5 * dt * dt
-    if u.force > 0.0:
-        for k in range(3):
-            x.p[k] += half * u.push[k]
-            x.v[k] += dt * u.push[k]
+    for k in range(3):
+        x.p[k] += half * u.push[k]
+        x.v[k] += dt * u.push[k]
     x.yaw = x.yaw + dt * x.yaw_rate + half * u.yaw_acc
     x.yaw_rate += dt * u.yaw_acc
     for k in range(joints):

@@ -26,7 +26,7 @@ FALLING_US: Final = 1_000_000  # in which what rotors do not carry falls plainly
 JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
 CONTACT_LOST_S: Final = 1.0  # without contact while it is asked for
 SURFACE_OFF: Final = 0.06  # m, from where it was announced
-SLIP: Final = 0.2  # m/s along the surface, which no reference asks for
+SLIP: Final = 0.3  # m/s along the surface, beside the plan
 _HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be believed again
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 
@@ -121,7 +121,7 @@ def has_lost_contact(context: FailsafeContext) -> bool:
 def surface_has_moved(context: FailsafeContext) -> bool:
     """In flight, the tool meets its surface far from where it was announced."""
     pressing = context.state.cascade.pressing
-    return bool(pressing.contact and abs(pressing.distance) > SURFACE_OFF) and _flies(context)
+    return bool(pressing.near and abs(pressing.moved) > SURFACE_OFF) and _flies(context)
 
 
 def tool_slips(context: FailsafeContext) -> bool:

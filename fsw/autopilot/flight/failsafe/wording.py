@@ -117,7 +117,7 @@ def without_contact(context: FailsafeContext) -> str:
 
 def surface_moved(context: FailsafeContext) -> str:
     """How far a surface is from where it was announced."""
-    return by_mm(abs(context.state.cascade.pressing.distance))
+    return by_mm(abs(context.state.cascade.pressing.moved))
 
 
 def carried(context: FailsafeContext) -> str:

@@ -144,7 +144,7 @@ def test_a_normal_that_the_arm_does_not_move_along_is_not_pressed_on() -> None:
     r, airframe = pressed_upon(vehicle, q, np.zeros(3), (0.0, -1.0, 0.0))
     r.u.force = 5.0
     press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
-    assert r.pressing.asked == 0.0
+    assert r.pressing.commanded == 0.0
 
 
 @pytest.mark.requirement("REQ-SAFE-13")
