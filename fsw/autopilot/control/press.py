@@ -7,11 +7,11 @@ mass matrix M and
 
 .. math:: \lambda = (J_n M^{-1} J_n^T)^{-1}, \qquad s = n^T (J J^T + \epsilon)^{-1} J
 
-the tool's mass along n and what joint torques give statically along n, the accelerations that the
-joint loop asks for lose their :math:`s^T J_n \ddot q`, the tool is kept still against the base's own
-acceleration, and :math:`-J_n^T f` presses. Whatever the wall's stiffness and wherever it moves, it
-then meets f, the tool's mass, and friction. What pushes the base is taken up by the arm. An arm that
-is nearly straight presses less and less, and follows no further.
+the tool's mass along n and what joint torques give statically along n, the accelerations that
+the joint loop asks for lose their :math:`s^T J_n \ddot q`, the tool is kept still against the
+base's own acceleration, and :math:`-J_n^T f` presses. Whatever the wall's stiffness and wherever it
+moves, it then meets f, the tool's mass, and friction. What pushes the base is taken up by the arm.
+An arm that is nearly straight presses less and less, and follows no further.
 
 The observer of the joints' generalised momentum gives the torques from outside, from which follow
 
