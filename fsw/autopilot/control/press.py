@@ -195,10 +195,11 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         k.share[i] = dot(along, _through(shape, lever))
     factorise(m.factor, m.qq, n)
     solve(m.factor, k.work, n)
-    eased = felt = whole = 0.0
+    eased = felt = whole = turned = 0.0
     for i in range(n):
         eased += k.along[i] * k.work[i]
         whole += k.share[i] * k.along[i]
+        turned += k.share[i] * k.share[i]
         felt += k.share[i] * k.external[i]
     v = rotate(R, velocity_of_tip(m, b))
     speed = dot(
@@ -206,7 +207,9 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     )
     k.speed = k.surface_speed - speed
     k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt
-    reach = math.sqrt(_DAMPED * whole / max(1.0 - whole, _DAMPED))
+    # Rates of s give the tool unit speed along n: an arm that is nearly straight has to turn fast.
+    # A part of n that no joint moves the tool along, as with a vehicle turned aside, is no matter.
+    reach = whole / math.sqrt(turned) if turned > 0.0 else 0.0
     k.stroke = clamp((reach - tuning.straight) / (tuning.bent - tuning.straight), 0.0, 1.0)
     k.unsure = 0.0
     gravity = rotate_back(R, (0.0, 0.0, GRAVITY))

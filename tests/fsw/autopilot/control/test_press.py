@@ -142,7 +142,8 @@ def test_a_normal_that_the_arm_does_not_move_along_is_not_pressed_on() -> None:
     vehicle = load_vehicle("probe-2r")  # its arm is in the body's x-z plane
     q = np.array(vehicle.home_posture)
     r, airframe = pressed_upon(vehicle, q, np.zeros(3), (0.0, -1.0, 0.0))
-    r.u.force = 5.0
+    assert r.pressing.stroke == 0.0
+    r.u.force, r.pressing.contact, r.pressing.pressed = 5.0, 1, 5.0
     press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
     assert r.pressing.commanded == 0.0
 
@@ -175,8 +176,20 @@ def test_a_surface_is_looked_for_no_faster_than_the_hardest_can_stop_the_tool() 
     k.stiffness, k.distance, r.u.force = 1e5, 0.02, 5.0
     k.speed = TUNING.share * (k.most - k.unsure) / math.sqrt(k.stiffness * k.mass)
     assert k.speed < TUNING.speed
-    press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
-    assert k.commanded == pytest.approx(0.0, abs=1e-9)
+    level = (r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
+    assert press(*level) == pytest.approx(0.0, abs=1e-9)
     k.speed *= 1.5
-    press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
-    assert k.commanded < -0.1
+    assert k.mass * press(*level) < -0.1  # N
+    assert k.commanded == 0.0
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_a_vehicle_turned_aside_presses_and_an_arm_that_is_straight_does_not() -> None:
+    vehicle = load_vehicle("probe-2r")
+    home, none, aside = np.array(vehicle.home_posture), np.zeros(3), math.radians(15.0)
+    r, airframe = pressed_upon(vehicle, home, none, (-math.cos(aside), -math.sin(aside), 0.0))
+    assert r.pressing.stroke == 1.0
+    tool = Arm(vehicle, np.array([1.5, 0.1]))
+    r = at_surface(airframe, estimate(tool.q, none[:2], none), (-1.0, 0.0, 0.0))
+    weigh_tool(r, airframe, TUNING)
+    assert r.pressing.stroke == 0.0
