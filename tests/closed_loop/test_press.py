@@ -63,11 +63,13 @@ def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffnes
 
 
 @pytest.mark.requirement("REQ-SAFE-14")
-def test_a_wall_that_comes_is_left_behind() -> None:
+@pytest.mark.parametrize("starts_s", [5.5, 7.0])
+def test_a_wall_that_comes_is_left_behind(starts_s: float) -> None:
+    """While the tool is pressed on it, and when it is just leaving it."""
     scenario = push()
     (panel,) = scenario.zones
-    coming = replace(panel, velocity_m_s=(-0.1, 0.0, 0.0), starts_s=7.0)
-    flight, seen = flown(replace(scenario, zones=(coming,)), seed=2, seconds=10.0)
+    coming = replace(panel, velocity_m_s=(-0.1, 0.0, 0.0), starts_s=starts_s)
+    flight, seen = flown(replace(scenario, zones=(coming,)), seed=2, seconds=starts_s + 3.0)
     (use,) = flight.sim.touch.uses().values()
     assert seen[:, 3].max() > 4.9  # it was pressed on
     assert use.force_max_n < use.force_bound_n

@@ -86,6 +86,7 @@ class PressTuning:
     fall: float = 10.0  # N/s, the same in contact: what leans on a surface is to be caught
     drop: float = 150.0  # N/s, where there is none
     felt: float = 0.4  # N, from which on there is contact
+    struck: float = 1.0  # N, the same where none was looked for
     lost: float = 0.15  # N, below which there is none
     farthest: float = 0.3  # m, of a surface from where it was announced, that is believed
     slipping: float = 0.5  # s, over which the mean of a slip is taken
@@ -296,7 +297,7 @@ def press(
     if k.contact > 0:
         if k.pressed < tuning.lost:
             k.contact = 0
-    elif blocked and k.pressed > tuning.felt + k.unsure:
+    elif k.pressed > k.unsure + (tuning.felt if blocked else tuning.struck):
         k.contact, k.mean_speed = 1, 0.0
     wanted = k.asked if k.contact > 0 or blocked else 0.0
     fall = tuning.fall if k.contact > 0 else tuning.drop
