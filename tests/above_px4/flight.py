@@ -121,6 +121,7 @@ class AbovePx4:
         self.commands: list[Any] = []
         self.next_target_us = START_US
         self.streams = True  # of targets
+        self.stopped = False  # our process, whose clocks go on
         self.arrived: list[Any] = []
         self.link.announce()
 
@@ -155,7 +156,7 @@ class AbovePx4:
         found = [one for one in answers if one is not None]
         self.answer = found[-1] if found else self.answer
         self.wall_us += 4000
-        frame = self.link.wait_for_step()
+        frame = None if self.stopped else self.link.wait_for_step()
         if frame is not None:
             self._tick(frame)
 

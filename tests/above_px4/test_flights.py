@@ -147,6 +147,22 @@ def test_a_px4_that_falls_silent_is_told_and_gets_no_more_set_points() -> None:
     assert flight.mode is Mode.HOLD
 
 
+@pytest.mark.parametrize("stop_s", [0.7, 1.1, 3.0])
+def test_a_planner_that_stopped_holds_and_does_not_go_on_with_its_plan(stop_s: float) -> None:
+    flight = handed_over(AbovePx4(still()))
+    begun = len(flight.modes)
+    flight.stopped = True
+    flight.run(stop_s)
+    assert (flight.px4.mode == HOLD) == (stop_s > 1.0)
+    place = flight.sim.truth().p_WB
+    flight.stopped = False
+    flight.run(2.5)
+    assert flight.px4.mode == OFFBOARD
+    assert flight.modes[begun:] == [Mode.DISARMED, Mode.HOLD]
+    assert f"this planner stopped for {stop_s:.1f} s: its plan ends" in flight.texts
+    assert flight.sim.truth().p_WB == pytest.approx(place, abs=0.1)
+
+
 def test_a_yaw_that_is_not_followed_is_told_and_planned_anew() -> None:
     """With PX4's own gains the paper's vehicle swings about its yaw for long."""
     slow = Gains(yaw_p=2.8, yaw_rate=0.2, yaw_rate_i=0.1)

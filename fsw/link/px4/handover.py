@@ -20,7 +20,8 @@ from fsw.link.px4.messages import HOLD, OFFBOARD, mode_name
 ANSWER_US: Final = 2_000_000  # in which PX4 enters Offboard when it is asked
 _ASK_AGAIN_US: Final = 500_000
 _ARM_AGAIN_US: Final = 1_000_000
-LOST_US: Final = 500_000  # PX4 has been silent so long: its link is lost
+# PX4 has been silent so long, or we have: the link is lost, and PX4 may fly another mode.
+LOST_US: Final = 500_000
 
 
 class Px4Seen(NamedTuple):
@@ -55,7 +56,8 @@ class Wish(NamedTuple):
 class Handover:
     """What was decided so far."""
 
-    flies: bool = False  # our autopilot did at the last look
+    looked_us: int = -1  # when the last look was
+    flies: bool = False  # our autopilot did then
     mode: tuple[int, int] = (0, 0)  # PX4's then
     asked_us: int = -1  # since when PX4 is asked for Offboard; -1: it is not
     ask_us: int = 0  # when to ask again
@@ -66,8 +68,14 @@ class Handover:
 
     def step(self, px4: Px4Seen, now_us: int, *, flies: bool) -> Wish:
         """Look at PX4 and at whether our autopilot ``flies`` at ``now_us`` [us]."""
-        wish = self._decide(px4, now_us, flies=flies)
-        self.flies, self.mode = flies and not wish.disarm, px4.mode
+        stopped_us = now_us - self.looked_us if self.looked_us >= 0 else 0
+        if flies and stopped_us >= LOST_US:
+            what = f"this planner stopped for {1e-6 * stopped_us:.1f} s: its plan ends"
+            self._say(Severity.CRITICAL, what)
+            wish = Wish(disarm=True)
+        else:
+            wish = self._decide(px4, now_us, flies=flies)
+        self.looked_us, self.flies, self.mode = now_us, flies and not wish.disarm, px4.mode
         texts, self._texts = tuple(self._texts), []
         return wish._replace(texts=texts) if texts else wish
 

@@ -52,7 +52,8 @@ def test_our_operator_asks_for_offboard_until_it_is_given() -> None:
 def test_offboard_that_px4_does_not_enter_is_given_up_with_a_sentence() -> None:
     handover = Handover()
     handover.step(IN_HOLD, 0, flies=False)
-    handover.step(IN_HOLD, 0, flies=True)
+    for t_us in range(0, ANSWER_US, 4_000):
+        assert not handover.step(IN_HOLD, t_us, flies=True).disarm
     wish = handover.step(IN_HOLD, ANSWER_US, flies=True)
     assert wish.disarm
     assert said(wish) == ["PX4 stays in Hold and does not enter Offboard"]
@@ -88,3 +89,14 @@ def test_silence_ends_set_points_and_what_was_given_then_does_not_count() -> Non
     assert not handover.step(OFF, 3_000_000, flies=False).arm
     handover.step(IN_HOLD, 3_004_000, flies=False)
     assert handover.step(OFF, 3_008_000, flies=False).arm
+
+
+def test_a_planner_that_stopped_ends_its_plan_even_if_px4_seems_to_follow() -> None:
+    """PX4 left Offboard and came back meanwhile, or follows a setpoint that is long over."""
+    handover = Handover(looked_us=0, flies=True, mode=OFFBOARD)
+    assert handover.step(OFF, LOST_US - 1, flies=True) == Wish()
+    wish = handover.step(OFF, 2 * LOST_US, flies=True)
+    assert wish.disarm
+    assert said(wish) == ["this planner stopped for 0.5 s: its plan ends"]
+    assert handover.streams
+    assert handover.step(OFF, 2 * LOST_US + 4_000, flies=False).arm, "PX4 gives it still: it holds"
