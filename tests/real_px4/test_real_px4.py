@@ -92,7 +92,7 @@ def test_a_sphere_as_large_as_the_analysis_asks_is_kept_above_px4(
 ) -> None:
     path = tmp_path / "workspace.toml"
     shipped = (files("sitl") / "scenarios" / "workspace.toml").read_text("utf-8")
-    path.write_text(shipped.replace("radius_m = 0.075", "radius_m = 0.095"))
+    path.write_text(shipped.replace("radius_m = 0.075", "radius_m = 0.12"))
     with flying(str(path), tmp_path, seed=seed, speed="0.5", planner=POINTS) as loop:
         given(loop)
         operator = loop.operator

@@ -402,9 +402,7 @@ class Commander:
         follower = self._modes.get(mode, self._no_mode)
         p_WE = end_effector(self._config.airframe.bodies, estimate)[0]
         here = still_at(p_WE, estimate.t_us, estimate.yaw)
-        last = here
-        if vehicle.flies:
-            last = self._horizon.target(self.mode(state), state, estimate, estimate.t_us)
+        last = self._horizon.target(self.mode(state), state, estimate, estimate.t_us)
         handover = Handover(last, completed)
         origin = last if completed or follower.continues_reference else here
         state = follower.activate(mission_left(state, mode), estimate, handover)

@@ -79,12 +79,16 @@ class ReferenceHorizon:
     ) -> EndEffectorTarget:
         """Where a mode has the end-effector at an instant, if it is from outside as it is limited.
 
-        What follows the target, and the mode that takes over, go by this.
+        What follows the target, and the mode that takes over, go by this. While nothing of ours
+        flies it is where the vehicle is: it may be carried, or flown by another autopilot.
         """
-        target = mode.target(state, t_us)
-        if not mode.external_reference:
-            return target
+        if state.vehicle.flies:
+            target = mode.target(state, t_us)
+            if not mode.external_reference:
+                return target
         p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
+        if not state.vehicle.flies:
+            return still_at(p_WE, t_us, estimate.yaw)
         _, lowest = self._came_up(state, target)
         return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, lowest)
 

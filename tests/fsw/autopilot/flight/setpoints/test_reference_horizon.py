@@ -193,3 +193,16 @@ def test_no_mode_is_led_far_away_at_once(mode: type[FlightMode]) -> None:
     state = replace(state, mission=replace(state.mission, stream=(far,)))
     _, (targets, _) = HORIZON(mode(CONFIG), state, estimate, 0)
     assert math.dist(targets[0].p_WE, estimate.p_WB) < 1.0
+
+
+@pytest.mark.parametrize("mode", [Hold, Trajectory, Takeoff])
+def test_while_nothing_of_ours_flies_the_target_is_where_the_vehicle_is(
+    mode: type[FlightMode],
+) -> None:
+    """Carried, or flown by another autopilot: it begins there, and a sphere hangs there."""
+    state = flying(Mode.DISARMED)
+    for x in (0.0, 4.0):
+        estimate = vehicle_at((x, 1.0, -3.0))
+        target = HORIZON.target(mode(CONFIG), state, estimate, 5)
+        here = end_effector(CONFIG.airframe.bodies, estimate)[0]
+        assert target == still_at(here, 5, estimate.yaw)
