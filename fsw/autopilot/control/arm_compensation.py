@@ -126,7 +126,8 @@ def compensate(
             a.low[i] = clamp(low - a.c[i], -_LONGEST, _LONGEST)
             a.high[i] = clamp(high - a.c[i], -_LONGEST, _LONGEST)
             a.slope[i] = a.swung[i] * (a.goal[i] - a.c[i])
-        _solve_within(a, n, left, left)
+        _damp(a, n, left)
+        _solve_within(a, n, left)
         for i in range(n):
             a.c[i] += a.step[i]
         to_joints(arm, a.c, a.q)
@@ -137,7 +138,7 @@ def compensate(
         a.low[i] = -a.rate[i] if held else -math.inf
         a.high[i] = -a.rate[i] if held else math.inf
         a.slope[i] = 0.0
-    _solve_within(a, n, subtract(wanted, _moved(a, a.rate, n)), left)
+    _solve_within(a, n, subtract(wanted, _moved(a, a.rate, n)))
     for i in range(n):
         a.rate[i] += a.step[i]
     to_joints(arm, a.rate, a.qd)
@@ -255,20 +256,28 @@ def _set_up(a: ArmTask, n: int) -> None:
 
 
 @compilable
-def _solve_within(a: ArmTask, n: int, off: Vec3, left: Vec3) -> None:
-    """Changes of the coordinates, within bounds, that move the end-effector by ``off``.
+def _damp(a: ArmTask, n: int, left: Vec3) -> None:
+    """Prepare ``_solve_within``. Reads axis, jacobian, swung; writes gram, factor.
 
-    What is ``left`` [m, B] to its place damps them, most where a turn bends the way from it.
-    Reads axis, jacobian, swung, low, high, and of slope what draws back to the plan; writes step.
+    What is ``left`` [m, B] to the end-effector's place damps, most where a turn bends the way from
+    it.
     """
     _set_up(a, n)
     for i in range(n):
-        a.slope[i] += dot(three(a.jacobian, 3 * i), off)
         bend = -dot(left, cross(three(a.axis, 3 * i), three(a.jacobian, 3 * i)))
         damping = _DAMPING * _DAMPING + dot(left, left) + max(bend, 0.0)
         a.gram[JOINTS * i + i] += damping + a.swung[i]
     factorise(a.factor, a.gram, n)
+
+
+@compilable
+def _solve_within(a: ArmTask, n: int, off: Vec3) -> None:
+    """Changes of the coordinates, within bounds, that move the end-effector by ``off``.
+
+    Reads jacobian, gram, factor, low, high, and of slope what draws back to the plan; writes step.
+    """
     for i in range(n):
+        a.slope[i] += dot(three(a.jacobian, 3 * i), off)
         a.step[i] = a.slope[i]
     solve(a.factor, a.step, n)
     outside = False
