@@ -116,7 +116,8 @@ _PUSHES: Final = 5.0 * 0.8 * math.sqrt(0.1 / 3.0)  # m/s^1.5
 _FORCE_OFF: Final = (2.5, 1.8, 1.5, 1.3)  # m/s^2
 _FORCE_OFF_AIDED: Final = 0.9  # m/s^2
 _GYRO_OFF: Final = 0.012  # rad/s: scale, axes and bias
-_GYRO_OFF_LONG: Final = 0.004  # rad/s
+_GYRO_OFF_LONG: Final = 0.004  # rad/s: bias, and what scale and axes make of turning to and fro
+_GYRO_AXES: Final = 0.011  # rad: by how much they are off for each radian that the vehicle turns on
 _FIELD_OFF_LONG: Final = 0.012  # rad/s: hard and soft iron of a vehicle that tilts
 _IRON: Final = 0.1  # rad: by how much they turn a field, for each radian that the vehicle turns
 _ACCEL_OFF: Final = 0.4  # m/s^2: scale, axes, bias and tilt
@@ -667,14 +668,15 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
         (y1 / m - y0 / n) / over,
         (z1 / m - z0 / n) / over,
     )
+    b = s.aids[kind, last % _AIDS]
+    turned_on = norm(rotation_vector(_apart(a, b, _AT + SAID)))
     if kind == 0:
         r = (r[0] + bias[0], r[1] + bias[1], r[2] + bias[2])
-        noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about / over
-        _note(s, now, GP, 4, r, _GYRO_OFF_LONG + noise)
+        noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about
+        _note(s, now, GP, 4, r, _GYRO_OFF_LONG + (_GYRO_AXES * turned_on + noise) / over)
     else:
-        b = s.aids[kind, last % _AIDS]
-        iron = _IRON * norm(rotation_vector(_apart(a, b, _AT + SAID)))
-        _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron / over)
+        iron = _IRON * turned_on / over
+        _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron)
 
 
 class Verdict(NamedTuple):
