@@ -166,7 +166,6 @@ class Watched(Record):
     thrust2: PerRotor  # N^2, of the thrust
     slow: PerRotor  # N, of rotors that are twice as slow
     slow_torque: Two  # N m about x and y, what they would leave
-    slow_lift: float  # N, the same
     slow_by: float  # N^2, mean of what they would leave and what is observed
     slow2: float  # N^2, mean square of what they would leave
     suspect: int  # rotor, or NO_ROTOR

@@ -13,8 +13,8 @@ when the mean square of x is large *and* the pattern explains nearly all of what
 along z, a mass or a battery that is not as believed, an arm that is heavier, a contact: each leaves
 another pattern, however strong it is. What lasts along z is learned as long as nothing turns the
 vehicle. Rotors that are all slower than believed make the vehicle swing, and half a swing looks
-like a single one: what rotors twice as slow would leave is computed as well, and where that much
-explains what is observed none has failed.
+like a single one: how rotors twice as slow would turn the vehicle is computed as well, and where
+that much explains what does, none has failed, whatever pushes along z meanwhile.
 
 A joint has failed when torque is observed that undoes what is asked of its drive, and the base does
 not feel it either.
@@ -63,9 +63,8 @@ WEAK_TIME: Final = 0.15  # s
 STRONG: Final = 4.0  # N, with which less time is needed
 STRONG_TIME: Final = 0.03  # s
 EXPLAINED: Final = 0.9  # share of all that is observed
-# All rotors are slow, and none has failed, where what is observed is up to SLOW times what rotors
-# twice as slow would leave, and that explains SLOW_SHARE of it. Measured beside walls with rotors
-# that are twice as slow: 1.05 to 1.26 times, and 0.74 to 0.88.
+# All rotors are slow, and none has failed, where what turns the vehicle is up to SLOW times what
+# rotors twice as slow would leave, and that explains SLOW_SHARE of it.
 SLOW: Final = 1.5
 SLOW_SHARE: Final = 0.7
 LOST: Final = 0.2  # of what is commanded; a rotor that gives less is lost
@@ -306,20 +305,19 @@ def _about(pattern: Vec3, x: float, y: float) -> float:
 
 @compilable
 def _observe_slow(r: Tick, law: WatchLaw, dt: float, decay: float, sent: Sent, seen: Vec3) -> None:
-    """What rotors twice as slow would leave, as what is ``seen`` [N], and how alike both are."""
+    """How rotors twice as slow would turn it, and how alike that is to what is ``seen`` [N]."""
     airframe, s, lever = law.airframe, r.watch, law.airframe.rotor_lever
     for i in range(int(airframe.rotors)):
         before = s.slow[i]
         s.slow[i] = lag_rotor(before, sent.rotor_thrust[i], math.sqrt(decay))
         r.mixer.off[i] = 0.5 * (before + s.slow[i]) - r.mixer.mean[i]
-    force, turn = rotor_wrench(airframe, r.mixer.off)
+    _, turn = rotor_wrench(airframe, r.mixer.off)
     share, forget = min(OBSERVER / law.times * dt, 1.0), min(dt / (MEMORY * law.times), 1.0)
     s.slow_torque[0] += share * (turn[0] - s.slow_torque[0])
     s.slow_torque[1] += share * (turn[1] - s.slow_torque[1])
-    s.slow_lift += share * (-force[2] - s.slow_lift)
-    left = s.slow_torque[0] / lever, s.slow_torque[1] / lever, s.slow_lift
-    s.slow_by += forget * (dot(left, seen) - s.slow_by)
-    s.slow2 += forget * (dot(left, left) - s.slow2)
+    x, y = s.slow_torque[0] / lever, s.slow_torque[1] / lever
+    s.slow_by += forget * (x * seen[0] + y * seen[1] - s.slow_by)
+    s.slow2 += forget * (x * x + y * y - s.slow2)
 
 
 @compilable
@@ -345,14 +343,15 @@ def _judge_rotors(r: Tick, law: WatchLaw, dt: float, settled: bool) -> None:
         size = mean_square(s, airframe, i)
         if size > most:
             found, most = i, size
-    observed = s.products[0] + s.products[1] + s.products[2]
+    turning = s.products[0] + s.products[1]
+    observed = turning + s.products[2]
     alike = mistaken = False
     if found >= 0:
         pattern = pattern_of(airframe, found)
         explained = dot(pattern, pattern) * most
         alike = most > weak * weak and explained > EXPLAINED * observed
         mistaken = _a_drive_does_this(r, airframe, pattern)
-    slow = s.slow_by * s.slow_by > SLOW_SHARE * observed * s.slow2
+    slow = s.slow_by * s.slow_by > SLOW_SHARE * turning * s.slow2
     if slow and 0.0 < s.slow_by < SLOW * s.slow2:
         mistaken = True
     if not (settled and alike and not mistaken):

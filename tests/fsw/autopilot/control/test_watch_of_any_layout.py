@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.actuator_watch import watch, watch_law
+from fsw.autopilot.control.actuator_watch import pattern_of, watch, watch_law
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe, airframe_of
 from fsw.autopilot.model.multibody import base_acceleration, move_bodies
@@ -65,6 +65,33 @@ def test_a_weak_rotor_is_found_and_no_other_one(rotors: int) -> None:
 
 def test_of_a_vehicle_that_is_heavier_than_believed_no_rotor_is_found() -> None:
     assert watched(ring(6), np.full(6, 0.8), 1.7).watch.failed == NO_ROTOR
+
+
+@pytest.mark.parametrize("rotors", [4, 6, 8])
+def test_rotors_that_are_all_slow_are_no_failed_one_whatever_lifts_meanwhile(rotors: int) -> None:
+    """hexa-3r landed for a sound rotor: pushes along z came when it turned."""
+    airframe = ring(rotors)
+    n, hover = airframe.rotors, airframe.mass * GRAVITY / airframe.rotors
+    r = placed(airframe, estimate_of(Rotation.identity())._replace(specific_force=GRAVITY))
+    pattern = np.array([pattern_of(airframe, k) for k in range(n)])
+    about = pattern[:, :2] @ pattern[0, :2]
+    decay, law, rate = rotor_decay(airframe, DT), watch_law(airframe), np.zeros(3)
+    believed = slow = np.full(n, hover)
+    for k in range(round(3.0 / DT)):
+        r.sent.rotor_thrust[:n] = asked = hover + 0.9 * hover * about * np.sin(15.0 * k * DT)
+        believed = asked + (believed - asked) * decay
+        slow = asked + (slow - asked) * np.sqrt(decay)
+        force, turn = rotor_wrench(airframe, slow)
+        move_bodies(r.bodies, airframe.bodies, 0.0, r.estimate)
+        push = float(about @ (slow - believed)) / about[0]
+        rate = rate + DT * np.array(
+            base_acceleration(r.bodies, airframe.bodies, turn, force, r.sent.joint_torque)
+        )
+        r.estimate.w_WB_B[:] = vec3(rate)
+        r.estimate.specific_force = (push - force[2]) / airframe.mass
+        WATCH([r], [r], [law], decay, DT, False)
+    assert r.watch.slow2 > (1.5 * law.thrusts) ** 2, "enough to name a rotor"
+    assert r.watch.failed == NO_ROTOR
 
 
 def held_still(vehicle: Vehicle, seconds: float) -> Tick:
