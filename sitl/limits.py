@@ -41,7 +41,7 @@ class LimitUse:
 
     unit: str
     most: float  # the limit
-    largest: float  # magnitude
+    largest: float  # magnitude; the value itself of an angle that is limited on one side
     at_s: float  # when
     beyond_s: float  # time spent beyond the limit
     kept: bool  # within the tolerance
@@ -139,7 +139,9 @@ class LimitRecord:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.limits, self._bounds = limits(vehicle), bounds(vehicle)
-        self._largest = np.zeros(len(self.limits))
+        # Of an angle that is limited on one side the value counts, which may never be above 0.
+        one_sided = np.pad(self._bounds.signed, (0, len(self.limits) - self._bounds.signed.size))
+        self._largest = np.where(one_sided, -math.inf, 0.0)
         self._when_s = np.zeros(len(self.limits))
         self._beyond_s = np.zeros(len(self.limits))
         self._steps = np.zeros(1)

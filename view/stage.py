@@ -62,10 +62,16 @@ class VehicleFigure:
             )
             for k, length in enumerate(_lengths(airframe), start=1)
         ]
-        self._joint = scene.add_icosphere(
-            f"{name}-joint2", radius=size.link, color=ghost or colours.GREY, visible=False,
-            **self._tone,
-        )  # fmt: skip
+        self._joints = [
+            scene.add_icosphere(
+                f"{name}-joint{k}",
+                radius=size.link,
+                color=ghost or colours.GREY,
+                visible=False,
+                **self._tone,
+            )
+            for k in range(2, len(self._links) + 1)
+        ]
         self._tool = scene.add_icosphere(
             f"{name}-tool", radius=size.tool, color=ghost or colours.ORANGE, visible=False,
             **self._tone,
@@ -77,7 +83,7 @@ class VehicleFigure:
         """Move it to a ``posture``; without one it is not visible. ``thrust`` [N] of each rotor."""
         if (posture is not None) != self._shown:
             self._shown = posture is not None
-            for part in (self._body, *self._links, self._joint, self._tool):
+            for part in (self._body, *self._links, *self._joints, self._tool):
                 part.visible = self._shown
         if posture is None:
             return
@@ -85,7 +91,9 @@ class VehicleFigure:
         arm = chain(posture, self._airframe)
         for link, (begin, end) in zip(self._links, pairwise(arm), strict=True):
             link.position, link.wxyz = _between(begin, end)
-        self._joint.position, self._tool.position = arm[-2], arm[-1]
+        for joint, place in zip(self._joints, arm[1:-1], strict=True):
+            joint.position = place
+        self._tool.position = arm[-1]
         tops = self._airframe.rotor_thrust_max
         for arrow, newtons, top in zip(self._arrows, thrust or (), tops, strict=False):
             arrow.scale = (1.0, 1.0, max(newtons / top, 0.01))
@@ -98,13 +106,9 @@ class VehicleFigure:
             part = one.name.rpartition("/")[2]
             if part in least:
                 least[part] = float(np.fmin(least[part], one.margin))
-        # What is on the last link colours the tool, what is on a link before it the last joint.
-        last = self._airframe.bodies.joints
-        for handle, first, end in (
-            (self._hull, ON_BASE, ON_BASE + 1), (self._joint, ON_BASE + 1, last),
-            (self._tool, last, last + 1),
-        ):  # fmt: skip
-            seen = [least[one.name] for one in points if first <= one.on < end]
+        # What is on the last link colours the tool, what is on one before it the joint at its end.
+        for on, handle in enumerate((self._hull, *self._joints, self._tool), start=ON_BASE):
+            seen = [least[one.name] for one in points if one.on == on]
             colour = colours.of_margin(float(np.fmin.reduce(seen)) if seen else math.nan)
             if self._colours.get(handle.name) != colour:
                 self._colours[handle.name] = colour

@@ -56,8 +56,8 @@ class CampaignRow:
     te_max_m: float | None = None
     contact: bool = False  # with a wall or the ground
     limits_kept: bool = True
-    joint_1_deg: float | None = None
-    link_2_deg: float | None = None
+    angle_margin_deg: float | None = None  # least, of a joint, of several coupled, or the tilt
+    angle_margin_of: str | None = None
     cs_mean: float = 0.0
     ce_mean: float = 0.0
     plans: int = 0

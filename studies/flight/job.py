@@ -106,8 +106,8 @@ class Outcome:
     te_m: float | None = None
     margin_m: float | None = None
     limits_kept: bool = True
-    joint_1_deg: float | None = None  # largest |th1|; None on a plant without limits
-    link_2_deg: float | None = None  # largest |th1 + th2|
+    angle_margin_deg: float | None = None  # least, to a limit; None on a plant without limits
+    angle_margin_of: str | None = None  # which: of a joint, of several coupled, or the tilt
     cs_sum: float = 0.0
     cs_mean: float = 0.0
     ce_sum: float = 0.0
@@ -139,6 +139,7 @@ def score(job: Job, result: FlightResult) -> Outcome:
     fault = job.fault
     truth, planner = result.truth, result.planner
     steps, totals = np.array(planner.step_us or (0.0,)), planner.metrics.as_json()
+    angle, room = _nearest_angle(truth)
     smoothness, effort = totals["control_smoothness"], totals["control_effort"]
     return Outcome(
         seed=job.seed,
@@ -148,8 +149,8 @@ def score(job: Job, result: FlightResult) -> Outcome:
         te_m=truth.tracking_error_rms_m,
         margin_m=truth.min_margin_m,
         limits_kept=all(use.kept for use in truth.limits.values()),
-        joint_1_deg=_largest_deg(truth, "joint_1_angle"),
-        link_2_deg=_largest_deg(truth, "link_2_angle"),
+        angle_margin_deg=room,
+        angle_margin_of=angle,
         cs_sum=smoothness["sum"],
         cs_mean=smoothness["mean"],
         ce_sum=effort["sum"],
@@ -164,9 +165,13 @@ def score(job: Job, result: FlightResult) -> Outcome:
     )
 
 
-def _largest_deg(truth: TruthResult, angle: str) -> float | None:
-    use = truth.limits.get(angle)  # the paper's vehicle has it, others have others
-    return None if use is None else math.degrees(use.largest)
+def _nearest_angle(truth: TruthResult) -> tuple[str | None, float | None]:
+    """The angle that came nearest to its limit, and how near [deg]; negative: beyond."""
+    left = {key: use.most - use.largest for key, use in truth.limits.items() if use.unit == "rad"}
+    if not left:
+        return None, None
+    nearest = min(left, key=left.__getitem__)
+    return nearest, math.degrees(left[nearest])
 
 
 @cache

@@ -16,7 +16,7 @@ from studies.flight.job import Job, Outcome
 from studies.paper.settings import Settings
 from studies.table_text import degrees, metres, millimetres
 
-HEADERS = ("passed", "95 %", "worst margin mm", "limits kept", "joints deg", "TE m")
+HEADERS = ("passed", "95 %", "worst margin mm", "limits kept", "angle left deg", "TE m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +30,7 @@ class Summary:
     te_worst_m: float | None
     worst_margin_m: float | None
     limits_kept: int  # flights without a broken limit
-    joint_1_deg: float | None  # largest |th1|; None on a plant without limits
-    link_2_deg: float | None  # largest |th1 + th2|
+    angle_margin_deg: float | None  # least, to any limit; None on a plant without limits
     cs_mean: float  # per planning step
     ce_mean: float
     cs_sum: float  # over a flight, as the paper defines it
@@ -83,6 +82,7 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
     whole = [row for row in outcomes if not row.error]
     errors = [row.te_m for row in whole if row.te_m is not None]
     margins = [row.margin_m for row in whole if row.margin_m is not None]
+    angles = [row.angle_margin_deg for row in whole if row.angle_margin_deg is not None]
     texts = [row.reported for row in whole if row.reported]
 
     def mean(field: Callable[[Outcome], float]) -> float:
@@ -96,8 +96,7 @@ def summarise(jobs: Sequence[Job], outcomes: Sequence[Outcome]) -> Summary:
         te_worst_m=max(errors, default=None),
         worst_margin_m=min(margins, default=None),
         limits_kept=sum(row.limits_kept for row in whole),
-        joint_1_deg=max((row.joint_1_deg for row in whole if row.joint_1_deg), default=None),
-        link_2_deg=max((row.link_2_deg for row in whole if row.link_2_deg), default=None),
+        angle_margin_deg=min(angles, default=None),
         cs_mean=mean(lambda row: row.cs_mean),
         ce_mean=mean(lambda row: row.ce_mean),
         cs_sum=mean(lambda row: row.cs_sum),
@@ -122,7 +121,7 @@ def cells(summary: Summary) -> tuple[str, ...]:
         f"{passed} (one flight)" if summary.flown < summary.total else passed,
         f"{summary.wilson_low:.2f}–{summary.wilson_high:.2f}",
         millimetres(summary.worst_margin_m),
-        "–" if summary.joint_1_deg is None else f"{summary.limits_kept}/{summary.total}",
-        f"{degrees(summary.joint_1_deg)}, {degrees(summary.link_2_deg)}",
+        "–" if summary.angle_margin_deg is None else f"{summary.limits_kept}/{summary.total}",
+        degrees(summary.angle_margin_deg),
         metres(summary.te_m),
     )

@@ -179,6 +179,17 @@ def test_an_angle_that_is_limited_on_one_side_or_unevenly_has_a_limit_for_each()
     assert record.uses()["joint_1_angle_min"].largest == pytest.approx(0.6)
 
 
+def test_a_joint_that_never_is_at_zero_keeps_its_limits() -> None:
+    first, second = PAPER.joints
+    below = replace(first, position_min=-2.0, position_max=-0.1)
+    vehicle = replace(PAPER, joints=(below, second), coupled_limits=())
+    record, state = LimitRecord(vehicle), at_rest(4, 2)
+    StateView(state).q_arm[:] = (-0.5, 0.0)
+    add(record, [state], (0.0, 0.0), 0.0)
+    use = record.uses()["joint_1_angle_max"]
+    assert (use.largest, use.kept, use.beyond_s) == (-0.5, True, 0.0)
+
+
 def test_drives_that_are_not_alike_are_judged_by_the_share_of_each() -> None:
     vehicle = random_vehicle(3, 5, np.random.default_rng(1))
     record, state = LimitRecord(vehicle), at_rest(5, 3)

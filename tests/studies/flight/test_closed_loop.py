@@ -12,8 +12,9 @@ from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import PlanInput
 from sitl.scenario_file import ScenarioError, load_scenario
 from studies.flight import closed_loop
-from studies.flight.job import Job, fly_job
+from studies.flight.job import Job, fly_job, score
 from studies.paper.cases import configuration, scenario
+from vehicles.vehicle_file import load_vehicle
 
 BRIEF = 2.0  # s
 
@@ -45,6 +46,20 @@ def test_the_full_plant_flies_and_flies_the_same_again(case: str) -> None:
     assert first.truth.min_margin_m is not None
     assert min(point.margin_m for point in first.planner.trace) >= first.truth.min_margin_m
     assert not again.planner.trace
+
+
+@pytest.mark.parametrize("vehicle", ["paper", "hexa-3r"])
+def test_a_row_says_which_angle_came_nearest_to_its_limit(vehicle: str) -> None:
+    flown = replace(load_scenario("walls", None, vehicle), duration_s=0.5)
+    job = Job("full", flown, flight_config(body=flown.body, vehicle=load_vehicle(vehicle)), 1)
+    result = fly_job(job)
+    row = score(job, result)
+    assert row.angle_margin_of is not None
+    used = result.truth.limits[row.angle_margin_of]
+    assert row.angle_margin_deg == math.degrees(used.most - used.largest)
+    for key, use in result.truth.limits.items():
+        if key == "tilt" or "angle" in key:
+            assert use.most - use.largest >= used.most - used.largest, key
 
 
 @pytest.mark.parametrize("plant", ["double-integrator", "full"])
