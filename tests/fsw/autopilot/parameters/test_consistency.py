@@ -22,6 +22,7 @@ from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet
+from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 POINT = SafeSet((point((1.0, 0.0, -1.0), 0.1),))
@@ -37,6 +38,22 @@ def _findings(config: FlightConfig, safe_set: SafeSet) -> dict[str, Finding]:
 def test_the_default_configuration_is_consistent(safe_set: SafeSet) -> None:
     config = flight_config()
     assert refusals(analyse(config, safe_set, loop_tube(config))) == ()
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_a_vehicle_that_its_own_arm_turns_is_refused_by_its_friction_and_its_pushes(
+    name: str,
+) -> None:
+    """Public vehicles of 7 rad/s^2 of friction, or with 9 rad/s^2 of pushes, left the safe set."""
+    vehicle = load_vehicle(name)
+    assert _findings(flight_config(vehicle=vehicle), WALLS)["turned"].holds
+    rough = [replace(one, coulomb=2.0) for one in vehicle.joints]
+    light = replace(vehicle.base, inertia=tuple([0.02 * one for one in vehicle.base.inertia]))
+    for changed in (replace(vehicle, joints=tuple(rough)), replace(vehicle, base=light)):
+        against = refusals(
+            analyse(config := flight_config(vehicle=changed), WALLS, loop_tube(config))
+        )
+        assert any("turns the base" in sentence for sentence in against)
 
 
 @pytest.mark.requirement("REQ-SAFE-7")
