@@ -15,6 +15,7 @@ from fsw.autopilot.control.actuator_watch import UNDONE, torques_by_friction
 from fsw.autopilot.control.tube import limits_used
 from fsw.autopilot.model.airframe import GRAVITY, airframe_of, wrench_of
 from fsw.autopilot.model.multibody import Bodies, bodies_of, posture
+from fsw.autopilot.parameters.carrying import payload_range
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig, of_vehicle
 from vehicles.description import Vehicle
@@ -72,9 +73,11 @@ def start_up(vehicle: Vehicle) -> str:
     used = limits_used(airframe, config.tuning.tracking, loop, pushed)
     most = max(used, key=lambda name: used[name])
     reach = base_reach(loop, config.surroundings)
+    payload = payload_range(config, loop)
     return (
         f"the base stays within {1e3 * reach:.0f} mm of its plan under {pushed:g} m/s^2, "
-        f"which takes {100.0 * used[most]:.0f} % of {most}"
+        f"which takes {100.0 * used[most]:.0f} % of {most}; it may carry "
+        f"{1e3 * payload.most:.0f} g, bounded by {payload.by}"
     )
 
 

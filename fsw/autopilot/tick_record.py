@@ -142,6 +142,13 @@ class Pressing(Record):
     load: PerJoint  # N m, torques of joints with those of the force on the tool
 
 
+class Payload(Record):
+    """What the gripper holds (``fsw/autopilot/control/payload.py``)."""
+
+    gripped: float  # 1: the gripper is closed
+    mass: float  # kg, of what is in it, at the end-effector
+
+
 FILTER_ACTED: Final = 1  # the safety filter changed the acceleration
 GATE_NEEDED: Final = 2  # the command is beyond the actuators' limits, or no number
 IMPAIRED: Final = 4  # a part has failed: ``health`` is not that of a healthy vehicle
@@ -177,7 +184,6 @@ class Watched(Record):
     failed_thrust2: float  # N^2, of the thrust
     failed_more2: float  # N^2, mean square of what it gives too much
     gives: float  # N, of the failed rotor
-    gripped: float  # 1: the gripper is closed, on what is not known
     lost_for: float  # s
     others_lost_for: PerRotor  # s, of each rotor beside the failed one
     lost: int
@@ -211,7 +217,8 @@ class Multibody(Record):
     The mass matrix's blocks are named by their rows and columns: v, w and q.
     """
 
-    of: Annotated[Floats, 3 + 2 * JOINTS]  # the base's rate, the joints' angles and their rates
+    of: Annotated[Floats, 4 + 2 * JOINTS]  # the base's rate, the joints' angles and rates, carried
+    carried: float  # kg, at the end-effector, beside the vehicle's own
 
     rotation: _Rotations  # from the link's frame to B
     origin: _Vectors  # m, of the joint
@@ -307,6 +314,7 @@ class Tick(Record):
     mixer: Mixer
     arm: ArmTask
     pressing: Pressing
+    payload: Payload
 
     @property
     def commanded(self) -> ActuatorCommand:

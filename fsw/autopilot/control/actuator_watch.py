@@ -187,7 +187,7 @@ def watch(
             s.thrust[i] = s.slow[i] = sent.rotor_thrust[i]
     _observe_base(r, law, decay, dt, sent)
     # At a surface, or with something in the gripper, it is not known what the joints are to do.
-    if angles_known and r.pressing.near == 0 and s.gripped == 0.0:
+    if angles_known and r.pressing.near == 0 and r.payload.gripped == 0.0:
         _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
     else:

@@ -24,6 +24,7 @@ from fsw.autopilot.control.joints import (
     rest_joints,
     torques_of_failed,
 )
+from fsw.autopilot.control.payload import let_go, weigh_payload
 from fsw.autopilot.control.press import look_for_surface, weigh_tool
 from fsw.autopilot.control.safety_filter import (
     FilterLaw,
@@ -237,6 +238,7 @@ def close_loops(
     settle_rotors(r, law, ticks)
     lift = -rotate_back(estimate.R_WB, r.pressing.force)[2]
     r.mass = estimate_mass(airframe, r.mass, r.rotors, estimate.specific_force, dt * ticks, lift)
+    let_go(r)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
     look_for_surface(r, airframe.bodies, tuning.press, law.tool_radius, zones, dt * ticks)
     motion = motion_state(airframe, r, r.rotors, r.sent.joint_torque)
@@ -378,8 +380,9 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
     field = -pushed[0], -pushed[1], motion.thrust / r.mass - pushed[2]
     for _ in range(ticks):
         torque = r.sent.joint_torque
-        observe_disturbance(r.joints, r.bodies, airframe, torque, field, law.dt)
+        observe_disturbance(r, airframe, torque, field, law.dt)
         observe_contact(r, airframe, torque, field, law.dt)
+    weigh_payload(r, airframe, field, law.dt * ticks)
     weigh_tool(r, airframe, law.tuning.press)
     # Not what is commanded: the rotors take 40 ms to give it.
     joint_torques(

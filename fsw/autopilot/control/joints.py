@@ -90,14 +90,15 @@ def _place(airframes: NDArray[Any], ticks: NDArray[Any]) -> None:
 
 @compilable
 def observe_disturbance(
-    k: Joints, m: Multibody, airframe: Airframe, torque: Floats, field: Vec3, dt: float
+    r: Tick, airframe: Airframe, torque: Floats, field: Vec3, dt: float
 ) -> None:
     """Momentum and disturbance ``dt`` [s] later, ``torque`` [N m] having been sent meanwhile.
 
     The ``field`` [m/s^2, B] is gravity less the base's acceleration, which is what thrust and
-    disturbance make of it, whatever the attitude.
+    disturbance make of it, whatever the attitude. What a closed gripper holds may be heavy.
     """
-    _observe(k.momentum, k.disturbance, _DISTURBANCE, m, airframe, torque, field, dt)
+    k, share = r.joints, 1.0 if r.payload.gripped > 0.0 else _DISTURBANCE
+    _observe(k.momentum, k.disturbance, share, r.bodies, airframe, torque, field, dt)
 
 
 @compilable
@@ -150,13 +151,18 @@ def joint_torques(
     """
     k, m, n = r.joints, r.bodies, int(airframe.bodies.joints)
     q, qd, qdd = r.estimate.q_arm, r.estimate.qd_arm, m.work
+    pressing, off, rate_off = presses(r, tuning), 0.0, 0.0
+    if pressing:  # how far the tool is off along the normal is no error, and not to be integrated
+        for i in range(n):
+            off += r.pressing.along[i] * (k.reference[i] - q[i])
+            rate_off += r.pressing.along[i] * (k.reference_rate[i] - qd[i])
     for i in range(n):
-        wanted, k.integral[i] = pid_step(
-            gains, k.integral[i], k.reference[i] - q[i], k.reference_rate[i] - qd[i], dt
-        )
+        error = k.reference[i] - q[i] - r.pressing.share[i] * off
+        rate_error = k.reference_rate[i] - qd[i] - r.pressing.share[i] * rate_off
+        wanted, k.integral[i] = pid_step(gains, k.integral[i], error, rate_error, dt)
         qdd[i] = wanted + r.flown_u.qdd_arm[i]
     limit_acceleration(airframe, arm, r.arm, q, qd, qdd)
-    if presses(r, tuning):
+    if pressing:
         _press_with(r, airframe, press(r, airframe, tuning, field, turning, dt), qdd)
         for i in range(n):
             torque = joint_load(m, i, field, turning) + r.pressing.work[i]

@@ -653,6 +653,7 @@ class Autopilot:
         last, airframe = state.cascade, self.config.airframe
         if flown:
             tube = self._watch.tube(state)
+            r.payload.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0
             self._cascade.step(r, ticks, self.zones_now(state), state.damage.health, tube)
             wanted = r.commanded
             if armed and not r.flags & GATE_NEEDED:
@@ -689,7 +690,6 @@ class Autopilot:
         if not watches or self._jumped(state, controlled.inputs.sensors.t_us):
             pause(r.watch)
             return state.damage
-        r.watch.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0
         return self._damage.see(
             state.damage,
             state.cascade,

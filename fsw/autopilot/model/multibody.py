@@ -1,7 +1,8 @@
 r"""The vehicle as rigid bodies: a base and an arm of up to ``JOINTS`` joints about any axes.
 
-Everything is written in the body frame B, about its origin, whose velocity is taken as zero: what
-the base's linear acceleration does to the arm is a uniform field. With w the base's rate and q the
+A payload is a point mass at the end-effector. Everything is written in the body frame B, about its
+origin, whose velocity is taken as zero: what the base's linear acceleration does to the arm is a
+uniform field. With w the base's rate and q the
 joints, the vehicle obeys
 
 .. math::
@@ -45,6 +46,7 @@ Several = tuple[float, ...]
 _SINGULAR: Final = 1e-9  # share of a diagonal entry that is left of one that others determine
 _SUMS: Final = len(Multibody().of_link) // JOINTS  # numbers that a link adds: seven vectors
 _VECTORS: Final = _SUMS // 3
+_CARRIED: Final = 3 + 2 * JOINTS  # its place in ``of``
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +202,8 @@ def _are_others(m: Multibody, b: Bodies, estimate: StateEstimate | Estimate) -> 
         i = 3 + 2 * k
         changed = changed or m.of[i] != estimate.q_arm[k] or m.of[i + 1] != estimate.qd_arm[k]
         m.of[i], m.of[i + 1] = estimate.q_arm[k], estimate.qd_arm[k]
+    changed = changed or m.of[_CARRIED] != m.carried
+    m.of[_CARRIED] = m.carried
     return changed
 
 
@@ -232,13 +236,13 @@ def _move_links(m: Multibody, b: Bodies, qd: Several | Floats, rate: Vec3) -> No
         put_three(m.rate, 3 * k, w)
         put_three(m.speed, 3 * k, v)
         R = nine(m.rotation, 9 * k)
-        inertia = _rotated(R, _six(b.inertia, k))
-        arm = rotate(R, three(b.com, 3 * k))
+        mass, com, own = _loaded(b, k, m.carried)
+        inertia, arm = _rotated(R, own), rotate(R, com)
         swept = cross(w, arm)
         _note(
             m.of_link,
             k,
-            b.mass[k],
+            mass,
             add(o, arm),
             inertia,
             add(v, swept),
@@ -247,6 +251,27 @@ def _move_links(m: Multibody, b: Bodies, qd: Several | Floats, rate: Vec3) -> No
             add(_symmetric(inertia, turning), cross(w, _symmetric(inertia, w))),
         )
         before = o
+
+
+@compilable
+def _loaded(b: Bodies, k: int, load: float) -> tuple[float, Vec3, V6]:
+    """Mass, centre and inertia of a link; the last has a ``load`` [kg] at the end-effector."""
+    mass, com, own = b.mass[k], three(b.com, 3 * k), _six(b.inertia, k)
+    if k < int(b.joints) - 1 or not load > 0.0:
+        return mass, com, own
+    whole = mass + load
+    d = b.tip[0] - com[0], b.tip[1] - com[1], b.tip[2] - com[2]
+    x, y, z = d
+    apart, square = mass * load / whole, dot(d, d)
+    return (
+        whole,
+        add_scaled(com, d, load / whole),
+        (
+            *(own[0] + apart * (square - x * x), own[1] + apart * (square - y * y)),
+            *(own[2] + apart * (square - z * z), own[3] - apart * x * y),
+            *(own[4] - apart * x * z, own[5] - apart * y * z),
+        ),
+    )
 
 
 @compilable
@@ -292,7 +317,7 @@ def _note(
 @compilable
 def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate: Vec3) -> None:
     """From the tip to the base. Writes of_link, vq, wq, qq, bias, momentum, drift, bias_v, _w."""
-    n, sums, mass = int(b.joints), m.of_link, 0.0
+    n, sums, mass = int(b.joints), m.of_link, m.carried
     for k in range(n - 1, -1, -1):
         mass += b.mass[k]
         if k < n - 1:
@@ -328,18 +353,18 @@ def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate
 
 
 @compilable
-def mass_of(b: Bodies) -> float:
-    """Of all bodies [kg]."""
+def mass_of(m: Multibody, b: Bodies) -> float:
+    """Of all bodies, and of what is carried [kg]."""
     mass = b.base_mass
     for k in range(int(b.joints)):
         mass += b.mass[k]
-    return float(mass)
+    return float(mass + m.carried)
 
 
 @compilable
 def _eliminate(m: Multibody, b: Bodies) -> None:
     """Linear motion and joints out of the mass matrix. Writes what comes after in the record."""
-    n, mass, c = int(b.joints), mass_of(b), three(m.centre, 0)
+    n, mass, c = int(b.joints), mass_of(m, b), three(m.centre, 0)
     for k in range(n):
         f = three(m.vq, 3 * k)
         put_three(m.wq_free, 3 * k, add_scaled(three(m.wq, 3 * k), cross(c, f), -1.0))
@@ -430,7 +455,7 @@ def load_on_base(m: Multibody, b: Bodies, force: Vec3, torque: Several | Floats)
 
     ``force`` [N, B] is that of the rotors, at B's origin, ``torque`` (j,) [N m] that of the joints.
     """
-    c, mass = three(m.centre, 0), mass_of(b)
+    c, mass = three(m.centre, 0), mass_of(m, b)
     push = add_scaled(force, three(m.bias_v, 0), -1.0)
     load = add(cross(c, push), three(m.bias_w, 0))
     for k in range(int(b.joints)):

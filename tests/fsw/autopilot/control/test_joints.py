@@ -132,7 +132,9 @@ def followed(
     for tick in range(round(seconds / DT)):
         estimate = estimate_of(Rotation.identity(), q_arm=pair(q), qd_arm=pair(qd))
         r = placed(AIRFRAME, estimate)
-        observe_disturbance(k, r.bodies, AIRFRAME, torque, DOWN, DT)
+        r.joints = k
+        observe_disturbance(r, AIRFRAME, torque, DOWN, DT)
+        k = r.joints
         k.reference[:2], k.reference_rate[:2] = references(tick * DT)
         r.joints = k
         torque = asked(r, AIRFRAME, GAINS, DOWN)

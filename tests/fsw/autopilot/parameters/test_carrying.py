@@ -1,0 +1,46 @@
+"""What a gripper may hold, against the loads of the multibody model."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.model.multibody import Multibody, joint_load, move_bodies
+from fsw.autopilot.parameters.carrying import payload_range
+from fsw.autopilot.parameters.consistency import loop_tube
+from fsw.autopilot.parameters.flight_config import FlightConfig, of_vehicle
+from fsw.autopilot.signals import StateEstimate
+from fsw.frozen import replace
+from vehicles.vehicle_file import load_vehicle
+
+PROBE = of_vehicle(FlightConfig(), load_vehicle("probe-2r"))
+
+
+def test_the_joint_that_bounds_it_carries_it_stretched_out_with_four_fifths_of_its_torque() -> None:
+    loop, airframe, none = loop_tube(PROBE), PROBE.airframe, (0.0, 0.0, 0.0)
+    most, by = payload_range(PROBE, loop)
+    assert by == "joint 1's torque"
+    level = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    stretched = StateEstimate(
+        0, none, none, level, none, 0.0, (0.5 * math.pi, 0.0), (0.0, 0.0), 9.8
+    )
+    m = Multibody()
+    m.carried = most
+    move_bodies(m, airframe.bodies, 0.0, stretched)
+    field = GRAVITY + loop.acceleration * PROBE.surroundings.disturbance
+    load = abs(joint_load(m, 0, (0.0, 0.0, field), none))
+    assert load == pytest.approx(0.8 * airframe.joint_torque_max[0])
+
+
+def test_weak_rotors_carry_less_and_a_light_vehicle_bears_no_heavy_loss() -> None:
+    loop, airframe = loop_tube(PROBE), PROBE.airframe
+    weak = replace(airframe, rotor_thrust_max=tuple(0.6 * t for t in airframe.rotor_thrust_max))
+    assert payload_range(replace(PROBE, airframe=weak), loop) == (0.0, "the rotors' thrust")
+    strong = replace(airframe, joint_torque_max=(50.0,) * len(airframe.joint_torque_max))
+    most, by = payload_range(replace(PROBE, airframe=strong), loop)
+    assert by == "the rotors' torque at the arm's full reach"
+    farther = replace(strong, rotor_lever=0.5)
+    most, by = payload_range(replace(PROBE, airframe=farther), loop)
+    assert (most, by) == (pytest.approx(0.2 * airframe.mass), "its loss in flight")
