@@ -197,7 +197,10 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     factorise(m.factor, m.qq, n)
     solve(m.factor, k.work, n)
     eased = felt = whole = turned = 0.0
+    reached = (0.0, 0.0, 0.0)
     for i in range(n):
+        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
+        reached = add_scaled(reached, lever, k.along[i])
         eased += k.along[i] * k.work[i]
         whole += k.share[i] * k.along[i]
         turned += k.share[i] * k.share[i]
@@ -207,7 +210,9 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         normal, (v[0] + r.estimate.v_WB[0], v[1] + r.estimate.v_WB[1], v[2] + r.estimate.v_WB[2])
     )
     k.speed = k.surface_speed - speed
-    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt
+    # Joints feel the part of a force that they move the tool along; of what is normal to the
+    # surface the rest is known. It turns a vehicle farther aside that is turned aside.
+    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt / max(whole, _AHEAD)
     # Rates of s give the tool unit speed along n: an arm that is nearly straight has to turn fast.
     # A part of n that no joint moves the tool along, as with a vehicle turned aside, is no matter.
     reach = whole / math.sqrt(turned) if turned > 0.0 else 0.0
@@ -219,7 +224,10 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         torque = airframe.joint_friction[i] + tuning.wrong * held
         torque += tuning.disturbance * norm(three(m.vq, 3 * i))
         k.unsure += abs(k.share[i]) * torque
-    force = rotate(R, _force_on_tool(r, shape, tip, n))
+    force = _force_on_tool(r, shape, tip, n)
+    if k.contact > 0:
+        force = add_scaled(force, subtract(along, _through(shape, reached)), k.pressed)
+    force = rotate(R, force)
     put_three(k.force, 0, force)
     # What the base counts on is no more than what it was asked to stand.
     into = clamp(dot(normal, force), 0.0, k.commanded + tuning.damping) if k.contact > 0 else 0.0
@@ -230,6 +238,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         r.observed.known[i] = (into * normal[i] + share * aside[i]) / r.mass
 
 
+_AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
 _BLOCKED = 0.5  # share of the speed asked for below which something is in the way
 _DAMPED = 1e-4  # m^2, of levers without which a direction is left out
 

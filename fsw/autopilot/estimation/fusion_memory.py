@@ -87,8 +87,8 @@ class EncoderWatch(NamedTuple):
         return EncoderWatch(angles, tuple(repeats), tuple(first))
 
 
-TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4]
-"""Samples, now [s], the joints' acceleration and the rotors' model."""
+TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4, Vec3]
+"""Samples, now [s], the joints' acceleration, the rotors' model and what surfaces push."""
 
 
 class Trail(NamedTuple):

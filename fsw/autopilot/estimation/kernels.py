@@ -61,6 +61,7 @@ class Asked(Record):
     dt: float  # s, length of the tick
     u: PerJoint  # rad/s^2, what torques made of the joints
     model: Four  # SI, FRD: what rotors make of the vehicle, see ``imu.add_imu``
+    pushed: Three  # m/s^2, NED: what surfaces that the tool touches make of it besides
     encoders: PerJoint  # rad
     encoders_age: float  # s
     time: float  # s, of a reading of the IMU
@@ -70,12 +71,16 @@ class Asked(Record):
     of_encoders: int
     present: Estimate
 
-    def begin(self, now: float, dt: float, u: JointVector, model: Vec4) -> None:
+    def begin(
+        self, now: float, dt: float, u: JointVector, model: Vec4, pushed: Vec3 = (0.0, 0.0, 0.0)
+    ) -> None:
         """A tick of ``dt`` [s] that ends ``now`` [s].
 
-        Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle.
+        Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle
+        and surfaces ``pushed`` it [m/s^2, NED].
         """
-        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *padded(u, JOINT_CAPACITY), *model)
+        joints = padded(u, JOINT_CAPACITY)
+        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *joints, *model, *pushed)
 
     def read_joints(self, angles: JointVector, age: float) -> None:
         """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
@@ -86,7 +91,7 @@ class Asked(Record):
         _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
 
 
-_TICK = struct.Struct(f"<q{5 + JOINT_CAPACITY}d")
+_TICK = struct.Struct(f"<q{8 + JOINT_CAPACITY}d")
 _ENCODERS = struct.Struct(f"<{JOINT_CAPACITY + 1}d")
 _ENCODERS_AT = Asked.place("encoders")
 _READING = struct.Struct("<7d")
@@ -128,7 +133,7 @@ def tick(
         if finite:
             found |= FINITE
         if a.dt > 0.0:
-            redundancy.witness(x, R, a.dt, model)
+            redundancy.witness(x, R, a.dt, model, (a.pushed[0], a.pushed[1], a.pushed[2]))
     return found
 
 

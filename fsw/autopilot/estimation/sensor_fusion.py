@@ -101,6 +101,7 @@ _SOURCES: Final = {
 }
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
+UNPUSHED: Final[Vec3] = (0.0, 0.0, 0.0)  # by what the tool touches
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
 
@@ -160,19 +161,21 @@ class SensorFusion:
         joint_acceleration: JointVector = (),
         watch: EncoderWatch | None = None,
         model: Vec4 = UNKNOWN,
+        pushed: Vec3 = UNPUSHED,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in what IMU and encoders measured since the last tick; the state at ``now`` [s].
 
         Of the other ``samples`` it knows what ``catch_up`` has fused so far.
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
         its encoders is kept in the memory. Where the IMU is silent or of no use, the ``model``
-        [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``). None before there was
+        [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``), which surfaces
+        ``pushed`` [m/s^2, NED] besides. None before there was
         a pose, or a position and a heading, to start from, and a reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = copied(memory.numbers)
         asked = self._asked
-        asked.begin(now, dt, joint_acceleration, model)
+        asked.begin(now, dt, joint_acceleration, model, pushed)
         memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
         silent = 0.0 <= imu_came < now - IMU_SILENT
         if silent:
@@ -187,7 +190,7 @@ class SensorFusion:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         trail = memory.trail
         if trail is not None:
-            tick = samples, now, joint_acceleration, model
+            tick = samples, now, joint_acceleration, model, pushed
             trail = Trail(trail.start, trail.began, (tick, trail.ticks))
         memory = memory._replace(
             numbers=x,
@@ -247,26 +250,30 @@ class SensorFusion:
         aloft: bool = True,
         flies: bool = True,
         damaged: bool = False,
+        touches: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
 
         The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
         there is nothing to fuse the state is the ``estimate`` of ``take_in``. Every 20 ms it is
         asked whether all sensors agree, unless the vehicle is so low that the ground may hold it.
-        Of a ``damaged`` one a rotor or a joint is known to have failed.
+        Of a ``damaged`` one a rotor or a joint is known to have failed, and one that ``touches``
+        something is turned by that.
         """
         memory, found = self._caught_up(memory, samples, now, estimate)
         if not memory.started:
             return memory, found
         if found is None:
             return begun(memory), None
-        return self._arbitration.step(memory, now, found, aloft=aloft, flies=flies, damaged=damaged)
+        return self._arbitration.step(
+            memory, now, found, aloft=aloft, flies=flies, damaged=damaged, touches=touches
+        )
 
     def _again(
         self, memory: FusionMemory, tick: TickInputs
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        samples, now, u, model = tick
-        memory, found = self.take_in(memory, samples, now, u, None, model)
+        samples, now, u, model, pushed = tick
+        memory, found = self.take_in(memory, samples, now, u, None, model, pushed)
         return self._caught_up(memory, samples, now, found)
 
     def _caught_up(

@@ -96,11 +96,13 @@ class Arbitration:
         aloft: bool,
         flies: bool,
         damaged: bool,
+        touches: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory, and the state ``found`` at ``now`` [s], after what is due.
 
         Nothing is, unless the vehicle ``flies``, and is ``aloft``: else the ground may hold it. Of
-        a ``damaged`` one a rotor or a joint is known to have failed.
+        a ``damaged`` one a rotor or a joint is known to have failed; the tool of one that
+        ``touches`` something turns it by more than is known.
         """
         evidence = memory.verdict.evidence
         if evidence is None:
@@ -115,10 +117,16 @@ class Arbitration:
             return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
         if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
             return memory, found
-        return self._look(memory, now, found, damaged)
+        return self._look(memory, now, found, damaged=damaged, touches=touches)
 
     def _look(
-        self, memory: FusionMemory, now: float, found: StateEstimate, damaged: bool
+        self,
+        memory: FusionMemory,
+        now: float,
+        found: StateEstimate,
+        *,
+        damaged: bool,
+        touches: bool,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory after a look at whether all sensors agree, and the state with it."""
         before = memory.verdict
@@ -129,7 +137,7 @@ class Arbitration:
             NO_AID if sample is None or sample is last else self._aid(memory, sample)
             for sample, last in zip(newest, before.seen, strict=True)
         ]
-        silent = _silent(memory, now) | _stuck(memory)
+        silent = _silent(memory, now) | _stuck(memory) | (Source.MODEL if touches else NOBODY)
         lost = redundancy.note_silence(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
         redundancy.look(evidence, memory.numbers, now, pose, fix, field, learns)

@@ -180,11 +180,12 @@ NO_AID: Final[Aid] = (False, 0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0, 0.
 
 
 @compilable
-def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
+def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
     """Integrate what everybody says of the tick of ``dt`` [s] that ends now.
 
     ``R`` [1, body to NED] and the ``model`` [SI, FRD] of ``imu.add_imu``, which is not known where
-    the vehicle does not fly: then all begins anew.
+    the vehicle does not fly: then all begins anew. What the tool touches ``pushed`` it [m/s^2, NED]
+    is the model's as well.
     """
     W = x.witness
     if not model[3] > 0.0:
@@ -205,7 +206,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
         W[SAID + i] = q[i]
     b = x.baseline
     felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
-    made = rotate(R, (0.0, 0.0, -model[3]))
+    own = rotate_back(R, pushed)
+    made = rotate(R, (own[0], own[1], own[2] - model[3]))
     share = dt / _BASELINE
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
@@ -215,7 +217,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4) -> None:
         W[MADE2 + i] += dt * W[MADE + i]
         W[SPUN + i] += dt * model[i]
         W[SPUN2 + i] += dt * W[SPUN + i]
-        beside = f[i] + (model[3] if i == 2 else 0.0)
+        beside = f[i] + (model[3] if i == 2 else 0.0) - own[i]
         W[BESIDE + i] += dt * beside
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):

@@ -22,7 +22,7 @@ from fsw.autopilot.estimation.fusion_memory import (
     at_start,
     copied,
 )
-from fsw.autopilot.estimation.sensor_fusion import UNKNOWN, SensorFusion
+from fsw.autopilot.estimation.sensor_fusion import UNKNOWN, UNPUSHED, SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 from fsw.autopilot.flight.estimate.estimator_report import (
@@ -35,6 +35,7 @@ from fsw.autopilot.flight.estimate.jump import on_return, told
 from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
+from fsw.autopilot.geometry.vectors import three
 from fsw.autopilot.measurements import JointSample, Sample
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.rotors import agility, swing
@@ -127,16 +128,19 @@ class SensedState:
         now = 1e-6 * inputs.sensors.t_us
         before = self._memory(state, now)
         pushed: JointVector = ()
-        model = UNKNOWN
+        model, surfaces = UNKNOWN, UNPUSHED
         if state.cascade.has_estimate:
             pushed, model = self._cascade.expected(state.cascade)
+            surfaces = three(state.cascade.observed.known, 0)
             # On the ground thrust does not explain how the vehicle moves.
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
         law = self._fusion.law
         airframe = self._cascade.law.airframe
         started, watch, samples = _without_stuck(state, before, inputs.samples, law, airframe)
-        memory, estimate = self._fusion.take_in(started, samples, now, pushed, watch, model)
+        memory, estimate = self._fusion.take_in(
+            started, samples, now, pushed, watch, model, surfaces
+        )
         caught = None
         if estimate is None and not state.cascade.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
@@ -216,6 +220,7 @@ class SensedState:
             aloft=is_aloft(state, now, self._legs, self._stale),
             flies=state.vehicle.flies,
             damaged=bool(state.damage.rotor or state.damage.joint),
+            touches=bool(state.cascade.pressing.contact or state.cascade.pressing.asked > 0.0),
         )
 
     def reported(

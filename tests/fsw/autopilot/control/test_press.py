@@ -193,3 +193,17 @@ def test_a_vehicle_turned_aside_presses_and_an_arm_that_is_straight_does_not() -
     r = at_surface(airframe, estimate(tool.q, none[:2], none), (-1.0, 0.0, 0.0))
     weigh_tool(r, airframe, TUNING)
     assert r.pressing.stroke == 0.0
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_of_a_vehicle_turned_aside_the_whole_normal_force_is_known() -> None:
+    """The joints feel what is in the arm's plane; the rest turns the vehicle farther aside."""
+    vehicle, aside = load_vehicle("probe-2r"), math.radians(20.0)
+    normal = np.array([-math.cos(aside), -math.sin(aside), 0.0])
+    home = np.array(vehicle.home_posture)
+    r, airframe = pressed_upon(vehicle, home, 5.0 * normal, vec3(normal))
+    assert r.pressing.pressed == pytest.approx(5.0, abs=0.1)
+    assert r.pressing.force[1] == pytest.approx(0.0, abs=1e-6)
+    r.pressing.contact = 1
+    weigh_tool(r, airframe, TUNING)
+    np.testing.assert_allclose(r.pressing.force, 5.0 * normal, atol=0.2)

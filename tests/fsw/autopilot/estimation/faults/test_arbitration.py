@@ -35,6 +35,7 @@ def hovering(
     poses: bool = True,
     garbage: bool = False,
     damaged: bool = False,
+    touches: bool = False,
     turned_by: Callable[[float], Vec3] | None = None,
     moved_by: float = 0.0,
 ) -> Iterator[FusionMemory]:
@@ -42,9 +43,9 @@ def hovering(
 
     In the last second the gyro says that the vehicle ``turns`` [rad/s] about its vertical, and
     encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second, or
-    ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``. Poses may
-    be ``turned_by`` an angle [rad, FRD] at each time [s] of that second, and ``moved_by`` so much
-    [m].
+    ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``, and its
+    tool ``touches`` something. Poses may be ``turned_by`` an angle [rad, FRD] at each time [s] of
+    that second, and ``moved_by`` so much [m].
     """
     memory, random = at_start(2), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -68,7 +69,7 @@ def hovering(
                 place = place[0] + moved_by, *place[1:]
             samples.insert(0, PoseSample(now, place, attitude, FINE, FINE))
         memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
-        memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged)
+        memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged, touches=touches)
         yield memory
 
 
@@ -116,6 +117,18 @@ def test_a_bias_is_as_unknown_as_residuals_are_large(turns: float) -> None:
     assert x["kept_bias"][3:] == pytest.approx(before.numbers[0]["gyro_bias"], abs=1e-4)
     waiting = np.arange(x["first"], x["end"]) % IMU_CAPACITY
     assert all(int(lost) & NO_RATE for lost in x["imu"][waiting, LOST])
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("touches", [False, True])
+def test_what_turns_a_vehicle_whose_tool_touches_something_is_nobody_s_fault(touches: bool) -> None:
+    """Gyro and poses say the same, and the rotors' model does not know of it."""
+
+    def turned_by(since: float) -> Vec3:
+        return 0.0, 0.0, 0.4 * since
+
+    memories = hovering(turns=0.4, turned_by=turned_by, touches=touches)
+    assert any(memory.verdict.is_on for memory in memories) is not touches
 
 
 @pytest.mark.requirement("REQ-EST-13")

@@ -100,7 +100,7 @@ def flown(
         s = x.view(np.recarray)[0]
         s.newest[:3], s.newest[3:] = felt, said
         s.suspect = int(verdict.is_on or bool(verdict.wrong))
-        redundancy.witness(s, R, TICK, (*alpha.tolist(), thrust))  # type: ignore[arg-type]
+        redundancy.witness(s, R, TICK, (*alpha.tolist(), thrust), NONE)  # type: ignore[arg-type]
         if tick % round(EVERY / TICK):
             continue
         pose: Aid = NO_AID
@@ -418,7 +418,17 @@ def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
     level: NDArray[np.float64] = np.eye(3).ravel()
     model: Vec4 = (0.1, 0.0, 0.0, G)
     R = tuple(level.tolist())
-    redundancy.witness(x, R, TICK, model)  # type: ignore[arg-type]
+    redundancy.witness(x, R, TICK, model, NONE)  # type: ignore[arg-type]
     assert x.witness.any()
-    redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0))  # type: ignore[arg-type]
+    redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0), NONE)  # type: ignore[arg-type]
     assert not x.witness[:4].any()
+
+
+def test_what_a_surface_pushes_is_the_rotors_model_s_as_well() -> None:
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    x.newest[:3] = (-1.5, 0.0, -G)  # what an accelerometer feels of it
+    for _ in range(100):
+        redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, G), (-1.5, 0.0, 0.0))
+    np.testing.assert_allclose(x.witness[redundancy.MADE :][:3], (-0.3, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(x.witness[redundancy.BESIDE :][:3], 0.0, atol=1e-9)
