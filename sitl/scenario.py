@@ -39,6 +39,9 @@ class Pilot:
     plan: Literal["none", "trajectory", "hop"]
     start_delay_s: Annotated[float, Range(0.0, 60.0)] = 1.0
     takeoff_height_m: Annotated[float, Range(0.4, 50.0)] = 1.5
+    # When it tells the gripper to close, and to open, since the simulation's start.
+    grab_s: Annotated[float, Range(0.0, 86400.0, or_inf=True)] = math.inf
+    release_s: Annotated[float, Range(0.0, 86400.0, or_inf=True)] = math.inf
 
 
 @dataclass(frozen=True, slots=True)

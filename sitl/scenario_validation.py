@@ -49,6 +49,13 @@ def check(scenario: Scenario) -> None:
     _check_names(scenario)
     _check_gears(scenario.actuators)
     _check_payload(scenario.payload)
+    if not scenario.pilot.release_s > scenario.pilot.grab_s and math.isfinite(
+        scenario.pilot.release_s
+    ):
+        raise ScenarioError(
+            f"pilot.release_s = {scenario.pilot.release_s:g}: must be later than grab_s, "
+            f"{scenario.pilot.grab_s:g}"
+        )
     _check_faults(scenario)
     check_trajectory(scenario.trajectory)
     hop, ground = scenario.pilot.plan == "hop", scenario.start.kind == "ground"

@@ -60,6 +60,8 @@ class Phase(Enum):
     FOLLOWING = "watch the trajectory being flown"
     TAKE_OFF = "take off"
     HOVER = "hover"
+    GRAB = "close the gripper"
+    RELEASE = "open the gripper"
     LAND = "land"
     DISARM = "wait for the vehicle to disarm"
     DONE = "done"
@@ -76,6 +78,7 @@ class FlightPlan:
     hop: bool
     takeoff_height_m: float
     first_phase: Phase
+    gripper_us: tuple[tuple[int, Phase], ...] = ()  # when to close and to open it
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +93,7 @@ class PilotState:
     since_us: int = START_US  # start of the phase
     next_ask_us: int = START_US
     hovering_since_us: int | None = None
+    gripped: int = 0  # commands to the gripper that were given
     start_height_m: float = 0.0
     last_text: str = ""
     refusal: str | None = None  # ends the run
@@ -106,6 +110,8 @@ _COMMANDS: Final[dict[Phase, tuple[int, Phase]]] = {
     Phase.ARM: (message_ids.CMD_ARM_DISARM, Phase.FOLLOW),
     Phase.FOLLOW: (message_ids.CMD_DO_SET_MODE, Phase.FOLLOWING),
     Phase.TAKE_OFF: (message_ids.CMD_TAKEOFF, Phase.HOVER),
+    Phase.GRAB: (message_ids.CMD_DO_GRIPPER, Phase.FOLLOWING),
+    Phase.RELEASE: (message_ids.CMD_DO_GRIPPER, Phase.FOLLOWING),
     Phase.LAND: (message_ids.CMD_LAND, Phase.DISARM),
 }
 
@@ -125,6 +131,14 @@ def flight_plan(
         hop=kind == "hop",
         takeoff_height_m=scenario.pilot.takeoff_height_m,
         first_phase=Phase.IDLE if kind == "none" else Phase.ARM,
+        gripper_us=tuple(
+            (START_US + round(1e6 * at_s), phase)
+            for at_s, phase in (
+                (scenario.pilot.grab_s, Phase.GRAB),
+                (scenario.pilot.release_s, Phase.RELEASE),
+            )
+            if math.isfinite(at_s)
+        ),
     )
 
 
@@ -156,6 +170,7 @@ def speak(
     plan: FlightPlan, state: PilotState, t_us: int
 ) -> tuple[PilotState, tuple[PilotMessage, ...]]:
     """Messages to send at the step of ``t_us``, at most MESSAGES_PER_STEP."""
+    state = _grip_next(plan, state, t_us)
     target_due = plan.target_at is not None and state.next_target_us <= t_us + TARGET_LEAD_US
     command_due = state.phase in _COMMANDS and t_us >= state.next_ask_us
     if plan.zones and t_us >= state.next_round_us:
@@ -179,6 +194,17 @@ def speak(
         messages.append(SendTarget(next_us, plan.target_at(next_us), plan.yaw_at(next_us)))
         next_us += TARGET_INTERVAL_US
     return replace(state, next_target_us=next_us), tuple(messages)
+
+
+def _grip_next(plan: FlightPlan, state: PilotState, t_us: int) -> PilotState:
+    """The next command to the gripper, when its time has come on the trajectory."""
+    if state.phase is not Phase.FOLLOWING or state.gripped == len(plan.gripper_us):
+        return state
+    at_us, phase = plan.gripper_us[state.gripped]
+    if t_us < at_us:
+        return state
+    done = state.gripped + 1
+    return replace(state, phase=phase, gripped=done, since_us=t_us, next_ask_us=t_us)
 
 
 def _announcements(plan: FlightPlan, state: PilotState) -> list[PilotMessage]:
@@ -257,5 +283,8 @@ def _command(plan: FlightPlan, phase: Phase) -> SendCommand:
         # Custom mode (1), PX4's main mode 4, automatic, and its first sub mode for modes of
         # others: here the end-effector's trajectory.
         return SendCommand(command, (1.0, _MAIN_AUTO, _AUTO_EXTERNAL1, _NAN, _NAN, _NAN, _NAN))
+    if phase is Phase.GRAB or phase is Phase.RELEASE:
+        closes = 1.0 if phase is Phase.GRAB else 0.0
+        return SendCommand(command, (1.0, closes, _NAN, _NAN, _NAN, _NAN, _NAN))
     height = plan.takeoff_height_m if phase is Phase.TAKE_OFF else _NAN
     return SendCommand(command, (_NAN, _NAN, _NAN, _NAN, _NAN, _NAN, height))

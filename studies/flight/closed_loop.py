@@ -29,6 +29,7 @@ from fsw.autopilot.signals import (
     Command,
     CommandRequest,
     EndEffectorTarget,
+    Grip,
     Mode,
     Plan,
     PlanFailure,
@@ -64,6 +65,12 @@ _ARM = Command(Arm(), CommandRequest(400, (1.0, *(0.0,) * 6), *_PILOT))
 _FOLLOW = Command(
     SwitchMode(Mode.TRAJECTORY), CommandRequest(176, (1.0, 4.0, 11.0, *(0.0,) * 4), *_PILOT)
 )
+
+
+def _grip(*, closes: bool) -> Command:
+    return Command(Grip(closes), CommandRequest(211, (1.0, float(closes), *(0.0,) * 5), *_PILOT))
+
+
 FIRST_COMMANDS = ((_ARM,), (_FOLLOW,))  # of the first ticks
 
 Seen: TypeAlias = Callable[[Simulation, TickInputs, TickOutputs], None]
@@ -79,6 +86,7 @@ class ClosedLoop:
     planner: PlanService
     airframe: Airframe
     state: FlightState = field(init=False)
+    gripped: int = 0  # commands to the gripper that were given
 
     def __post_init__(self) -> None:
         self.state = first_state(self.airframe)
@@ -93,7 +101,7 @@ class ClosedLoop:
         return TickInputs(
             sensors=sensors,
             plan=self.planner.take(sensors.t_us),
-            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else (),
+            commands=FIRST_COMMANDS[step] if step < len(FIRST_COMMANDS) else self.grips(),
             targets=self.targets(),
             announced=self.announced(),
             samples=samples,
@@ -117,6 +125,15 @@ class ClosedLoop:
         first = 0 if step == 0 else newest
         clock = simulation.clock
         return tuple(target(clock, start_us + TARGET_US * k) for k in range(first, newest + 1))
+
+    def grips(self) -> tuple[Command, ...]:
+        """What the scenario's pilot tells the gripper, in the first tick that is seen from then."""
+        pilot = self.simulation.scenario.pilot
+        times = (pilot.grab_s, pilot.release_s)[self.gripped :]
+        if not times or not STEP_US * self.simulation.step >= 1e6 * times[0]:
+            return ()
+        self.gripped += 1
+        return (_grip(closes=self.gripped == 1),)
 
     def announced(self) -> tuple[SafeSetAnnouncement, ...]:
         """What the scenario's pilot announces at this step: ten times a second where zones move."""

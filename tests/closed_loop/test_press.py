@@ -76,3 +76,17 @@ def test_a_wall_that_comes_is_left_behind(starts_s: float) -> None:
     assert any("surface not where announced" in text for text in flight.texts), flight.texts
     assert flight.mode is Mode.HOLD
     assert flight.sim.touch.normal() == 0.0
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_a_tool_that_slides_over_a_wall_keeps_the_force() -> None:
+    whole = load_scenario("wipe")
+    assert isinstance(whole.trajectory, Push)
+    short = replace(whole.trajectory, slide_m=((0.0, 0.0, -0.25),), hold_s=(5.0,))
+    flight, seen = flown(replace(whole, trajectory=short), seed=2, seconds=11.0)
+    (use,) = flight.sim.touch.uses().values()
+    assert use.slip_m > 0.25
+    assert flight.mode is Mode.TRAJECTORY, flight.texts
+    held = np.abs(seen[:, 3] - 3.0) < 0.01
+    assert held.sum() * 0.002 > 4.5
+    assert math.sqrt(float(((seen[held, 0] - 3.0) ** 2).mean())) < 0.6  # 20 %

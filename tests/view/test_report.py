@@ -39,7 +39,7 @@ from view.flight_data import FlightData, Table
 from view.flight_events import EventKind, FlightEvent
 from view.log_flight import LogFlight
 from view.report.chart import thinned
-from view.report.charts import event_marks
+from view.report.charts import event_marks, force
 from view.report.page import difference
 from view.report.reported import Reported
 
@@ -225,6 +225,24 @@ def test_of_many_events_the_axes_show_the_failsafes_first() -> None:
     )
     assert len(marks) == 60
     assert marks[-1] == (500.0, "201")
+
+
+def test_the_force_on_the_tool_is_drawn_with_its_bound() -> None:
+    t = np.arange(4) / 50.0
+    own = {"pressed": t, "asked": 0.0 * t + 5.0, "most": 0.0 * t + 10.0}
+    tables = {
+        "tool_contact": Table("tool_contact", t, own),
+        "sim_contact": Table("sim_contact", t, {"normal": 2.0 * t}),
+    }
+    data = FlightData(Path(), {}, {}, tables, (), (), 0, True)
+    chart = force([Reported(label="", data=data, margins=None, events=(), numbers={})])
+    assert chart is not None
+    figure = {"data": chart.data}
+    np.testing.assert_allclose(trace(figure, "true")["y"], 2.0 * t, rtol=1e-4)
+    np.testing.assert_allclose(trace(figure, "observed")["y"], t, rtol=1e-4)
+    assert {shape["y0"] for shape in chart.layout["shapes"] if "y0" in shape} >= {10.0}
+    bare = FlightData(Path(), {}, {}, {"any": Table("any", t, {})}, (), (), 0, True)
+    assert force([Reported(label="", data=bare, margins=None, events=(), numbers={})]) is None
 
 
 def test_the_events_are_in_a_table_in_order(page: str) -> None:

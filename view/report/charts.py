@@ -18,6 +18,7 @@ from view.report.chart import (
     COLOURS,
     ESTIMATE,
     LIMIT,
+    REFERENCE,
     TRUTH,
     Chart,
     Row,
@@ -53,9 +54,9 @@ def charts(flights: Sequence[Reported]) -> list[Chart]:
     from view.report.paths import paths
 
     made = (
-        paths(flights), margins(flights), parts(flights), tracking(flights), inputs(flights),
-        plan_inputs(flights), motion(flights), limits(flights), solver(flights), stages(flights),
-        loop_timing(flights), estimator(flights), worst_second(flights),
+        paths(flights), margins(flights), parts(flights), tracking(flights), force(flights),
+        inputs(flights), plan_inputs(flights), motion(flights), limits(flights), solver(flights),
+        stages(flights), loop_timing(flights), estimator(flights), worst_second(flights),
     )  # fmt: skip
     return [chart for chart in made if chart is not None and chart.data]
 
@@ -191,6 +192,34 @@ def _whose(own_only: Sequence[str], flights: Sequence[Reported]) -> str:
     if len(own_only) == len(flights):
         return estimated
     return f"true state; of {', '.join(own_only)} {estimated}"
+
+
+def force(flights: Sequence[Reported]) -> Chart | None:
+    """The normal force on the tool: true, observed, asked for and allowed."""
+    traces, bounds = [], set[float]()
+    for k, flight in enumerate(flights):
+        truth, own = flight.table("sim_contact"), flight.table("tool_contact")
+        if own is None or not len(own.t):
+            continue
+        alone, t = len(flights) == 1, flight.since(own.t)
+        bounds.update(float(most) for most in np.unique(own["most"]))
+        if alone:
+            traces.append(line("observed", t, own["pressed"], ESTIMATE, width=0.8))
+            traces.append(line("asked for", t, own["asked"], REFERENCE))
+        if truth is not None:
+            colour = TRUTH if alone else COLOURS[k % len(COLOURS)]
+            name = "true" if alone else flight.label
+            traces.append(line(name, flight.since(truth.t), truth["normal"], colour))
+    if not traces:
+        return None
+    return over_time(
+        "force",
+        "Force on the tool",
+        "Normal force on a surface that the tool may touch; observed without a force sensor while "
+        "one is near. Dashed: the most that is allowed.",
+        [Row("force [N]", traces, tuple(sorted(bounds)))],
+        _marks(flights),
+    )
 
 
 def inputs(flights: Sequence[Reported]) -> Chart | None:
