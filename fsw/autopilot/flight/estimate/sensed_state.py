@@ -211,7 +211,9 @@ class SensedState:
         estimate: StateEstimate | None,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """See ``SensorFusion.catch_up``, of a vehicle in a ``state``."""
-        now = memory.now
+        now, r = memory.now, state.cascade
+        # What pushes back, or was just gripped, turns the vehicle by more than is known of it.
+        touches = bool(r.pressing.contact or r.pressing.asked > 0.0 or r.payload.gripped > 0.0)
         return self._fusion.catch_up(
             memory,
             samples,
@@ -220,7 +222,7 @@ class SensedState:
             aloft=is_aloft(state, now, self._legs, self._stale),
             flies=state.vehicle.flies,
             damaged=bool(state.damage.rotor or state.damage.joint),
-            touches=bool(state.cascade.pressing.contact or state.cascade.pressing.asked > 0.0),
+            touches=touches,
         )
 
     def reported(
