@@ -11,7 +11,7 @@ from typing import Final, cast
 from fsw.autopilot.parameters.float32 import nearest_decimal
 from fsw.autopilot.parameters.param_type import field_of, value_of
 from fsw.link.endpoints import open_endpoint
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages import status_text
 from messages.addresses import LinkAddress, address_text
 from messages.frames import Frame, FrameWriter, Losses

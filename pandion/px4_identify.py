@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from fsw.autopilot.control.px4_identification import Identified, Manoeuvre, identify
 from fsw.autopilot.control.px4_loops import Px4Tuning, airframe_above_px4
 from fsw.autopilot.control.px4_tube import is_stable
 from fsw.autopilot.model.airframe import Airframe
@@ -22,6 +21,7 @@ from fsw.link.px4.open import Px4Addresses, open_px4
 from fsw.runtime import clock
 from messages.addresses import LinkAddress
 from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
+from pandion.px4_identification import Identified, Manoeuvre, identify
 from vehicles.vehicle_file import load_vehicle
 
 # PX4's parameters, and the fields of Px4Tuning that they are.

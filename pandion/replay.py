@@ -17,8 +17,8 @@ from vehicles.vehicle_file import parse_vehicle
 
 if TYPE_CHECKING:
     from fsw.runtime.program import FlightProgram
-    from fsw.runtime.replay import Replayed
     from messages.ulog_reader import UlogFile
+    from pandion.flight_replay import Replayed
 
 SAME, DIFFERS = 0, 1  # exit codes
 
@@ -40,8 +40,8 @@ def main(argv: list[str]) -> int:
     """Read a log, and compare if asked; returns the exit code."""
     what = "Show what a flight log holds, or replay its inputs."
     options = read(ReplayOptions, "pandion replay", what, argv)
-    from fsw.log.reader import open_flight
     from messages.ulog_reader import UlogError
+    from pandion.logged_ticks import open_flight
 
     try:
         log = open_flight(options.log)
@@ -52,7 +52,7 @@ def main(argv: list[str]) -> int:
 
 
 def _verify(options: ReplayOptions, log: UlogFile) -> int:
-    from fsw.runtime.replay import other_numbers, replay
+    from pandion.flight_replay import other_numbers, replay
 
     console = console_beside(options.json)
     program = _program(log)
@@ -76,7 +76,7 @@ def _program(log: UlogFile) -> FlightProgram[Any]:
     """The flight software of this build, configured by the names in the log."""
     from fsw.autopilot.parameters.control_choice import choice_of
     from fsw.runtime.assembly import flight_software
-    from fsw.runtime.replay import fact
+    from pandion.flight_replay import fact
 
     return flight_software(
         choice_of(partial(fact, log)),
@@ -88,8 +88,8 @@ def _program(log: UlogFile) -> FlightProgram[Any]:
 
 def _origin(log: UlogFile) -> Origin:
     """Where the local frame of the flight began; not chosen by a name."""
-    from fsw.runtime.replay import logged_numbers
     from messages.ulog_reader import UlogError
+    from pandion.flight_replay import logged_numbers
 
     numbers = logged_numbers(log)
     try:

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.signals import SafeSet, Vec3
 from fsw.link.endpoints import open_endpoint
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages.addresses import LinkAddress, address_text
 from messages.frames import FrameWriter, Losses
 from view.scene import Scene

@@ -24,9 +24,9 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.events.event_table import condition_of
 from fsw.link.wire import decode
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.px4_mode import AVAILABLE_MODES
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import Frame, wire_fields
 from messages.joint_arrays import STATE_AT, STATE_COUNT_AT, joined
 from view.flight_events import EventKind

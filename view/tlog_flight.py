@@ -16,8 +16,8 @@ from command_line.bounded_file import read_bounded
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import Vec3
-from fsw.link.wire.message_ids import ATTITUDE, LOCAL_POSITION_NED, SYSTEM_ID
 from messages.frames import Frame
+from messages.message_ids import ATTITUDE, LOCAL_POSITION_NED, SYSTEM_ID
 from messages.tlog_reader import TlogFrames
 from view.flight import Curve, Trail
 from view.flight_data import UlogError

@@ -16,8 +16,8 @@ from fsw.link.inbox import Inbox
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, ON_REQUEST, STREAMS
-from fsw.link.wire import message_ids as ids
 from messages import dialect
+from messages import message_ids as ids
 from messages.generate import DEFINITION
 
 _HEAD = """\

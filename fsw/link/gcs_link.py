@@ -30,13 +30,13 @@ from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
-from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire import encode_replies
 from fsw.link.wire.decode import for_this_vehicle
-from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.telemetry_context import TelemetryContext
-from messages import dialect
+from messages import dialect, message_ids
 from messages.addresses import Address, LinkAddress
 from messages.frames import Frame, Losses, as_version_1, is_version_1
+from messages.message_ids import AUTOPILOT, SYSTEM_ID
 
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""

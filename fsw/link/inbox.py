@@ -33,7 +33,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.autopilot.tuning import Tuning
 from fsw.link.bounded_memory import renew
-from fsw.link.wire import decode, decode_commands, message_ids
+from fsw.link.wire import decode, decode_commands
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_setpoints import (
     actuator_setpoint,
@@ -43,6 +43,7 @@ from fsw.link.wire.decode_setpoints import (
     global_setpoint,
     joint_setpoint,
 )
+from messages import message_ids
 from messages.frames import Frame
 
 _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it

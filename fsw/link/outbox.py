@@ -8,11 +8,10 @@ from typing import Final
 from fsw.autopilot.signals import StatusText
 from fsw.link.signing.signing import Signing
 from fsw.link.text_limiter import TextLimiter
-from fsw.link.wire import message_ids
-from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput, WireValues
-from messages import status_text
+from messages import message_ids, status_text
 from messages.frames import FrameWriter
+from messages.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 
 _MAX_DATAGRAM: Final = 1400  # bytes, fits an Ethernet packet
 

@@ -12,9 +12,9 @@ from typing import Final
 
 from fsw.autopilot.signals import CommandAck, CommandRequest, CommandResult
 from fsw.link.bounded_memory import renew
-from fsw.link.wire import message_ids
-from fsw.link.wire.message_ids import SIMULATOR, SYSTEM_ID
+from messages import message_ids
 from messages.frames import FrameWriter
+from messages.message_ids import SIMULATOR, SYSTEM_ID
 
 _AGAIN_US: Final = 100_000
 _OVER_US: Final = 600_000  # a ground station waits for a second at least

@@ -36,7 +36,7 @@ from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sensor_clock import SensorClock
 from fsw.link.udp_endpoint import Address
 from fsw.link.vehicle_link import Pacing
-from fsw.link.wire import decode, encode_replies, message_ids
+from fsw.link.wire import decode, encode_replies
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import (
     ODOMETRY_VALUES,
@@ -46,12 +46,12 @@ from fsw.link.wire.decode_sensors import (
     joint_sample,
     pose_sample,
 )
-from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
-from messages import status_text
+from messages import message_ids, status_text
 from messages.frames import Frame, FrameWriter, split
 from messages.joint_arrays import BASE, ENCODERS_AT, STATE_AT
 from messages.lockstep_codec import LockstepFrame, LockstepReader
+from messages.message_ids import AUTOPILOT, SYSTEM_ID
 from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements

@@ -35,8 +35,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.vehicle_link import Pacing, VehicleLink
-from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
+from fsw.link.vehicle_link import VEHICLE_PILOT, Pacing, VehicleLink
 from fsw.log.run_files import RunFiles
 from fsw.runtime.clock import unix_us
 from fsw.runtime.deadline_monitor import DeadlineMonitor
@@ -298,7 +297,7 @@ class FlightLoop(Generic[State]):
         for ack in acks:
             if ack.result == CommandResult.IN_PROGRESS:
                 continue
-            if (ack.target_system, ack.target_component) == (SYSTEM_ID, PATH_PLANNER):
+            if (ack.target_system, ack.target_component) == VEHICLE_PILOT:
                 self._vehicle.queue_ack(ack)
             else:
                 self._ground.acknowledge(t_us, ack)

@@ -10,12 +10,13 @@ import math
 from dataclasses import replace
 from typing import Final, cast
 
+from messages import message_ids
 from messages.frames import FrameWriter, split
+from messages.message_ids import PATH_PLANNER, SIMULATOR, SYSTEM_ID
 from sitl.earth import DEFAULT_ORIGIN, place_of
-from sitl.link import message_ids, pilot
+from sitl.link import pilot
 from sitl.link.encode import StepEncoder
 from sitl.link.encode_sensors import SensorEncoder
-from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot import FlightPlan, Phase, PilotState
 from sitl.link.pilot_messages import Ack, Heard
 from sitl.link.udp_endpoint import PeerSocket
@@ -49,7 +50,7 @@ class Companion:
         self._start, self._pilot = start, FrameWriter(SYSTEM_ID, PATH_PLANNER)
         self._since_us = 0  # of the way there
         self._state = PilotState(Phase.IDLE)
-        self._joints = SensorEncoder(FrameWriter(SYSTEM_ID, SENSORS), DEFAULT_ORIGIN)
+        self._joints = SensorEncoder(FrameWriter(SYSTEM_ID, SIMULATOR), DEFAULT_ORIGIN)
         self._asked = False  # for the trajectory
         self._still_since_s = math.inf
         self._mode: int | None = None

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple, cast
 
-from messages import status_text
+from messages import message_ids, status_text
 from messages.frames import Frame, split
 from messages.lockstep_codec import LockstepReader
-from sitl.link import message_ids
+from messages.message_ids import PATH_PLANNER
 from sitl.link.failures import Injection
-from sitl.link.message_ids import PATH_PLANNER
 from sitl.link.pilot_messages import Ack
 from sitl.simulation import Controls
 from vehicles.description import Vehicle

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from messages import status_text
+from messages import message_ids, status_text
 from messages.frames import FrameWriter
 from messages.joint_arrays import BASE, base, more
 from messages.lockstep_codec import LockstepFrame
+from messages.message_ids import PATH_PLANNER, SIMULATOR, SYSTEM_ID
 from sitl.earth import DEFAULT_ORIGIN, Place
-from sitl.link import message_ids
 from sitl.link.encode_sensors import SensorEncoder
 from sitl.link.failures import Answer, Injection
-from sitl.link.message_ids import PATH_PLANNER, SENSORS, SYSTEM_ID
 from sitl.link.pilot_messages import (
     PilotMessage,
     SendCommand,
@@ -57,7 +56,7 @@ class StepEncoder:
         self, lockstep: bool, *, measured: bool = False, origin: Place = DEFAULT_ORIGIN
     ) -> None:
         """Send the true state, or what sensors have ``measured``; the frame is at ``origin``."""
-        self._sensors = FrameWriter(SYSTEM_ID, SENSORS)
+        self._sensors = FrameWriter(SYSTEM_ID, SIMULATOR)
         self._pilot = FrameWriter(SYSTEM_ID, PATH_PLANNER)
         self._text_id = 0
         self._mode = (1 if lockstep else 0) | (2 if measured else 0)

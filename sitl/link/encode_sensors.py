@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from messages import message_ids
 from messages.frames import FrameWriter
 from messages.joint_arrays import BASE, base, more
 from messages.lockstep_codec import LockstepFrame
 from sitl.earth import Place, place_of
-from sitl.link import message_ids
 from sitl.sensors.barometer import standard_altitude
 from sitl.sensors.measurements import (
     GnssMeasurement,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from messages.message_ids import ACCEPTED, DENIED, UNSUPPORTED
 from sitl.faults.keys import Fault, Kind, Unit, absence, instances
-from sitl.link.message_ids import ACCEPTED, DENIED, UNSUPPORTED
 from sitl.scenario import Scenario
 from sitl.scenario_validation import units_aboard
 from sitl.simulation import Simulation

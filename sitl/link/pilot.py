@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from sitl.link import message_ids
+from messages import message_ids
 from sitl.link.pilot_messages import (
     Announce,
     Heard,

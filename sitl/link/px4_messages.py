@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple, cast
 
+from messages import message_ids
 from messages.frames import Frame, FrameWriter
+from messages.message_ids import SIMULATOR, SYSTEM_ID
 from sitl.earth import Place
-from sitl.link import message_ids
 from sitl.link.encode_sensors import (
     BAROMETRIC,
     INERTIAL,
@@ -23,7 +24,6 @@ from sitl.link.encode_sensors import (
     gps_values,
     pressure_values,
 )
-from sitl.link.message_ids import SENSORS, SYSTEM_ID
 from sitl.sensors.measurements import (
     GnssMeasurement,
     ImuMeasurement,
@@ -55,7 +55,7 @@ class Px4Encoder:
 
     def __init__(self, origin: Place) -> None:
         """Begin the local frame at ``origin``."""
-        self._writer = FrameWriter(SYSTEM_ID, SENSORS)
+        self._writer = FrameWriter(SYSTEM_ID, SIMULATOR)
         self._origin = origin
 
     def step(self, t_us: int, measurements: list[Measurement]) -> bytes:

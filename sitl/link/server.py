@@ -10,13 +10,13 @@ from typing import Final
 
 from command_line.process import StopRequest
 from messages.frames import split
+from messages.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.faults.keys import Fault
 from sitl.link import decode, pilot
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import Exchange, SimulatorError
 from sitl.link.failures import Injector
-from sitl.link.message_ids import ACCEPTED, CMD_REBOOT_SHUTDOWN
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
 from sitl.link.udp_endpoint import PeerSocket

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fsw.autopilot.control.px4_identification import Manoeuvre, Pushed, identify
 from fsw.autopilot.control.px4_loops import Px4Tuning
+from pandion.px4_identification import Manoeuvre, Pushed, identify
 from pandion.px4_identify import GAINS, Identifier, NotIdentified
 from tests.above_px4.flight import AbovePx4
 from tests.above_px4.test_flights import still

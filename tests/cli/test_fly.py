@@ -22,8 +22,8 @@ import pytest
 from pymavlink import mavutil
 
 from fsw.link.telemetry.streams import STREAMS
-from fsw.link.wire.message_ids import ORBIT_EXECUTION_STATUS, PANDION, TOOL_CONTACT
 from messages.frames import Frame, FrameWriter, split
+from messages.message_ids import ORBIT_EXECUTION_STATUS, PANDION, TOOL_CONTACT
 from tests.cli.command import clean_up, group_is_empty, pandion, read_until, start
 from tests.processes.both_processes import free_port
 

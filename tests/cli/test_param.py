@@ -16,8 +16,8 @@ import pytest
 
 from fsw.autopilot.parameters.param_type import field_of
 from fsw.autopilot.parameters.registry import PARAMETERS
-from fsw.link.wire import message_ids as ids
 from fsw.storage.parameter_file import load
+from messages import message_ids as ids
 from messages.frames import FrameWriter, split
 from pandion import param, param_vehicle
 from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused

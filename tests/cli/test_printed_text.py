@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from command_line.output import command_name, json_text, print_error
 from command_line.printable import printable
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages.frames import FrameWriter
 from pandion.__main__ import main
 from pandion.display import Display

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages import ulog
 from messages.frames import FrameWriter
 from messages.ulog_reader import UlogError

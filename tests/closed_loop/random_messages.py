@@ -42,9 +42,9 @@ from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService, SourcedService
-from fsw.link.wire import message_ids as ids
 from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import FrameWriter, split, wire_fields
 from sitl.result import EndKind
 from sitl.scenario_file import parse_scenario

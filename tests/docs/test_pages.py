@@ -20,8 +20,8 @@ from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.telemetry.streams import STREAMS
-from fsw.link.wire import message_ids as ids
 from messages import dialect
+from messages import message_ids as ids
 from pandion.result import FlightReports, as_json
 from sitl.sensors.keys import Timing
 from tests.docs.fences import DOCS, PAGES, ROOT, named, without_fences

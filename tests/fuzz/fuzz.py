@@ -30,7 +30,7 @@ PACKAGES = {  # of each target: in which an input may reach something new
     "ground-link": ["fsw.link"],
     "simulator-link": ["fsw.link.sim_link", "fsw.link.wire"],
     "vehicle-replies": ["sitl.link", "messages.status_text", "messages.lockstep_codec"],
-    "replay": ["fsw.runtime.replay", "fsw.log", "messages.ulog_reader", "command_line"],
+    "replay": ["pandion.flight_replay", "fsw.log", "messages.ulog_reader", "command_line"],
     "log-pages": ["view", "messages.ulog_reader", "command_line", "fsw.log.json_codec"],
     "results": ["view", "command_line", "pandion.report", "pandion.result"],
     "tlog": ["view", "messages.tlog_reader", "fsw.link.wire.decode"],

@@ -22,17 +22,17 @@ from fsw.link.signing.key_file import KeyFile
 from fsw.link.sim_link import SimLink
 from fsw.link.telemetry.streams import STREAMS
 from fsw.link.udp_endpoint import LinkError
-from fsw.link.wire import message_ids as ids
-from fsw.link.wire.message_ids import SYSTEM_ID
-from fsw.log.reader import open_flight
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
-from fsw.runtime.replay import fact, other_numbers, replay
 from fsw.storage import parameter_file as storage
 from messages import dialect, ulog
+from messages import message_ids as ids
 from messages.frames import cut
+from messages.message_ids import SYSTEM_ID
 from messages.ulog_reader import UlogError, open_log
+from pandion.flight_replay import fact, other_numbers, replay
 from pandion.log_summary import summary
+from pandion.logged_ticks import open_flight
 from pandion.report import write_report
 from sitl.link.decode import read_reply
 from sitl.link.encode import StepEncoder

@@ -18,13 +18,13 @@ from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
 from fsw.log import topics
 from fsw.log.flight_log import LogSubject, definitions
-from fsw.log.reader import open_flight
 from fsw.log.topics import TOPICS
 from fsw.runtime.assembly import flight_software
-from fsw.runtime.replay import Replayed, other_numbers, replay
 from messages import ulog
 from messages.ulog import Topic
 from messages.ulog_reader import UlogError
+from pandion.flight_replay import Replayed, other_numbers, replay
+from pandion.logged_ticks import open_flight
 from pandion.replay import main
 from tests.replay.recorded import CHOICE, flight, written
 

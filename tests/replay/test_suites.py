@@ -12,10 +12,10 @@ from pyulog import ULog
 from fsw.autopilot.signals import EstimatorReport, FlightSnapshot, TickInputs, TickOutputs
 from fsw.link.wire.encode_health import estimator_status
 from fsw.link.wire.encode_place import gps_raw, odometry
-from fsw.log.reader import open_flight
 from fsw.runtime.assembly import flight_software
-from fsw.runtime.replay import Replayed, replay
 from messages.frames import wire_fields
+from pandion.flight_replay import Replayed, replay
+from pandion.logged_ticks import open_flight
 from sitl.scenario_file import load_scenario
 from tests.fsw.link.snapshots import CONTEXT
 from tests.replay.recorded import CHOICE, Recorded, written

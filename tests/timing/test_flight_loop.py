@@ -36,19 +36,18 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.inbox import Inbox
 from fsw.link.vehicle_link import Pacing
-from fsw.link.wire import message_ids
 from fsw.log.flight_log import FlightLog
-from fsw.log.reader import LoggedTick, open_flight, ticks
 from fsw.runtime.flight_loop import Ending, FlightLoop, FlightRecord
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, MPC, RATE_GROUPS, TELEMETRY, Member
 from fsw.runtime.timing import GroupTimer
-from messages import dialect
+from messages import dialect, message_ids
 from messages.block_file import BlockFile
 from messages.frames import FrameWriter, split
+from pandion.logged_ticks import LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import FACTS, outputs_at
-from tests.fsw.log.test_reader import SUBJECT
+from tests.replay.test_logged_ticks import SUBJECT
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 from tests.whole_tick import Tick, parts_of
 

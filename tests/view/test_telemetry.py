@@ -16,8 +16,8 @@ from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
 from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
+from messages import message_ids as ids
 from messages import tlog_reader
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT

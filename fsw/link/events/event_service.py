@@ -7,11 +7,11 @@ from typing import Final, cast
 
 from fsw.link.events.event_log import EventLog, NumberedEvent
 from fsw.link.events.event_table import ARGUMENTS
-from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.message_ids import AUTOPILOT, SYSTEM_ID
 from fsw.link.wire.outgoing import Outgoing
+from messages import message_ids
 from messages.frames import Frame
+from messages.message_ids import AUTOPILOT, SYSTEM_ID
 
 _ANNOUNCED_US: Final = 3_000_000  # between two announcements of the newest, as PX4
 _MOST: Final = 64  # answers to one request

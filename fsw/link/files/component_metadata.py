@@ -14,9 +14,9 @@ from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.events.event_table import event_document
 from fsw.link.files.ftp_tree import Node
 from fsw.link.files.served_file import MemoryFile
-from fsw.link.wire import message_ids
 from fsw.link.wire.outgoing import Outgoing
 from fsw.link.wire.telemetry_context import TelemetryContext
+from messages import message_ids
 
 _GENERAL: Final = "general.json"
 _PARAMETERS: Final = "parameters.json"

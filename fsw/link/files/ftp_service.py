@@ -17,9 +17,9 @@ from fsw.link.files.ftp_jobs import Job
 from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, refused, write
 from fsw.link.files.ftp_tree import Directory, find, listing
 from fsw.link.files.served_file import OpenFile
-from fsw.link.wire import message_ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing
+from messages import message_ids
 from messages.frames import Frame
 
 _FRAMES: Final = 10  # a tick: two datagrams

@@ -16,9 +16,9 @@ from typing import Final, NamedTuple, cast
 from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
-from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput
+from messages import message_ids
 from messages.frames import Frame
 
 CHUNK: Final = 90  # bytes of a log in one LOG_DATA

@@ -18,9 +18,9 @@ from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, Statu
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.served_file import DiskFile, OpenFile
 from fsw.link.services.service import Outcome
-from fsw.link.wire import message_ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
+from messages import message_ids
 from messages.frames import Frame
 
 _START, _STOP = 2510, 2511  # MAV_CMD

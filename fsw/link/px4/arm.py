@@ -16,13 +16,14 @@ from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import CommandAck, JointVector, MessageSource, Mode, TickOutputs
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
-from fsw.link.wire import encode_replies, message_ids
+from fsw.link.wire import encode_replies
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.message_ids import PANDION, SYSTEM_ID
 from fsw.link.wire.px4_mode import custom_mode
+from messages import message_ids
 from messages.addresses import LinkAddress
 from messages.frames import FrameWriter, Losses
 from messages.joint_arrays import ENCODERS_AT, STATE_AT, base, joined, more
+from messages.message_ids import PANDION, SYSTEM_ID
 
 SILENT_US: Final = 100_000  # an arm that says nothing for so long is not there
 _BANDWIDTH: Final = 60.0  # rad/s, of rates that are found from angles

@@ -47,12 +47,10 @@ from fsw.link.px4.messages import (
     state_of,
 )
 from fsw.link.udp_endpoint import LinkError
-from fsw.link.vehicle_link import Pacing
-from fsw.link.wire import message_ids
+from fsw.link.vehicle_link import VEHICLE_PILOT, Pacing
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import battery_reading
-from fsw.link.wire.message_ids import PATH_PLANNER, SYSTEM_ID
-from messages import status_text
+from messages import message_ids, status_text
 from messages.frames import Frame, Losses
 
 _STREAMS: Final = {  # asked for, with its period [us]
@@ -71,7 +69,6 @@ _HEARTBEAT_US: Final = 1_000_000
 _WHOLE_PIECE, _PIECES = 50, 5  # bytes of a STATUSTEXT, and pieces of a sentence
 _PATIENCE_S: Final = 0.02
 _SLOW: Final = 0.5  # of the rate asked for: less is asked for again
-_US: Final = (SYSTEM_ID, PATH_PLANNER)  # who commands our autopilot to follow what PX4 does
 _SPOKEN: Final = {ARM_DISARM: "arming", SET_MODE: "its mode", SET_INTERVAL: "a stream"}
 
 
@@ -366,7 +363,9 @@ class Px4Link:
     def _command_us(self, action: Arm | Disarm, number: float) -> None:
         self._commands = self._commands % 200 + 1  # so that none is taken for a repetition
         params = (number, float(self._commands), *(0.0,) * 5)
-        self._inbox.accept_command(Command(action, CommandRequest(ARM_DISARM, params, *_US)))
+        self._inbox.accept_command(
+            Command(action, CommandRequest(ARM_DISARM, params, *VEHICLE_PILOT))
+        )
 
     # ------------------------------------------------------------------ the rest
 

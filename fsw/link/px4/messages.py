@@ -6,10 +6,10 @@ import math
 from typing import Final, cast
 
 from fsw.autopilot.signals import JointVector, Setpoint, Vec3
-from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.message_ids import SYSTEM_ID
+from messages import message_ids
 from messages.frames import Frame, FrameWriter
+from messages.message_ids import SYSTEM_ID
 
 COMPANION: Final = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 PX4: Final = (SYSTEM_ID, 1)  # who it is: system and component

@@ -26,10 +26,10 @@ from fsw.link.services.mission_wire import (
     item_float,
     item_int,
 )
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
+from messages import message_ids as ids
 from messages.frames import Frame
 
 _ReadItem = Callable[[Numbers], MissionItem]

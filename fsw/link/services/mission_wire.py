@@ -6,7 +6,6 @@ import math
 from typing import Final, cast
 
 from fsw.autopilot.signals import FlightSnapshot, MissionProgress, MissionState, Mode, Vec4
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.mission_items import (
     INVALID_PARAM1,
@@ -17,6 +16,7 @@ from fsw.link.wire.mission_items import (
 )
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from messages import message_ids as ids
 
 Peer = tuple[int, int]
 """System and component of a client."""

@@ -21,10 +21,10 @@ from fsw.autopilot.parameters.param_type import as_bytes, field_of, value_of
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
 from fsw.link.services.service import Outcome
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.storage.parameter_store import ParameterStore
+from messages import message_ids as ids
 from messages.frames import Frame
 
 BURST: Final = 10  # values at once: one datagram

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import cast
 
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.message_ids import PING, TIMESYNC
 from fsw.link.wire.outgoing import Outgoing
 from messages.frames import Frame
+from messages.message_ids import PING, TIMESYNC
 
 
 class TimeService:

@@ -19,8 +19,8 @@ from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.signing.signed_times import TOLERANCE, SignedTimes
 from fsw.link.udp_endpoint import Address, is_loopback
 from fsw.link.wire.decode import Numbers, for_this_vehicle
-from fsw.link.wire.message_ids import HEARTBEAT, RADIO_STATUS
 from messages.frames import Frame, announcing_signature, is_signed, is_version_1
+from messages.message_ids import HEARTBEAT, RADIO_STATUS
 
 _HASH_SIZE: Final = 6  # bytes, the first of SHA-256
 _SIGNATURE_SIZE: Final = 13  # bytes: link, time (6), hash (6)

@@ -13,9 +13,10 @@ from fsw.autopilot.signals import CommandAck, CommandRequest, FlightSnapshot, Se
 from fsw.link.services.service import CommandedService, LinkService
 from fsw.link.telemetry.stream_rates import UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
-from fsw.link.wire import decode, encode_replies, message_ids
+from fsw.link.wire import decode, encode_replies
 from fsw.link.wire.outgoing import Outgoing
 from fsw.link.wire.telemetry_context import TelemetryContext
+from messages import message_ids
 from messages.frames import Frame
 
 _GET_MESSAGE_INTERVAL: Final = 510  # MAV_CMD

@@ -18,11 +18,11 @@ from fsw.link.wire import (
     encode_identity,
     encode_place,
     encode_standard,
-    message_ids,
 )
-from fsw.link.wire.message_ids import AUTOPILOT, PANDION
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
+from messages import message_ids
+from messages.message_ids import AUTOPILOT, PANDION
 
 Encoder = Callable[[FlightSnapshot, TelemetryContext], WireValues | None]
 Answerer = Callable[[float, FlightSnapshot, TelemetryContext], Sequence[Outgoing]]

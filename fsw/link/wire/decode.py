@@ -27,9 +27,9 @@ from fsw.autopilot.signals import (
     Vec3,
     Zone,
 )
-from fsw.link.wire.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 from messages.frames import Frame, wire_fields
 from messages.joint_arrays import STATE_AT, joined
+from messages.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
 
 Numbers = tuple[float, ...]  # a payload without text, in wire order
 

@@ -22,8 +22,8 @@ from fsw.autopilot.measurements import (
     Vec4,
 )
 from fsw.autopilot.signals import BatteryReading
-from fsw.link.wire import message_ids
 from fsw.link.wire.decode import Numbers
+from messages import message_ids
 from messages.frames import Frame
 from messages.joint_arrays import ENCODERS_AT, ENCODERS_COUNT_AT, joined
 

@@ -14,11 +14,11 @@ from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind, Zone
-from fsw.link.wire import message_ids
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.record import JOINTS, padded
+from messages import message_ids
 from messages.joint_arrays import JOINTS_MAX, base, more
 
 _LOCAL_NED: Final = 1  # MAV_FRAME

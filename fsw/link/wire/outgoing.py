@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fsw.autopilot.signals import StatusText
-from fsw.link.wire.message_ids import AUTOPILOT
+from messages.message_ids import AUTOPILOT
 
 WireValues = tuple[float | bytes, ...]
 """Every field of a message in wire order, see ``messages.frames.wire_fields``."""

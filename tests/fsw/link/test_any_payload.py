@@ -11,8 +11,8 @@ import fastcrc
 import pytest
 
 from docs.pages.messages import heard
-from fsw.link.wire import message_ids as ids
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import as_version_1
 from tests.fsw.link.ground import Ground, whole_vehicle
 

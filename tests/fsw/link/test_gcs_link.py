@@ -24,9 +24,9 @@ from fsw.link.peers import EXPIRY_US
 from fsw.link.sent_frames import SentFrames
 from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, as_version_1, split
 from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import SNAPSHOT, outputs_at

@@ -18,8 +18,8 @@ from fsw.link.ground_links import GroundLinks
 from fsw.link.link_choice import LinkChoice, addresses
 from fsw.link.services.time_service import TimeService
 from fsw.link.udp_endpoint import LinkError, OpenEndpoint
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import ServiceOutput
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.ground import Ground, ground_station
 from tests.fsw.link.snapshots import outputs_at

@@ -9,7 +9,7 @@ import pytest
 
 from fsw.autopilot.signals import BatteryReading, SensorFrame, TickInputs
 from fsw.link.inbox import Inbox
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages.frames import FrameWriter, split
 
 NONE = (0.0, 0.0, 0.0)

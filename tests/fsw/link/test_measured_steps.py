@@ -23,9 +23,9 @@ from fsw.autopilot.signals import Origin, SensorFrame
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import SimLink
 from fsw.link.vehicle_link import Pacing
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.decode_sensors import SampleDecoder
 from fsw.runtime.clock import now_us
+from messages import message_ids as ids
 from messages.frames import FrameWriter, split
 from sitl import earth
 from sitl.link.encode import StepEncoder

@@ -14,8 +14,8 @@ from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import MessageSource, SensorFrame, Severity, TickOutputs
 from fsw.link.inbox import Inbox
 from fsw.link.sim_link import SimLink
-from fsw.link.wire import message_ids as ids
 from fsw.runtime.clock import now_us
+from messages import message_ids as ids
 from messages.frames import FrameWriter
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import Announce

@@ -28,7 +28,7 @@ from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sim_link import SimLink
 from fsw.link.text_limiter import TextLimiter
 from fsw.link.vehicle_link import Pacing
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages import status_text
 from messages.frames import FrameWriter, split
 from sitl.earth import DEFAULT_ORIGIN

@@ -21,8 +21,8 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
-from fsw.link.wire import message_ids as ids
 from fsw.storage.parameter_store import ParameterStore
+from messages import message_ids as ids
 from messages.addresses import LinkAddress, SerialLine, TcpEnd
 from messages.frames import Frame, FrameWriter, Losses
 from messages.stream_reader import StreamReader

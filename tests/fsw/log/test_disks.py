@@ -20,12 +20,12 @@ from pyulog import ULog
 
 from fsw.autopilot.signals import SensorFrame, TickInputs
 from fsw.log.flight_log import FlightLog
-from fsw.log.reader import Gap, LoggedTick, open_flight, ticks
 from fsw.log.run_files import RunFiles
 from messages.block_file import BlockFile
+from pandion.logged_ticks import Gap, LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import outputs_at
 from tests.fsw.log.specimens import inputs
-from tests.fsw.log.test_reader import SUBJECT
+from tests.replay.test_logged_ticks import SUBJECT
 from tests.waiting import wait_for
 
 _THREE = (0.5, 0.5, 0.5)

@@ -32,7 +32,7 @@ from fsw.autopilot.signals import (
 from fsw.log.encoder import FULL, THIN
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.px4_records import planned_rates
-from fsw.log.reader import LoggedTick, open_flight, ticks
+from pandion.logged_ticks import LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import SNAPSHOT, VEHICLE, outputs_at
 
 ORIGIN = Origin(47.0, 8.0, 400.0)

@@ -10,13 +10,13 @@ import pytest
 
 from command_line.process import StopRequest
 from messages.frames import split
+from messages.message_ids import COMMAND_ACK, OBSTACLE_SHAPE
 from sitl.faults.keys import KINDS, Fault, Kind
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
 from sitl.link.exchange import ExchangeCounts
 from sitl.link.failures import Injection
 from sitl.link.faulty_endpoint import FaultyEndpoint
-from sitl.link.message_ids import COMMAND_ACK, OBSTACLE_SHAPE
 from sitl.link.pilot import flight_plan
 from sitl.link.server import serve
 from sitl.scenario_file import load_scenario

@@ -33,8 +33,8 @@ from fsw.link.events.event_table import (
     event_document,
     failsafe_event,
 )
-from fsw.link.wire import message_ids
 from fsw.link.wire.outgoing import Outgoing
+from messages import message_ids
 from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import outputs_at
 

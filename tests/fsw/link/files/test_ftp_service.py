@@ -19,8 +19,8 @@ from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.ftp_tree import Directory
 from fsw.link.files.served_file import DiskFile, MemoryFile
 from fsw.link.files.vehicle_files import vehicle_files
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import PackedOutgoing
+from messages import message_ids as ids
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import values_of
 

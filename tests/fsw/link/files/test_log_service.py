@@ -14,8 +14,8 @@ from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.files.flight_logs import MARK, FlightLogs, flight_logs
 from fsw.link.files.log_service import CHUNK, LogService
 from fsw.link.files.vehicle_files import vehicle_files
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import ServiceOutput
+from messages import message_ids as ids
 from messages.block_file import BlockFile
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import message_of, values_of

@@ -14,8 +14,8 @@ from fsw.autopilot.signals import CommandRequest, CommandResult, StatusText
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_stream import PIECE, LogStreamService
 from fsw.link.services.service import Outcome
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split
 
 TICK_US = 2_000

@@ -13,10 +13,10 @@ from fsw.autopilot.parameters.param_type import field_of, value_of
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import CommandRequest, StatusText
 from fsw.link.services.parameter_service import BURST, ParameterService
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split, wire_fields
 from tests.fsw.storage.test_parameter_store import ticks
 from tests.fsw.storage.threads import AtOnce

@@ -17,8 +17,8 @@ from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import FrameTrust
 from fsw.link.udp_endpoint import LinkError
-from fsw.link.wire import message_ids as ids
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import FrameWriter, as_version_1, is_signed, split
 from tests.fsw.link.ground import Ground, ManualClock, ground_station, station_socket
 from tests.fsw.link.snapshots import CONTEXT, outputs_at

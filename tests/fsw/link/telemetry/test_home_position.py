@@ -8,7 +8,7 @@ from dataclasses import replace
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import GROUND_RATES, STREAMS
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
 

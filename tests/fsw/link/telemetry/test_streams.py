@@ -9,7 +9,7 @@ import pytest
 
 from fsw.link.telemetry.stream_rates import OFF, UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES, STREAMS
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 
 TICK_US = 2_000
 

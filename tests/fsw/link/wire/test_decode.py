@@ -17,8 +17,8 @@ from fsw.autopilot.signals import (
     Touch,
 )
 from fsw.link.inbox import Inbox
-from fsw.link.wire import message_ids as ids
 from messages import dialect
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
 NAN = math.nan

@@ -14,7 +14,7 @@ from fsw.autopilot.signals import (
     PositionFrom,
 )
 from fsw.link.inbox import Inbox, Received
-from fsw.link.wire import message_ids as ids
+from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split, wire_fields
 
 NAN = math.nan

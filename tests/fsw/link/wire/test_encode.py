@@ -28,9 +28,9 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.telemetry.streams import STREAMS, Stream
 from fsw.link.wire import encode_replies, encode_standard
-from fsw.link.wire import message_ids as ids
 from fsw.link.wire.telemetry_context import GENERIC
 from messages import dialect, status_text
+from messages import message_ids as ids
 from messages.frames import FrameWriter
 from tests.fsw.link.snapshots import ACTUATORS, CONTEXT, REPORT, SNAPSHOT
 

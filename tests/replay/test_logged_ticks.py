@@ -17,7 +17,7 @@ from fsw.log import topics
 from fsw.log.encoder import SAMPLES, TYPED, LogEncoder
 from fsw.log.flight_log import FlightLog, LogSubject
 from fsw.log.json_codec import JsonCodec
-from fsw.log.reader import LoggedTick, open_flight, ticks
+from pandion.logged_ticks import LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import VEHICLE, outputs_at
 from tests.fsw.log.specimens import inputs
 

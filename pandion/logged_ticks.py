@@ -16,8 +16,6 @@ from fsw.log.samples import TOPIC_NUMBERS, Samples
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
 
-__all__ = ["Gap", "LoggedTick", "UlogError", "UlogFile", "open_flight", "ticks"]
-
 _SENSORS: Final = topics.TOPICS.index(topics.SENSOR_FRAME)
 _INPUT: Final = topics.TOPICS.index(topics.TICK_INPUT)
 _TICK: Final = topics.TOPICS.index(topics.TICK)

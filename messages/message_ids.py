@@ -1,4 +1,4 @@
-"""Message ids and enum values of MAVLink that the link uses, by name."""
+"""Message ids of MAVLink, systems and components, and the commands both processes name."""
 
 from typing import Final
 
@@ -6,15 +6,16 @@ HEARTBEAT: Final = 0
 SYS_STATUS: Final = 1
 SYSTEM_TIME: Final = 2
 PING: Final = 4
+SET_MODE: Final = 11
 PARAM_REQUEST_READ: Final = 20
 PARAM_REQUEST_LIST: Final = 21
 PARAM_VALUE: Final = 22
 PARAM_SET: Final = 23
-SET_MODE: Final = 11
 GPS_RAW_INT: Final = 24
 ATTITUDE: Final = 30
 ATTITUDE_QUATERNION: Final = 31
 LOCAL_POSITION_NED: Final = 32
+GLOBAL_POSITION_INT: Final = 33
 SERVO_OUTPUT_RAW: Final = 36
 MISSION_REQUEST_PARTIAL_LIST: Final = 37
 MISSION_WRITE_PARTIAL_LIST: Final = 38
@@ -27,11 +28,10 @@ MISSION_COUNT: Final = 44
 MISSION_CLEAR_ALL: Final = 45
 MISSION_ITEM_REACHED: Final = 46
 MISSION_ACK: Final = 47
-MISSION_REQUEST_INT: Final = 51
-MISSION_ITEM_INT: Final = 73
-GLOBAL_POSITION_INT: Final = 33
 SET_GPS_GLOBAL_ORIGIN: Final = 48
 GPS_GLOBAL_ORIGIN: Final = 49
+MISSION_REQUEST_INT: Final = 51
+MISSION_ITEM_INT: Final = 73
 VFR_HUD: Final = 74
 COMMAND_INT: Final = 75
 COMMAND_LONG: Final = 76
@@ -39,22 +39,22 @@ COMMAND_ACK: Final = 77
 SET_ATTITUDE_TARGET: Final = 82
 ATTITUDE_TARGET: Final = 83
 SET_POSITION_TARGET_LOCAL_NED: Final = 84
-SET_POSITION_TARGET_GLOBAL_INT: Final = 86
 POSITION_TARGET_LOCAL_NED: Final = 85
+SET_POSITION_TARGET_GLOBAL_INT: Final = 86
 HIL_ACTUATOR_CONTROLS: Final = 93
 HIGHRES_IMU: Final = 105
 HIL_SENSOR: Final = 107
-HIL_GPS: Final = 113
-DISTANCE_SENSOR: Final = 132
+RADIO_STATUS: Final = 109
 FILE_TRANSFER_PROTOCOL: Final = 110
+TIMESYNC: Final = 111
+HIL_GPS: Final = 113
 LOG_REQUEST_LIST: Final = 117
 LOG_ENTRY: Final = 118
 LOG_REQUEST_DATA: Final = 119
 LOG_DATA: Final = 120
 LOG_ERASE: Final = 121
 LOG_REQUEST_END: Final = 122
-RADIO_STATUS: Final = 109
-TIMESYNC: Final = 111
+DISTANCE_SENSOR: Final = 132
 SET_ACTUATOR_CONTROL_TARGET: Final = 139
 ALTITUDE: Final = 141
 BATTERY_STATUS: Final = 147
@@ -94,6 +94,7 @@ OBSTACLE_POINT: Final = 60210
 OBSTACLE_SHAPE: Final = 60211
 JOINT_ENCODERS: Final = 60212
 MPC_HORIZON_ARM: Final = 60213
+FORCE_TORQUE: Final = 60214
 TOOL_CONTACT: Final = 60215
 
 SYSTEM_ID: Final = 1  # the vehicle
@@ -103,3 +104,17 @@ AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1: speaks common.xml
 PANDION: Final = 25
 PATH_PLANNER: Final = 195  # MAV_COMP_ID_PATHPLANNER: the scenario's pilot, on the simulator link
 SIMULATOR: Final = 200  # component of the simulated sensors, which also lets them fail
+
+CMD_LAND: Final = 21  # MAV_CMD
+CMD_TAKEOFF: Final = 22
+CMD_DO_SET_MODE: Final = 176
+CMD_DO_GRIPPER: Final = 211
+CMD_REBOOT_SHUTDOWN: Final = 246
+CMD_ARM_DISARM: Final = 400
+CMD_INJECT_FAILURE: Final = 420
+
+ACCEPTED: Final = 0  # MAV_RESULT
+TEMPORARILY_REJECTED: Final = 1
+DENIED: Final = 2
+UNSUPPORTED: Final = 3
+IN_PROGRESS: Final = 5
