@@ -18,6 +18,8 @@ from command_line.process import (
     events_of,
     run_reported,
 )
+from command_line.revision import revision
+from command_line.run_directory import run_directory
 from fsw.arguments import FswOptions
 from fsw.autopilot.control.control_metrics import ControlMetrics
 from fsw.autopilot.ports import LoopHealth, PlanningCycle
@@ -40,8 +42,6 @@ from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.telemetry_context import TelemetryContext
 from fsw.log.flight_log import LogSubject, vehicle_facts
-from fsw.log.revision import revision
-from fsw.log.run_directory import run_directory
 from fsw.log.run_files import RunFiles
 from fsw.runtime import clock, report
 from fsw.runtime.console import Console

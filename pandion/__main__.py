@@ -24,7 +24,7 @@ GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
             "fly a scenario with both processes, print the result",
         ),
         "sitl": ("sitl.__main__", "run the simulator alone"),
-        "fsw": ("fsw.__main__", "run the flight software alone"),
+        "fsw": ("pandion.flight_software", "run the flight software alone"),
         "param": (
             "pandion.param",
             "list, set, import and export parameters of a vehicle or a file",

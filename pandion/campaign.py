@@ -11,9 +11,9 @@ from command_line.junit import junit_xml
 from command_line.options import as_words, group, json_file, option, read, switch
 from command_line.output import command_name, console_beside, json_text, print_error, say, try_write
 from command_line.parser import COULD_NOT_START
+from command_line.run_directory import new_run_directory
 from command_line.values import whole
 from command_line.version import version
-from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from pandion.gate_options import junit, required

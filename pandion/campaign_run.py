@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from command_line.output import console_beside, print_error, try_write
 from command_line.parser import COULD_NOT_START
+from command_line.run_directory import new_run_directory
 from command_line.version import version
-from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 

@@ -38,12 +38,12 @@ class Child:
         processor: int | None = None,
         runner: str | None = None,
     ) -> None:
-        """Start ``python -m name``, ``sitl`` or ``fsw``; its standard error goes to the log.
+        """Start ``sitl`` or ``fsw`` as pandion's verbs; the standard error goes to the log.
 
         It may run on one processor only, any if None. A runner is a module that runs the process
         of this name in its own way.
         """
-        module = [name] if runner is None else [runner, name]
+        module = [runner or "pandion", name]
         self.name = name
         self.interrupted = False  # by us
         self.killed = False  # by us

@@ -11,8 +11,8 @@ from command_line.bounded_json import JsonError, json_object
 from command_line.options import read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
+from command_line.run_directory import new_run_directory
 from command_line.version import version
-from fsw.log.run_directory import new_run_directory
 from pandion.display import Display
 from pandion.falsify_options import FalsifyOptions
 from sitl.scenario import vehicle_of

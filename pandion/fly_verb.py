@@ -11,11 +11,11 @@ from pathlib import Path
 from command_line.options import as_words, declared, group, json_file, option, read, switch
 from command_line.output import command_name, json_text, print_error, try_write, unwritable, without
 from command_line.parser import COULD_NOT_START
+from command_line.run_directory import run_directory
 from command_line.version import version
 from fsw.arguments import OUT, PARAMS, FswOptions
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.link.link_choice import NO_LINK, LinkChoice, addresses
-from fsw.log.run_directory import run_directory
 from messages.addresses import LinkError, parse_link_address
 from pandion.display import Display
 from pandion.join_truth import join_truth

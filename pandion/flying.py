@@ -15,13 +15,13 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from command_line.revision import revision
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
 from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
 from fsw.log.flight_log import FlightLog, LogSubject, vehicle_facts
-from fsw.log.revision import revision
 from fsw.storage.parameter_file import load, save
 from pandion.flown import Result, Verdict, write_json
 from pandion.join_truth import join_truth

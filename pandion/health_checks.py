@@ -228,7 +228,7 @@ def _found(name: str) -> Path | None:
 
 def code() -> Check:
     """Which code flies, as flight logs say it."""
-    from fsw.log.revision import revision
+    from command_line.revision import revision
 
     known = revision()
     if "unknown" in known:

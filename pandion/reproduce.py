@@ -14,10 +14,10 @@ from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read
 from command_line.output import console_beside, print_error, say, write_text
 from command_line.parser import COULD_NOT_START
+from command_line.run_directory import new_run_directory
 from command_line.values import number, one_of
 from command_line.version import version
 from fsw.autopilot.parameters.control_choice import KNOWN
-from fsw.log.run_directory import new_run_directory
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
 from pandion.gate_options import junit

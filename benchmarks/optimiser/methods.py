@@ -18,9 +18,9 @@ from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.slsqp_solver import NonlinearProgram, minimise
 from fsw.autopilot.mpc.solution import Solution
 from fsw.autopilot.signals import Plan, SafeSet
+from studies.flight.slsqp_solver import NonlinearProgram, minimise
 
 _ITERATIONS = (1, 2, 3)
 

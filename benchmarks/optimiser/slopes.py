@@ -6,7 +6,7 @@ import numpy as np
 
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.qp_data import CONE
-from fsw.autopilot.mpc.slsqp_solver import NonlinearProgram, Slopes
+from studies.flight.slsqp_solver import NonlinearProgram, Slopes
 
 
 def slopes_of(problem: NonlinearProgram) -> Slopes:

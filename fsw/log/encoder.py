@@ -34,7 +34,6 @@ from fsw.autopilot.signals import (
     ContactReport,
     EstimatorReport,
     FlightSnapshot,
-    Mode,
     Origin,
     PlanRequest,
     PlanTimings,
@@ -44,7 +43,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
-from fsw.log.packed import Packed, Records
+from fsw.log.packed import Every, Packed
 from fsw.log.px4_records import Px4Records, validity
 from fsw.log.samples import Samples
 from messages.ulog import Topic, logged_text
@@ -71,12 +70,9 @@ _INNOVATION_BITS: Final = (0, 1, 2, 6, 9)
 _ROTARY_WING: Final = 1  # VEHICLE_TYPE of PX4
 
 
-# Ticks are written by parts that are as long as the vehicle has joints and rotors.
-(_TICK,) = Packed(topics.TICK).heads
 # What tools look at the spectrum of.
 _RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
 _PLANNING: Final = Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
-_BARRIER, _END_EFFECTOR = _PLANNING.heads
 _MPC: Final = Packed(topics.MPC_STATUS)
 _CONTACT: Final = Packed(topics.TOOL_CONTACT)
 _ASKED: Final = Packed(topics.VEHICLE_COMMAND)
@@ -97,11 +93,8 @@ class _Layout:
 
         self.samples = Samples(joints)
         # What a replay needs and what it is compared by: every tick in every profile.
-        sent = packed(topics.ACTUATOR_COMMAND)
-        as_sent = sent.struct.format.removeprefix("<")
-        (self.sensors,), (self.command,) = packed(topics.SENSOR_FRAME).heads, sent.heads
-        self.short_tick = Records(f"<5sQ{as_sent}")
-        self.whole_tick = Records(f"<5sQ{self.samples.frame.size}s{as_sent}")
+        self.short_tick = packed(topics.TICK, topics.ACTUATOR_COMMAND)
+        self.whole_tick = packed(topics.SENSOR_FRAME, topics.ACTUATOR_COMMAND)
         # What follows from that, for reading.
         self.detail = packed(
             topics.VEHICLE_ATTITUDE,
@@ -133,10 +126,8 @@ class LogEncoder:
 
         Of a vehicle with this ``airframe``, THIN or FULL. The local frame begins at ``origin``.
         """
-        self._detail_us, self._fast_us = DETAIL_US[profile], FAST_US[profile]
-        self._plan_us = PLAN_US[profile]
-        # Numbers of the intervals that were written last.
-        self._detailed = self._fast = self._planned = -1
+        self._details, self._rates = Every(DETAIL_US[profile]), Every(FAST_US[profile])
+        self._plans = Every(PLAN_US[profile])
         self._px4 = Px4Records(airframe, origin)
         self._of = _Layout(airframe.rotors, airframe.bodies.joints)
         self._joints = airframe.bodies.joints
@@ -171,25 +162,22 @@ class LogEncoder:
         for ack in outputs.acks:
             addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
             values = (ack.command & _U32, ack.result & 0xFF, *addressee)
-            out += _ANSWERED.pack((*_ANSWERED.heads, snapshot.t_us, *values))
+            out += _ANSWERED.pack(snapshot.t_us, values)
         for text in outputs.texts:
             out += logged_text(text.severity & 7, snapshot.t_us, text.text)
         self._last = snapshot
 
     def _timed(self, snapshot: FlightSnapshot, out: bytearray) -> None:
         """What has a rate of its own, as far as it is due."""
-        interval = snapshot.t_us // self._detail_us
-        if interval != self._detailed:
-            self._detailed = interval
+        t_us = snapshot.t_us
+        if self._details.is_due(t_us):
             out += self._detail(snapshot)
             if snapshot.touching is not None:
-                out += _contact(snapshot.t_us, snapshot.touching)
-        if snapshot.plan_state is not None and snapshot.t_us // self._plan_us != self._planned:
-            self._planned = snapshot.t_us // self._plan_us
+                out += _contact(t_us, snapshot.touching)
+        if snapshot.plan_state is not None and self._plans.is_due(t_us):
             out += self._in_flight(snapshot)
-        if snapshot.t_us // self._fast_us != self._fast:
-            self._fast = snapshot.t_us // self._fast_us
-            out += _RATES.pack((*_RATES.heads, snapshot.t_us, *snapshot.estimate.w_WB_B))
+        if self._rates.is_due(t_us):
+            out += _RATES.pack(t_us, snapshot.estimate.w_WB_B)
 
     def _add_status(
         self, snapshot: FlightSnapshot, last: FlightSnapshot | None, out: bytearray
@@ -213,44 +201,33 @@ class LogEncoder:
                 self._px4.feel(sample.acceleration, sample.rate)
         if not inputs.samples:
             self._px4.feel(one.accel_B, one.gyro_B)
-        of = self._of
-        numbers = of.samples.frame.pack(
-            *one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *one.q_arm, *one.qd_arm
-        )
-        command = (of.command, t_us, *sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
+        of, arm = self._of, (*one.q_arm, *one.qd_arm)
+        frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)
+        command = (*sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        if self._imu is not None and numbers == of.samples.frame_of(self._imu):
-            return of.short_tick.pack((_TICK, t_us, *command))
-        return of.whole_tick.pack((of.sensors, t_us, numbers, *command))
+        if self._imu and of.samples.frame.pack(*frame) == of.samples.frame_of(self._imu):
+            return of.short_tick.pack(t_us, (), command)
+        return of.whole_tick.pack(t_us, frame, command)
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
-        estimate, sent = snapshot.estimate, snapshot.actuators
-        t_us = snapshot.t_us
-        attitude, position, motors, arm = self._of.detail.heads
+        x, sent, ground = snapshot.estimate, snapshot.actuators, _sees_ground(snapshot)
         return self._of.detail.pack(
-            (
-                attitude, t_us, *quaternion_from_matrix(estimate.R_WB),
-                position, t_us, *estimate.p_WB, *estimate.v_WB, estimate.yaw,
-                *validity(snapshot), -estimate.p_WB[2], _sees_ground(snapshot),
-                motors, t_us, *self._airframe.shares(sent).rotor_thrust,
-                arm, t_us, *estimate.q_arm, *estimate.qd_arm, *sent.joint_torque,
-            )
-        )  # fmt: skip
+            snapshot.t_us,
+            quaternion_from_matrix(x.R_WB),
+            (*x.p_WB, *x.v_WB, x.yaw, *validity(snapshot), -x.p_WB[2], ground),
+            self._airframe.shares(sent).rotor_thrust,
+            (*x.q_arm, *x.qd_arm, *sent.joint_torque),
+        )
 
     def _in_flight(self, snapshot: FlightSnapshot) -> bytes:
-        t_us, x, u = snapshot.t_us, snapshot.plan_state, snapshot.plan_input
+        x, u = snapshot.plan_state, snapshot.plan_input
         assert x is not None
         a, yaw_acc, qdd = (
             ((0.0,) * 3, 0.0, (0.0,) * len(x.q_arm)) if u is None else (u.a, u.yaw_acc, u.qdd_arm)
         )
-        position, arm, plan = self._of.in_flight.heads
-        return self._of.in_flight.pack(
-            (
-                *(position, t_us, *x.p, *x.v, *x.a, x.yaw, x.yaw_rate),
-                *(arm, t_us, *x.q_arm, *x.qd_arm, *qdd),
-                *(plan, t_us, *a, yaw_acc),
-            )
-        )
+        body = (*x.p, *x.v, *x.a, x.yaw, x.yaw_rate)
+        arm = (*x.q_arm, *x.qd_arm, *qdd)
+        return self._of.in_flight.pack(snapshot.t_us, body, arm, (*a, yaw_acc))
 
     def _add_inputs(self, inputs: TickInputs, out: bytearray) -> None:
         """Every input that is not what it was on the tick before."""
@@ -268,23 +245,18 @@ class LogEncoder:
                     out += _command(t_us, command.request)
 
     def _status(self, snapshot: FlightSnapshot) -> bytes:
-        mode: Mode = snapshot.mode
-        head, landing, found = self._of.status.heads
-        known = snapshot.actuators_found
+        mode, failures, known = snapshot.mode, snapshot.failures, snapshot.actuators_found
         rotors = 1 << known.rotor >> 1  # from 1; 0: none
+        joints = [round(kind) for kind in known.joints or (0.0,) * self._joints]
         return self._of.status.pack(
+            snapshot.t_us,
             (
-                *(head, snapshot.t_us, 2 if snapshot.armed else 1, NAV_STATES[mode]),
-                *(
-                    bool(snapshot.failures),
-                    mode.value.encode(),
-                    ",".join(snapshot.failures).encode(),
-                ),
+                *(2 if snapshot.armed else 1, NAV_STATES[mode], bool(failures)),
+                *(mode.value.encode(), ",".join(failures).encode()),
                 *(self._took_over, _ROTARY_WING, False),
-                *(landing, snapshot.t_us, snapshot.landed),
-                *(found, snapshot.t_us, rotors != 0, rotors, known.effect, known.lost),
-                *(known.disobeys, *(round(kind) for kind in known.joints or (0.0,) * self._joints)),
-            )
+            ),
+            (snapshot.landed,),
+            (rotors != 0, rotors, known.effect, known.lost, known.disobeys, *joints),
         )
 
     def _planning(self, snapshot: FlightSnapshot) -> bytes:
@@ -302,13 +274,14 @@ class LogEncoder:
         known = snapshot.estimator
         rest = b"" if known is None else _estimator(t_us, known)
         return rest + _PLANNING.pack(
+            t_us,
             (
-                *(_BARRIER, t_us, *_filled(margins), *_filled(barrier), least),
+                *(*_filled(margins), *_filled(barrier), least),
                 *(int(report.kind), len(margins), argmin),
                 *(safety.breaches, safety.departures, safety.interventions),
                 *(*_filled(report.added[: topics.MARGINS]), report.shortfall),
-                *(_END_EFFECTOR, t_us, *p, *v, *wanted),
-            )
+            ),
+            (*p, *v, *wanted),
         )
 
     def _mpc(self, snapshot: FlightSnapshot) -> bytes:
@@ -323,24 +296,20 @@ class LogEncoder:
                 *(plan.cost, plan.slack_max, times.linearise_us, times.solve_us, times.total_us),
                 *(min(plan.sqp_iterations, _U16), min(plan.solver_iterations, _U16)),
             )
-        return _MPC.pack(
-            (
-                *(*_MPC.heads, snapshot.t_us, t_plan, plan_id, *counts, *about),
-                int(snapshot.plan_status),
-            )
-        )
+        status = int(snapshot.plan_status)
+        return _MPC.pack(snapshot.t_us, (t_plan, plan_id, *counts, *about, status))
 
 
 def _contact(t_us: int, k: ContactReport) -> bytes:
     numbers = (*k.force, k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance)
-    return _CONTACT.pack((*_CONTACT.heads, t_us, *numbers, k.contact))
+    return _CONTACT.pack(t_us, (*numbers, k.contact))
 
 
 def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:
     """A record of loop_timing for rate group 0, the tick, or 1, the planner."""
     period_us, *counts_and_times, _ = astuple(timing)
     counts, times = counts_and_times[:3], counts_and_times[3:]
-    return _TIMING.pack((*_TIMING.heads, t_us, *counts, period_us, *times, group))
+    return _TIMING.pack(t_us, (*counts, period_us, *times, group))
 
 
 def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
@@ -367,7 +336,6 @@ def _status_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
 
 
 def _estimator(t_us: int, known: EstimatorReport) -> bytes:
-    status, innovations, bias = _ESTIMATOR.heads
     ratios, variance, motion = known.ratios, known.pose_covariance, known.velocity_covariance
     accuracy = (
         math.sqrt(max(motion[0], motion[6], motion[11])),
@@ -377,19 +345,24 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
     pose = known.innovation(Sensor.POSE.value, 6)
     fix = known.innovation(Sensor.GNSS.value, 6)
     return _ESTIMATOR.pack(
+        t_us,
         (
-            *(status, t_us, known.level_accuracy, known.vertical_accuracy),
+            *(known.level_accuracy, known.vertical_accuracy),
             *(ratios.heading, ratios.velocity, ratios.place, ratios.height, ratios.above_ground),
             *(*accuracy, math.nan if known.unaided_us < 0 else 1e-6 * known.unaided_us),
             *(known.pose_delay, known.resets & _U32, known.flags, faults.encode()),
             *(_unusable(known), _unaided(known), _refused(ratios), 0.0),
-            *(innovations, t_us, *fix[3:], *fix[:3], *pose),
+        ),
+        (
+            *(*fix[3:], *fix[:3], *pose),
             *known.innovation(Sensor.BAROMETER.value, 1),
             *known.innovation(Sensor.RANGEFINDER.value, 1),
             *known.innovation(Sensor.MAGNETOMETER.value, 1),
-            *(bias, t_us, *known.gyro_bias, *known.gyro_bias_variance),
+        ),
+        (
+            *(*known.gyro_bias, *known.gyro_bias_variance),
             *(*known.accel_bias, *known.accel_bias_variance),
-        )
+        ),
     )
 
 
@@ -418,19 +391,15 @@ def _refused(ratios: TestRatios) -> int:
 def _request(packed: Packed, t_us: int, request: PlanRequest) -> bytes:
     x = request.start
     first = request.targets[0].p_WE if request.targets else _NOWHERE
-    return packed.pack(
-        (
-            *(*packed.heads, t_us, request.plan_id & _U32, request.t_apply_us),
-            *(*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm),
-            *(*first, request.from_nominal),
-        )
-    )
+    start = (*x.p, *x.v, *x.a, *x.j, *x.s, x.yaw, x.yaw_rate, *x.q_arm, *x.qd_arm)
+    when = request.plan_id & _U32, request.t_apply_us
+    return packed.pack(t_us, (*when, *start, *first, request.from_nominal))
 
 
 def _command(t_us: int, request: CommandRequest) -> bytes:
-    heads, params, number = _ASKED.heads, request.params, request.command & _U32
     source = (request.source_system & 0xFF, request.source_component & _U16)
-    return _ASKED.pack((*heads, t_us, *params, number, *source, request.confirmation & 0xFF))
+    number, again = request.command & _U32, request.confirmation & 0xFF
+    return _ASKED.pack(t_us, (*request.params, number, *source, again))
 
 
 def _add_text(t_us: int, name: str, text: bytes, out: bytearray) -> None:
@@ -438,7 +407,7 @@ def _add_text(t_us: int, name: str, text: bytes, out: bytearray) -> None:
     parts = max(-(-len(text) // size), 1)
     for part in range(parts):
         piece = text[part * size : (part + 1) * size]
-        out += _INPUT.pack((*_INPUT.heads, t_us, name.encode("ascii"), part, parts, piece))
+        out += _INPUT.pack(t_us, (name.encode("ascii"), part, parts, piece))
 
 
 def _filled(values: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,9 +1,10 @@
-"""Records of topics as bytes, several in one call."""
+"""Records of topics as bytes, several in one call, and when they are due."""
 
 from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 from struct import Struct
 from typing import Any, Final
 
@@ -13,27 +14,34 @@ from messages.ulog import Topic, data_head
 _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 
 
-class Records:
-    """Records that are packed in one call."""
-
-    def __init__(self, layout: str) -> None:
-        """As :mod:`struct` names them."""
-        self.struct = Struct(layout)
-
-    def pack(self, values: tuple[Any, ...]) -> bytes:
-        """Pack heads and values; a number too large for a float becomes infinite."""
-        try:
-            return self.struct.pack(*values)
-        except OverflowError:
-            return self.struct.pack(*map(_within_float, values))
-
-
-class Packed(Records):
-    """Records of some topics."""
+class Packed:
+    """Records of some topics of one instant."""
 
     def __init__(self, *members: Topic) -> None:
-        super().__init__("<" + "".join("5s" + topic.codes for topic in members))
-        self.heads = tuple(data_head(topics.NUMBERS[topic.name], topic) for topic in members)
+        self._struct = Struct("<" + "".join("5s" + topic.codes for topic in members))
+        self._heads = tuple(data_head(topics.NUMBERS[topic.name], topic) for topic in members)
+
+    def pack(self, t_us: int, *values: Sequence[Any]) -> bytes:
+        """The records at ``t_us``, of the values of each; what no float can hold is infinite."""
+        entries: list[Any] = []
+        for head, of_topic in zip(self._heads, values, strict=True):
+            entries += (head, t_us, *of_topic)
+        try:
+            return self._struct.pack(*entries)
+        except OverflowError:
+            return self._struct.pack(*map(_within_float, entries))
+
+
+class Every:
+    """A grid of instants, with one record for each interval."""
+
+    def __init__(self, period_us: int) -> None:
+        self._period_us, self._last = period_us, -1
+
+    def is_due(self, t_us: int) -> bool:
+        """Whether ``t_us`` is the first that was asked about in its interval."""
+        last, self._last = self._last, t_us // self._period_us
+        return self._last != last
 
 
 def _within_float(value: Any) -> Any:

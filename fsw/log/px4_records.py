@@ -30,7 +30,7 @@ from fsw.autopilot.signals import (
     Vec4,
 )
 from fsw.log import px4_topics as topics
-from fsw.log.packed import Packed
+from fsw.log.packed import Every, Packed
 
 _TORQUE_US: Final = 10_000
 _SETPOINTS_US: Final = 50_000
@@ -66,8 +66,8 @@ class Px4Records:
         self._of_torque = [_shares([row[3 + axis] for row in rows], airframe) for axis in range(3)]
         self._of_thrust = _shares([-row[2] for row in rows], airframe)
         self._origin = origin
-        # Numbers of the intervals that were written last.
-        self._torque = self._setpoints = self._place = self._second = -1
+        self._torque, self._setpoints = Every(_TORQUE_US), Every(_SETPOINTS_US)
+        self._place, self._second = Every(_PLACE_US), Every(_SECOND_US)
         self._failures: tuple[str, ...] = ()
         self._accel = self._gyro = _UNKNOWN
         self._shaken = self._turned = 0.0  # m/s^2, rad/s
@@ -75,25 +75,17 @@ class Px4Records:
     def add(self, snapshot: FlightSnapshot, out: bytearray) -> None:
         """Append what is due in this tick."""
         t_us = snapshot.t_us
-        if t_us // _TORQUE_US != self._torque:
-            self._torque = t_us // _TORQUE_US
+        if self._torque.is_due(t_us):
             out += self._torques(snapshot)
-        interval = t_us // _SETPOINTS_US
-        if interval == self._setpoints and snapshot.failures is self._failures:
-            return
-        new_failures = snapshot.failures != self._failures
-        self._failures = snapshot.failures
-        if interval != self._setpoints:
-            self._setpoints = interval
+        if self._setpoints.is_due(t_us):
             out += self._setpoint_records(snapshot)
-        if t_us // _PLACE_US != self._place:
-            self._place = t_us // _PLACE_US
+        if self._place.is_due(t_us):
             out += _place(snapshot, self._origin)
-        second = t_us // _SECOND_US
-        if second != self._second:
+        second, before = self._second.is_due(t_us), self._failures
+        self._failures = snapshot.failures
+        if second:
             out += self._slow(snapshot)
-        if second != self._second or new_failures:
-            self._second = second
+        if second or self._failures != before:
             out += _failsafe_flags(snapshot)
 
     def feel(self, accel: Vec3, gyro: Vec3) -> None:
@@ -112,33 +104,26 @@ class Px4Records:
     def _torques(self, snapshot: FlightSnapshot) -> bytes:
         thrust = snapshot.actuators.rotor_thrust
         torque = [_sum(shares, thrust) for shares in self._of_torque]
-        return _TORQUE.pack((*_TORQUE.heads, snapshot.t_us, *torque))
+        return _TORQUE.pack(snapshot.t_us, torque)
 
     def _setpoint_records(self, snapshot: FlightSnapshot) -> bytes:
         t_us = snapshot.t_us
         thrust = (0.0, 0.0, -_sum(self._of_thrust, snapshot.actuators.rotor_thrust))
-        found = _THRUST.pack((*_THRUST.heads, t_us, *thrust))
+        found = _THRUST.pack(t_us, thrust)
         plan = snapshot.plan_state
         if plan is None:
             return found
-        attitude, rates = _ATTITUDE.heads
-        return found + _ATTITUDE.pack(
-            (
-                *(attitude, t_us, *_attitude(plan, snapshot.plan_input), plan.yaw_rate, *thrust),
-                *(rates, t_us, *planned_rates(plan), *thrust),
-            )
-        )
+        attitude = (*_attitude(plan, snapshot.plan_input), plan.yaw_rate, *thrust)
+        return found + _ATTITUDE.pack(t_us, attitude, (*planned_rates(plan), *thrust))
 
     def _slow(self, snapshot: FlightSnapshot) -> bytes:
-        battery, (status, imu) = snapshot.battery, _SLOW.heads
+        battery = snapshot.battery
         left = battery.time_left if math.isfinite(battery.time_left) else _NAN
-        return _SLOW.pack(
-            (
-                *(status, snapshot.t_us, battery.voltage, battery.current),
-                *(1e3 * battery.consumed, battery.remaining, left, int(battery.charge)),
-                *(imu, snapshot.t_us, self._shaken, self._turned),
-            )
+        status = (
+            *(battery.voltage, battery.current, 1e3 * battery.consumed),
+            *(battery.remaining, left, int(battery.charge)),
         )
+        return _SLOW.pack(snapshot.t_us, status, (self._shaken, self._turned))
 
 
 def origin_of(numbers: Mapping[str, float]) -> Origin:
@@ -151,7 +136,7 @@ def origin_of(numbers: Mapping[str, float]) -> Origin:
 
 def cpu_load(t_us: int, load: float, memory: float) -> bytes:
     """A record of cpuload: the ``load`` [1] of the tick, and the share of ``memory`` [1]."""
-    return _LOAD.pack((*_LOAD.heads, t_us, load, memory))
+    return _LOAD.pack(t_us, (load, memory))
 
 
 def validity(snapshot: FlightSnapshot) -> tuple[bool, bool, bool, bool]:
@@ -203,7 +188,7 @@ def _attitude(plan: PredictionState, u: PlanInput | None) -> Vec4:
 
 
 def _place(snapshot: FlightSnapshot, origin: Origin) -> bytes:
-    known, (estimated, received) = snapshot.estimator, _PLACE.heads
+    known = snapshot.estimator
     here = _on_earth(origin, snapshot.estimate.p_WB)
     level, vertical = (
         (_NAN, _NAN) if known is None else (known.level_accuracy, known.vertical_accuracy)
@@ -219,12 +204,7 @@ def _place(snapshot: FlightSnapshot, origin: Origin) -> bytes:
             *(fix.velocity_sigma, math.hypot(fix.v[0], fix.v[1])),
         )
         kind, satellites = fix.kind & 0xFF, fix.satellites & 0xFF
-    return _PLACE.pack(
-        (
-            *(estimated, snapshot.t_us, *here, level, vertical),
-            *(received, snapshot.t_us, *reading, kind, satellites),
-        )
-    )
+    return _PLACE.pack(snapshot.t_us, (*here, level, vertical), (*reading, kind, satellites))
 
 
 def _on_earth(origin: Origin, p: Vec3) -> Vec3:
@@ -239,8 +219,8 @@ def _failsafe_flags(snapshot: FlightSnapshot) -> bytes:
     level, height, level_speed, climb = validity(snapshot)
     charge = int(snapshot.battery.charge)
     return _FLAGS.pack(
+        snapshot.t_us,
         (
-            *(*_FLAGS.heads, snapshot.t_us),
             *(not _ATTITUDE_LOST.isdisjoint(active), not height),
             *(not level, not (level_speed and climb)),
             snapshot.mission.total == 0,
@@ -251,5 +231,5 @@ def _failsafe_flags(snapshot: FlightSnapshot) -> bytes:
             Condition.FENCE_BREACH.value in active,
             Condition.TILT_LOST.value in active,
             not _ROTOR.isdisjoint(active),
-        )
+        ),
     )

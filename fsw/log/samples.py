@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from struct import Struct, pack
 from typing import Any, Final
 
-from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.measurements import ImuSample, Sample
 from fsw.log import topics
 from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
@@ -17,27 +18,6 @@ Values = tuple[Any, ...]
 _SIX: Final = Struct("<6d")
 _UNKNOWN_POSE: Final = pack("<10d", *(math.nan,) * 10)  # position, velocity and attitude
 _LATEST: Final = 1e12  # s; what is later fits no field
-
-
-def _of_imu(one: ImuSample) -> Values:
-    return (one.time, *one.acceleration, *one.rate)
-
-
-def _of_joints(one: JointSample) -> Values:
-    return (one.time, *one.angles)
-
-
-def _of_pose(one: PoseSample) -> Values:
-    place = (one.time, *one.position, *one.attitude, *one.position_variance)
-    return (*place, *one.attitude_variance, one.reset_counter, one.drifts, _sampled_us(one))
-
-
-# The frequent ones; :class:`_Codec` finds the values of any other by the names of its fields.
-_VALUES: Final[dict[type, Callable[[Any], Values]]] = {
-    ImuSample: _of_imu,
-    JointSample: _of_joints,
-    PoseSample: _of_pose,
-}
 
 
 def _sampled_us(one: Sample) -> int:
@@ -51,22 +31,24 @@ class _Codec:
     def __init__(self, kind: type[Sample], topic: Topic) -> None:
         self.number = topics.NUMBERS[topic.name]
         self._kind = kind
-        self._names = tuple(field.name for field in dataclasses.fields(kind))
+        self._of = attrgetter(*[field.name for field in dataclasses.fields(kind)])
         own = [field for field in topic.fields if field.name != topics.SAMPLED]
         self._sizes = tuple(field.count for field in own)  # 0: a number by itself
+        self._is_stamped = len(own) < len(topic.fields)
         self.head = data_head(self.number, topic)
         self.pack = Struct("<5s" + topic.codes).pack
-        self.values = _VALUES.get(kind, self._any_values)
         self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
 
-    def _any_values(self, sample: Sample) -> Values:
+    def values(self, sample: Sample) -> Values:
+        """As the record has them."""
         values: list[float] = []
-        for name, size in zip(self._names, self._sizes, strict=True):
-            value = getattr(sample, name)
+        for value, size in zip(self._of(sample), self._sizes, strict=True):
             if size:
                 values += value
             else:
                 values.append(value)
+        if self._is_stamped:
+            values.append(_sampled_us(sample))
         return tuple(values)
 
     def read(self, body: bytes) -> Sample:

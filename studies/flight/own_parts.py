@@ -163,6 +163,8 @@ def planner_of(config: FlightConfig, parts: OwnParts = OURS) -> PlanningCycle:
     Raises:
         OwnPartError: It cannot be used.
     """
+    import studies.flight.rival_planners  # noqa: F401 - whose names a configuration may have
+
     own = parts.planning(config)
     return own or Planner(config.planner, config.airframe, processor_time_us)
 

@@ -32,7 +32,7 @@ NOT_YET = (
     "fsw/autopilot/control",
 )
 # Keys of files that users have: a scenario's rangefinder, a journal's margin.
-KEYS = {"least_m", "most_m", "least_margin_m", "most_likely"}
+KEYS = {"least_m", "most_m", "least_margin_m", "most_likely", "least_squares"}
 SENTENCES = (
     "says what cannot be",
     "say what cannot be",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+import studies.flight.rival_planners  # noqa: F401 - whose names configurations have
 from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local

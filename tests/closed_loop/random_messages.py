@@ -41,7 +41,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
-from fsw.link.services.service import LinkService, SourcedService
+from fsw.link.services.service import LinkService
 from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
 from messages import message_ids as ids
@@ -172,8 +172,7 @@ class Talkers:
             self.inbox.accept(frame, sender)
             for service in self.services:
                 if frame.message_id in service.message_ids:
-                    if isinstance(service, SourcedService):
-                        service.source = sender
+                    service.source = sender
                     service.handle(frame, t_us)
 
     def command(self, sender: MessageSource, number: int, *params: float) -> None:

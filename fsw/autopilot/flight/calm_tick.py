@@ -24,9 +24,8 @@ from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.estimator import READINGS, read_into, reading_of
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.estimate.sensed_state import SensedState
-from fsw.autopilot.flight.failsafe.active import surely_none
-from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS
-from fsw.autopilot.flight.failsafe.table import SLOW_US
+from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS, FailsafeContext
+from fsw.autopilot.flight.failsafe.table import SLOW_US, quickly_active
 from fsw.autopilot.flight.plan_exchange import planned_input
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
@@ -196,5 +195,6 @@ def _is_calm(state: FlightState, config: FlightConfig) -> bool:
         and bool(state.mission.stream)
         and plan.running is not None
         and state.t_us >= plan.since_us
-        and surely_none(state, estimate, config)
+        and not (vehicle.conditions or state.safety.is_open or state.aiding.lost)
+        and not quickly_active(FailsafeContext(state, estimate, config))
     )

@@ -10,11 +10,16 @@ from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.arming_health import arming_health
 from fsw.autopilot.flight.commands.dedup import answered_before, remember, still_true
 from fsw.autopilot.flight.commands.handlers import Decision, decide, decide_without_estimate
-from fsw.autopilot.flight.failsafe.active import active, quickly_active, surely_none
 from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.failsafe.response import overridden, respond
-from fsw.autopilot.flight.failsafe.table import BLOCKING, SLOW_US, unhealthy
+from fsw.autopilot.flight.failsafe.table import (
+    BLOCKING,
+    SLOW_US,
+    active,
+    quickly_active,
+    unhealthy,
+)
 from fsw.autopilot.flight.land_detector import in_the_air, standing_unclear, stands
 from fsw.autopilot.flight.mission.sequencer import refusal as mission_refusal
 from fsw.autopilot.flight.modes import MODES
@@ -165,8 +170,6 @@ class Commander:
     ) -> FlightState:
         """Report each condition once, when it becomes active, and take its action."""
         slowly = estimate.t_us // SLOW_US != state.t_us // SLOW_US
-        if not slowly and surely_none(state, estimate, self._config):
-            return state
         vehicle = state.vehicle
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show

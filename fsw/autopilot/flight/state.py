@@ -190,6 +190,12 @@ class SafetyMemory:
     jumped_us: int = -1  # when
     counters: SafetyCounters = field(default_factory=SafetyCounters)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether an episode goes on that a later tick may end, or act upon."""
+        since_us = self.off_plan_us, self.breach_us, self.fence_us, self.filter_us
+        return max(*since_us, self.rolled_us, self.pitched_us, self.light_us) >= 0
+
 
 _HEADING_KEPT: Final = 0.5  # of the thrust of a rotor; hover needs half of its command
 

@@ -30,6 +30,7 @@ class Ocp:
         self._limits = JointLimits(model, config.limits)
         parts = parts_of(config, model, safe_set)
         self._costs, self._barriers = parts.costs, parts.barriers
+        self.follows_zones = parts.follows_zones
         blocks: list[tuple[ConstraintBlock, float | None]] = [
             (self._limits.rows, config.joint_slack)
         ]

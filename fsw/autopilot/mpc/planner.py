@@ -19,6 +19,7 @@ from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.mpc.solvers import SOLVERS, Question, Search
+from fsw.autopilot.mpc.variants import VARIANTS
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import (
@@ -43,7 +44,14 @@ class Planner:
     def __init__(
         self, config: PlannerConfig, airframe: Airframe, stopwatch_us: Callable[[], float]
     ) -> None:
-        """Build the prediction model; ``stopwatch_us`` is for the reported stage times only."""
+        """Build the prediction model; ``stopwatch_us`` is for the reported stage times only.
+
+        Raises:
+            ValueError: The controller or the solver is one of a study that is not imported.
+        """
+        for name, known in ((config.controller, VARIANTS), (config.solver, SOLVERS)):
+            if name not in known:
+                raise ValueError(f"{name} is flown for comparison; start it with pandion")
         self._untuned = self._config = config
         self._tuning: Tuning = ()
         self._stopwatch_us = stopwatch_us
@@ -159,9 +167,7 @@ class Planner:
             return self._ocp
         known = None if self._safe_set is None else layout(self._safe_set)
         self._safe_set = safe_set
-        # The costs of sc, and of a centred naive, hold the zones' numbers themselves.
-        in_rows = self._config.controller in ("blf", "hc")
-        if self._ocp is None or layout(safe_set) != known or not in_rows:
+        if self._ocp is None or layout(safe_set) != known or not self._ocp.follows_zones:
             self._ocp = Ocp(self._config, self._model, safe_set)
         else:
             self._ocp.update(safe_set)

@@ -8,15 +8,25 @@ from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.model.body import BodyName
 from fsw.autopilot.mpc.costs import CostWeights
 from fsw.autopilot.mpc.qp_data import InputLimits
-from fsw.autopilot.mpc.soft_costs import SoftWeights
 from fsw.autopilot.periods import HORIZON_US, PLANNING_US
+
+
+@dataclass(frozen=True, slots=True)
+class SoftWeights:
+    """Weights of Table II for eqs 29 and 30, and of our centring; all are flown for comparison."""
+
+    wall: float = 5.0  # w_4
+    wall_terminal: float = 20.0  # w_s4
+    workspace: float = 5.0  # w_5
+    workspace_terminal: float = 20.0  # w_s5
+    centring: float = 100.0  # ours, for the like-for-like Naive
 
 
 @dataclass(frozen=True, slots=True)
 class PlannerConfig:
     """Horizon, weights, limits and barriers of the MPC."""
 
-    controller: str = "blf"  # a name in variants.py
+    controller: str = "blf"  # a name in variants.py; those that it is compared with in studies
     horizon: int = HORIZON_US // PLANNING_US  # n
     period_us: int = PLANNING_US  # T
     solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's

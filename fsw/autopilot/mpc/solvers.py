@@ -2,7 +2,7 @@
 
 Another one is a function and a row in ``SOLVERS`` (and in
 ``fsw.autopilot.parameters.control_choice``, which names it for the command line without importing
-it).
+it). The paper's own is that of ``studies.flight.rival_planners``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.slsqp_solver import NonlinearProgram, minimise
 from fsw.autopilot.mpc.solution import Solution
 
 Stopwatch = Callable[[], float]
@@ -62,15 +61,6 @@ def by_programs(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch)
     return Search(solution, done, iterations, linearise_us, solve_us)
 
 
-def by_slsqp(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
-    """The paper's optimiser, from rest whatever was planned before."""
-    mark = stopwatch_us()
-    solution = minimise(NonlinearProgram(asked.ocp, asked.start, asked.targets))
-    solve_us = stopwatch_us() - mark
-    return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
-
-
 SOLVERS: dict[str, Callable[[Question, PlannerConfig, Stopwatch], Search]] = {
     "clarabel": by_programs,
-    "slsqp": by_slsqp,
 }

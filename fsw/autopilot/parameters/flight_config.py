@@ -17,14 +17,13 @@ from fsw.autopilot.model.airframe import AIRFRAME, Airframe, airframe_of
 from fsw.autopilot.model.body import BODIES, BodyName
 from fsw.autopilot.model.multibody import place_of_tip, posture
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.solvers import SOLVERS
-from fsw.autopilot.mpc.variants import VARIANTS
+from fsw.autopilot.parameters.control_choice import KNOWN
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.signals import Origin
 from fsw.autopilot.tuning import Tuning, tuned
 from vehicles.description import Vehicle
 
-CONTROLLERS = tuple(VARIANTS)
+CONTROLLERS = KNOWN["controller"]
 INNERS: tuple[Inner, ...] = ("tracking", "pid", "px4")
 
 
@@ -203,7 +202,7 @@ def flight_config(
         ("controller", controller, CONTROLLERS),
         ("inner loop", inner, INNERS),
         ("robustness", robustness, ROBUSTNESS_PRESETS),
-        ("solver", solver, SOLVERS),
+        ("solver", solver, KNOWN["solver"]),
         ("body", body, BODIES),
     ):
         if name not in known:

@@ -7,6 +7,7 @@ from typing import Final, cast
 
 from fsw.link.events.event_log import EventLog, NumberedEvent
 from fsw.link.events.event_table import ARGUMENTS
+from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.outgoing import Outgoing
 from messages import message_ids
@@ -21,7 +22,7 @@ _MS: Final = 0xFFFFFFFF
 _SEQUENCE: Final = 0x10000
 
 
-class EventService:
+class EventService(LinkService):
     """Serves one link from the shared log."""
 
     message_ids = frozenset({message_ids.REQUEST_EVENT})

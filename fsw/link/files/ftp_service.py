@@ -17,6 +17,7 @@ from fsw.link.files.ftp_jobs import Job
 from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, refused, write
 from fsw.link.files.ftp_tree import Directory, find, listing
 from fsw.link.files.served_file import OpenFile
+from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing
 from messages import message_ids
@@ -69,7 +70,7 @@ class _Running:
         return self.request.opcode == Opcode.BURST_READ_FILE
 
 
-class FtpService:
+class FtpService(LinkService):
     """Serves one tree of files on one link."""
 
     message_ids = frozenset({message_ids.FILE_TRANSFER_PROTOCOL})

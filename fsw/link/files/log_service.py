@@ -16,6 +16,7 @@ from typing import Final, NamedTuple, cast
 from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
+from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput
 from messages import message_ids
@@ -41,7 +42,7 @@ class _Request(NamedTuple):
     paced: bool  # whether the client sets the pace
 
 
-class LogService:
+class LogService(LinkService):
     """Serves the logs of one link. Messages carry no addressee, so there is one transfer."""
 
     message_ids = frozenset(

@@ -17,7 +17,7 @@ from typing import Final, cast
 from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.served_file import DiskFile, OpenFile
-from fsw.link.services.service import Outcome
+from fsw.link.services.service import LinkService, Outcome
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
 from messages import message_ids
@@ -38,7 +38,7 @@ _DEFINITIONS: Final = frozenset((b"B", b"F", b"I", b"M", b"P", b"Q"))
 _DATA: Final = struct.Struct(f"<H4B{PIECE}s")
 
 
-class LogStreamService:
+class LogStreamService(LinkService):
     """One stream a link, to the program that asked for it."""
 
     message_ids = frozenset({message_ids.LOGGING_ACK})

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, cast
 
-from fsw.autopilot.signals import MessageSource, Severity, StatusText
+from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.services.mission_store import ALL_KINDS, ROOM, Kind, Meaning, MissionStore
 from fsw.link.services.mission_wire import (
     Peer,
@@ -26,6 +26,7 @@ from fsw.link.services.mission_wire import (
     item_float,
     item_int,
 )
+from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
@@ -73,11 +74,10 @@ class _Download:
     last_received_us: int
 
 
-class MissionService:
+class MissionService(LinkService):
     """The mission protocol on one link."""
 
     def __init__(self, store: MissionStore) -> None:
-        self.source: MessageSource | None = None  # of the frame that is handled now
         self._store = store
         self._upload: _Upload | None = None
         self._download: _Download | None = None

@@ -20,7 +20,7 @@ from fsw.autopilot.parameters.float32 import as_text, nearest_decimal
 from fsw.autopilot.parameters.param_type import as_bytes, field_of, value_of
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
-from fsw.link.services.service import Outcome
+from fsw.link.services.service import LinkService, Outcome
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.storage.parameter_store import ParameterStore
@@ -44,7 +44,7 @@ _COUNT: Final = len(_NAMES)
 _INDEX: Final = {name: index for index, name in enumerate(_NAMES)}
 
 
-class ParameterService:
+class ParameterService(LinkService):
     """Parameters on one link."""
 
     message_ids = frozenset({ids.PARAM_REQUEST_READ, ids.PARAM_REQUEST_LIST, ids.PARAM_SET})

@@ -9,59 +9,41 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol, runtime_checkable
+from typing import Final
 
 from fsw.autopilot.signals import CommandRequest, MessageSource
 from fsw.link.wire.outgoing import ServiceOutput
 from messages.frames import Frame
 
-
-class LinkService(Protocol):
-    """One protocol on one link. Checks itself whether a frame is addressed to this vehicle."""
-
-    message_ids: frozenset[int]  # what it wants to hear
-
-    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
-        """Answer a valid frame at once: values of the right type and number, not of any sense."""
-        ...
-
-    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
-        """Go on with an answer that is paced; called often, so idle must cost nothing."""
-        ...
-
-
-@runtime_checkable
-class BulkService(LinkService, Protocol):
-    """A service with much to send to clients that set the pace themselves, piece by piece."""
-
-    def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
-        """The next datagram; nothing without a transfer.
-
-        Called in what is left of a tick, several times, so that it delays none.
-        """
-        ...
-
-
-@runtime_checkable
-class SourcedService(LinkService, Protocol):
-    """A service whose answer depends on who asks."""
-
-    source: MessageSource | None  # of the frame that is handled now
-
-
 Outcome = tuple[int, str]
 """MAV_RESULT of a command, and in a sentence why it is refused."""
 
 
-@runtime_checkable
-class CommandedService(LinkService, Protocol):
-    """A service that carries out commands, which do not reach the tick then."""
+class LinkService:
+    """One protocol on one link. Checks itself whether a frame is addressed to this vehicle."""
 
-    commands: frozenset[int]  # MAV_CMD
+    message_ids: frozenset[int] = frozenset()  # what it wants to hear
+    commands: frozenset[int] = frozenset()  # MAV_CMD that it carries out; no tick sees them
+    source: MessageSource | None = None  # of the frame that is handled now
+
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
+        """Answer a valid frame at once: values of the right type and number, not of any sense."""
+        return ()
+
+    def poll(self, t_us: int) -> Sequence[ServiceOutput]:
+        """Go on with an answer that is paced; called often, so idle must cost nothing."""
+        return ()
+
+    def bulk(self, t_us: int) -> Sequence[ServiceOutput]:
+        """The next datagram of what clients ask for piece by piece; nothing without a transfer.
+
+        Called in what is left of a tick, several times, so that it delays none.
+        """
+        return ()
 
     def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
-        """Do it at once, or begin to."""
-        ...
+        """Do one of its ``commands`` at once, or begin to."""
+        raise NotImplementedError
 
 
 _BUSY_US: Final = 100_000  # after a question or an answer; the slowest pace is 20 ms
@@ -76,9 +58,7 @@ class Dispatch:
         self.failures = 0  # answers that ended in an exception
         self.busy_until_us = 0  # a service was asked or has answered lately
         self._send = send
-        self._polls = tuple(service.poll for service in services)
-        self._bulky = tuple(service for service in services if isinstance(service, BulkService))
-        self._sourced = tuple(one for one in services if isinstance(one, SourcedService))
+        self._services = tuple(services)
         self._wanting: dict[int, tuple[LinkService, ...]] = {}  # by message
         for service in services:
             for id_ in service.message_ids:
@@ -91,26 +71,20 @@ class Dispatch:
 
     def handle(self, frame: Frame, t_us: int, source: MessageSource | None = None) -> None:
         """Let every service that wants the frame answer it."""
-        for sourced in self._sourced:
-            sourced.source = source
         for service in self._wanting.get(frame.message_id, ()):
+            service.source = source
             self.busy_until_us = t_us + _BUSY_US
             self._answer(t_us, service.handle, frame, t_us)
 
     def poll(self, t_us: int) -> None:
         """Let every service go on with what it is sending."""
-        for poll in self._polls:
-            try:
-                for outgoing in poll(t_us):
-                    self.busy_until_us = t_us + _BUSY_US
-                    self._send(outgoing, t_us)
-            except Exception:
-                self._note_failure()
+        for service in self._services:
+            self._answer(t_us, service.poll, t_us)
 
     def bulk(self, t_us: int) -> bool:
         """Let services send a datagram each of what clients wait for; whether any did."""
         sent = False
-        for service in self._bulky:
+        for service in self._services:
             sent |= self._answer(t_us, service.bulk, t_us)
         return sent
 
@@ -125,10 +99,7 @@ class Dispatch:
                 self._send(outgoing, t_us)
                 sent = True
         except Exception:
-            self._note_failure()
+            if self.failures == 0:
+                traceback.print_exc()
+            self.failures += 1
         return sent
-
-    def _note_failure(self) -> None:
-        if self.failures == 0:
-            traceback.print_exc()
-        self.failures += 1

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
+from fsw.link.services.service import LinkService
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.outgoing import Outgoing
 from messages.frames import Frame
 from messages.message_ids import PING, TIMESYNC
 
 
-class TimeService:
+class TimeService(LinkService):
     """Answers in the vehicle's own time, with which its messages are stamped."""
 
     message_ids = frozenset({PING, TIMESYNC})
@@ -25,7 +26,3 @@ class TimeService:
         if system or component:
             return ()  # a ping with a target is an answer
         return (Outgoing(PING, (time_us, sequence, frame.system_id, frame.component_id)),)
-
-    def poll(self, t_us: int) -> Sequence[Outgoing]:
-        """Nothing is paced."""
-        return ()

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from fsw.autopilot.signals import CommandAck, CommandRequest, FlightSnapshot, Severity, StatusText
-from fsw.link.services.service import CommandedService, LinkService
+from fsw.link.services.service import LinkService
 from fsw.link.telemetry.stream_rates import UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode, encode_replies
@@ -46,12 +46,7 @@ class LinkCommands:
         """Carry out what changes the rates, and let ``services`` carry out what is theirs."""
         self._rates = rates
         self._context = context
-        self._commanded = {
-            command: service
-            for service in services
-            if isinstance(service, CommandedService)
-            for command in service.commands
-        }
+        self._commanded = {command: service for service in services for command in service.commands}
 
     def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None

@@ -22,6 +22,7 @@ from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
 from fsw.link.sent_frames import SentFrames
+from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
 from fsw.link.wire.outgoing import Outgoing
@@ -362,7 +363,7 @@ def test_garbage_that_looks_like_the_next_header_does_not_end_the_flight(ground:
     assert [frame for _, frame in ground.recorded] == [first, second]
 
 
-class Echo:
+class Echo(LinkService):
     """A service that answers each PING with itself, and counts down once asked."""
 
     message_ids = frozenset({ids.PING})

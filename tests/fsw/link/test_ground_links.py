@@ -16,6 +16,7 @@ import pytest
 from fsw.autopilot.signals import CommandAck, MissionProgress
 from fsw.link.ground_links import GroundLinks
 from fsw.link.link_choice import LinkChoice, addresses
+from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.udp_endpoint import LinkError, OpenEndpoint
 from fsw.link.wire.outgoing import ServiceOutput
@@ -115,7 +116,7 @@ def test_who_speaks_often_is_not_forgotten_for_those_who_spoke_once(
     assert not api.link.hears(101, 190)
 
 
-class Counting:
+class Counting(LinkService):
     """A service that says nothing, and counts how often it is asked whether it would."""
 
     message_ids = frozenset((ids.TIMESYNC,))

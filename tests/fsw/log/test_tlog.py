@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from fsw.log.run_directory import new_run_directory
+from command_line.run_directory import new_run_directory
 from fsw.log.tlog import TlogWriter
 from messages.frames import FrameWriter
 from tests.waiting import wait_for

@@ -46,7 +46,7 @@ class Failsafe:
 
     condition: Condition
     active: Evidence
-    action: Callable[[FailsafeContext], Action]
+    asks: Action | Callable[[FailsafeContext], Action] = Action.WARN  # what is done
     severity: Severity = Severity.WARNING  # of a report without a change of mode
     detail: Callable[[FailsafeContext], str] = lambda _: ""  # behind the condition's name
     of_vehicle: bool = False  # a fault of the vehicle, shown by telemetry for as long as it lasts
@@ -57,30 +57,43 @@ class Failsafe:
     component: Subject | None = None  # which is reported as unhealthy while it lasts
     takeover: UserTakeoverAllowed = UserTakeoverAllowed.ALWAYS
 
-
-def _always(action: Action) -> Callable[[FailsafeContext], Action]:
-    return lambda _: action
+    def action(self, context: FailsafeContext) -> Action:
+        """What is done now, if it is active."""
+        return self.asks if isinstance(self.asks, Action) else self.asks(context)
 
 
 _SLOWLY: Final = SLOW_US + AT_ONCE_US
 _TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
+# What rows have in common. Faults of the vehicle are found out once a planning period.
+_fault = partial(Failsafe, of_vehicle=True, within_us=_SLOWLY)
 _of_contact = partial(
-    Failsafe,
-    action=_always(Action.RETREAT),
-    severity=Severity.CRITICAL,
-    slow=True,
-    within_us=_SLOWLY,
+    Failsafe, asks=Action.RETREAT, severity=Severity.CRITICAL, slow=True, within_us=_SLOWLY
 )
+_of_sensors = partial(
+    Failsafe,
+    severity=Severity.CRITICAL,
+    of_vehicle=True,
+    slow=True,
+    within_us=_TWICE,
+    component=Subject.SENSORS,
+)
+_of_battery = partial(
+    Failsafe,
+    asks=actions.on_battery,
+    detail=wording.charge_left,
+    slow=True,
+    within_us=_TWICE,
+    component=Subject.BATTERY,
+)
+_of_host = partial(Failsafe, slow=True, within_us=SECOND_US)
 
 FAILSAFES: Final = (
-    Failsafe(
+    _fault(
         Condition.ATTITUDE_LOST,
         evidence.attitude_is_lost,
-        _always(Action.TERMINATE),
+        Action.TERMINATE,
         Severity.EMERGENCY,
         lambda c: ": no estimate for 0.25 s" if evidence.is_blind(c) else wording.unaided(c),
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("COM_ATT_LOSS",),
         component=Subject.ATTITUDE,
     ),
@@ -97,48 +110,40 @@ FAILSAFES: Final = (
         ),
         component=Subject.ATTITUDE,
     ),
-    Failsafe(
+    _fault(
         Condition.POSITION_LOST,
         lambda c: evidence.position_is_off(c, c.limits.position_lost),
-        _always(Action.DESCEND),
+        Action.DESCEND,
         Severity.CRITICAL,
         wording.uncertain,
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T", "COM_POS_FS_EPH"),
         component=Subject.ESTIMATOR,
         takeover=UserTakeoverAllowed.NEVER,
     ),
-    Failsafe(
+    _fault(
         Condition.PLANNER_LOST,
         evidence.planner_is_lost,
-        _always(Action.DESCEND),
+        Action.DESCEND,
         Severity.CRITICAL,
         wording.no_plan,
-        of_vehicle=True,
         slow=True,
-        within_us=_SLOWLY,
         parameters=("COM_PLN_LOSS_T",),
         takeover=UserTakeoverAllowed.NEVER,
     ),
-    Failsafe(
+    _fault(
         Condition.BREACH,
         lambda c: c.state.safety.breach_us >= 0,
         lambda c: actions.on_breach(c, c.limits.breach_action),
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.breach_by),
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("SAFE_BREACH_ACT",),
     ),
-    Failsafe(
+    _fault(
         Condition.FENCE_BREACH,
         lambda c: c.state.safety.fence_us >= 0,
         lambda c: actions.on_breach(c, c.limits.fence_action),
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.fence_by),
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("GF_ACTION",),
     ),
     Failsafe(
@@ -152,15 +157,13 @@ FAILSAFES: Final = (
         within_us=_TWICE,
         parameters=("SAFE_BREACH_ACT", "COM_FAIL_ACT_T"),
     ),
-    Failsafe(
+    _fault(
         Condition.GROUND_CONTACT,
         evidence.stands_on_ground,
-        _always(Action.LAND),
+        Action.LAND,
         Severity.CRITICAL,
         detail=wording.carried,
-        of_vehicle=True,
         slow=True,
-        within_us=_SLOWLY,
     ),
     Failsafe(
         Condition.ROTOR_LOST,
@@ -172,7 +175,7 @@ FAILSAFES: Final = (
         parameters=("FD_ACT_EN", "CBRK_FLIGHTTERM"),
         component=Subject.ACTUATORS,
     ),
-    Failsafe(
+    _fault(
         Condition.ROTOR_FAILED,
         lambda c: (
             bool(c.state.damage.rotor) and not c.state.damage.spared and c.state.vehicle.flies
@@ -180,79 +183,56 @@ FAILSAFES: Final = (
         actions.on_rotor_failed,
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
-        of_vehicle=True,
         slow=True,
-        within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
         component=Subject.ACTUATORS,
     ),
-    Failsafe(
+    _fault(
         Condition.JOINT_FAILED,
         lambda c: bool(c.state.damage.joint) and c.state.vehicle.flies,
         actions.on_actuator_failure,
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.damage.joint}{wording.lasting(c, c.state.damage.joint_us)}",
-        of_vehicle=True,
         slow=True,
-        within_us=_SLOWLY,
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
         component=Subject.ACTUATORS,
     ),
-    Failsafe(
+    _fault(
         Condition.POSITION_LOW,
         lambda c: evidence.position_is_off(c, c.limits.position_low),
         lambda c: actions.by_number(c.limits.position_low_action),
         Severity.CRITICAL,
         wording.uncertain,
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T", "COM_POS_LOW_EPH", "COM_POS_LOW_ACT"),
         component=Subject.ESTIMATOR,
     ),
-    Failsafe(
+    _fault(
         Condition.SENSOR_LOST,
         evidence.sensor_is_lost,
         lambda c: actions.by_number(c.limits.sensor_loss_action),
         Severity.CRITICAL,
         wording.lost_sensor,
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
         component=Subject.SENSORS,
     ),
-    Failsafe(
+    _of_sensors(
         Condition.INERTIAL_LOST,
         evidence.inertial_is_lost,
-        _always(Action.DESCEND),
-        Severity.CRITICAL,
-        wording.lost_sensor,
-        of_vehicle=True,
-        slow=True,
-        within_us=_TWICE,
+        Action.DESCEND,
+        detail=wording.lost_sensor,
         parameters=("COM_SENS_LOSS_T",),
-        component=Subject.SENSORS,
     ),
-    Failsafe(
+    _of_sensors(
         Condition.SENSORS_UNDECIDED,
         lambda c: evidence.sensors_contradict(c, UNDECIDED),
-        _always(Action.LAND),
-        Severity.CRITICAL,
-        wording.suspects,
-        of_vehicle=True,
-        slow=True,
-        within_us=_TWICE,
-        component=Subject.SENSORS,
+        Action.LAND,
+        detail=wording.suspects,
     ),
-    Failsafe(
+    _of_sensors(
         Condition.SENSORS_CONTRADICT,
         lambda c: evidence.sensors_contradict(c, 0.1),
-        _always(Action.RETREAT),
-        Severity.CRITICAL,
-        wording.suspects,
-        of_vehicle=True,
-        slow=True,
-        within_us=_TWICE,
-        component=Subject.SENSORS,
+        Action.RETREAT,
+        detail=wording.suspects,
     ),
     Failsafe(
         Condition.ROOM_LACKING,
@@ -273,7 +253,7 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.TUBE_LEFT,
         lambda c: c.state.safety.off_plan_us >= 0,
-        _always(Action.REPLAN),
+        Action.REPLAN,
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.off_plan_by),
         of_vehicle=True,
@@ -282,7 +262,7 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.FILTER_ACTIVE,
         lambda c: c.state.safety.filter_us >= 0,
-        _always(Action.PUSH),
+        Action.PUSH,
         Severity.CRITICAL,
         of_vehicle=True,
         within_us=2 * AT_ONCE_US,
@@ -290,31 +270,27 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.PLAN_STALE,
         evidence.plan_is_stale,
-        _always(Action.BRAKE),
+        Action.BRAKE,
         detail=wording.no_plan,
         of_vehicle=True,
     ),
-    Failsafe(
+    _fault(
         Condition.AIDING_LOST,
         evidence.is_unaided,
-        _always(Action.DEAD_RECKON),
+        Action.DEAD_RECKON,
         detail=wording.unaided,
-        of_vehicle=True,
-        within_us=_SLOWLY,
         parameters=("COM_AID_LOSS_T",),
         component=Subject.ESTIMATOR,
     ),
     Failsafe(
         Condition.ESTIMATE_INVALID,
         lambda c: c.state.invalid_ticks >= evidence.INVALID_TICKS,
-        _always(Action.WARN),
         of_vehicle=True,
         component=Subject.ESTIMATOR,
     ),
     Failsafe(
         Condition.OUTPUT_NOT_FINITE,
         lambda c: c.state.output_replaced,
-        _always(Action.WARN),
         of_vehicle=True,
         within_us=2 * AT_ONCE_US,
         component=Subject.ACTUATORS,
@@ -322,7 +298,6 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.PLAN_REFUSED,
         lambda c: c.state.plan.refused,
-        _always(Action.WARN),
         detail=wording.refused_plan,
         of_vehicle=True,
         within_us=2 * AT_ONCE_US,
@@ -331,7 +306,6 @@ FAILSAFES: Final = (
         Condition.PLAN_LATE,
         # In every tick: a plan may come before the next look, and would have been late in silence.
         lambda c: c.state.plan.awaited_missed and evidence.plans(c),
-        _always(Action.WARN),
         within_us=2 * AT_ONCE_US,
     ),
     Failsafe(
@@ -340,57 +314,41 @@ FAILSAFES: Final = (
             c.state.safety.jumped_us >= 0
             and c.estimate.t_us - c.state.safety.jumped_us < evidence.JUMP_SHOWN_US
         ),
-        _always(Action.WARN),
-        Severity.CRITICAL,
-        wording.jumped,
+        severity=Severity.CRITICAL,
+        detail=wording.jumped,
         slow=True,
         within_us=_SLOWLY,
     ),
-    Failsafe(
+    _of_host(
         Condition.LOOP_OVERRUN,
         lambda c: c.state.host.missed_ticks >= evidence.MISSED_TICKS,
-        _always(Action.WARN),
         detail=lambda c: f": {c.state.host.missed_ticks} in the last second",
-        slow=True,
-        within_us=SECOND_US,
     ),
-    Failsafe(
+    _of_host(
         Condition.CLOCK_JUMPED,
         lambda c: abs(c.state.host.clock_jump_us) >= evidence.JUMP_US,
-        _always(Action.WARN),
         detail=lambda c: f" by {1e-6 * c.state.host.clock_jump_us:+.1f} s",
-        slow=True,
-        within_us=SECOND_US,
     ),
-    Failsafe(
+    _of_host(
         Condition.LINK_FLOODED,
         lambda c: c.state.host.datagrams > c.limits.flood_rate,
-        _always(Action.WARN),
-        Severity.CRITICAL,
+        severity=Severity.CRITICAL,
         detail=lambda c: f": {c.state.host.datagrams} datagrams in the last second",
-        slow=True,
-        within_us=SECOND_US,
         parameters=("COM_FLOOD_RATE",),
     ),
-    Failsafe(
+    _of_host(
         Condition.LOG_STOPPED,
         lambda c: bool(c.state.host.log_failure),
-        _always(Action.WARN),
-        Severity.CRITICAL,
+        severity=Severity.CRITICAL,
         detail=lambda c: f": {c.state.host.log_failure}",
-        slow=True,
-        within_us=SECOND_US,
         parameters=("COM_ARM_SDCARD",),
         component=Subject.STORAGE,
     ),
-    Failsafe(
+    _of_host(
         Condition.DISK_FULL,
         lambda c: c.state.host.disk_left_us >= 0,
-        _always(Action.WARN),
-        Severity.CRITICAL,
+        severity=Severity.CRITICAL,
         detail=lambda c: f": room for {1e-6 * c.state.host.disk_left_us:.0f} s of the flight log",
-        slow=True,
-        within_us=SECOND_US,
         component=Subject.STORAGE,
     ),
     Failsafe(
@@ -403,7 +361,7 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.ZONES_SILENT,
         lambda c: c.state.mission.silent_zones > 0,
-        _always(Action.WARN),  # a place to go to is not known: nothing is known of the zone
+        Action.WARN,  # a place to go to is not known: nothing is known of the zone
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.mission.silent_zones} held where predicted",
         slow=True,
@@ -433,49 +391,34 @@ FAILSAFES: Final = (
             "COM_FAIL_ACT_T",
         ),
     ),
-    Failsafe(
+    _of_battery(
         Condition.BATTERY_LOW,
         lambda c: c.state.battery.charge is BatteryWarning.LOW,
-        actions.on_battery,
-        detail=wording.charge_left,
-        slow=True,
-        within_us=_TWICE,
         parameters=("BAT_LOW_THR",),
-        component=Subject.BATTERY,
     ),
-    Failsafe(
+    _of_battery(
         Condition.BATTERY_CRITICAL,
         lambda c: c.state.battery.charge is BatteryWarning.CRITICAL,
-        actions.on_battery,
-        Severity.CRITICAL,
-        wording.charge_left,
-        slow=True,
+        severity=Severity.CRITICAL,
         delayed=True,
-        within_us=_TWICE,
         parameters=("BAT_CRIT_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
-        component=Subject.BATTERY,
     ),
-    Failsafe(
+    _of_battery(
         Condition.BATTERY_EMERGENCY,
         lambda c: c.state.battery.charge is BatteryWarning.EMERGENCY,
-        actions.on_battery,
-        Severity.EMERGENCY,
-        wording.charge_left,
-        slow=True,
+        severity=Severity.EMERGENCY,
         delayed=True,
-        within_us=_TWICE,
         parameters=("BAT_EMERGEN_THR", "COM_LOW_BAT_ACT", "COM_FAIL_ACT_T"),
-        component=Subject.BATTERY,
     ),
     Failsafe(
         Condition.PARAMETERS_CONTRADICT,
         lambda c: bool(c.contradiction),
-        _always(Action.WARN),
         detail=lambda c: f": {c.contradiction}",
         slow=True,
         within_us=_SLOWLY,
     ),
 )
+
 
 ROWS: Final = {row.condition: row for row in FAILSAFES}
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
@@ -490,3 +433,16 @@ def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
     On the ground the arming checks say it. They are about arming, and an armed vehicle has none.
     """
     return tuple([one.value for one in conditions if ROWS[one].component is not None])
+
+
+def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
+    """Rows whose condition is active, in the order of the table; almost always none."""
+    return tuple([row for row in FAILSAFES if row.active(context)])
+
+
+def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
+    """The same between two planning periods: the slow rows are as they were found last."""
+    before = context.state.vehicle.conditions
+    return tuple(
+        [row for row in FAILSAFES if (row.condition in before if row.slow else row.active(context))]
+    )

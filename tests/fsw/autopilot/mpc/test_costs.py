@@ -15,16 +15,12 @@ from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import YAW, Array, condense
 from fsw.autopilot.mpc.costs import Cost, CostWeights, PostureCost, TrackingCost
-from fsw.autopilot.mpc.soft_costs import (
-    SoftWeights,
-    SphereCost,
-    ZoneCost,
-    one_sided_reciprocal,
-)
+from fsw.autopilot.mpc.planner_config import SoftWeights
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, Zone
+from studies.flight.soft_costs import SphereCost, ZoneCost, one_sided_reciprocal
 from tests.fsw.autopilot.mpc.quadratics import quadratic
 from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import prediction_vector

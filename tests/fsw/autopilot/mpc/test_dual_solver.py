@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import studies.flight.rival_planners  # noqa: F401 - whose names configurations have
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array, condense

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import studies.flight.rival_planners  # noqa: F401 - whose names configurations have
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array, CondensedModel, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp

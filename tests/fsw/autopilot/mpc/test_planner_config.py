@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.mpc.costs import CostWeights
-from fsw.autopilot.mpc.planner_config import PlannerConfig
+from fsw.autopilot.mpc.planner_config import PlannerConfig, SoftWeights
 from fsw.autopilot.mpc.qp_data import InputLimits
-from fsw.autopilot.mpc.soft_costs import SoftWeights
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import number_at
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import studies.flight.rival_planners  # noqa: F401 - whose names configurations have
 from fsw.autopilot.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.linearisation import Linearisation

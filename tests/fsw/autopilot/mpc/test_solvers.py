@@ -14,7 +14,7 @@ from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.solution import Solution
-from fsw.autopilot.mpc.solvers import Question, Search, by_programs, by_slsqp
+from fsw.autopilot.mpc.solvers import Question, Search, by_programs
 from fsw.autopilot.signals import SolverStatus
 
 INPUTS, SLACKS = 6, 2
@@ -72,15 +72,3 @@ def test_both_stages_are_timed_over_all_programs() -> None:
     search = searched(Programs(), 3, itertools.accumulate(range(9)))
     assert search.linearise_us == 1.0 + 4.0 + 7.0
     assert search.solve_us == 2.0 + 5.0 + 8.0
-
-
-def test_what_is_searched_in_one_piece_is_timed_in_one_piece(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found = Solution(SolverStatus.SOLVED, np.zeros(INPUTS), 17)
-    monkeypatch.setattr("fsw.autopilot.mpc.solvers.NonlinearProgram", lambda *_: None)
-    monkeypatch.setattr("fsw.autopilot.mpc.solvers.minimise", lambda _: found)
-    marks = itertools.count(5000, 1000)
-    question = Question(cast(Ocp, Programs()), START, TARGETS, GUESS)
-    search = by_slsqp(question, PlannerConfig(body="points"), lambda: float(next(marks)))
-    assert search == Search(found, 17, 17, linearise_us=0.0, solve_us=1000.0)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from fsw.autopilot.model.body import BODIES
-from fsw.autopilot.mpc.solvers import SOLVERS
 from fsw.autopilot.parameters.control_choice import INNER_LOOPS, KNOWN
-from fsw.autopilot.parameters.flight_config import CONTROLLERS, INNERS, ROBUSTNESS_PRESETS
+from fsw.autopilot.parameters.flight_config import INNERS, ROBUSTNESS_PRESETS
+from studies.flight.rival_planners import SOLVERS, VARIANTS
 
 
 def test_every_name_offered_can_be_built_and_none_is_left_out() -> None:
     assert {what: set(names) for what, names in KNOWN.items()} == {
-        "controller": set(CONTROLLERS),
+        "controller": set(VARIANTS),
         "tracking": set(INNER_LOOPS),
         "lambda": set(ROBUSTNESS_PRESETS),
         "solver": set(SOLVERS),

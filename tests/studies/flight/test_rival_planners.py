@@ -14,12 +14,12 @@ from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import condense
 from fsw.autopilot.mpc.costs import PostureCost, TrackingCost
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.soft_costs import SphereCost, ZoneCost
-from fsw.autopilot.mpc.variants import VARIANTS, parts_of
+from fsw.autopilot.mpc.variants import parts_of
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet
+from studies.flight.rival_planners import VARIANTS, SphereCost, ZoneCost
 from tests.fsw.autopilot.mpc.quadratics import quadratic
 from tests.fsw.paper_arm import INPUTS
 

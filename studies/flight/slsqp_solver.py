@@ -17,8 +17,10 @@ import numpy as np
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
+from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.mpc.qp_data import CONE, QpData
 from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.solvers import Question, Search, Stopwatch
 from fsw.autopilot.signals import SolverStatus
 
 Slopes = tuple[Callable[[Array], Array], Callable[[Array], Array]]
@@ -33,6 +35,14 @@ _STATUS = {
     _INCOMPATIBLE: SolverStatus.INFEASIBLE,
     _ITERATIONS: SolverStatus.TIME_LIMIT,
 }
+
+
+def by_slsqp(asked: Question, config: PlannerConfig, stopwatch_us: Stopwatch) -> Search:
+    """The paper's optimiser, from rest whatever was planned before."""
+    mark = stopwatch_us()
+    solution = minimise(NonlinearProgram(asked.ocp, asked.start, asked.targets))
+    solve_us = stopwatch_us() - mark
+    return Search(solution, solution.iterations, solution.iterations, 0.0, solve_us)
 
 
 def minimise(

@@ -11,7 +11,6 @@ Source: docs/equations.md E29, E30.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +20,11 @@ from fsw.autopilot.barriers.zone_rows import ZoneRows
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Array, P
 from fsw.autopilot.mpc.costs import Quadratic, add_square
+from fsw.autopilot.mpc.planner_config import SoftWeights
 from fsw.autopilot.signals import Zone
 from fsw.compiled import compiled
 
-_LEAST_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
-
-
-@dataclass(frozen=True, slots=True)
-class SoftWeights:
-    """Weights of Table II for eqs 29 and 30, and of our centring."""
-
-    wall: float = 5.0  # w_4
-    wall_terminal: float = 20.0  # w_s4
-    workspace: float = 5.0  # w_5
-    workspace_terminal: float = 20.0  # w_s5
-    centring: float = 100.0  # ours, for the like-for-like Naive
+_MIN_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
 
 
 class ZoneCost:
@@ -81,7 +70,7 @@ class SphereCost:
 @compiled
 def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float]:
     """Eq 29 of a ``gap`` [m] and ``weight`` [1/m^2]: value, slope (< 0) and curvature (> 0)."""
-    d = max(gap, _LEAST_GAP)
+    d = max(gap, _MIN_GAP)
     value, slope, curvature = 1.0 / d**2, -2.0 / d**3, 6.0 / d**4
     step = min(gap - d, 0.0)
     value += step * (slope + 0.5 * step * curvature)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,12 +19,19 @@ from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.slsqp_solver import MAX_ITERATIONS, TOLERANCE, NonlinearProgram, minimise
 from fsw.autopilot.mpc.solution import Solution
-from fsw.autopilot.mpc.variants import VARIANTS
+from fsw.autopilot.mpc.solvers import Question, Search
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import PlanFailure, SafeSet, SolverStatus
+from studies.flight.rival_planners import VARIANTS
+from studies.flight.slsqp_solver import (
+    MAX_ITERATIONS,
+    TOLERANCE,
+    NonlinearProgram,
+    by_slsqp,
+    minimise,
+)
 from tests.fsw.autopilot.mpc.requests import STILL, below, hovering, planned, planner, request
 from tests.fsw.paper_arm import INPUTS, STATES
 
@@ -265,3 +273,16 @@ def test_a_failure_is_no_plan() -> None:
     assert isinstance(answer, PlanFailure)
     assert answer.status is not SolverStatus.INPUT_REFUSED
     assert "iterations" in answer.reason
+
+
+def test_what_is_searched_in_one_piece_is_timed_in_one_piece(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = Solution(SolverStatus.SOLVED, np.zeros(INPUTS), 17)
+    monkeypatch.setattr("studies.flight.slsqp_solver.NonlinearProgram", lambda *_: None)
+    monkeypatch.setattr("studies.flight.slsqp_solver.minimise", lambda _: found)
+    marks = itertools.count(5000, 1000)
+    targets = TargetPoints(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2))
+    question = Question(cast(Ocp, None), np.zeros(STATES), targets, np.zeros(INPUTS))
+    search = by_slsqp(question, CONFIG, lambda: float(next(marks)))
+    assert search == Search(found, 17, 17, linearise_us=0.0, solve_us=1000.0)

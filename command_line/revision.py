@@ -9,7 +9,7 @@ from typing import Final
 
 from command_line.version import version
 
-_SOURCE: Final = Path(__file__).resolve().parents[2]
+_SOURCE: Final = Path(__file__).resolve().parents[1]
 _PATIENCE_S: Final = 5.0
 _OF_A_REPOSITORY: Final = (
     "GIT_DIR",
