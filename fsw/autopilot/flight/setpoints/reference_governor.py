@@ -118,42 +118,6 @@ def limit_descent(p: Vec3, v: Vec3, body_height: float, touch_speed: float) -> t
     return (x, y, z), (vx, vy, vz)
 
 
-def limit_reference(
-    targets: tuple[EndEffectorTarget, ...],
-    p_WE: Vec3,
-    v_WE: Vec3,
-    safe_set: SafeSet,
-    barrier: BarrierTuning,
-) -> tuple[EndEffectorTarget, ...]:
-    """The targets of a horizon, the same object where nothing had to be limited.
-
-    What is asked for near the motion of the end-effector, ``p_WE`` [m] and ``v_WE`` [m/s], and not
-    far behind a wall passes as it is: the paper's own path enters the safety zone.
-    """
-    return _limit_all(targets, p_WE, v_WE, safe_set, barrier, UNLIMITED)[0]
-
-
-def _limit_all(
-    targets: tuple[EndEffectorTarget, ...],
-    p_WE: Vec3,
-    v_WE: Vec3,
-    safe_set: SafeSet,
-    barrier: BarrierTuning,
-    limits: Limits,
-) -> tuple[tuple[EndEffectorTarget, ...], int]:
-    """``limit_reference`` with limits of height and speed, and which of them targets have left."""
-    zones, begin_us, limited, left = _moving_zones(safe_set), targets[0].t_us, [], 0
-    for target in targets:
-        p, v, which = _limit_target()(
-            *(zones, begin_us, target.t_us, target.p_WE, target.v_WE),
-            *(p_WE, v_WE, barrier.alpha, barrier.slope, limits),
-        )
-        limited.append(EndEffectorTarget(target.t_us, p, v, target.a_WE, target.yaw, target.force))
-        left |= which
-    result = tuple(limited)
-    return targets if result == targets else result, left
-
-
 @kernel
 def _limited(
     zones: Array,
@@ -167,7 +131,7 @@ def _limited(
     slope: float,
     limits: Limits,
 ) -> tuple[Vec3, Vec3, int]:
-    """``limit_reference`` for place and velocity of one target, of ``t_us``; what it has left."""
+    """Place and velocity of one target, of ``t_us``, as limited; and which limits it has left."""
     ahead, left = 1e-6 * (t_us - begin_us), 0
     lowest, highest, fastest = limits
     led = add_scaled(p_WE, v_WE, ahead)
@@ -289,8 +253,13 @@ class ReferenceGovernor:
     def limit_horizon(
         self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
     ) -> tuple[EndEffectorTarget, ...]:
-        """See ``limit_reference``; the end-effector is at ``p_WE`` [m] and moves at v_WE [m/s]."""
-        return limit_reference(targets, p_WE, v_WE, safe_set, self._barrier)
+        """The targets of a horizon, the same object where nothing had to be limited.
+
+        What is asked for near the motion of the end-effector, ``p_WE`` [m, NED] and ``v_WE``
+        [m/s, NED], and not far behind a wall passes as it is: the paper's own path enters the
+        safety zone.
+        """
+        return self._limited(targets, p_WE, v_WE, safe_set, UNLIMITED)[0]
 
     def limit_external(
         self,
@@ -306,8 +275,27 @@ class ReferenceGovernor:
         [m, NED] is where it came up from, if it is on its way from below the lowest height.
         """
         limits = self._limits_from(lowest)
-        limited, left = _limit_all(targets, p_WE, v_WE, safe_set, self._barrier, limits)
+        limited, left = self._limited(targets, p_WE, v_WE, safe_set, limits)
         return limited, self.reason(left, limits)
+
+    def _limited(
+        self,
+        targets: tuple[EndEffectorTarget, ...],
+        p_WE: Vec3,
+        v_WE: Vec3,
+        safe_set: SafeSet,
+        limits: Limits,
+    ) -> tuple[tuple[EndEffectorTarget, ...], int]:
+        """The targets within limits of height and speed too, and which of these they have left."""
+        zones, begin_us, limited, left = _moving_zones(safe_set), targets[0].t_us, [], 0
+        alpha, slope = self._barrier.alpha, self._barrier.slope
+        for one in targets:
+            about = zones, begin_us, one.t_us, one.p_WE, one.v_WE, p_WE, v_WE
+            p, v, which = _limit_target()(*about, alpha, slope, limits)
+            limited.append(EndEffectorTarget(one.t_us, p, v, one.a_WE, one.yaw, one.force))
+            left |= which
+        result = tuple(limited)
+        return targets if result == targets else result, left
 
     def limit_now(
         self,

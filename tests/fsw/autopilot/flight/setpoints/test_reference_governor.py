@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.flight.setpoints.reference_governor import (
     ReferenceGovernor,
-    limit_reference,
     project,
     project_to_safe_set,
 )
@@ -23,7 +21,8 @@ from fsw.autopilot.signals import EndEffectorTarget, MotionSetpoint, SafeSet, Ve
 
 WALL = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
 STILL: Vec3 = (0.0, 0.0, 0.0)
-BARRIER = BarrierTuning(alpha=2.0, slope=4.0)
+CONFIG = flight_config(body="points")
+GOVERNOR = ReferenceGovernor(CONFIG)
 
 
 def horizon(first: Vec3, v: Vec3 = STILL) -> tuple[EndEffectorTarget, ...]:
@@ -41,7 +40,7 @@ def horizon(first: Vec3, v: Vec3 = STILL) -> tuple[EndEffectorTarget, ...]:
 def kept(
     targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3 = STILL
 ) -> tuple[EndEffectorTarget, ...]:
-    return limit_reference(targets, p_WE, v_WE, WALL, BARRIER)
+    return GOVERNOR.limit_horizon(targets, p_WE, v_WE, WALL)
 
 
 def test_the_paper_s_path_into_the_safety_zone_passes_untouched() -> None:
@@ -80,7 +79,7 @@ BRANCH = SafeSet((point((1.0, 0.0, -1.2), 0.3),))
 
 def test_a_path_that_passes_a_point_within_its_clearance_stays_as_it_is() -> None:
     targets = horizon((1.0, 0.25, -1.2), (0.3, 0.0, 0.0))
-    assert limit_reference(targets, (0.9, 0.3, -1.2), STILL, BRANCH, BARRIER) is targets
+    assert GOVERNOR.limit_horizon(targets, (0.9, 0.3, -1.2), STILL, BRANCH) is targets
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.01, 0.3), st.floats(0.5, 3.0))
@@ -92,13 +91,11 @@ def test_nothing_pulls_deep_into_the_ball_of_a_point_or_fast_towards_it(
     p_WE = (1.0 + 0.35 * away[0], 0.35 * away[1], -1.2)
     inward = (-speed * away[0], -speed * away[1], 0.0)
     targets = (EndEffectorTarget(0, target, inward, STILL),)
-    (limited,) = limit_reference(targets, p_WE, STILL, BRANCH, BARRIER)
+    (limited,) = GOVERNOR.limit_horizon(targets, p_WE, STILL, BRANCH)
     assert math.dist(limited.p_WE, (1.0, 0.0, -1.2)) == pytest.approx(max(distance, 0.2))
     assert math.hypot(*limited.v_WE) <= 0.5 + 1e-9
 
 
-CONFIG = flight_config(body="points")
-GOVERNOR = ReferenceGovernor(CONFIG)
 LEGS = CONFIG.airframe.leg_length
 NO_WALLS = SafeSet()
 
@@ -164,11 +161,13 @@ def test_a_setpoint_stays_within_the_configured_distance_of_the_vehicle() -> Non
 
 
 def test_a_horizon_is_limited_with_the_barriers_own_braking() -> None:
-    barrier = CONFIG.planner.walls
+    walls = replace(CONFIG.planner.walls, alpha=1.0)
+    weaker = ReferenceGovernor(replace(CONFIG, planner=replace(CONFIG.planner, walls=walls)))
     targets, here = horizon((0.8, 0.0, -1.2), (3.0, 0.0, 0.0)), (0.4, 0.0, -1.2)
-    expected = limit_reference(targets, here, STILL, WALL, barrier)
-    assert GOVERNOR.limit_horizon(targets, here, STILL, WALL) == expected
-    assert expected != targets
+    faster, slower = (
+        one.limit_horizon(targets, here, STILL, WALL)[0].v_WE[0] for one in (GOVERNOR, weaker)
+    )
+    assert 0.0 < slower < faster < 3.0
 
 
 def test_a_target_beyond_a_wall_rests_at_the_boundary_and_one_inside_goes_on() -> None:
