@@ -524,8 +524,8 @@ BOTH = (Condition.DATALINK_LOST, Condition.BREACH)  # any two, of which the firs
 def two_rows(later: Action, at_once: Action) -> tuple[Failsafe, Failsafe]:
     first, second = (ROWS[condition] for condition in BOTH)
     return (
-        replace(first, action=lambda _: later, delayed=True),
-        replace(second, action=lambda _: at_once, delayed=False),
+        replace(first, asks=later, delayed=True),
+        replace(second, asks=at_once, delayed=False),
     )
 
 
