@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from fsw.autopilot.periods import PLANNING_US, TICK_US
@@ -55,6 +55,12 @@ class GroupTiming:
     lateness_p99_us: float = 0.0
     lateness_max_us: float = 0.0
     load: float = 0.0  # share of the period spent executing, mean over the interval
+
+    @property
+    def shown(self) -> tuple[float, ...]:
+        """Counts, period and times, in the order of log and link."""
+        period_us, *counts_and_times, _ = astuple(self)
+        return (*counts_and_times[:3], period_us, *counts_and_times[3:])
 
 
 @dataclass(frozen=True, slots=True)

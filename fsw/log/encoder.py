@@ -8,7 +8,6 @@ each would cost more than the numbers in them.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
 from operator import attrgetter
 from typing import Any, Final
 
@@ -31,7 +30,6 @@ from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import (
     CommandRequest,
-    ContactReport,
     EstimatorReport,
     FlightSnapshot,
     Origin,
@@ -173,7 +171,8 @@ class LogEncoder:
         if self._details.is_due(t_us):
             out += self._detail(snapshot)
             if snapshot.touching is not None:
-                out += _contact(t_us, snapshot.touching)
+                contact, force, *numbers = snapshot.touching
+                out += _CONTACT.pack(t_us, (*force, *numbers, contact))
         if snapshot.plan_state is not None and self._plans.is_due(t_us):
             out += self._in_flight(snapshot)
         if self._rates.is_due(t_us):
@@ -300,16 +299,9 @@ class LogEncoder:
         return _MPC.pack(snapshot.t_us, (t_plan, plan_id, *counts, *about, status))
 
 
-def _contact(t_us: int, k: ContactReport) -> bytes:
-    numbers = (*k.force, k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance)
-    return _CONTACT.pack(t_us, (*numbers, k.contact))
-
-
 def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:
     """A record of loop_timing for rate group 0, the tick, or 1, the planner."""
-    period_us, *counts_and_times, _ = astuple(timing)
-    counts, times = counts_and_times[:3], counts_and_times[3:]
-    return _TIMING.pack(t_us, (*counts, period_us, *times, group))
+    return _TIMING.pack(t_us, (*timing.shown, group))
 
 
 def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:

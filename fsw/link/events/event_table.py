@@ -73,6 +73,9 @@ _ACTIONS: Final = {
         )
     },
 }
+# The names of these enumerations in the document.
+_HEALTH_T, _MODE_T = "health_component_t", "navigation_mode_group_t"
+_CONDITION_T, _ACTION_T = "condition_t", "failsafe_action_t"
 _CONDITIONS: Final = {condition: number for number, condition in enumerate(Condition)}
 
 
@@ -146,55 +149,37 @@ def _event(number: int, severity: int, arguments: bytes) -> Event:
 @cache
 def event_document() -> bytes:
     """The document about all events, as JSON."""
-    modes = _argument("uint32_t", "modes", enum="navigation_mode_group_t")
-    component = _argument("uint8_t", "component")
-    health = "health_component_t"
     checks = {
-        str(_CHECK + number): {
-            "name": f"check_{number}_{check.subject.name.lower()}",
-            "message": check.summary,
-            "arguments": [modes, component],
-        }
+        str(_CHECK + number): _described(
+            f"check_{number}_{check.subject.name.lower()}",
+            check.summary,
+            f"{_MODE_T} modes",
+            "uint8_t component",
+        )
         for number, check in enumerate(CHECKS)
     }
-    arming = {
-        "name": "arming_check_summary",
-        "message": "Arming checks",
-        "type": "summary",
-        "arguments": [
-            _argument("uint8_t", "chunk_idx"),
-            *(_argument("", name, enum=health) for name in ("error", "warning")),
-            *(
-                _argument("", name, enum="navigation_mode_group_t")
-                for name in ("can_arm", "can_run")
-            ),
-        ],
-    }
-    healthy = {
-        "name": "health_summary",
-        "message": "Health",
-        "type": "summary",
-        "arguments": [
-            _argument("uint8_t", "chunk_idx"),
-            *(_argument("", name, enum=health) for name in ("is_present", "error", "warning")),
-        ],
-    }
-    condition = _argument("", "condition", enum="condition_t")
-    begun = {
-        "name": "failsafe",
-        "message": "{1}: {2}",
-        "arguments": [condition, _argument("", "action", enum="failsafe_action_t")],
-    }
-    delayed = {
-        "name": "failsafe_delayed",
-        "message": "{1}: {2}, {3} in {4} s",
-        "arguments": [
-            condition,
-            *(_argument("", name, enum="failsafe_action_t") for name in ("action", "later")),
-            _argument("uint8_t", "delay_s"),
-        ],
-    }
-    over = {"name": "failsafe_over", "message": "Over: {1}", "arguments": [condition]}
+    arming = _described(
+        "arming_check_summary",
+        "Arming checks",
+        *("uint8_t chunk_idx", f"{_HEALTH_T} error", f"{_HEALTH_T} warning"),
+        *(f"{_MODE_T} can_arm", f"{_MODE_T} can_run"),
+        sums_up=True,
+    )
+    healthy = _described(
+        "health_summary",
+        "Health",
+        *("uint8_t chunk_idx", f"{_HEALTH_T} is_present"),
+        *(f"{_HEALTH_T} error", f"{_HEALTH_T} warning"),
+        sums_up=True,
+    )
+    condition, action = f"{_CONDITION_T} condition", f"{_ACTION_T} action"
+    begun = _described("failsafe", "{1}: {2}", condition, action)
+    delayed = _described(
+        "failsafe_delayed",
+        "{1}: {2}, {3} in {4} s",
+        *(condition, action, f"{_ACTION_T} later", "uint8_t delay_s"),
+    )
+    over = _described("failsafe_over", "Over: {1}", condition)
     described = {
         "namespace": "pandion",
         "enums": _enumerations(),
@@ -214,8 +199,11 @@ def event_document() -> bytes:
     return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
 
 
-def _argument(kind: str, name: str, enum: str = "") -> dict[str, str]:
-    return {"type": enum or kind, "name": name}
+def _described(name: str, message: str, *arguments: str, sums_up: bool = False) -> dict[str, Any]:
+    """An event and its ``arguments``, each a type and a name."""
+    typed = [dict(zip(("type", "name"), one.split(), strict=True)) for one in arguments]
+    kind = {"type": "summary"} if sums_up else {}
+    return {"name": name, "message": message, **kind, "arguments": typed}
 
 
 def _enumerations() -> dict[str, Any]:
@@ -224,10 +212,10 @@ def _enumerations() -> dict[str, Any]:
     groups = {1 << px4.nav_state: (px4.name, px4.name) for px4 in _MODE_GROUPS.values()}
     components = {1 << bit: names for bit, names in _COMPONENTS.items()}
     return {
-        "health_component_t": _enumeration("uint32_t", components, bitfield=True),
-        "navigation_mode_group_t": _enumeration("uint32_t", groups, bitfield=True),
-        "condition_t": _enumeration("uint8_t", conditions),
-        "failsafe_action_t": _enumeration("uint8_t", actions),
+        _HEALTH_T: _enumeration("uint32_t", components, bitfield=True),
+        _MODE_T: _enumeration("uint32_t", groups, bitfield=True),
+        _CONDITION_T: _enumeration("uint8_t", conditions),
+        _ACTION_T: _enumeration("uint8_t", actions),
     }
 
 

@@ -109,10 +109,6 @@ def _set_standard_mode(request: CommandRequest, _: Locate) -> CommandAction:
     return SwitchMode(mode)
 
 
-def _take_off(request: CommandRequest, locate: Locate) -> CommandAction:
-    return TakeOff(_height(request, locate, "no takeoff"))
-
-
 def _reposition(request: CommandRequest, locate: Locate) -> CommandAction:
     speed, flags, _, yaw = request.params[:4]
     if abs(yaw) > MAX_YAW:
@@ -162,10 +158,6 @@ def _look_at(request: CommandRequest, locate: Locate) -> CommandAction:
     if any(math.isnan(value) for value in request.params[4:6]):
         raise _InvalidError("no region of interest: latitude and longitude are needed")
     return LookAt(Place(_north_east(request, locate, "no region of interest")))
-
-
-def _look_away(request: CommandRequest, _: Locate) -> CommandAction:
-    return LookAt(None)
 
 
 def _look(request: CommandRequest, locate: Locate) -> CommandAction:
@@ -234,10 +226,6 @@ def _set_mission_step(request: CommandRequest, _: Locate) -> CommandAction:
     return SetMissionStep(request.params[0], request.params[1] == 1.0)
 
 
-def _check_arming(request: CommandRequest, _: Locate) -> CommandAction:
-    return Order.CHECK_ARMING
-
-
 def _calibrate(request: CommandRequest, _: Locate) -> CommandAction:
     """All zeros cancel a calibration; none is running."""
     if all(value == 0.0 or math.isnan(value) for value in request.params):
@@ -270,8 +258,8 @@ def _inject_failure(request: CommandRequest, _: Locate) -> CommandAction:
     return InjectFailure(int(unit), int(kind), int(instance))
 
 
-def _to(mode: Mode) -> Callable[[CommandRequest, Locate], CommandAction]:
-    return lambda *_: SwitchMode(mode)
+def _always(action: CommandAction) -> Callable[[CommandRequest, Locate], CommandAction]:
+    return lambda *_: action
 
 
 def _height(request: CommandRequest, locate: Locate, refused: str) -> Place:
@@ -319,10 +307,10 @@ def _or_none(value: float) -> float | None:
 
 # By MAV_CMD of MAVLink common.xml.
 _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = {
-    17: _to(Mode.HOLD),  # NAV_LOITER_UNLIM
-    20: _to(Mode.RETURN),  # NAV_RETURN_TO_LAUNCH
-    21: _to(Mode.LAND),  # NAV_LAND
-    22: _take_off,  # NAV_TAKEOFF
+    17: _always(SwitchMode(Mode.HOLD)),  # NAV_LOITER_UNLIM
+    20: _always(SwitchMode(Mode.RETURN)),  # NAV_RETURN_TO_LAUNCH
+    21: _always(SwitchMode(Mode.LAND)),  # NAV_LAND
+    22: lambda request, locate: TakeOff(_height(request, locate, "no takeoff")),  # NAV_TAKEOFF
     34: _orbit,  # DO_ORBIT
     176: _set_mode,  # DO_SET_MODE
     178: _change_speed,  # DO_CHANGE_SPEED
@@ -332,7 +320,7 @@ _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = 
     192: _reposition,  # DO_REPOSITION
     193: _pause_or_continue,  # DO_PAUSE_CONTINUE
     195: _look_at,  # DO_SET_ROI_LOCATION
-    197: _look_away,  # DO_SET_ROI_NONE
+    197: _always(LookAt(None)),  # DO_SET_ROI_NONE
     201: _look,  # DO_SET_ROI
     209: _test_actuator,  # DO_MOTOR_TEST
     211: _grip,  # DO_GRIPPER
@@ -343,6 +331,6 @@ _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = 
     300: _start_mission,  # MISSION_START
     310: _test_actuator,  # ACTUATOR_TEST
     400: _arm_or_disarm,  # COMPONENT_ARM_DISARM
-    401: _check_arming,  # RUN_PREARM_CHECKS
+    401: _always(Order.CHECK_ARMING),  # RUN_PREARM_CHECKS
     420: _inject_failure,  # INJECT_FAILURE
 }

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Final
 
 from fsw.autopilot.model.kinematics import end_effector
-from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind, Zone
 from fsw.link.wire.encode_standard import as_asked
@@ -99,11 +99,10 @@ def barrier_margin(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues 
 
 def tool_contact(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
     """TOOL_CONTACT while a surface that may be touched is near."""
-    k = snapshot.touching
-    if k is None:
+    if snapshot.touching is None:
         return None
-    about = (k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance)
-    return (snapshot.t_us, *k.force, *about, int(k.contact))
+    contact, force, *numbers = snapshot.touching
+    return (snapshot.t_us, *force, *numbers, int(contact))
 
 
 def mpc_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
@@ -186,26 +185,8 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
 
 def loop_timing(group: int) -> Callable[[FlightSnapshot, TelemetryContext], WireValues]:
     """The encoder of LOOP_TIMING of one PANDION_RATE_GROUP."""
-    name = _RATE_GROUPS[group]
-
-    def encode(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
-        timing: GroupTiming = getattr(context.health, name)
-        return (
-            snapshot.t_us,
-            timing.ticks,
-            timing.late_ticks,
-            timing.skipped_ticks,
-            timing.period_us,
-            timing.execution_p50_us,
-            timing.execution_p99_us,
-            timing.execution_max_us,
-            timing.lateness_p50_us,
-            timing.lateness_p99_us,
-            timing.lateness_max_us,
-            group,
-        )
-
-    return encode
+    timing = attrgetter(_RATE_GROUPS[group])
+    return lambda snapshot, context: (snapshot.t_us, *timing(context.health).shown, group)
 
 
 def _microseconds(value: float) -> int:

@@ -154,23 +154,15 @@ def horizontal_place(item: MissionItem, locate: Locate) -> Vec2:
 
 
 def _waypoint(item: MissionItem, locate: Locate) -> MissionStep:
-    hold, acceptance = item.params[0], item.params[1]
-    if not _within(hold, LONGEST_STAY):
-        raise _bad(1, f"a stay of {hold:g} s is outside 0 to {LONGEST_STAY:g} s")
-    if not _within(acceptance, WIDEST_ACCEPTANCE):
+    hold, acceptance = _stay(item, "a stay"), item.params[1]
+    if not 0.0 <= acceptance <= WIDEST_ACCEPTANCE:
         raise _bad(2, f"an acceptance of {acceptance:g} m is outside 0 to {WIDEST_ACCEPTANCE:g} m")
     place = _place(item, locate, "a waypoint needs a place")
     return _go(item, place, hold, acceptance or USUAL_ACCEPTANCE)
 
 
 def _loiter_time(item: MissionItem, locate: Locate) -> MissionStep:
-    if not _within(item.params[0], LONGEST_STAY):
-        raise _bad(1, f"a stay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
-    return _loiter(item, locate, item.params[0])
-
-
-def _loiter_unlimited(item: MissionItem, locate: Locate) -> MissionStep:
-    return _loiter(item, locate, math.inf)
+    return _loiter(item, locate, _stay(item, "a stay"))
 
 
 def _loiter_to_height(item: MissionItem, locate: Locate) -> MissionStep:
@@ -244,14 +236,9 @@ def _land(item: MissionItem, locate: Locate) -> MissionStep:
     return MissionStep(MissionAction.LAND, position, yaw=yaw, acceptance=USUAL_ACCEPTANCE)
 
 
-def _return(item: MissionItem, _: Locate) -> MissionStep:
-    return MissionStep(MissionAction.RETURN)
-
-
 def _delay(item: MissionItem, _: Locate) -> MissionStep:
-    if not _within(item.params[0], LONGEST_STAY):
-        raise _bad(1, f"a delay of {item.params[0]:g} s is outside 0 to {LONGEST_STAY:g} s")
-    return MissionStep(MissionAction.DELAY, hold_s=item.params[0], stop_after=not item.autocontinue)
+    hold = _stay(item, "a delay")
+    return MissionStep(MissionAction.DELAY, hold_s=hold, stop_after=not item.autocontinue)
 
 
 def _change_speed(item: MissionItem, _: Locate) -> MissionStep:
@@ -275,13 +262,9 @@ def _look_at(item: MissionItem, locate: Locate) -> MissionStep:
     return MissionStep(MissionAction.LOOK_AT, (*horizontal_place(item, locate), 0.0))
 
 
-def _look_away(item: MissionItem, _: Locate) -> MissionStep:
-    return MissionStep(MissionAction.LOOK_AT)
-
-
 def _look(item: MissionItem, locate: Locate) -> MissionStep:
     if item.params[0] == 0.0:
-        return _look_away(item, locate)
+        return MissionStep(MissionAction.LOOK_AT)
     if item.params[0] == 3.0:
         return _look_at(item, locate)
     raise _bad(1, f"kind {item.params[0]:g} of a region of interest is not 0 or 3")
@@ -291,18 +274,18 @@ _MAX_ITEMS: Final = float(1 << 16)
 _MAX_HEADING: Final = math.degrees(MAX_YAW)
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     NAV_WAYPOINT: _waypoint,
-    NAV_LOITER_UNLIMITED: _loiter_unlimited,
+    NAV_LOITER_UNLIMITED: lambda item, locate: _loiter(item, locate, math.inf),
     NAV_LOITER_TIME: _loiter_time,
     NAV_LOITER_TURNS: _loiter_turns,
     NAV_LOITER_TO_ALT: _loiter_to_height,
     DO_JUMP: _jump,
-    NAV_RETURN: _return,
+    NAV_RETURN: lambda *_: MissionStep(MissionAction.RETURN),
     NAV_LAND: _land,
     NAV_TAKEOFF: _take_off,
     NAV_DELAY: _delay,
     DO_CHANGE_SPEED: _change_speed,
     DO_SET_ROI_LOCATION: _look_at,
-    DO_SET_ROI_NONE: _look_away,
+    DO_SET_ROI_NONE: lambda *_: MissionStep(MissionAction.LOOK_AT),
     DO_SET_ROI: _look,
 }
 
@@ -337,6 +320,14 @@ def _z(item: MissionItem, locate: Locate) -> float:
     return z
 
 
+def _stay(item: MissionItem, what: str) -> float:
+    """How long parameter 1 says [s]."""
+    seconds = item.params[0]
+    if not 0.0 <= seconds <= LONGEST_STAY:
+        raise _bad(1, f"{what} of {seconds:g} s is outside 0 to {LONGEST_STAY:g} s")
+    return seconds
+
+
 def _heading(degrees: float) -> float | None:
     """The heading [rad] that parameter 4 names; NaN keeps it."""
     if math.isnan(degrees):
@@ -344,10 +335,6 @@ def _heading(degrees: float) -> float | None:
     if not abs(degrees) <= _MAX_HEADING:
         raise _bad(4, f"a heading of {degrees:g} deg is outside {_MAX_HEADING:g} deg either way")
     return math.radians(degrees)
-
-
-def _within(value: float, most: float) -> bool:
-    return 0.0 <= value <= most
 
 
 def _bad(number: int, reason: str) -> BadItem:
