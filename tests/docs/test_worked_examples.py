@@ -53,6 +53,27 @@ assert "the arm swings" in texts[0].text
 from docs.pages.failsafes import reference
 assert "| the arm swings | in flight, a joint is faster than 6 rad/s |" in reference()
 """
+NEW_SHAPE = """
+from dataclasses import replace
+from fsw.autopilot.flight.commands.bounds import zone_problem
+from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.shapes.zones import surfaces
+from fsw.autopilot.signals import SafeSet, Shape, Zone
+from fsw.link.wire.decode import obstacle_shape
+from fsw.link.wire.encode_dialect import safe_set_shapes
+from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
+layer = Shape("layer", (-6.0, -2.0))
+out, within = Zone(layer, 0.5), Zone(layer, 0.5, keep_in=True)
+def distances(z):
+    return [at.distance for at in surfaces(SafeSet((out, within)), (0.0, 0.0, z), 0)]
+assert distances(0.0) == [1.5, -2.5], distances(0.0)
+assert distances(-3.0) == [-1.5, 0.5], distances(-3.0)
+assert distances(-7.0) == [0.5, -1.5], distances(-7.0)
+assert "its bottom below" in kind_of(layer).check(Shape("layer", (-2.0, -6.0)))
+assert zone_problem(out) is None
+sent = safe_set_shapes(0, replace(SNAPSHOT, safe_set=SafeSet((within,))), CONTEXT)[0].values
+assert obstacle_shape(sent).zone == within
+"""
 NEW_TILT = """
 import math
 from fsw.autopilot.control.braking import Brake
@@ -68,6 +89,7 @@ assert math.isclose(-braking.a[0], math.tan(limit) * GRAVITY)
 """
 CHECKS = {
     "Add a flight mode": NEW_MODE,
+    "Add a shape": NEW_SHAPE,
     "Act on a condition": NEW_CONDITION,
     "Change the tilt limit": NEW_TILT,
 }
