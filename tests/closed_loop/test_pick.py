@@ -9,7 +9,7 @@ import pytest
 
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.parameters.flight_config import flight_config
-from sitl.link import message_ids
+from messages import message_ids
 from sitl.link.pilot import Phase, PilotState, flight_plan, listen, speak
 from sitl.link.pilot_messages import Ack, Heard, SendCommand
 from sitl.mission_clock import MissionClock
