@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from sitl.scenario import Hold, Push
+from sitl.scenario import Hold, Points, Push
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.trajectory import curve_row, place_on_curve, reference, warped
 
@@ -18,14 +18,19 @@ COMPILED = njit(place_on_curve)  # once for all scenarios: it takes longer than 
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_derivatives_equal_finite_differences(name: str) -> None:
-    curve = reference(load_scenario(name).trajectory)
+    trajectory = load_scenario(name).trajectory
+    curve = reference(trajectory)
+    # A cubic through points begins and ends with an acceleration, which is not differentiated.
+    ends = (trajectory.time_s[0], trajectory.time_s[-1]) if isinstance(trajectory, Points) else ()
     for t in np.linspace(0.0, 120.0, 400):
+        if any(abs(t - end) <= STEP for end in ends):
+            continue
         before, here, after = (curve.at(t - STEP), curve.at(t), curve.at(t + STEP))
         v = (np.array(after.p) - np.array(before.p)) / (2 * STEP)
         a = (np.array(after.v) - np.array(before.v)) / (2 * STEP)
         assert np.abs(v - here.v).max() <= 1e-7
-        # Between pieces the jerk, of at most 0.5 m/s^3 here, jumps.
-        assert np.abs(a - here.a).max() <= 1e-6 + 0.25 * STEP * 0.5
+        # Between pieces the jerk, of at most 0.8 m/s^3 here, jumps.
+        assert np.abs(a - here.a).max() <= 1e-6 + 0.25 * STEP * 0.8
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -34,12 +39,13 @@ def test_a_trajectory_starts_and_stops_at_rest(name: str) -> None:
     if isinstance(trajectory, Hold):
         return
     curve = reference(trajectory)
-    # The places of a push are gone through in their own time.
-    end = 300.0 if isinstance(trajectory, Push) else trajectory.duration_s
+    # The places of a push, and points, are gone through in their own time.
+    end = 300.0 if isinstance(trajectory, Push | Points) else trajectory.duration_s
     for t in (-1.0, 0.0, end, end + 5.0):
         point = curve.at(t)
-        assert max(map(abs, (*point.v, *point.a))) <= 1e-12
-    assert curve.at(-1.0) == curve.at(0.0)
+        assert max(map(abs, point.v)) <= 1e-12
+        assert isinstance(trajectory, Points) or max(map(abs, point.a)) <= 1e-12
+    assert curve.at(-1.0).p == pytest.approx(curve.at(0.0).p, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", scenario_names())
