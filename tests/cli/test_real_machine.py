@@ -11,12 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from command_line import folders
+from command_line import folders, revision
 from command_line.output import print_anything
 from fsw.link.build_links import _key_file
 from fsw.link.link_choice import LinkChoice
 from fsw.link.signing.key_file import SigningKey
-from fsw.log import revision
 from pandion import dialect, health_checks
 from pandion.display import Display
 
