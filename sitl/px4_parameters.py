@@ -91,10 +91,11 @@ def _control(vehicle: Vehicle) -> dict[str, int | float]:
         "MPC_THR_HOVER": round(float(hover), 3),
         "MPC_XY_P": 1.8,
         "MPC_XY_VEL_P_ACC": 5.0,
-        "MPC_XY_VEL_D_ACC": 0.4,
+        "MPC_XY_VEL_D_ACC": 0.6,
         "MPC_VELD_LP": 15.0,
         "MPC_XY_VEL_I_ACC": 1.0,
         "MPC_Z_P": 1.5,
+        "MPC_Z_VEL_P_ACC": 8.0,
         "MC_AIRMODE": _AIRMODE,
     }
     derivative = max(2.0 * _RATE_DAMPING * math.sqrt(lag * _RATE_GAIN) - 1.0, 0.0) / _RATE_GAIN

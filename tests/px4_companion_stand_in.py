@@ -46,9 +46,9 @@ class Gains:
     xy_p: float = 1.8
     xy_vel_p: float = 5.0
     xy_vel_i: float = 1.0
-    xy_vel_d: float = 0.4
+    xy_vel_d: float = 0.6
     z_p: float = 1.5
-    z_vel_p: float = 4.0
+    z_vel_p: float = 8.0
     z_vel_i: float = 2.0
     tilt_p: float = 7.0
     yaw_p: float = 1.5

@@ -30,6 +30,8 @@ INERTIAL = 0x3F
 SKIPPED = 10  # steps, as recorded; 8 to 14 were seen
 GRAVITY = 9.81
 EARTH_M = 6_371_000.0
+GATE_M = 0.03  # of an innovation; more is refused, but for so many in a row
+AGAIN = 20
 
 Vector = np.ndarray
 
@@ -81,6 +83,8 @@ class Px4StandIn:
         self._origin: tuple[float, float, float] | None = None
         self._sum = np.zeros(3)  # integral of the position error, m s
         self._rate = np.zeros(3)
+        self._bias = np.zeros(3)  # of the accelerometer, m/s^2
+        self._refused = 0  # places in a row
 
     def greeting(self) -> bytes:
         """What it says once it is connected."""
@@ -126,7 +130,7 @@ class Px4StandIn:
     def _predict(self, force: Vector, rate: Vector, dt: float) -> None:
         self._rate = rate
         self.R = self.R @ turn(rate * dt)
-        self.v = self.v + (self.R @ force + np.array([0.0, 0.0, GRAVITY])) * dt
+        self.v = self.v + (self.R @ (force - self._bias) + np.array([0.0, 0.0, GRAVITY])) * dt
         self.p = self.p + self.v * dt
 
     def _correct(self, p: Vector, R: Vector | None) -> None:
@@ -136,8 +140,12 @@ class Px4StandIn:
             self.v = np.zeros(3)
             return
         error = p - self.p
+        self._refused = self._refused + 1 if np.linalg.norm(error) > GATE_M else 0
+        if 0 < self._refused < AGAIN:
+            return
         self.p = self.p + 0.15 * error
         self.v = self.v + 0.5 * error
+        self._bias = self._bias - 0.3 * self.R.T @ error
         if R is not None:
             self.R = self.R @ turn(0.1 * vee(self.R.T @ R))
 

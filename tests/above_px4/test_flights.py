@@ -1,7 +1,7 @@
 """The planner above the stand-in for PX4: handing over, walls, and what can be lost on the way.
 
 The stand-in is checked against recorded conversations in what it says; its control is a model of
-PX4's. What a real PX4 flies is on the page docs/tutorials/fly-your-px4-vehicle.md.
+PX4's. What a real PX4 flies is on the page docs/tutorials/fly-px4-with-the-planner.md.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fsw.autopilot.control.px4_loops import Px4Tuning
+from fsw.autopilot.control.px4_tube import px4_tube
 from fsw.autopilot.signals import Command, CommandRequest, GoTo, Mode, Place
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from tests.above_px4.flight import TRAJECTORY, AbovePx4
+from tests.above_px4.worst_push import AT_MOST, KEPT, worst_push
 from tests.closed_loop.harness import command, hover
 from tests.px4_companion_stand_in import HOLD, OFFBOARD, POSITION, SET_MODE, Gains
 
@@ -145,6 +148,22 @@ def test_a_px4_that_falls_silent_is_told_and_gets_no_more_set_points() -> None:
     assert "PX4 is heard" in flight.texts
     assert flight.px4.mode == OFFBOARD, "it gives the vehicle again by itself"
     assert flight.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_worst_push_stays_inside_the_bound_that_is_printed(axis: int) -> None:
+    px4 = Px4Tuning()
+    scenario = replace(still(), disturbances=(worst_push(px4, 3.0, axis),))
+    flight = handed_over(AbovePx4(scenario))
+    furthest = 0.0
+    for _ in range(100):
+        flight.run(0.1)
+        p, planned = flight.sim.truth().p_WB, flight.setpoints[-1][1].p
+        furthest = max(furthest, abs(p[axis] - planned[axis]))
+    print(f"axis {axis}: {1e3 * furthest:.1f} mm")
+    bound = AT_MOST * px4_tube(px4, 0.2, 0.1, 0.002).base
+    assert 0.5 * bound < furthest < bound < KEPT
+    assert not [text for text in flight.texts if "off the plan" in text]
 
 
 @pytest.mark.parametrize("stop_s", [0.7, 1.1, 3.0])

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from fsw.autopilot.control.px4_loops import Px4Tuning
+from fsw.autopilot.control.px4_tube import px4_tube
 from messages.addresses import parse_link_address
 from pandion.param_vehicle import ParameterClient
 from sitl.px4_parameters import px4_parameters
 from sitl.scenario_file import load_scenario
 from sitl.sensors.keys import MeasuredSensors
 from sitl.start import flown_vehicle
+from tests.above_px4.worst_push import AT_MOST, KEPT, worst_push
 from tests.real_px4.real_px4 import HOLD, LAND, NO_BUILD, OFFBOARD, Loop, flying, there_is_one
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(not there_is_one(), reason=NO_BUILD)]
@@ -106,6 +109,36 @@ def test_a_sphere_as_large_as_the_analysis_asks_is_kept_above_px4(
     assert result["min_margin_m"] > 0.0
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_worst_push_stays_inside_the_bound_that_is_printed(tmp_path: Path, axis: int) -> None:
+    push = worst_push(Px4Tuning(), 60.0, axis)
+    path = tmp_path / "pushed.toml"
+    path.write_text(
+        'duration_s = 600.0\n[start]\nkind = "ground"\n[pilot]\nplan = "none"\n'
+        '[trajectory]\nkind = "hold"\nposition_m = [0.0, 0.0, -1.2]\n'
+        f'[[disturbances]]\nkind = "sequence"\nperiod_s = {push.period_s}\n'
+        f"starts_s = {push.starts_s}\n"
+        f"acceleration_m_s2 = {[list(one) for one in push.acceleration_m_s2]}\n"
+    )
+    with flying(str(path), tmp_path, speed="0.5", planner=POINTS) as loop:
+        given(loop)
+        operator = loop.operator
+        assert operator.t_s < 58.0, "the push has begun"
+        operator.wait(71.0 - operator.t_s)
+        assert operator.mode == OFFBOARD, (operator.texts[-5:], loop.said("fsw"))
+        loop.result()
+    times, places, _ = truth(tmp_path)
+    (log,) = (tmp_path / "fsw").glob("*.ulg")
+    planned = recorded(log, "vehicle_local_position_setpoint")
+    at = 1e-6 * planned["timestamp"]
+    flown = (at > 60.0) & (at < 70.0)
+    off = np.interp(at, times, places[:, axis]) - planned["xy"[axis]]
+    furthest = float(np.abs(off[flown]).max())
+    bound = AT_MOST * px4_tube(Px4Tuning(), 0.2, 0.1, 0.002).base
+    print(f"axis {axis}: {1e3 * furthest:.1f} mm of {1e3 * bound:.1f} mm")
+    assert 0.5 * bound < furthest < bound < KEPT
+
+
 def test_a_planner_that_is_killed_leaves_px4_to_its_failsafe(tmp_path: Path) -> None:
     with flying("walls-calm", tmp_path, seed=22, planner=POINTS) as loop:
         given(loop)
@@ -179,10 +212,14 @@ def ground(vehicle: str, folder: Path) -> Path:
 
 def truth(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times [s] of PX4, places [m] and joints [rad] of a flight that was."""
-    (found,) = (
-        one for one in ULog(str(folder / "truth.ulg")).data_list if one.name == "sim_ground_truth"
-    )
-    data: dict[str, Any] = found.data
+    data = recorded(folder / "truth.ulg", "sim_ground_truth")
     places = np.column_stack([data[f"p_WB[{k}]"] for k in range(3)])
     joints = np.column_stack([data[f"q_arm[{k}]"] for k in range(2)])
     return 1e-6 * data["timestamp"], places, joints
+
+
+def recorded(log: Path, topic: str) -> dict[str, Any]:
+    """One topic of a flight log."""
+    (found,) = (one for one in ULog(str(log)).data_list if one.name == topic)
+    data: dict[str, Any] = found.data
+    return data

@@ -64,16 +64,16 @@ class Px4Tuning:
     position_gain: float = 1.8  # 1/s
     velocity_gain: float = 5.0  # 1/s
     velocity_integral: float = 1.0  # 1/s^2
-    acceleration_gain: float = 0.4
+    acceleration_gain: float = 0.6
     height_gain: float = 1.5  # 1/s
-    climb_gain: float = 4.0  # 1/s
+    climb_gain: float = 8.0  # 1/s
     climb_integral: float = 2.0  # 1/s^2
     # As identified of PX4 v1.17 with the gains of `pandion px4 params`. By those alone it would be
     # 103 1/s^2, 14.7 1/s and 24 ms: filters and the link make less of it.
     tilt_kp: float = 73.0  # 1/s^2
     tilt_kd: float = 12.5  # 1/s
     delay: float = 0.046  # s, of its feedback
-    observer: float = 20.0  # rad/s, of the disturbance; PX4's estimate comes 125 times a second
+    observer: float = 30.0  # rad/s, of the disturbance; PX4's estimate comes 125 times a second
     cancelled: float = 0.8  # share of the observed disturbance
 
 

@@ -230,8 +230,8 @@ def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
     """
     planner = replace(
         config.planner,
-        walls=replace(config.planner.walls, alpha=2.0, lambda_=0.37),
-        workspace=replace(config.planner.workspace, alpha=1.88, lambda_=0.37),
+        walls=replace(config.planner.walls, alpha=1.93, lambda_=0.4),
+        workspace=replace(config.planner.workspace, alpha=1.8, lambda_=0.4),
         lambda_min=0.0,
     )
     limits = replace(config.limits, watches_actuators=0, clearance_sigmas=0.0)
