@@ -41,7 +41,14 @@ from fsw.autopilot.geometry.vectors import (
 )
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.arm_coordinates import ArmCoordinates, bounds_of, to_coordinates, to_joints
-from fsw.autopilot.model.multibody import Bodies, factorise, place_links, place_of_tip, solve
+from fsw.autopilot.model.multibody import (
+    Bodies,
+    factorise,
+    lever_of,
+    place_links,
+    place_of_tip,
+    solve,
+)
 from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec3
 from fsw.autopilot.tick_record import ArmTask, Estimate, PlanState
 from fsw.compiled import compilable
@@ -196,7 +203,7 @@ def _reach(a: ArmTask, b: Bodies, arm: ArmCoordinates) -> None:
     put_three(a.tip, 0, tip)
     # Of joints, and from the last on of coordinates.
     for k in range(n - 1, -1, -1):
-        moved = cross(three(a.axis, 3 * k), subtract(tip, three(a.origin, 3 * k)))
+        moved = lever_of(a, k, tip)
         for i in range(k + 1, n):
             moved = add_scaled(moved, three(a.jacobian, 3 * i), -arm.row[JOINTS * i + k])
         for i in range(3):

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.autopilot.geometry.vectors import clamp, cross, dot, subtract, three
+from fsw.autopilot.geometry.vectors import clamp, dot
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.multibody import place_of_tip
+from fsw.autopilot.model.multibody import lever_of, place_of_tip
 from fsw.autopilot.signals import Vec3
 from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
@@ -55,8 +55,7 @@ def weigh_payload(r: Tick, airframe: Airframe, field: Vec3, dt: float) -> None:
         return
     tip, found, all_levers = place_of_tip(m, b), 0.0, _HANGING
     for i in range(int(b.joints)):
-        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
-        each = dot(lever, field)
+        each = dot(lever_of(m, i, tip), field)
         found += each * r.joints.disturbance[i]
         all_levers += each * each
     more = p.mass + dt / WEIGHING_TIME * found / all_levers

@@ -50,8 +50,10 @@ from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import (
     Bodies,
     factorise,
+    lever_of,
     place_of_tip,
     solve,
+    times_symmetric,
     velocity_of_tip,
 )
 from fsw.autopilot.shapes.zones import (
@@ -189,18 +191,16 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         return
     R, normal = r.estimate.R_WB, three(k.normal, 0)
     along, tip = rotate_back(R, normal), place_of_tip(m, b)
-    shape = _levers(r, tip, n)
+    shape, reached = _levers(r, tip, n), (0.0, 0.0, 0.0)
     for i in range(n):
-        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
+        lever = lever_of(m, i, tip)
         k.along[i] = k.work[i] = dot(along, lever)
-        k.share[i] = dot(along, _through(shape, lever))
+        k.share[i] = dot(along, times_symmetric(shape, lever))
+        reached = add_scaled(reached, lever, k.along[i])
     factorise(m.factor, m.qq, n)
     solve(m.factor, k.work, n)
     eased = felt = whole = turned = 0.0
-    reached = (0.0, 0.0, 0.0)
     for i in range(n):
-        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
-        reached = add_scaled(reached, lever, k.along[i])
         eased += k.along[i] * k.work[i]
         whole += k.share[i] * k.along[i]
         turned += k.share[i] * k.share[i]
@@ -226,7 +226,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         k.unsure += abs(k.share[i]) * torque
     force = _force_on_tool(r, shape, tip, n)
     if k.contact > 0:
-        force = add_scaled(force, subtract(along, _through(shape, reached)), k.pressed)
+        force = add_scaled(force, subtract(along, times_symmetric(shape, reached)), k.pressed)
     force = rotate(R, force)
     put_three(k.force, 0, force)
     # What the base counts on is no more than what it was asked to stand.
@@ -250,7 +250,7 @@ def _levers(r: Tick, tip: Vec3, n: int) -> V6:
     xx = yy = zz = _DAMPED
     xy = xz = yz = 0.0
     for i in range(n):
-        x, y, z = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
+        x, y, z = lever_of(m, i, tip)
         xx, yy, zz = xx + x * x, yy + y * y, zz + z * z
         xy, xz, yz = xy + x * y, xz + x * z, yz + y * z
     a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
@@ -260,22 +260,12 @@ def _levers(r: Tick, tip: Vec3, n: int) -> V6:
 
 
 @compilable
-def _through(s: V6, v: Vec3) -> Vec3:
-    return (
-        s[0] * v[0] + s[3] * v[1] + s[4] * v[2],
-        s[3] * v[0] + s[1] * v[1] + s[5] * v[2],
-        s[4] * v[0] + s[5] * v[1] + s[2] * v[2],
-    )
-
-
-@compilable
 def _force_on_tool(r: Tick, shape: V6, tip: Vec3, n: int) -> Vec3:
     """Least force [N, B] on the tool that gives the observed torques, by damped least squares."""
     total, m = (0.0, 0.0, 0.0), r.bodies
     for i in range(n):
-        lever = cross(three(m.axis, 3 * i), subtract(tip, three(m.origin, 3 * i)))
-        total = add_scaled(total, lever, r.pressing.external[i])
-    return _through(shape, total)
+        total = add_scaled(total, lever_of(m, i, tip), r.pressing.external[i])
+    return times_symmetric(shape, total)
 
 
 @compilable

@@ -169,8 +169,8 @@ class SensorFusion:
         ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
         its encoders is kept in the memory. Where the IMU is silent or of no use, the ``model``
         [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``), which surfaces
-        ``pushed`` [m/s^2, NED] besides. None before there was
-        a pose, or a position and a heading, to start from, and a reading of the arm.
+        ``pushed`` [m/s^2, NED] besides. None before there was a pose, or a position and a heading,
+        to start from, and a reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = copied(memory.numbers)

@@ -36,8 +36,6 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGener
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.model.kinematics import end_effector
-from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.autopilot.parameters.contradictions import contradictions
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -313,7 +311,8 @@ class Commander:
             state = replace(state, mission=replace(state.mission, flight=flight))
         if decision.restart or decision.gripper is not None:
             gripper = decision.gripper or vehicle.gripper
-            vehicle = replace(vehicle, restarts=decision.restart, gripper=gripper)
+            restarts = vehicle.restarts or decision.restart
+            vehicle = replace(vehicle, restarts=restarts, gripper=gripper)
         if vehicle is not state.vehicle:
             state = replace(state, vehicle=vehicle)
         if decision.look_at is not None:
@@ -403,8 +402,7 @@ class Commander:
         before, vehicle = state.vehicle.mode, state.vehicle
         texts.append(StatusText(Severity.INFO, f"{before.value} to {mode.value}: {cause}"))
         follower = self._modes.get(mode, self._no_mode)
-        p_WE = end_effector(self._config.airframe.bodies, estimate)[0]
-        here = still_at(p_WE, estimate.t_us, estimate.yaw)
+        here = self._horizon.here(estimate, estimate.t_us)
         last = self._horizon.target(self.mode(state), state, estimate, estimate.t_us)
         handover = Handover(last, completed)
         origin = last if completed or follower.continues_reference else here

@@ -2,8 +2,7 @@ r"""The vehicle as rigid bodies: a base and an arm of up to ``JOINTS`` joints ab
 
 A payload is a point mass at the end-effector. Everything is written in the body frame B, about its
 origin, whose velocity is taken as zero: what the base's linear acceleration does to the arm is a
-uniform field. With w the base's rate and q the
-joints, the vehicle obeys
+uniform field. With w the base's rate and q the joints, the vehicle obeys
 
 .. math::
     \begin{bmatrix} m 1 & M_{vw} & M_{vq} \\ \cdot & M_{ww} & M_{wq} \\ \cdot & \cdot & M_{qq}
@@ -35,7 +34,15 @@ from fsw.autopilot.geometry.rotation import (
     quaternion_from_euler,
     rotate,
 )
-from fsw.autopilot.geometry.vectors import add, add_scaled, cross, dot, put_three, three
+from fsw.autopilot.geometry.vectors import (
+    add,
+    add_scaled,
+    cross,
+    dot,
+    put_three,
+    subtract,
+    three,
+)
 from fsw.autopilot.signals import Mat3, StateEstimate, Vec3
 from fsw.autopilot.tick_record import ArmTask, Estimate, Multibody
 from fsw.compiled import compilable
@@ -111,8 +118,8 @@ def _product(a: Mat3, b: Mat3) -> Mat3:
 
 
 @compilable
-def _symmetric(s: V6, v: Vec3) -> Vec3:
-    """A symmetric matrix of the entries xx yy zz xy xz yz times a vector."""
+def times_symmetric(s: V6, v: Vec3) -> Vec3:
+    """A symmetric matrix ``s`` (xx yy zz xy xz yz) times a vector ``v`` [any, B]; both in B."""
     return (
         s[0] * v[0] + s[3] * v[1] + s[4] * v[2],
         s[3] * v[0] + s[1] * v[1] + s[5] * v[2],
@@ -123,9 +130,9 @@ def _symmetric(s: V6, v: Vec3) -> Vec3:
 @compilable
 def _rotated(R: Mat3, s: V6) -> V6:
     """A symmetric matrix in other axes."""
-    x = _symmetric(s, (R[0], R[1], R[2]))
-    y = _symmetric(s, (R[3], R[4], R[5]))
-    z = _symmetric(s, (R[6], R[7], R[8]))
+    x = times_symmetric(s, (R[0], R[1], R[2]))
+    y = times_symmetric(s, (R[3], R[4], R[5]))
+    z = times_symmetric(s, (R[6], R[7], R[8]))
     return (
         R[0] * x[0] + R[1] * x[1] + R[2] * x[2],
         R[3] * y[0] + R[4] * y[1] + R[5] * y[2],
@@ -246,9 +253,9 @@ def _move_links(m: Multibody, b: Bodies, qd: Several | Floats, rate: Vec3) -> No
             add(o, arm),
             inertia,
             add(v, swept),
-            _symmetric(inertia, w),
+            times_symmetric(inertia, w),
             add(a, add(cross(turning, arm), cross(w, swept))),
-            add(_symmetric(inertia, turning), cross(w, _symmetric(inertia, w))),
+            add(times_symmetric(inertia, turning), cross(w, times_symmetric(inertia, w))),
         )
         before = o
 
@@ -329,7 +336,7 @@ def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate
         x, y = three(sums, 3 * (i + 1)), three(sums, 3 * (i + 2))
         inertia = (x[0], x[1], x[2], y[0], y[1], y[2])
         put_three(m.vq, 3 * k, add_scaled(cross(axis, h), s, mass))
-        put_three(m.wq, 3 * k, add(cross(h, s), _symmetric(inertia, axis)))
+        put_three(m.wq, 3 * k, add(cross(h, s), times_symmetric(inertia, axis)))
         for j in range(k + 1):
             along, aside = three(m.axis, 3 * j), cross(three(m.origin, 3 * j), three(m.axis, 3 * j))
             value = dot(along, three(m.wq, 3 * k)) + dot(aside, three(m.vq, 3 * k))
@@ -344,7 +351,7 @@ def _sum_up(m: Multibody, b: Bodies, armature: float, qd: Several | Floats, rate
         m.bias[k] = dot(axis, three(sums, 3 * (i + 6))) + dot(s, three(sums, 3 * (i + 5)))
     base, c = b.base_mass, (b.base_com[0], b.base_com[1], b.base_com[2])
     swept = cross(rate, cross(rate, c))
-    spin = cross(rate, _symmetric(_six(b.base_inertia, 0), rate))
+    spin = cross(rate, times_symmetric(_six(b.base_inertia, 0), rate))
     put_three(m.bias_v, 0, add_scaled(three(sums, 15), swept, base))
     put_three(m.bias_w, 0, add_scaled(add(three(sums, 18), spin), cross(c, swept), base))
     whole = 1.0 / (mass + base)
@@ -485,7 +492,7 @@ def torque_to_turn(
     """
     if knows_arm:
         return add(rotate(m.inertia, acceleration), load)
-    return add(_symmetric(_six(b.base_inertia, 0), acceleration), load)
+    return add(times_symmetric(_six(b.base_inertia, 0), acceleration), load)
 
 
 @compilable
@@ -510,6 +517,12 @@ def place_of_tip(m: Multibody | ArmTask, b: Bodies) -> Vec3:
     last = int(b.joints) - 1
     tip = (b.tip[0], b.tip[1], b.tip[2])
     return add(three(m.origin, 3 * last), rotate(nine(m.rotation, 9 * last), tip))
+
+
+@compilable
+def lever_of(m: Multibody | ArmTask, k: int, tip: Vec3) -> Vec3:
+    """How a turn of joint ``k`` moves what is at ``tip`` [m, B] on the last link [m/rad, B]."""
+    return cross(three(m.axis, 3 * k), subtract(tip, three(m.origin, 3 * k)))
 
 
 @compilable

@@ -18,9 +18,15 @@ import math
 from typing import Final, NamedTuple
 
 from fsw.autopilot.geometry.rotation import rotate_back
-from fsw.autopilot.geometry.vectors import add, add_scaled, clamp, cross, dot, norm, three
+from fsw.autopilot.geometry.vectors import add, clamp, cross, dot, norm
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.multibody import Bodies, base_acceleration, place_of_tip, posture
+from fsw.autopilot.model.multibody import (
+    Bodies,
+    base_acceleration,
+    lever_of,
+    place_of_tip,
+    posture,
+)
 from fsw.autopilot.signals import JointVector, RotorVector, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
@@ -112,8 +118,7 @@ def load_of_tip(r: Tick, b: Bodies, torque: JointVector | Floats) -> tuple[Vec3,
     force = rotate_back(r.estimate.R_WB, k.force)
     tip = place_of_tip(m, b)
     for i in range(int(b.joints)):
-        lever = cross(three(m.axis, 3 * i), add_scaled(tip, three(m.origin, 3 * i), -1.0))
-        k.load[i] = torque[i] + dot(lever, force)
+        k.load[i] = torque[i] + dot(lever_of(m, i, tip), force)
     return force, cross(tip, force)
 
 

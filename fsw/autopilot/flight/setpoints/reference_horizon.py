@@ -82,15 +82,19 @@ class ReferenceHorizon:
         What follows the target, and the mode that takes over, go by this. While nothing of ours
         flies it is where the vehicle is: it may be carried, or flown by another autopilot.
         """
-        if state.vehicle.flies:
-            target = mode.target(state, t_us)
-            if not mode.external_reference:
-                return target
-        p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         if not state.vehicle.flies:
-            return still_at(p_WE, t_us, estimate.yaw)
+            return self.here(estimate, t_us)
+        target = mode.target(state, t_us)
+        if not mode.external_reference:
+            return target
+        p_WE, v_WE = end_effector(self._config.airframe.bodies, estimate)
         _, lowest = self._came_up(state, target)
         return self._governor.limit_now(target, p_WE, v_WE, state.kept.safe_set, lowest)
+
+    def here(self, estimate: StateEstimate, t_us: int) -> EndEffectorTarget:
+        """At rest where the end-effector is, from ``t_us`` [us] on."""
+        p_WE, _ = end_effector(self._config.airframe.bodies, estimate)
+        return still_at(p_WE, t_us, estimate.yaw)
 
     def _came_up(self, state: FlightState, target: EndEffectorTarget) -> tuple[FlightState, float]:
         """The state, and the lowest z [m, NED] of a reference from outside besides the usual one.
