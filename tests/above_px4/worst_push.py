@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsw.autopilot.control.px4_loops import Px4Tuning
 from fsw.autopilot.control.px4_tube import horizontal_loop, softer
 from fsw.autopilot.control.tube import after_a_push
+from fsw.autopilot.parameters.consistency import loop_tube, stand_off
+from fsw.autopilot.parameters.flight_config import above_px4, flight_config
 from sitl.scenario import V3, Sequence
 
 _DT = 0.01  # s, for which each value holds
 _LASTS = 8.0  # s; what was before that adds 2 mm
-AT_MOST = 0.8  # m/s^2
-KEPT = 0.1  # m, that plans keep from walls: lambda over k_S
+_CONFIG = above_px4(flight_config())
+_MOST = _CONFIG.surroundings.disturbance  # m/s^2
+BOUND = _MOST * loop_tube(_CONFIG).base  # m, that is printed
+KEPT = stand_off(_CONFIG.planner.walls)  # m, that plans keep from walls
 
 
-def worst_push(px4: Px4Tuning, starts_s: float, axis: int) -> Sequence:
+def worst_push(starts_s: float, axis: int) -> Sequence:
     """At its end, on an ``axis``, the base is as far off as the tube says; it begins at a time."""
-    response = after_a_push(*horizontal_loop(softer(px4)), _DT, _LASTS)[::-1, 0]
+    response = after_a_push(*horizontal_loop(softer(_CONFIG.px4)), _DT, _LASTS)[::-1, 0]
     values: list[V3] = []
     for sign in np.sign(response).tolist():
         one = [0.0, 0.0, 0.0]
-        one[axis] = AT_MOST * sign
+        one[axis] = _MOST * sign
         values.append((one[0], one[1], one[2]))
     return Sequence(tuple(values), _DT, starts_s, name=f"worst {axis}")

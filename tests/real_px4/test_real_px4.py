@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from fsw.autopilot.control.px4_loops import Px4Tuning
-from fsw.autopilot.control.px4_tube import px4_tube
 from messages.addresses import parse_link_address
 from pandion.param_vehicle import ParameterClient
 from sitl.px4_parameters import px4_parameters
 from sitl.scenario_file import load_scenario
 from sitl.sensors.keys import MeasuredSensors
 from sitl.start import flown_vehicle
-from tests.above_px4.worst_push import AT_MOST, KEPT, worst_push
+from tests.above_px4.worst_push import BOUND, KEPT, worst_push
 from tests.real_px4.real_px4 import HOLD, LAND, NO_BUILD, OFFBOARD, Loop, flying, there_is_one
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(not there_is_one(), reason=NO_BUILD)]
@@ -75,43 +73,22 @@ def test_the_plant_hovers_folds_its_arm_and_lands(tmp_path: Path, vehicle: str) 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_walls_are_kept_by_the_planner_above_px4(tmp_path: Path, seed: int) -> None:
-    with flying("walls", tmp_path, seed=seed, speed="0.5", planner=POINTS) as loop:
-        given(loop)
-        operator = loop.operator
-        operator.wait(90.0)
-        assert operator.mode == OFFBOARD, (operator.texts[-5:], loop.said("fsw"))
-        result = loop.result()
-    print(
-        f"seed {seed}: minimum margin {1e3 * result['min_margin_m']:.1f} mm, tracking error "
-        f"{1e3 * result['tracking_error_rms_m']:.1f} mm"
-    )
+    result = flown("walls", tmp_path, seed)
     assert result["min_margin_m"] > 0.02
     assert result["tracking_error_rms_m"] < 0.1
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_sphere_as_large_as_the_analysis_asks_is_kept_above_px4(
-    tmp_path: Path, seed: int
-) -> None:
+def test_a_sphere_with_room_for_the_hand_over_is_kept_above_px4(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "workspace.toml"
     shipped = (files("sitl") / "scenarios" / "workspace.toml").read_text("utf-8")
     path.write_text(shipped.replace("radius_m = 0.075", "radius_m = 0.12"))
-    with flying(str(path), tmp_path, seed=seed, speed="0.5", planner=POINTS) as loop:
-        given(loop)
-        operator = loop.operator
-        operator.wait(90.0)
-        assert operator.mode == OFFBOARD, (operator.texts[-5:], loop.said("fsw"))
-        result = loop.result()
-    print(
-        f"seed {seed}: minimum margin {1e3 * result['min_margin_m']:.1f} mm, tracking error "
-        f"{1e3 * result['tracking_error_rms_m']:.1f} mm"
-    )
-    assert result["min_margin_m"] > 0.0
+    assert flown(str(path), tmp_path, seed)["min_margin_m"] > 0.0
 
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_worst_push_stays_inside_the_bound_that_is_printed(tmp_path: Path, axis: int) -> None:
-    push = worst_push(Px4Tuning(), 60.0, axis)
+    push = worst_push(60.0, axis)
     path = tmp_path / "pushed.toml"
     path.write_text(
         'duration_s = 600.0\n[start]\nkind = "ground"\n[pilot]\nplan = "none"\n'
@@ -131,12 +108,11 @@ def test_the_worst_push_stays_inside_the_bound_that_is_printed(tmp_path: Path, a
     (log,) = (tmp_path / "fsw").glob("*.ulg")
     planned = recorded(log, "vehicle_local_position_setpoint")
     at = 1e-6 * planned["timestamp"]
-    flown = (at > 60.0) & (at < 70.0)
+    pushed = (at > 60.0) & (at < 70.0)
     off = np.interp(at, times, places[:, axis]) - planned["xy"[axis]]
-    furthest = float(np.abs(off[flown]).max())
-    bound = AT_MOST * px4_tube(Px4Tuning(), 0.2, 0.1, 0.002).base
-    print(f"axis {axis}: {1e3 * furthest:.1f} mm of {1e3 * bound:.1f} mm")
-    assert 0.5 * bound < furthest < bound < KEPT
+    furthest = float(np.abs(off[pushed]).max())
+    print(f"axis {axis}: {1e3 * furthest:.1f} mm of {1e3 * BOUND:.1f} mm")
+    assert 0.5 * BOUND < furthest < BOUND < KEPT
 
 
 def test_a_planner_that_is_killed_leaves_px4_to_its_failsafe(tmp_path: Path) -> None:
@@ -190,6 +166,21 @@ def test_a_px4_that_is_killed_ends_both_others_with_a_sentence(tmp_path: Path) -
         assert loop.operator.until(lambda: "PX4 is silent" in loop.said("fsw"), 10.0)
         assert "PX4 closed the connection" in loop.said("sitl")
         assert loop.fsw.poll() is None, "it waits for PX4 to come back"
+
+
+def flown(scenario: str, folder: Path, seed: int) -> dict[str, Any]:
+    """What the plant found in 90 s of a scenario at half of real time, followed to the end."""
+    with flying(scenario, folder, seed=seed, speed="0.5", planner=POINTS) as loop:
+        given(loop)
+        operator = loop.operator
+        operator.wait(90.0)
+        assert operator.mode == OFFBOARD, (operator.texts[-5:], loop.said("fsw"))
+        result = loop.result()
+    print(
+        f"seed {seed}: minimum margin {1e3 * result['min_margin_m']:.1f} mm, tracking error "
+        f"{1e3 * result['tracking_error_rms_m']:.1f} mm"
+    )
+    return result
 
 
 def given(loop: Loop) -> None:

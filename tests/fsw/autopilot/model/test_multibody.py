@@ -67,34 +67,24 @@ def test_it_equals_pinocchio_for_any_vehicle_in_any_motion() -> None:
     """2,300 states, 1,250 of them of those that come with Pandion; as Python."""
     random = np.random.default_rng(7)
     for vehicle in vehicles():
-        referee, b, n = Referee(vehicle), bodies_of(vehicle), len(vehicle.joints)
+        referee, b = Referee(vehicle), bodies_of(vehicle)
         m = Multibody()
         for _ in range(250 if vehicle.name in vehicle_names() else 35):
-            q, qd, w = random.uniform(-3, 3, n), random.uniform(-5, 5, n), random.uniform(-4, 4, 3)
-            referee.place(q, qd, w)
-            move_bodies(m, b, 0.0, estimate(q, qd, w))
-            check_terms(referee, m, n)
-            check_laws(referee, m, b, random)
-            check_momentum(referee, m, qd, w)
+            check_motion(referee, m, b, random)
             check_tip(referee, m, b)
 
 
 def test_it_equals_pinocchio_with_a_payload_at_the_end_effector() -> None:
     random, load = np.random.default_rng(8), 0.4
     for vehicle in vehicles():
-        referee, b, n = Referee(vehicle), bodies_of(vehicle), len(vehicle.joints)
+        referee, b = Referee(vehicle), bodies_of(vehicle)
         at_tip = referee.model.frames[referee.model.getFrameId("end_effector")]
         point = pin.Inertia(load, np.zeros(3), np.zeros((3, 3)))
         referee.model.appendBodyToJoint(at_tip.parentJoint, point, at_tip.placement)
         m = Multibody()
         m.carried = load
         for _ in range(20):
-            q, qd, w = random.uniform(-3, 3, n), random.uniform(-5, 5, n), random.uniform(-4, 4, 3)
-            referee.place(q, qd, w)
-            move_bodies(m, b, 0.0, estimate(q, qd, w))
-            check_terms(referee, m, n)
-            check_laws(referee, m, b, random)
-            check_momentum(referee, m, qd, w)
+            check_motion(referee, m, b, random)
 
 
 def test_what_is_carried_is_seen_in_a_pose_that_stays() -> None:
@@ -105,6 +95,17 @@ def test_what_is_carried_is_seen_in_a_pose_that_stays() -> None:
     m.carried = 0.3
     move_bodies(m, b, 0.0, still)
     assert m.qq[0] > light
+
+
+def check_motion(referee: Referee, m: Multibody, b: Bodies, random: np.random.Generator) -> None:
+    """All but the tip, in one motion that is drawn."""
+    n = b.joints
+    q, qd, w = random.uniform(-3, 3, n), random.uniform(-5, 5, n), random.uniform(-4, 4, 3)
+    referee.place(q, qd, w)
+    move_bodies(m, b, 0.0, estimate(q, qd, w))
+    check_terms(referee, m, n)
+    check_laws(referee, m, b, random)
+    check_momentum(referee, m, qd, w)
 
 
 def check_terms(referee: Referee, m: Multibody, n: int) -> None:
