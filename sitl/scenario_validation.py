@@ -12,6 +12,7 @@ from sitl.scenario import (
     Circle,
     Lissajous,
     Payload,
+    Pilot,
     Points,
     Polynomial,
     Push,
@@ -49,13 +50,7 @@ def check(scenario: Scenario) -> None:
     _check_names(scenario)
     _check_gears(scenario.actuators)
     _check_payload(scenario.payload)
-    if not scenario.pilot.release_s > scenario.pilot.grab_s and math.isfinite(
-        scenario.pilot.release_s
-    ):
-        raise ScenarioError(
-            f"pilot.release_s = {scenario.pilot.release_s:g}: must be later than grab_s, "
-            f"{scenario.pilot.grab_s:g}"
-        )
+    _check_grip(scenario.pilot)
     _check_faults(scenario)
     check_trajectory(scenario.trajectory)
     hop, ground = scenario.pilot.plan == "hop", scenario.start.kind == "ground"
@@ -158,6 +153,16 @@ def _check_gears(keys: ActuatorKeys) -> None:
             f"actuators.backlash_deg = {keys.backlash_deg:g}: needs the inertia of a motor that "
             f"crosses the gap, actuators.motor_inertia_kg_m2 of at least {_MIN_INERTIA:g}"
         )
+
+
+def _check_grip(keys: Pilot) -> None:
+    grab_s, release_s = keys.grab_s, keys.release_s
+    if math.isfinite(release_s) and not release_s > grab_s:
+        raise ScenarioError(
+            f"pilot.release_s = {release_s:g}: must be later than grab_s, {grab_s:g}"
+        )
+    if math.isfinite(grab_s) and keys.plan != "trajectory":
+        raise ScenarioError(f'pilot.grab_s: needs plan = "trajectory", not "{keys.plan}"')
 
 
 def _check_payload(keys: Payload | None) -> None:

@@ -189,6 +189,20 @@ def test_a_payload_that_cannot_be_is_refused(changes: dict[str, Any], says: str)
         check(hovering(replace(PACKAGE, **changes)))
 
 
+@pytest.mark.parametrize(
+    ("pilot", "says"),
+    [
+        (Pilot("trajectory", grab_s=3.0, release_s=3.0), r"release_s = 3: must be later than grab"),
+        (Pilot("trajectory", release_s=3.0), r"must be later than grab_s, inf"),
+        (Pilot("none", grab_s=3.0), r'grab_s: needs plan = "trajectory", not "none"'),
+    ],
+)
+def test_a_grip_that_never_comes_is_refused(pilot: Pilot, says: str) -> None:
+    with pytest.raises(ScenarioError, match=says):
+        check(replace(hovering(), pilot=pilot))
+    check(replace(hovering(), pilot=Pilot("trajectory", grab_s=3.0, release_s=4.0)))
+
+
 def test_a_file_says_all_of_it() -> None:
     scenario = hovering(replace(PACKAGE, position_m=(0.1, 0.2, -1.0), gripper=True))
     text = scenario_text(scenario)
