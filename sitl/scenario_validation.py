@@ -161,8 +161,6 @@ def _check_grip(keys: Pilot) -> None:
         raise ScenarioError(
             f"pilot.release_s = {release_s:g}: must be later than grab_s, {grab_s:g}"
         )
-    if math.isfinite(grab_s) and keys.plan != "trajectory":
-        raise ScenarioError(f'pilot.grab_s: needs plan = "trajectory", not "{keys.plan}"')
 
 
 def _check_payload(keys: Payload | None) -> None:
