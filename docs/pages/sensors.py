@@ -31,8 +31,7 @@ _POSE: Final = {
     "attitude_deg": "noise about each axis",
     "outlier_m": "an outlier lies so far off, in any direction",
     "outlier_deg": "and is turned by so much",
-    "position_resolution_m": "step of the digits; 0: none",
-    "attitude_resolution_deg": "the same, of a small rotation",
+    "attitude_resolution_deg": "of a small rotation",
 }
 MEANINGS: Final[dict[str, dict[str, str]]] = {
     "timing": {
@@ -60,8 +59,6 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "misalignment_deg": "of each axis towards each other one, drawn once a flight",
         "gyro_limit_rad_s": "end of the range",
         "accel_limit_m_s2": "the same",
-        "gyro_resolution_rad_s": "step of the digits; 0: none",
-        "accel_resolution_m_s2": "the same",
         "vibration_rad_s": "amplitude that one rotor causes in hover; grows with its thrust",
         "vibration_m_s2": "the same",
         "rotor_hz": "turns of a rotor in hover; with the root of its thrust",
@@ -83,10 +80,10 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "wander_time_s": "its correlation time",
         "velocity_m_s": "noise of each axis",
         "outlier_m": "an outlier lies so far off, in any direction",
-        "position_resolution_deg": "step of latitude and longitude; default 1e-7 as in HIL_GPS, "
-        "11 mm northwards; 0: none",
-        "height_resolution_m": "the same; default 0.001 as in HIL_GPS",
-        "velocity_resolution_m_s": "the same; default 0.01 as in HIL_GPS",
+        "position_resolution_deg": "of latitude and longitude; default 1e-7 as in HIL_GPS, 11 mm "
+        "northwards",
+        "height_resolution_m": "default 0.001 as in HIL_GPS",
+        "velocity_resolution_m_s": "default 0.01 as in HIL_GPS",
         "rtk": "says that its fix is one with corrections (`fix_type` 6), or a plain one (3)",
     },
     "barometer": {
@@ -94,7 +91,6 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "offset_pa": "pressure of the day against the standard, drawn once a flight",
         "drift_pa": "deviation of what changes slowly, a Gauss–Markov process",
         "drift_time_s": "its correlation time",
-        "resolution_pa": "step of the digits; 0: none",
         "outlier_pa": "an outlier is off by so much",
     },
     "magnetometer": {
@@ -102,7 +98,6 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "noise_gauss": "white noise of each axis",
         "offset_gauss": "of each axis, drawn once a flight",
         "scale_share": "scale error of each axis, drawn once a flight",
-        "resolution_gauss": "step of the digits; 0: none",
         "outlier_gauss": "an outlier adds so much, in any direction",
     },
     "rangefinder": {
@@ -110,11 +105,9 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "most_m": "farther, nothing is sent",
         "noise_m": "white noise",
         "scale_share": "scale error, drawn once a flight",
-        "resolution_m": "step of the digits; 0: none",
         "outlier_m": "an outlier is so much too short",
     },
     "encoders": {
-        "resolution_rad": "step of the digits; 0: none",
         "noise_rad": "white noise of each joint",
         "offset_rad": "error of each zero, drawn once a flight",
         "outlier_rad": "an outlier of the first joint is off by so much",
@@ -124,8 +117,8 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "torque_n_m": "the same; default 0.002",
         "force_bias_n": "of each axis, drawn once a flight; default 0.2",
         "torque_bias_n_m": "the same; default 0.005",
-        "force_resolution_n": "step of the digits, 0: none; default 0.0125",
-        "torque_resolution_n_m": "the same; default 0.0005",
+        "force_resolution_n": "default 0.0125",
+        "torque_resolution_n_m": "default 0.0005",
         "outlier_n": "an outlier adds so much, in any direction",
     },
 }
@@ -183,7 +176,7 @@ def _table(
         if kind is not keys.Timing and field.name in common and not any(given):
             continue
         repeated = kind is not keys.Timing and field.name in common
-        meaning = "" if repeated else MEANINGS[name][field.name]
+        meaning = "" if repeated else _meaning(name, field.name)
         allowed = "" if repeated else _allowed(hints[field.name])
         value = _value(dict(zip(values, given, strict=True))) if values else ""
         source = _source([notes[suite].get(field.name, "") for suite in values])
@@ -194,6 +187,12 @@ def _table(
         line += f" [{source}]" if source else ""
         rows.append(line)
     return "\n".join(rows) + "\n"
+
+
+def _meaning(name: str, key: str) -> str:
+    """What a key means; the head of the page says it of every resolution."""
+    said = MEANINGS[name]
+    return said.get(key, "") if "resolution" in key else said[key]
 
 
 def _value(given: dict[str, Any]) -> str:
@@ -222,8 +221,9 @@ def _shown(value: Any) -> str:
 
 
 def _source(said: list[str]) -> str:
-    different = list(dict.fromkeys(text for text in said if text))
-    return "; ".join(different)
+    # The head of the page says that a number without a source is our choice.
+    sources = (re.sub(r"(, |: )?our choice(: )?", "", text) for text in said)
+    return "; ".join(dict.fromkeys(text for text in sources if text))
 
 
 def _comments(text: str) -> dict[str, dict[str, str]]:
