@@ -37,42 +37,42 @@ From `fsw/autopilot/flight/failsafe/table.py`; how it works:
 [failsafes and faults](../concepts/failsafes.md). Actions, from the mildest to the strongest:
 {actions}.
 
-A condition is reported by its name. In brackets: whether it is a fault of the vehicle, the severity
-of the text (one that changes the mode is critical, one that terminates an emergency), and the
-longest time from what is detected, with the time in its definition, to report and action. Behind →
-the action; one that parameters choose is their default ([parameters](parameters.md)). Without an
-end, a condition ends when it is not so any more.
+Every condition is reported. *After* is the longest time from what is detected, with the time in its
+definition, to report and action. *Action* is the default ([choices](parameters.md)). A text that
+changes the mode is critical, one that terminates an emergency. Without an end, a condition ends
+when it is not so any more.
+
+## Conditions
 """
 
 _RULES = """\
 ## Arming checks
 
-Each check that fails is a sentence behind `not armed:`, and in the answer to RUN_PREARM_CHECKS.
-Forced arming overrides all but an invalid estimate and a flight that was terminated
-([arming](../concepts/failsafes.md#arming)). By subject, where a check fails; × where waiting does
-not help:
+Each check that fails is a sentence behind `not armed:`, and in the answer to
+RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate and a flight that was
+terminated ([arming](../concepts/failsafes.md#arming)).
 
 {checks}
 """
-_IN_FLIGHT: Final = "in flight, "
 
 
 def reference() -> str:
     """The page, in Markdown."""
     actions = ", ".join(action.value for action in Action)
-    flying = [row for row in FAILSAFES if words(row).detected.startswith(_IN_FLIGHT)]
-    others = [row for row in FAILSAFES if row not in flying]
-    parts = [_HEAD.format(actions=actions)]
-    for heading, rows in (("In flight", flying), ("At any time", others)):
-        parts += [f"## {heading}\n", "\n".join(_line(row) for row in rows) + "\n"]
-    checks = "\n".join(_check(check) for check in CHECKS)
-    return "\n".join((*parts, _RULES.format(checks=checks)))
+    rows = ["| condition (text) | detected | after | action | severity | ends |", "|---" * 6 + "|"]
+    rows += [f"| {' | '.join(_cells(row))} |" for row in FAILSAFES]
+    table = "\n".join(rows) + "\n"
+    checks = ["| subject | check fails where | waiting helps |", "|---" * 3 + "|"]
+    checks += [_check(check) for check in CHECKS]
+    return "\n".join(
+        (_HEAD.format(actions=actions), table, _RULES.format(checks="\n".join(checks)))
+    )
 
 
 def _check(check: ArmingCheck) -> str:
-    """A line of the arming checks."""
+    """A row of the arming checks."""
     fails = check.summary[0].lower() + check.summary[1:]
-    return f"- {check.subject.value}: {fails}{' ×' * check.permanent}"
+    return f"| {check.subject.value} | {fails} | {'no' if check.permanent else 'yes'} |"
 
 
 def words(row: Failsafe) -> Words:
@@ -80,14 +80,15 @@ def words(row: Failsafe) -> Words:
     return WORDS[row.condition.name]
 
 
-def _line(row: Failsafe) -> str:
-    said = words(row)
-    facts = [row.severity.name.lower(), seconds(row.within_us)]
-    if row.of_vehicle:
-        facts.insert(0, "fault")
-    detected = said.detected.removeprefix(_IN_FLIGHT)
-    ends = f". Ends: {said.ends}" if said.ends else ""
-    return f"- **{row.condition.value}** ({', '.join(facts)}): {detected} → {_action(row)}{ends}"
+def _cells(row: Failsafe) -> tuple[str, ...]:
+    return (
+        row.condition.value + (" (fault)" if row.of_vehicle else ""),
+        words(row).detected,
+        seconds(row.within_us),
+        _action(row),
+        row.severity.name.lower(),
+        words(row).ends,
+    )
 
 
 def seconds(time_us: int) -> str:

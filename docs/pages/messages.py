@@ -101,7 +101,10 @@ def _traffic(crossing: Sequence[Traffic], private: set[int]) -> str:
         by_rate.setdefault(row.rates or "received", []).append(
             f"{shown}({row.message_id}{of}){arrows if row.component and row.heard else ''}"
         )
-    rows = [f"- {rate}: {', '.join(names)}" for rate, names in sorted(by_rate.items(), key=_order)]
+    rows = ["| Hz | messages |", "|---|---|"]
+    rows += [
+        f"| {rate} | {', '.join(names)} |" for rate, names in sorted(by_rate.items(), key=_order)
+    ]
     return "\n".join(rows) + "\n"
 
 

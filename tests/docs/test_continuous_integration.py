@@ -29,7 +29,7 @@ def test_the_file_of_the_page_is_a_campaign_and_its_requirements_are_such() -> N
     assert parse_plan(fence("toml"), "page", Path()).count == 20
     wanted = re.findall(r'--require "([^"]+)"', fence("bash"))
     section = PAGE.read_text("utf-8").split("## What can be required\n")[1].split("\n## ")[0]
-    listed = re.findall(r"^- (`.+?`): ", section, re.MULTILINE)
+    listed = re.findall(r"^\| (`[^|]+`) \|", section, re.MULTILINE)
     wanted += [text for row in listed for text in re.findall(r"`([^`]+)`", row)]
     assert len(wanted) >= 8
     for text in wanted:

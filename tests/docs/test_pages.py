@@ -126,7 +126,7 @@ def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:
 
 def test_the_streams_on_the_page_are_those_that_are_sent() -> None:
     text = (REFERENCE / "messages.md").read_text(encoding="utf-8")
-    rows = dict(re.findall(r"^- ([\w./, ]+): (.+)$", text, re.MULTILINE))
+    rows = dict(re.findall(r"^\| ([^|]+) \| (.+) \|$", text, re.MULTILINE))
     for stream in STREAMS:
         name = dialect.mavlink_map[stream.message_id].msgname
         rate = f"{stream.ground_hz:g}/{stream.api_hz:g}"

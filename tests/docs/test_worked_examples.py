@@ -51,7 +51,7 @@ for rate, mode in ((5.9, Mode.TRAJECTORY), (-6.1, Mode.HOLD)):
     assert bool(texts) == (mode is Mode.HOLD)
 assert "the arm swings" in texts[0].text
 from docs.pages.failsafes import reference
-assert "- **the arm swings** (warning, 2 ms): a joint is faster than 6 rad/s" in reference()
+assert "| the arm swings | in flight, a joint is faster than 6 rad/s |" in reference()
 """
 NEW_SHAPE = """
 from dataclasses import replace
