@@ -10,6 +10,7 @@ from command_line.options import option, read
 from command_line.output import print_error, without
 from command_line.parser import COULD_NOT_START
 from messages.addresses import LinkError, parse_link_address
+from vehicles.vehicle_file import VehicleError, load_vehicle
 
 LEFT: Final = 0  # exit code
 
@@ -23,6 +24,12 @@ class TopOptions:
         "of the vehicle: udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD",
         default="udp:127.0.0.1:18570",
     )
+    airframe: str = option(
+        "--airframe NAME",
+        "what the vehicle is, which messages do not tell: a vehicle that comes with Pandion, or a "
+        ".toml file",
+        default="paper",
+    )
 
 
 def main(argv: list[str]) -> int:
@@ -30,10 +37,10 @@ def main(argv: list[str]) -> int:
     what = "Inspect a running vehicle: rates and fields of its messages, margins, texts."
     options = read(TopOptions, "pandion top", what, argv)
     try:
-        vehicle = parse_link_address(options.vehicle)
+        vehicle, flown = parse_link_address(options.vehicle), load_vehicle(options.airframe)
         from view.top.app import TopApp
         from view.top.peer import TelemetryPeer
-    except LinkError as error:
+    except (LinkError, VehicleError) as error:
         print_error("pandion top", error)
         return COULD_NOT_START
     except ModuleNotFoundError as error:
@@ -47,6 +54,8 @@ def main(argv: list[str]) -> int:
     except LinkError as error:
         print_error("pandion top", error)
         return COULD_NOT_START
-    app = TopApp(peer)
+    from fsw.autopilot.model.airframe import airframe_of
+
+    app = TopApp(peer, airframe_of(flown))
     app.run()
     return app.return_code or LEFT  # 1 after an exception, which it has printed and does not raise

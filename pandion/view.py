@@ -101,7 +101,7 @@ def _show_live(options: ViewOptions) -> int:
     try:
         commands = options.host in LOCAL or options.allow_commands
         where, airframe = parse_link_address(options.vehicle), load_vehicle(options.airframe)
-        link = VehicleLink(where, commands=commands, airframe=airframe_of(airframe))
+        link = VehicleLink(where, airframe_of(airframe), commands=commands)
         server = open_server(options.host, options.port, f"vehicle at {options.vehicle}")
     except (LinkError, PageError, VehicleError) as error:
         print_error("pandion view", error)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import SafeSet, Vec3
 from fsw.link.endpoints import open_endpoint
 from messages import message_ids as ids
@@ -47,9 +47,7 @@ OFFBOARD: Final = (1.0, 6.0, 0.0)
 class VehicleLink(threading.Thread):
     """Speaks to one vehicle until it is closed. A vehicle that is not there yet may come."""
 
-    def __init__(
-        self, vehicle: LinkAddress, *, commands: bool, airframe: Airframe = AIRFRAME
-    ) -> None:
+    def __init__(self, vehicle: LinkAddress, airframe: Airframe, *, commands: bool) -> None:
         """Open a link of its own towards ``vehicle``; without ``commands`` it only looks.
 
         One that only looks is no ground station to the vehicle: it must not hide that the link to

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
 from fsw.autopilot.flight.failsafe.conditions import Condition
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.signals import (
     CommandResult,
@@ -98,7 +98,7 @@ class Heard:
 class Telemetry:
     """The newest of everything one vehicle has said; of texts and events the last few hundred."""
 
-    airframe: Airframe = AIRFRAME
+    airframe: Airframe  # of the vehicle, which messages do not tell
     t: float = math.nan  # s, the vehicle's clock
     heard: dict[tuple[int, int, int], Heard] = field(default_factory=dict)
     events: deque[Event] = field(default_factory=lambda: deque(maxlen=_EVENTS))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import Vec3
 from messages.frames import Frame
@@ -103,7 +103,7 @@ class _Recording:
 class TlogFlight:
     """See :class:`view.flight.Flight`."""
 
-    def __init__(self, path: Path, airframe: Airframe = AIRFRAME) -> None:
+    def __init__(self, path: Path, airframe: Airframe) -> None:
         """Read a log of such an ``airframe``, which the messages do not tell.
 
         Raises:

@@ -19,7 +19,7 @@ from benchmarks.optimiser.instances import INPUTS, STATES, Instance
 from benchmarks.optimiser.solved import Solved, timed
 from fsw.autopilot.barriers.cbf_row import cbf_lower_bound
 from fsw.autopilot.barriers.safe_approach import safe_approach_speed
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.kinematics import position, velocity
 from fsw.autopilot.model.linearisation import Linearisation
@@ -67,16 +67,18 @@ def installed(solver: str) -> bool:
 class CasadiMethod:
     """One program for one horizon and safe set, its functions compiled where that is possible."""
 
-    def __init__(self, config: PlannerConfig, safe_set: SafeSet, solver: str) -> None:
+    def __init__(
+        self, config: PlannerConfig, airframe: Airframe, safe_set: SafeSet, solver: str
+    ) -> None:
         import casadi
 
         from benchmarks.optimiser.ocp import build, sphere_of
 
         self._config, self._safe_set = config, safe_set
         self._sphere = sphere_of(safe_set)
-        self._model = condense(AIRFRAME, config.period, config.horizon)
+        self._model = condense(airframe, config.period, config.horizon)
         self._horizon = Linearisation(self._model)
-        program, parameters = build(config, safe_set)
+        program, parameters = build(config, airframe, safe_set)
         self._states, self._controls = program.states, program.controls
         self._bounds = {
             "lbx": program.lower,
@@ -109,7 +111,7 @@ class CasadiMethod:
 
     def _unknowns(self, request: PlanRequest, inputs: Array) -> Array:
         """States that follow from the inputs, stage by stage, and no slack."""
-        states = self._model.phi @ to_vector(request.start, 2) + self._model.gamma @ inputs
+        states = self._model.phi @ to_vector(request.start) + self._model.gamma @ inputs
         parts: list[Array] = [states[0]]
         for i, controls in enumerate(self._controls):
             u = inputs[INPUTS * i : INPUTS * (i + 1)]
@@ -128,7 +130,7 @@ class CasadiMethod:
 
     def _parameters(self, request: PlanRequest, optimum: Array) -> Array:
         """Start, targets, directions at the optimum and the h that eq 25 requires."""
-        start = to_vector(request.start, 2)
+        start = to_vector(request.start)
         self._horizon.refill(start, optimum)
         yaws = self._horizon.states[:, YAW]
         parts: list[Any] = [start]
@@ -148,7 +150,7 @@ class CasadiMethod:
         h_start: list[float] = []
         if self._sphere is None:
             tuning = self._config.walls
-            parts = body_of("points", AIRFRAME).parts
+            parts = body_of("points", self._model.airframe).parts
             start = self._horizon.horizon.frames[0]
             points = [
                 (position(start, part.on, part.begin), velocity(start, part.on, part.begin))

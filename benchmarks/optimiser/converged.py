@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsw.autopilot.barriers.constraint_block import TargetPoints
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
@@ -18,14 +18,14 @@ _STAYS = 1e-7  # m/s^2 and rad/s^2
 class ConvergedOcp:
     """Cost of given inputs, and the converged solution of a request."""
 
-    def __init__(self, config: PlannerConfig, safe_set: SafeSet) -> None:
-        self._ocp = Ocp(config, condense(AIRFRAME, config.period, config.horizon), safe_set)
+    def __init__(self, config: PlannerConfig, airframe: Airframe, safe_set: SafeSet) -> None:
+        self._ocp = Ocp(config, condense(airframe, config.period, config.horizon), safe_set)
         self._unknowns = self._ocp.qp.inputs
 
     def cost(self, request: PlanRequest, inputs: Array) -> float:
         """Cost of ``inputs`` (6 n,) [m/s^2, rad/s^2] with the smallest slacks that admit them."""
         ocp = self._ocp
-        ocp.linearise(to_vector(request.start, 2), inputs, target_points(request))
+        ocp.linearise(to_vector(request.start), inputs, target_points(request))
         program = ocp.qp
         return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
 
@@ -35,7 +35,7 @@ class ConvergedOcp:
         Where they keep on changing (the directions of eq 23 turn with the iterate) the best
         that was met counts.
         """
-        start, targets = to_vector(request.start, 2), target_points(request)
+        start, targets = to_vector(request.start), target_points(request)
         inputs, best = guess, (guess, self.cost(request, guess))
         for _ in range(_MAX_ITERATIONS):
             self._ocp.linearise(start, inputs, targets)

@@ -17,7 +17,6 @@ from benchmarks.optimiser.converged import ConvergedOcp
 from benchmarks.optimiser.instances import Instance, planner_of, record
 from benchmarks.optimiser.methods import Entry, Method, entries, guess_for
 from benchmarks.optimiser.solved import Solved, stopwatch_us
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.planner import Planner
 from studies.paper.cases import Case
@@ -125,7 +124,7 @@ class _Lane:
 
 class _Rivals:
     def __init__(self, horizon: int, effort: Effort) -> None:
-        self._config = planner_of(horizon).planner
+        self._config = planner_of(horizon)
         self._effort = effort
         self.samples = [Samples(horizon, entry) for entry in entries()]
         self._lanes: dict[Case, _Lane] = {}
@@ -168,14 +167,14 @@ class _Rivals:
     def _lane(self, instance: Instance) -> _Lane:
         found = self._lanes.get(instance.case)
         if found is None:
-            config, safe_set = self._config, instance.request.safe_set
+            config, airframe = self._config.planner, self._config.airframe
+            problem = config, airframe, instance.request.safe_set
             built = [
-                None if samples.entry.build is None else samples.entry.build(config, safe_set)
+                None if samples.entry.build is None else samples.entry.build(*problem)
                 for samples in self.samples
             ]
-            found = _Lane(
-                Planner(config, AIRFRAME, stopwatch_us), ConvergedOcp(config, safe_set), built
-            )
+            planner = Planner(config, airframe, stopwatch_us)
+            found = _Lane(planner, ConvergedOcp(*problem), built)
             self._lanes[instance.case] = found
         return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +14,7 @@ from benchmarks.optimiser.converged import target_points
 from benchmarks.optimiser.instances import INPUTS, Instance
 from benchmarks.optimiser.slopes import slopes_of
 from benchmarks.optimiser.solved import Solved, stopwatch_us, timed
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner import Planner
@@ -39,7 +40,7 @@ class Method(Protocol):
         ...
 
 
-Build = Callable[[PlannerConfig, SafeSet], Method]
+Build = Callable[[PlannerConfig, Airframe, SafeSet], Method]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +56,8 @@ class Entry:
 class PlannerMethod:
     """The planner as it flies, all of it: request in, plan out."""
 
-    def __init__(self, config: PlannerConfig, safe_set: SafeSet, iterations: int) -> None:
-        self._planner = Planner(replace(config, sqp_iterations=iterations), AIRFRAME, stopwatch_us)
+    def __init__(self, config: PlannerConfig, airframe: Airframe, iterations: int) -> None:
+        self._planner = Planner(replace(config, sqp_iterations=iterations), airframe, stopwatch_us)
         self._planner.warm_up()
 
     def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
@@ -79,14 +80,16 @@ class PlannerMethod:
 class SlsqpMethod:
     """The paper's optimiser, from u = 0 as in the paper."""
 
-    def __init__(self, config: PlannerConfig, safe_set: SafeSet, *, analytic: bool) -> None:
-        model = condense(AIRFRAME, config.period, config.horizon)
+    def __init__(
+        self, config: PlannerConfig, airframe: Airframe, safe_set: SafeSet, *, analytic: bool
+    ) -> None:
+        model = condense(airframe, config.period, config.horizon)
         self._ocp = Ocp(config, model, safe_set)
         self._analytic = analytic
 
     def solve(self, instance: Instance, guess: Array, optimum: Array) -> Solved:
         """See ``Method``; ``guess`` and ``optimum`` (6 n,) [m/s^2, rad/s^2] are not used."""
-        start, targets = to_vector(instance.request.start, 2), target_points(instance.request)
+        start, targets = to_vector(instance.request.start), target_points(instance.request)
 
         def search() -> Solution:
             problem = NonlinearProgram(self._ocp, start, targets)
@@ -101,15 +104,15 @@ def entries() -> tuple[Entry, ...]:
     """Everything that is compared, in the order of the table."""
 
     def planner(solver: str, iterations: int) -> Build:
-        return lambda config, safe_set: PlannerMethod(
-            replace(config, solver=solver), safe_set, iterations
+        return lambda config, airframe, _: PlannerMethod(
+            replace(config, solver=solver), airframe, iterations
         )
 
     def slsqp(*, analytic: bool) -> Build:
-        return lambda config, safe_set: SlsqpMethod(config, safe_set, analytic=analytic)
+        return partial(SlsqpMethod, analytic=analytic)
 
     def casadi(solver: str) -> Build:
-        return lambda config, safe_set: CasadiMethod(config, safe_set, solver)
+        return partial(CasadiMethod, solver=solver)
 
     ours = "as it flies: the last plan moved on, functions compiled by numba"
     paper = "no inputs, as in the paper; our functions, compiled by numba; slopes"

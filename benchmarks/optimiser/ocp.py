@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.optimiser.instances import INPUTS, STATES
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
-from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
+from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.kinematics import body_axes
 from fsw.autopilot.model.prediction import (
     Q_ARM,
@@ -85,12 +85,14 @@ def tuning_of(config: PlannerConfig, safe_set: SafeSet) -> BarrierTuning:
     return config.workspace if sphere_of(safe_set) is not None else config.walls
 
 
-def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[NonlinearProgram, Any]:
+def build(
+    config: PlannerConfig, airframe: Airframe, safe_set: SafeSet
+) -> tuple[NonlinearProgram, Any]:
     """The program and its parameters: start (19,), then those of the nodes 1..n."""
     if hasattr(ca.GlobalOptions, "setNumpyMode"):
         ca.GlobalOptions.setNumpyMode(-1)  # symbols stay symbols in numpy's functions, silently
     n, program = config.horizon, NonlinearProgram()
-    a, b = (ca.DM(matrix) for matrix in discretise(AIRFRAME, config.period))
+    a, b = (ca.DM(matrix) for matrix in discretise(airframe, config.period))
     rows = barrier_rows(safe_set)
     start = ca.SX.sym("start", STATES)
     nodes = [ca.SX.sym(f"node{i}", TARGET + DIRECTIONS + rows) for i in range(1, n + 1)]
@@ -108,7 +110,7 @@ def build(config: PlannerConfig, safe_set: SafeSet) -> tuple[NonlinearProgram, A
         if i == 0:
             program.nothing_but(x - start)
         else:
-            _node(program, config, safe_set, i, x, slack, nodes[i - 1])
+            _node(program, config, airframe, safe_set, i, x, slack, nodes[i - 1])
         if i < n:
             t = np.tan(config.limits.tilt) * (GRAVITY - u[2])
             program.at_least_zero([t * t - u[0] * u[0] - u[1] * u[1]])
@@ -136,6 +138,7 @@ def _controls(
 def _node(
     program: NonlinearProgram,
     config: PlannerConfig,
+    airframe: Airframe,
     safe_set: SafeSet,
     i: int,
     x: Any,
@@ -143,23 +146,23 @@ def _node(
     node: Any,
 ) -> None:
     """Costs, joint limits and barrier rows of one node."""
-    points = _points(config, x)
-    _add_cost(program, config, i == config.horizon, x, points[2], node)
+    points = _points(airframe, x)
+    _add_cost(program, config, airframe, i == config.horizon, x, points[2], node)
     joint, barrier = config.joint_slack, config.barrier_slack
     program.cost += joint * slack[0]
     for k in range(1, slack.numel()):
         program.cost += barrier * slack[k]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]
     for angle, limit in (
-        (th1, AIRFRAME.angle_limits.high[0]),
-        (th12, AIRFRAME.angle_limits.high[1]),
+        (th1, airframe.angle_limits.high[0]),
+        (th12, airframe.angle_limits.high[1]),
     ):
         program.at_least_zero([limit + slack[0] - angle, limit + slack[0] + angle])
     if slack.numel() > 1:
         program.at_least_zero(_barrier(config, safe_set, points, slack, node))
 
 
-def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
+def _points(airframe: Airframe, x: Any) -> list[tuple[Any, Any]]:
     """Position and velocity of base, joint 2 and end-effector."""
     axes = np.zeros((4, 3), dtype=object)
     plain = body_axes.py_func  # type: ignore[attr-defined]  # the equations, not compiled
@@ -168,7 +171,7 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
     p, v = x[P : P + 3], x[V : V + 3]
     points = [(p, v)]
     angle, rate = 0.0, 0.0
-    for joint, length in enumerate((AIRFRAME.bodies.offset[5], AIRFRAME.bodies.tip[2])):
+    for joint, length in enumerate((airframe.bodies.offset[5], airframe.bodies.tip[2])):
         angle, rate = angle + x[Q_ARM + 2 * joint], rate + x[QD_ARM + 2 * joint]
         ahead, down = length * ca.sin(angle), length * ca.cos(angle)
         p = p + ahead * b1 + down * b3
@@ -180,12 +183,13 @@ def _points(config: PlannerConfig, x: Any) -> list[tuple[Any, Any]]:
 def _add_cost(
     program: NonlinearProgram,
     config: PlannerConfig,
+    airframe: Airframe,
     last: bool,
     x: Any,
     tip: tuple[Any, Any],
     node: Any,
 ) -> None:
-    w, airframe = config.weights, AIRFRAME
+    w = config.weights
     target_v = node[3:6] if w.relative_velocity else 0.0
     m1, m2 = airframe.bodies.mass[:2]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]

@@ -11,6 +11,7 @@ from typing import Final
 from PIL import Image
 
 from docs.figures.browser import page
+from fsw.autopilot.model.airframe import AIRFRAME
 from messages.frames import Frame
 from messages.tlog_reader import tlog_frames
 from pandion.report import write_report
@@ -62,7 +63,7 @@ def draw_inspector(directory: Path, target: Path) -> None:
 async def _inspected(tlog: Path) -> str:
     """The inspector as SVG, a minute into a flight."""
     flight = _Recorded(tlog)
-    app = TopApp(flight, lambda: flight.now)
+    app = TopApp(flight, AIRFRAME, lambda: flight.now)
     async with app.run_test(size=_CELLS) as pilot:
         while flight.now < _SHOWN_S:
             flight.now += 0.02

@@ -18,7 +18,6 @@ from benchmarks.optimiser.measurement import Effort, Samples, run
 from benchmarks.optimiser.methods import Entry, guess_for
 from benchmarks.optimiser.report import lines
 from benchmarks.optimiser.solved import stopwatch_us
-from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.mpc.planner import Planner
 
 KEYS = {"n", "method", "sqp_iterations", "median_us", "p99_us", "max_us", "suboptimality_p50"}
@@ -107,7 +106,7 @@ def test_the_table_says_in_what_form_casadi_computes(
     )
     method = Entry("casadi-fatrop", None, None, casadi_method.given())
     assert said in method.given
-    built = replace(method, build=lambda config, safe_set: pytest.fail("is not built"))
+    built = replace(method, build=lambda *_: pytest.fail("is not built"))
     assert method.given in "\n".join(lines([Samples(5, built)]))
 
 
@@ -115,12 +114,13 @@ def test_the_table_says_in_what_form_casadi_computes(
 def test_casadi_solves_the_same_problem(solver: str, recorded: list[Instance]) -> None:
     """An independent writing of costs, rows, slacks and limits has its optimum where ours is."""
     pytest.importorskip("casadi")
-    config = planner_of(5).planner
+    flown = planner_of(5)
+    config, airframe = flown.planner, flown.airframe
     for instance in recorded:
-        converged = ConvergedOcp(config, instance.request.safe_set)
-        guess = guess_for(Planner(config, AIRFRAME, stopwatch_us), instance)
+        converged = ConvergedOcp(config, airframe, instance.request.safe_set)
+        guess = guess_for(Planner(config, airframe, stopwatch_us), instance)
         optimum, best = converged.solve(instance.request, guess)
-        method = CasadiMethod(config, instance.request.safe_set, solver)
+        method = CasadiMethod(config, airframe, instance.request.safe_set, solver)
         answer = method.solve(instance, guess, optimum)
         assert answer.inputs is not None
         np.testing.assert_allclose(answer.inputs[:3], optimum[:3], atol=5e-3)

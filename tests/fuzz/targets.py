@@ -15,6 +15,7 @@ from pathlib import Path
 import fastcrc
 
 from docs.pages.messages import heard
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.control_choice import choice_of
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.link.inbox import Inbox
@@ -198,7 +199,7 @@ def _tlog(stack: ExitStack) -> Try:
         frames = list(_valid_frames(data, told, SYSTEM_ID))
         path.write_bytes(b"".join(bytes(8) + frame for frame in frames) or data)
         with suppress(UlogError):
-            flight = TlogFlight(path)
+            flight = TlogFlight(path, AIRFRAME)
             flight.scene(flight.end)
             flight.region()
             flight.curves()

@@ -40,7 +40,7 @@ def live(
             station.bind(("127.0.0.1", vehicle.gcs_port))
             station.settimeout(10.0)
             _, where = station.recvfrom(2048)
-        link = VehicleLink(where, commands=True)
+        link = VehicleLink(where, AIRFRAME, commands=True)
         link.start()
         server = open_server("127.0.0.1", free_port(), "a vehicle")
         shown = LivePage(server, link)

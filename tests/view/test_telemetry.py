@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
@@ -48,7 +49,7 @@ def everything(snapshot=FLYING) -> list[Outgoing]:
 
 
 def test_failsafes_are_named_as_long_as_they_last() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     beat = next(one for one in everything() if one.message_id == ids.HEARTBEAT)
     take(telemetry, replace(beat, values=(*beat.values[:4], 5, *beat.values[5:])))
     assert telemetry.scene(0.0).failures == "failsafe"
@@ -69,7 +70,7 @@ def test_failsafes_are_named_as_long_as_they_last() -> None:
 
 
 def test_a_vehicle_that_starts_again_has_none_of_the_last_flight() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     said = failsafe_event(
         FailsafeEvent(Condition.BREACH.value, Action.HOLD.value, Severity.CRITICAL)
@@ -84,7 +85,7 @@ def test_a_vehicle_that_starts_again_has_none_of_the_last_flight() -> None:
 
 
 def test_the_scene_is_the_snapshot_that_was_sent() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     scene = telemetry.scene(0.0)
     assert scene.t == pytest.approx(3.004)
@@ -109,7 +110,7 @@ def test_the_scene_is_the_snapshot_that_was_sent() -> None:
 
 
 def test_the_horizon_begins_where_the_plan_does_and_is_pushed_by_its_inputs() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     horizon = telemetry.scene(0.0).horizon
     assert horizon is not None
@@ -120,7 +121,7 @@ def test_the_horizon_begins_where_the_plan_does_and_is_pushed_by_its_inputs() ->
 
 
 def test_a_safe_set_that_is_gone_is_not_shown() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     take(telemetry, *(messages_now(ids.OBSTACLE_SHAPE, 0.0, SNAPSHOT, CONTEXT) or ()))
     assert telemetry.scene(0.0).safe_set == SafeSet()
@@ -141,7 +142,7 @@ def test_a_zone_that_nobody_can_believe_is_counted_and_listed_once(
     field: int, number: float, words: str
 ) -> None:
     """A viewer shows what a log or a peer says; whoever says it may say anything."""
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     first = messages_now(ids.OBSTACLE_SHAPE, 0.0, FLYING, CONTEXT)[0]
     bad = replace(first, values=(*first.values[:field], number, *first.values[field + 1 :]))
@@ -154,7 +155,7 @@ def test_a_zone_that_nobody_can_believe_is_counted_and_listed_once(
 
 
 def test_half_a_safe_set_does_not_replace_a_whole_one() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     other = replace(FLYING, safe_set=SafeSet((*WALLS.zones, Zone(ball((0.0,) * 3, 1.0), 0.5))))
     first, second, third = messages_now(ids.OBSTACLE_SHAPE, 0.0, other, CONTEXT) or ()
@@ -165,7 +166,7 @@ def test_half_a_safe_set_does_not_replace_a_whole_one() -> None:
 
 
 def test_what_stopped_coming_is_shown_no_longer() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     later = replace(FLYING, t_us=9_000_000, estimate=FLYING.estimate._replace(t_us=9_000_000))
     take(telemetry, *(messages_now(ids.LOCAL_POSITION_NED, 0.0, later, CONTEXT) or ()))
@@ -177,7 +178,7 @@ def test_what_stopped_coming_is_shown_no_longer() -> None:
 
 
 def test_a_long_text_is_one_event_and_a_critical_one_a_reason() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     text = b"arming refused: " + b"x" * 60
     take(
         telemetry,
@@ -189,7 +190,7 @@ def test_a_long_text_is_one_event_and_a_critical_one_a_reason() -> None:
 
 
 def test_rates_are_measured_and_fall_to_zero() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     (sent,) = messages_now(ids.ATTITUDE, 0.0, FLYING, CONTEXT) or ()
     for k in range(50):
         take(telemetry, sent, at=0.02 * k)
@@ -200,7 +201,7 @@ def test_rates_are_measured_and_fall_to_zero() -> None:
 
 
 def test_memory_is_bounded() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     for k in range(2000):
         take(telemetry, Outgoing(ids.STATUSTEXT, (6, b"text %d" % k, 0, 0)))
     assert len(telemetry.events) == 500
@@ -208,7 +209,7 @@ def test_memory_is_bounded() -> None:
 
 
 def test_somebody_who_makes_up_messages_does_not_fill_the_memory() -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     known = set(telemetry.heard)
     for system in range(1, 40):
@@ -228,7 +229,7 @@ def test_somebody_who_makes_up_messages_does_not_fill_the_memory() -> None:
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("message_id", [ids.ATTITUDE, ids.LOCAL_POSITION_NED, ids.ARM_JOINT_STATE])
 def test_an_estimate_that_is_no_number_is_no_place(message_id: int, wrong: float) -> None:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     assert telemetry.scene().estimate is not None
     (sent,) = messages_now(message_id, 0.0, FLYING, CONTEXT) or ()
@@ -248,7 +249,7 @@ def test_a_telemetry_log_of_any_length_is_refused(
         monkeypatch.setattr(tlog_flight, "_MAX_SCENES", 20)
         path.write_bytes(a_log(50))
     with pytest.raises(UlogError, match=r"too long: (must be )?at most"):
-        TlogFlight(path)
+        TlogFlight(path, AIRFRAME)
 
 
 def a_log(steps: int) -> bytes:
@@ -266,7 +267,7 @@ def a_log(steps: int) -> bytes:
 def test_a_telemetry_log_is_a_flight(tmp_path: Path) -> None:
     path = tmp_path / "flight.tlog"
     path.write_bytes(a_log(50))
-    flight = TlogFlight(path)
+    flight = TlogFlight(path, AIRFRAME)
     assert (flight.begin, flight.end) == pytest.approx((3.0, 3.96), abs=0.05)
     assert flight.worst is not None
     assert flight.worst.margin == pytest.approx(0.2)
@@ -293,7 +294,7 @@ def a_flight(wall_s: int, seconds: int, north: float, beside: bool = False) -> b
 
 def places(path: Path, log: bytes) -> tuple[TlogFlight, list[float]]:
     path.write_bytes(log)
-    flight = TlogFlight(path)
+    flight = TlogFlight(path, AIRFRAME)
     scenes = [flight.scene(float(t)) for t in np.arange(flight.begin, flight.end, 0.1)]
     return flight, [scene.estimate.p[0] for scene in scenes if scene.estimate]
 
@@ -375,11 +376,11 @@ def test_a_log_of_another_vehicle_says_whose_it_is(tmp_path: Path) -> None:
     frame = FrameWriter(7, 1).frame(ids.HEARTBEAT, 0, 2, 12, 0, 4, 3)
     path.write_bytes((1_000_000).to_bytes(8, "big") + frame)
     with pytest.raises(UlogError, match="it has messages of system 7"):
-        TlogFlight(path)
+        TlogFlight(path, AIRFRAME)
 
 
 def test_what_is_no_telemetry_log_is_refused_in_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "flight.tlog"
     path.write_bytes(b"no log at all")
     with pytest.raises(UlogError, match="no telemetry log with positions"):
-        TlogFlight(path)
+        TlogFlight(path, AIRFRAME)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from textual.widgets import DataTable, Input, RichLog
 
+from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.link.udp_endpoint import OpenEndpoint
 from messages.frames import Frame, FrameWriter, split, wire_fields
 from pandion.top import main
@@ -58,7 +59,7 @@ def said(text: bytes, severity: int = 6, number: int = 0, chunk: int = 0) -> byt
 
 
 def seen(*frames: bytes, now: float = 0.0) -> str:
-    telemetry = Telemetry()
+    telemetry = Telemetry(AIRFRAME)
     for one in frames:
         for part in split(one):
             telemetry.take(part, 0.0)
@@ -147,7 +148,7 @@ def test_what_is_shown_and_what_keys_do() -> None:
 
 async def drive() -> None:
     fed = Fed()
-    app = TopApp(fed, lambda: fed.now)
+    app = TopApp(fed, AIRFRAME, lambda: fed.now)
     async with app.run_test(size=(140, 40)) as pilot:
         fed.waiting = [margins(0.3, 0.02), beat(), said(b"no plan in time", 3)]
         app.refresh_all()
@@ -194,7 +195,7 @@ def test_a_margin_that_is_not_finite_has_no_bar() -> None:
 
 async def show_margins_that_are_not_finite() -> None:
     fed = Fed()
-    app = TopApp(fed, lambda: fed.now)
+    app = TopApp(fed, AIRFRAME, lambda: fed.now)
     async with app.run_test(size=(140, 40)) as pilot:
         await pilot.pause()  # until its widgets are there
         fed.waiting = [margins(math.nan, math.inf, 0.25)]

@@ -15,6 +15,7 @@ from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Footer, Input, RichLog, Static
 
 from command_line.printable import printable
+from fsw.autopilot.model.airframe import Airframe
 from messages.frames import Frame
 from view.flight_events import EventKind
 from view.scene import Event, Scene
@@ -62,10 +63,12 @@ class TopApp(App[None]):
         Binding("escape", "all", "show all", show=False),
     ]
 
-    def __init__(self, peer: Peer, clock: Callable[[], float] = time.monotonic) -> None:
-        """Show what ``peer`` hears."""
+    def __init__(
+        self, peer: Peer, airframe: Airframe, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Show what ``peer`` hears of a vehicle of this ``airframe``."""
         super().__init__()
-        self.telemetry = Telemetry()
+        self.telemetry = Telemetry(airframe)
         self.paused = False
         self.pattern = ""
         self._peer = peer
