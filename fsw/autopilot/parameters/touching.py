@@ -121,16 +121,6 @@ def against_touching(config: FlightConfig, zone: Zone, loop: Tube) -> str:
     )
 
 
-def max_force(config: FlightConfig, zone: Zone, loop: Tube) -> float:
-    """The largest force [N] that can be asked for at a surface that may be touched."""
-    touch, tuning = zone.touch, config.tuning.press
-    if touch is None:
-        return 0.0
-    found = grip(config.airframe, tuning, _normal_in_body(zone), config.surroundings.disturbance)
-    bounded = touch.force_max - found.unsure - tuning.damping
-    return max(min(bounded, config.airframe.mass * _left(config, loop)), 0.0)
-
-
 def _left(config: FlightConfig, loop: Tube) -> float:
     """Acceleration [m/s^2] that the tilt leaves beside the worst disturbance on one axis."""
     level = GRAVITY * math.tan(config.airframe.tilt_max)
