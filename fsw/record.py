@@ -53,6 +53,11 @@ def padded_rows(rows: Iterable[tuple[float, ...]], size: int) -> tuple[float, ..
 _ZEROS: Final = tuple([(0.0,) * count for count in range(ANGLE_LIMITS * JOINTS + 1)])
 
 
+def per_joint(joints: int) -> str:
+    """The format of an array for joints, as ``struct`` has it, of a vehicle with so many."""
+    return f"{joints}d{_NUMBER * (JOINTS - joints)}x"
+
+
 _NUMBER: Final = 8  # bytes, of whole numbers and of others
 _NUMBERS, _ARRAY = -1, -2  # views of a whole record
 

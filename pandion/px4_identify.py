@@ -66,7 +66,7 @@ class Identifier:
             home = self.airframe.home_posture[: self.airframe.bodies.joints]
             wanted = self.manoeuvre.step(frame, tuple(home))
         mode = Mode.HOLD if self.flies else Mode.DISARMED
-        outputs = TickOutputs(ActuatorCommand((), ()), mode, self.flies, setpoint=wanted)
+        outputs = TickOutputs(ActuatorCommand((), ()), mode, self.flies, wanted)
         link.send_actuators(frame.t_us, outputs)
         for text in link.notices:
             self.tell(text.text)

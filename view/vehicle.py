@@ -100,7 +100,7 @@ def horizon(
     """
     model = condense_once(airframe, len(inputs), period)
     u = np.array([(*one.a, one.yaw_acc, *one.qdd_arm) for one in inputs]).ravel()
-    nodes = model.phi @ to_vector(start, airframe.bodies.joints) + model.gamma @ u
+    nodes = model.phi @ to_vector(start) + model.gamma @ u
     base = tuple(_vec3(node[P : P + 3]) for node in nodes)
     return Horizon(base, tuple(predicted_end_effector(airframe.bodies, node)[0] for node in nodes))
 

@@ -1006,14 +1006,14 @@ class TickOutputs:
     actuators: ActuatorCommand
     mode: Mode
     armed: bool
+    setpoint: Setpoint | None = None  # for an autopilot with loops of its own; None: nothing flown
+    gripper: float = 0.0  # 1: closes and holds, -1: opens, 0: was never told
     # Made when it is asked for; None: the tick is not concluded.
     shown: FlightSnapshot | Callable[[], FlightSnapshot] | None = None
     plan_request: PlanRequest | None = None
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = ()
     tuning_taken: bool | None = None  # whether the requested one is in use; None: none was
-    setpoint: Setpoint | None = None  # for an autopilot with loops of its own; None: nothing flown
-    gripper: float = 0.0  # 1: closes and holds, -1: opens, 0: was never told
 
     @property
     def snapshot(self) -> FlightSnapshot:

@@ -19,6 +19,7 @@ from fsw.autopilot.signals import (
     PredictionState,
     StateEstimate,
     Vec2,
+    Vec3,
 )
 from fsw.record import (
     JOINTS,
@@ -32,6 +33,7 @@ from fsw.record import (
     Three,
     Two,
     padded,
+    per_joint,
 )
 
 
@@ -345,6 +347,25 @@ class Tick(Record):
         return north, east
 
     @property
+    def pushed(self) -> Vec3:
+        """What a surface accelerates the base by that the tool presses on [m/s^2, NED]."""
+        x, y, z = _THREE.unpack_from(self.memory, _PUSHED_AT)
+        return x, y, z
+
+    @property
+    def touches(self) -> bool:
+        """Whether the tool is at something or asked to be, or holds something."""
+        (contact,) = _WHOLE.unpack_from(self.memory, _CONTACT_AT)
+        (asked,) = _ONE.unpack_from(self.memory, _ASKED_AT)
+        (gripped,) = _ONE.unpack_from(self.memory, _GRIPPED_AT)
+        return bool(contact or asked > 0.0 or gripped > 0.0)
+
+    @property
+    def undone(self) -> JointVector:
+        """What undoes the torques of the joints (j,) [N m], as the watch observes it."""
+        return _JOINTS.unpack_from(self.memory, _UNDONE_AT)[: self.joint_count]
+
+    @property
     def joint_acceleration(self) -> JointVector:
         """What was found for the joints (j,) [rad/s^2] by ``accelerate_joints``."""
         return _JOINTS.unpack_from(self.memory, _WORK_AT)[: self.joint_count]
@@ -364,8 +385,8 @@ class Tick(Record):
     def known(self, x: StateEstimate) -> None:
         self.has_estimate = 1
         t_us, p, v, R, w, yaw, q, qd, force = x
-        arm = *padded(q, JOINTS), *padded(qd, JOINTS)
-        _ESTIMATE.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *arm, force)
+        known = _ESTIMATES[len(q)]
+        known.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *q, *qd, force)
 
     @property
     def nominal(self) -> PredictionState | None:
@@ -405,22 +426,24 @@ class Tick(Record):
 
 def estimate_in(record: Record, at: int, joints: int) -> StateEstimate:
     """The ``Estimate`` ``at`` [byte] of a record, of a vehicle of so many ``joints``."""
-    x: Any = _ESTIMATE.unpack_from(record.memory, at)
+    x: Any = _ESTIMATES[joints].unpack_from(record.memory, at)
     p, v, R, w = x[1:4], x[4:7], x[7:16], x[16:19]
-    q, qd = x[20 : 20 + joints], x[20 + JOINTS : 20 + JOINTS + joints]
+    q, qd = x[20 : 20 + joints], x[20 + joints : -1]
     return StateEstimate(x[0], p, v, R, w, x[19], q, qd, x[-1])
 
 
 NO_ROTOR: Final = -1
-_ESTIMATE: Final = struct.Struct(f"<q{19 + 2 * JOINTS + 1}d")
+_ESTIMATES: Final = [struct.Struct(f"<q19d{2 * per_joint(n)}d") for n in range(JOINTS + 1)]
 _PLAN: Final = struct.Struct(f"<{15 + 2 * JOINTS}d")
 _INPUT: Final = struct.Struct(f"<{4 + JOINTS + 4}d")
 _COMMAND: Final = struct.Struct(f"<{ROTORS + JOINTS}d")
 _COUNTED_COMMAND: Final = struct.Struct(f"<2q{ROTORS + JOINTS}d")  # rotor_count, joint_count, sent
 _JOINTS: Final = struct.Struct(f"<{JOINTS}d")
 _HEAD: Final = struct.Struct("<4q")  # has_estimate, has_plan, rotor_count, joint_count
+_WHOLE: Final = struct.Struct("<q")
 _ONE: Final = struct.Struct("<d")
 _TWO: Final = struct.Struct("<2d")
+_THREE: Final = struct.Struct("<3d")
 
 
 _DOWN_AT: Final = Tick.place("estimate", "p_WB") + 2 * 8
@@ -433,6 +456,11 @@ _WORK_AT: Final = Tick.place("bodies", "work")
 _COUNTS_AT: Final = Tick.place("rotor_count")
 _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")
+_PUSHED_AT: Final = Tick.place("observed", "known")
+_UNDONE_AT: Final = Tick.place("watch", "undone")
+_CONTACT_AT: Final = Tick.place("pressing", "contact")
+_ASKED_AT: Final = Tick.place("pressing", "asked")
+_GRIPPED_AT: Final = Tick.place("payload", "gripped")
 
 
 def new_tick(mass: float, rotors: int, joints: int) -> Tick:

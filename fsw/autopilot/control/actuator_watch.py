@@ -461,12 +461,13 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
     s.odd2 += forget * (odd2 - s.odd2)
 
 
-def felt_inside(s: Watched, airframe: Airframe) -> JointVector:
+def felt_inside(r: Tick, airframe: Airframe) -> JointVector:
     """How much of what undoes each joint's torque is felt nearer to the base (j,) [1].
 
     By mean squares, of what turns the base beside the model where drives act on it as they are
     asked, and as the arm is seen to move; or of what undoes the torque of a joint between.
     """
+    s = r.watch
     turned2 = airframe.rotor_lever**2 * float(s.products[0] + s.products[1])
     unseen, inside, felt = float(s.odd2) - turned2, 0.0, []
     for u in s.undone2[: airframe.bodies.joints].tolist():

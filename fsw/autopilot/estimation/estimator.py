@@ -20,17 +20,17 @@ from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.autopilot.signals import Mat3, SensorFrame, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate, Tick
 from fsw.compiled import compilable, kernel, machine_code
-from fsw.record import JOINTS as JOINT_CAPACITY
-from fsw.record import Floats, padded
+from fsw.record import JOINTS as _ROOM
+from fsw.record import Floats, per_joint
 
 _ANGLES_AT: Final = 16
-_RATES_AT: Final = _ANGLES_AT + JOINT_CAPACITY
-READINGS: Final = _RATES_AT + JOINT_CAPACITY
+_RATES_AT: Final = _ANGLES_AT + _ROOM
+READINGS: Final = _RATES_AT + _ROOM
 """Numbers of a frame: position, velocity, quaternion, gyro, accelerometer, joints, their rates.
 
 It has room for the joints of any vehicle; those that one does not have are zero.
 """
-_FRAME: Final = struct.Struct(f"<{READINGS}d")
+_FRAMES: Final = [struct.Struct(f"<{_ANGLES_AT}d{2 * per_joint(n)}") for n in range(_ROOM + 1)]
 POSE, INERTIAL, JOINTS = 1, 2, 4  # parts of a frame
 # Farther or faster is no vehicle of this kind.
 _PLACE_LIMIT: Final = 1e5  # m
@@ -55,9 +55,8 @@ def read_frame(sensors: SensorFrame, r: Tick) -> int:
 def reading_of(sensors: SensorFrame) -> Floats:
     """The numbers of a frame (READINGS,) [SI]."""
     s = sensors
-    arm = padded(s.q_arm, JOINT_CAPACITY) + padded(s.qd_arm, JOINT_CAPACITY)
-    frame = _FRAME.pack(*s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *arm)
-    return np.frombuffer(frame)
+    parts = *s.p_WB, *s.v_WB, *s.q_WB, *s.gyro_B, *s.accel_B, *s.q_arm, *s.qd_arm
+    return np.frombuffer(_FRAMES[len(s.q_arm)].pack(*parts))
 
 
 @kernel
@@ -123,4 +122,4 @@ def _within(values: Vec3, limit: float) -> bool:
 @cache
 def _machine_code() -> Callable[..., int]:
     """``_read``, compiled when it is first wanted."""
-    return machine_code(_read, Tick().array, np.frombuffer(bytes(_FRAME.size)), 0)
+    return machine_code(_read, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0)

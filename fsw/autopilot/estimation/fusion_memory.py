@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -66,23 +66,28 @@ class EncoderWatch(NamedTuple):
         return math.inf in self.repeats
 
     def after(
-        self, angles: JointVector, undone: JointVector, felt: JointVector, *, judged: bool
+        self,
+        angles: JointVector,
+        undone: JointVector,
+        felt: Callable[[], JointVector],
+        *,
+        judged: bool,
     ) -> EncoderWatch:
         """The watch after a reading of ``angles`` (j,) [rad].
 
         An encoder is stuck that says the same while torque that its joint is given moves nothing,
         and what carries the joint feels that it moves. ``undone`` (j,) [N m] is what the watch over
-        the joints finds to act against each torque, and ``felt`` (j,) [1] how much of that is felt
-        nearer to the base (``actuator_watch.felt_inside``). A joint that fails is not felt, a load
-        that is not known acts from the start. On the ground, and where a joint is known to have
-        failed, they are not ``judged``.
+        the joints finds to act against each torque, and ``felt`` says how much of that is felt
+        nearer to the base (j,) [1] (``actuator_watch.felt_inside``). A joint that fails is not
+        felt, a load that is not known acts from the start. On the ground, and where a joint is
+        known to have failed, they are not ``judged``.
         """
         repeats, first = [0.0] * len(angles), list(undone)
         for k in range(len(angles) if judged and len(self.angles) == len(angles) else 0):
             if angles[k] == self.angles[k]:
                 repeats[k], first[k] = self.repeats[k] + 1.0, self.first[k]
-                held = abs(undone[k] - first[k]) > _HELD and felt[k] > _FELT
-                if held and repeats[k] >= _REPEATS:
+                held = repeats[k] >= _REPEATS and abs(undone[k] - first[k]) > _HELD
+                if held and felt()[k] > _FELT:
                     repeats[k] = math.inf
         return EncoderWatch(angles, tuple(repeats), tuple(first))
 

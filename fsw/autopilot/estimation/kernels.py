@@ -46,7 +46,7 @@ from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate
 from fsw.compiled import compilable, kernel, machine_code
 from fsw.record import JOINTS as JOINT_CAPACITY
-from fsw.record import Four, PerJoint, Record, Three, padded
+from fsw.record import Four, PerJoint, Record, Three, per_joint
 
 # What ``tick`` does, in this order.
 PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
@@ -79,20 +79,19 @@ class Asked(Record):
         Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle
         and surfaces ``pushed`` it [m/s^2, NED].
         """
-        joints = padded(u, JOINT_CAPACITY)
-        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, *joints, *model, *pushed)
+        _TICKS[len(u)].pack_into(self.memory, 0, round(1e6 * now), dt, *u, *model, *pushed)
 
     def read_joints(self, angles: JointVector, age: float) -> None:
         """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
-        _ENCODERS.pack_into(self.memory, _ENCODERS_AT, *padded(angles, JOINT_CAPACITY), age)
+        _ENCODERS[len(angles)].pack_into(self.memory, _ENCODERS_AT, *angles, age)
 
     def read(self, time: float, force: Vec3, rate: Vec3) -> None:
         """What the IMU says: ``time`` [s], ``force`` [m/s^2, FRD] and ``rate`` [rad/s, FRD]."""
         _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
 
 
-_TICK = struct.Struct(f"<q{8 + JOINT_CAPACITY}d")
-_ENCODERS = struct.Struct(f"<{JOINT_CAPACITY + 1}d")
+_TICKS = [struct.Struct(f"<qd{per_joint(n)}7d") for n in range(JOINT_CAPACITY + 1)]
+_ENCODERS = [struct.Struct(f"<{per_joint(n)}d") for n in range(JOINT_CAPACITY + 1)]
 _ENCODERS_AT = Asked.place("encoders")
 _READING = struct.Struct("<7d")
 _READING_AT = Asked.place("time")

@@ -246,7 +246,7 @@ class Autopilot:
     ) -> TickOutputs:
         """What a tick commands: rotors and joints, gripper, and another autopilot's setpoint."""
         asked, v = self._cascade.setpoint(r) if flown else None, state.vehicle
-        return TickOutputs(sent, v.mode, v.armed, setpoint=asked, gripper=v.gripper)
+        return TickOutputs(sent, v.mode, v.armed, asked, v.gripper)
 
     def _estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -269,7 +269,7 @@ class Autopilot:
         c = controlled
         outputs, inputs, state, r, estimate, fusion, flown = c[:7]
         plan, texts, safety, reset = c.plan, outputs.texts, state.safety, None
-        flags = r.flags if flown else 0
+        flags = r.flags if flown and not c.calm else 0  # a calm tick has none
         if estimate is not None and (flags & OFF_PLAN or safety.off_plan_us >= 0):
             safety = self._watch.off_plan(
                 safety,

@@ -220,8 +220,20 @@ def _put_vehicle(
 
 def end_effector(bodies: Bodies, estimate: StateEstimate) -> tuple[Vec3, Vec3]:
     """World position p_WE [m] and velocity v_WE [m/s] of the estimated end-effector."""
-    frame = frame_of(bodies, estimate)
-    return position(frame, bodies.joints, bodies.tip), velocity(frame, bodies.joints, bodies.tip)
+    return _tip(frame_of(bodies, estimate), packed_bodies(bodies))
+
+
+@machine_code
+@kernel
+def _tip(frame: Array, bodies: NDArray[Any]) -> tuple[Vec3, Vec3]:
+    return _moving_tip(frame, bodies[0])
+
+
+@compilable
+def _moving_tip(frame: Array, b: Bodies) -> tuple[Vec3, Vec3]:
+    """Position [m, NED] and velocity [m/s, NED] of the end-effector of a frame."""
+    tip, last = (b.tip[0], b.tip[1], b.tip[2]), int(b.joints)
+    return position(frame, last, tip), velocity(frame, last, tip)
 
 
 def level_frame(bodies: Bodies, q_arm: JointVector, yaw: float) -> Array:
@@ -246,9 +258,9 @@ def end_effector_when_level(bodies: Bodies, q_arm: JointVector, yaw: float) -> V
 @compilable
 def predicted_end_effector(b: Bodies, state: Array) -> tuple[Vec3, Vec3]:
     """Its position [m, NED] and velocity [m/s, NED] in a prediction ``state`` (states,) [SI]."""
-    frame, tip = np.zeros(FRAME), (b.tip[0], b.tip[1], b.tip[2])
+    frame = np.zeros(FRAME)
     fill_frame(state, b, frame)
-    return position(frame, int(b.joints), tip), velocity(frame, int(b.joints), tip)
+    return _moving_tip(frame, b)
 
 
 @compiled

@@ -140,7 +140,8 @@ class Linearisation:
         ``pushes`` (n, 3) [m/s^2, NED] accelerate the base in each step beside its thrust.
         """
         self.horizon.inputs[:] = inputs
-        np.matmul(self.model.phi, start, out=self.states)
+        # One matrix: NumPy takes twice as long for a stack of them.
+        np.dot(self.model.phi.reshape(-1, len(start)), start, out=self.states.reshape(-1))
         np.add(self.states, self.model.gamma @ inputs, out=self.states)
         if pushes is not None:
             p, v, dt = np.zeros(3), np.zeros(3), self.model.period

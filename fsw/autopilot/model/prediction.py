@@ -28,7 +28,6 @@ from scipy.linalg import expm
 
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import PredictionState
-from fsw.autopilot.tick_record import PlanState
 from fsw.compiled import compilable
 
 Array = NDArray[np.float64]
@@ -137,20 +136,8 @@ def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:
     return CondensedModel(airframe=airframe, horizon=horizon, period=period, phi=phi, gamma=gamma)
 
 
-@compilable
-def to_vector(state: PredictionState | PlanState, joints: int) -> Array:
-    """The prediction state in the layout of this module, (states,), of a vehicle with ``joints``.
-
-    Args:
-        state: Of as many joints, or with room for more.
-        joints: How many [1].
-    """
-    x = np.empty(states_of(joints))
-    for k in range(3):
-        x[P + k], x[V + k], x[A + k] = state.p[k], state.v[k], state.a[k]
-    for k in range(2):
-        x[J + k], x[S + k] = state.j[k], state.s[k]
-    x[YAW], x[YAW_RATE] = state.yaw, state.yaw_rate
-    for k in range(joints):
-        x[Q_ARM + 2 * k], x[QD_ARM + 2 * k] = state.q_arm[k], state.qd_arm[k]
-    return x
+def to_vector(state: PredictionState) -> Array:
+    """The prediction state in the layout of this module, (states,)."""
+    arm = [number for joint in zip(state.q_arm, state.qd_arm, strict=True) for number in joint]
+    base = *state.p, *state.v, *state.a, *state.j, *state.s, state.yaw, state.yaw_rate
+    return np.array((*base, *arm))

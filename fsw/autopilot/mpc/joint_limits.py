@@ -24,15 +24,16 @@ class JointLimits:
 
     def __init__(self, model: CondensedModel, limits: InputLimits) -> None:
         bounded = _rows(model, limits)
-        self._minus = -np.array([row for row, _ in bounded])  # (rows, states)
+        minus = -np.array([row for row, _ in bounded])  # (rows, states)
+        self._minus = np.ascontiguousarray(minus.T)
         self.rows = block((len(bounded),), 1, model.horizon, model.inputs)
         self.rows.lower_bound[:] = np.tile([-bound for _, bound in bounded], model.horizon)
-        self.rows.gradient[:] = (self._minus @ model.gamma[1:]).reshape(self.rows.gradient.shape)
+        self.rows.gradient[:] = (minus @ model.gamma[1:]).reshape(self.rows.gradient.shape)
         self._value = self.rows.value.reshape(model.horizon, -1)
 
     def refill(self, horizon: Linearisation) -> None:
         """Bring angles and rates up to date; the gradient never changes."""
-        np.matmul(horizon.states[1:], self._minus.T, out=self._value)
+        np.dot(horizon.states[1:], self._minus, out=self._value)
 
 
 def _rows(model: CondensedModel, limits: InputLimits) -> list[tuple[Array, float]]:

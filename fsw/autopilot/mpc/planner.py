@@ -90,7 +90,7 @@ class Planner:
             A plan whose every program was solved, or a failure that says which was not.
         """
         begin = self._stopwatch_us()
-        start = to_vector(request.start, self._joints)
+        start = to_vector(request.start)
         refusal = self._refusal(request, start)
         if refusal is not None:
             return PlanFailure(

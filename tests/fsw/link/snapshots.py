@@ -145,4 +145,4 @@ def outputs_at(t_us: int, **changes: object) -> TickOutputs:
     snapshot = replace(SNAPSHOT, t_us=t_us, estimate=estimate)
     if "snapshot" in changes:
         changes["shown"] = changes.pop("snapshot")
-    return replace(TickOutputs(ACTUATORS, snapshot.mode, snapshot.armed, snapshot), **changes)  # type: ignore[arg-type]
+    return replace(TickOutputs(ACTUATORS, snapshot.mode, snapshot.armed, shown=snapshot), **changes)  # type: ignore[arg-type]

@@ -36,8 +36,8 @@ def test_a_period_in_ticks_is_the_planners_period() -> None:
     for _ in range(50):
         state = after(state, U, STILL, 0.002)
     a, b = discretise(replace(AIRFRAME, attitude_lag=AttitudeLag(at_once=True)), 0.1)
-    whole = a @ to_vector(MOVING, 2) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
-    np.testing.assert_allclose(to_vector(state, 2), whole, atol=1e-12)
+    whole = a @ to_vector(MOVING) + b @ np.array([*U.a, U.yaw_acc, *U.qdd_arm])
+    np.testing.assert_allclose(to_vector(state), whole, atol=1e-12)
 
 
 def test_its_points_are_the_planners_points() -> None:

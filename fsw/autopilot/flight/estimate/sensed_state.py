@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 from fsw.autopilot.control.actuator_watch import felt_inside
@@ -35,7 +36,6 @@ from fsw.autopilot.flight.estimate.jump import on_return, told
 from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
-from fsw.autopilot.geometry.vectors import three
 from fsw.autopilot.measurements import JointSample, Sample
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.rotors import agility, swing
@@ -131,7 +131,7 @@ class SensedState:
         model, surfaces = UNKNOWN, UNPUSHED
         if state.cascade.has_estimate:
             pushed, model = self._cascade.expected(state.cascade)
-            surfaces = three(state.cascade.observed.known, 0)
+            surfaces = state.cascade.pushed
             # On the ground thrust does not explain how the vehicle moves.
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
@@ -211,9 +211,7 @@ class SensedState:
         estimate: StateEstimate | None,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """See ``SensorFusion.catch_up``, of a vehicle in a ``state``."""
-        now, r = memory.now, state.cascade
-        # What pushes back, or was just gripped, turns the vehicle by more than is known of it.
-        touches = bool(r.pressing.contact or r.pressing.asked > 0.0 or r.payload.gripped > 0.0)
+        now = memory.now
         return self._fusion.catch_up(
             memory,
             samples,
@@ -222,7 +220,8 @@ class SensedState:
             aloft=is_aloft(state, now, self._legs, self._stale),
             flies=state.vehicle.flies,
             damaged=bool(state.damage.rotor or state.damage.joint),
-            touches=touches,
+            # What pushes back, or was just gripped, turns the vehicle by more than is known of it.
+            touches=state.cascade.touches,
         )
 
     def reported(
@@ -336,10 +335,9 @@ def _without_stuck(
     before = watch = memory.encoders
     for one in samples:
         if type(one) is JointSample:
-            seen = state.cascade.watch
-            undone = tuple(seen.undone[: len(one.angles)].tolist())
-            judged = state.vehicle.flies and not state.damage.joint
-            watch = watch.after(one.angles, undone, felt_inside(seen, airframe), judged=judged)
+            r, judged = state.cascade, state.vehicle.flies and not state.damage.joint
+            felt = partial(felt_inside, r, airframe)
+            watch = watch.after(one.angles, r.undone, felt, judged=judged)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, law, one)
     if watch.stuck:

@@ -422,6 +422,7 @@ FAILSAFES: Final = (
 
 ROWS: Final = {row.condition: row for row in FAILSAFES}
 FAULTS: Final = frozenset(row.condition for row in FAILSAFES if row.of_vehicle)
+_QUICK: Final = tuple([row for row in FAILSAFES if not row.slow])
 BLOCKING: Final = frozenset(
     row.condition for row in FAILSAFES if row.takeover is UserTakeoverAllowed.NEVER
 )
@@ -443,6 +444,7 @@ def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
     before = context.state.vehicle.conditions
+    rows = FAILSAFES if before else _QUICK
     return tuple(
-        [row for row in FAILSAFES if (row.condition in before if row.slow else row.active(context))]
+        [row for row in rows if (row.condition in before if row.slow else row.active(context))]
     )

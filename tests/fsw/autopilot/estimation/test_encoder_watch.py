@@ -18,7 +18,7 @@ def watched(
     """A watch after equal readings, while torques [N m] go nowhere."""
     watch = EncoderWatch()
     for one in undone:
-        watch = watch.after(STANDS, one, felt, judged=judged)
+        watch = watch.after(STANDS, one, lambda: felt, judged=judged)
     return watch
 
 
@@ -41,14 +41,16 @@ def test_an_encoder_is_stuck_where_its_joint_is_felt_to_move(
 ) -> None:
     watch = watched(undone, felt)
     assert watch.stuck
-    assert watch.after(STANDS, (0.0, 0.0), UNFELT, judged=True).stuck, "until it speaks again"
+    assert watch.after(STANDS, (0.0, 0.0), lambda: UNFELT, judged=True).stuck, (
+        "until it speaks again"
+    )
     speaks = tuple(angle + 0.0015 for angle in STANDS)
-    assert not watch.after(speaks, (HELD, HELD), FELT, judged=True).stuck
+    assert not watch.after(speaks, (HELD, HELD), lambda: FELT, judged=True).stuck
 
 
 def test_one_that_is_stuck_stays_so_while_another_one_moves() -> None:
     watch = watched(rising(0.0, HELD), (-1.0, 0.7))
-    assert watch.after(MOVES, (0.0, 0.0), UNFELT, judged=True).stuck
+    assert watch.after(MOVES, (0.0, 0.0), lambda: UNFELT, judged=True).stuck
 
 
 @pytest.mark.parametrize(

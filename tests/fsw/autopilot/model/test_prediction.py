@@ -86,7 +86,7 @@ def test_plain_float_model_equals_the_matrices_at_the_ticks_rate() -> None:
         x, u = prediction_vector(random), random.uniform(-3.0, 3.0, INPUTS)
         command = PlanInput((u[0], u[1], u[2]), u[3], (u[4], u[5]))
         np.testing.assert_allclose(
-            to_vector(plain.step(as_state(x), command), 2), a @ x + b @ u, atol=1e-11
+            to_vector(plain.step(as_state(x), command)), a @ x + b @ u, atol=1e-11
         )
 
 
@@ -96,9 +96,9 @@ def test_fifty_plain_ticks_make_one_planning_period() -> None:
     a, b = discretise(VEHICLE, 0.1)
     command = PlanInput((u[0], u[1], u[2]), u[3], (u[4], u[5]))
     moved = NominalModel(VEHICLE, 0.002).advance(as_state(x), command, 50)
-    np.testing.assert_allclose(to_vector(moved, 2), a @ x + b @ u, atol=1e-9)
+    np.testing.assert_allclose(to_vector(moved), a @ x + b @ u, atol=1e-9)
 
 
 def test_vector_layout_keeps_every_entry() -> None:
     x = np.arange(STATES, dtype=float)
-    np.testing.assert_array_equal(to_vector(as_state(x), 2), x)
+    np.testing.assert_array_equal(to_vector(as_state(x)), x)

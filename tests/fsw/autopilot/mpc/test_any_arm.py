@@ -72,8 +72,8 @@ def flown(
     cycles: int,
 ) -> Array:
     """The states at the cycles (cycles + 1, states) of a vehicle that does what is planned."""
-    airframe, model, planner = of(name)
-    x = [to_vector(start, airframe.bodies.joints)]
+    _, model, planner = of(name)
+    x = [to_vector(start)]
     for k in range(cycles):
         targets = (still_at(target),) * (NODES + 1)
         asked = PlanRequest(k, k * PERIOD_US, as_state(x[-1]), targets, zones, k > 0)

@@ -53,7 +53,7 @@ def flat(plan: Plan) -> Array:
 
 def nodes_of(plan: Plan) -> Array:
     """Predicted states (n + 1, 19)."""
-    return MODEL.phi @ to_vector(plan.start, 2) + MODEL.gamma @ flat(plan).ravel()
+    return MODEL.phi @ to_vector(plan.start) + MODEL.gamma @ flat(plan).ravel()
 
 
 @pytest.mark.drawn(1)

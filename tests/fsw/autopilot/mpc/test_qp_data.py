@@ -142,7 +142,7 @@ def test_at_rest_before_a_point_every_controller_is_held_by_it_as_written_a_seco
 ) -> None:
     config, way = replace(CONFIG, controller=controller), np.array(direction)
     start, asked = question(np.random.default_rng(1), SafeSet())
-    start[:] = to_vector(hovering(), 2)
+    start[:] = to_vector(hovering())
     asked = around(asked, start, np.zeros(INPUTS * N))
     here = asked.points.position[0, END_EFFECTOR]
     asked = replace(
