@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from dataclasses import replace as replace
 else:
     import dataclasses
-    from operator import attrgetter
 
     def dataclass(*, frozen, slots):
         """What ``dataclasses.dataclass`` makes, frozen by the type checker alone."""
@@ -22,22 +21,25 @@ else:
 
         def made(definition):
             kind = dataclasses.dataclass(slots=slots, unsafe_hash=True)(definition)
-            names = [field.name for field in dataclasses.fields(kind)]
-            # Where a value checks itself, and for one field, of which attrgetter makes no tuple,
-            # the library's replace does.
-            if len(names) > 1 and not hasattr(kind, "__post_init__"):
-                kind._all_fields = attrgetter(*names)
+            if not hasattr(kind, "__post_init__"):  # else a value checks itself
+                kind._copy = _copy_of(kind)
             return kind
 
         return made
 
+    def _copy_of(kind):
+        """A function that copies values of a kind, written field by field as the library does."""
+        lines = [f" copied.{field.name} = value.{field.name}" for field in dataclasses.fields(kind)]
+        made = {"new": object.__new__, "kind": kind}
+        exec("\n".join(["def copy(value):", " copied = new(kind)", *lines, " return copied"]), made)
+        return made["copy"]
+
     def replace(value, /, **changes):
         """``dataclasses.replace``, in a quarter of the time for values of this ``dataclass``."""
-        kind = type(value)
-        fields_of = kind.__dict__.get("_all_fields")
-        if fields_of is None:
+        copy = type(value).__dict__.get("_copy")
+        if copy is None:
             return dataclasses.replace(value, **changes)
-        copied = kind(*fields_of(value))
+        copied = copy(value)
         for name, new in changes.items():
             setattr(copied, name, new)
         return copied

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import mul
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -517,8 +518,8 @@ class Simulation:
             wanted = tuple(min(max(f, 0.0), 1.0) for f in wanted)
         if not (min(torques) >= -1.0 and max(torques) <= 1.0):
             torques = tuple(min(max(f, -1.0), 1.0) for f in torques)
-        self._thrust = tuple([f * full for f, full in zip(wanted, self._full, strict=True)])
-        self._torque = tuple([f * full for f, full in zip(torques, self._full_torque, strict=True)])
+        self._thrust = tuple(map(mul, wanted, self._full))
+        self._torque = tuple(map(mul, torques, self._full_torque))
 
     def _drive(self, drives: Drives) -> None:
         """What of the command takes effect in this step."""
