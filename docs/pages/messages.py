@@ -42,8 +42,8 @@ _DIALECT_HEAD = """\
 ## The dialect
 
 Bytes are the payload size before trailing zeros are removed. Fields are in the order of the
-definition; on the wire larger types come first. `target_system` and `target_component` (uint8_t, 0
-for any) are left out.
+definition; on the wire larger types come first. Times are on the vehicle's clock, unused entries
+zero. `target_system` and `target_component` (uint8_t, 0 for any) are left out.
 """
 # What the vehicle says in answer, or as it happens, beside the streams.
 ANSWERS: Final = (
@@ -128,10 +128,17 @@ def _message(message: ET.Element) -> str:
             continue
         enum = field.attrib.get("enum")
         unit = f"`{enum}`" if enum else field.attrib.get("units", "")
-        meaning = (field.text or "").strip()
+        meaning = _without_repetition((field.text or "").strip())
         type_ = f"{field.attrib['type']} {unit}".rstrip()
         rows.append(f"- `{field.attrib['name']}` {type_}: {meaning}")
     return "\n".join(rows) + "\n"
+
+
+def _without_repetition(meaning: str) -> str:
+    """A field's meaning without what the page says once, of all."""
+    for said in (", on the vehicle's clock", " Unused entries are zero."):
+        meaning = meaning.replace(said, "")
+    return meaning
 
 
 def _enum(enum: ET.Element) -> str:
