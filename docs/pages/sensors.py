@@ -29,8 +29,6 @@ TABLES: Final[dict[str, type[keys.Timing]]] = {
 _POSE: Final = {
     "position_m": "noise of each axis",
     "attitude_deg": "noise about each axis",
-    "outlier_m": "an outlier lies so far off, in any direction",
-    "outlier_deg": "and is turned by so much",
     "attitude_resolution_deg": "of a small rotation",
 }
 MEANINGS: Final[dict[str, dict[str, str]]] = {
@@ -79,7 +77,6 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "wander_vertical_m": "the same",
         "wander_time_s": "its correlation time",
         "velocity_m_s": "noise of each axis",
-        "outlier_m": "an outlier lies so far off, in any direction",
         "position_resolution_deg": "of latitude and longitude; default 1e-7 as in HIL_GPS, 11 mm "
         "northwards",
         "height_resolution_m": "default 0.001 as in HIL_GPS",
@@ -91,26 +88,24 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "offset_pa": "pressure of the day against the standard, drawn once a flight",
         "drift_pa": "deviation of what changes slowly, a Gauss–Markov process",
         "drift_time_s": "its correlation time",
-        "outlier_pa": "an outlier is off by so much",
     },
     "magnetometer": {
         "field_gauss": "the Earth's field, NED",
         "noise_gauss": "white noise of each axis",
         "offset_gauss": "of each axis, drawn once a flight",
         "scale_share": "scale error of each axis, drawn once a flight",
-        "outlier_gauss": "an outlier adds so much, in any direction",
     },
     "rangefinder": {
         "least_m": "nearer, nothing is sent",
         "most_m": "farther, nothing is sent",
         "noise_m": "white noise",
         "scale_share": "scale error, drawn once a flight",
-        "outlier_m": "an outlier is so much too short",
+        "outlier_m": "too short",
     },
     "encoders": {
         "noise_rad": "white noise of each joint",
         "offset_rad": "error of each zero, drawn once a flight",
-        "outlier_rad": "an outlier of the first joint is off by so much",
+        "outlier_rad": "of the first joint",
     },
     "force_torque": {
         "force_n": "white noise of each axis; default 0.05",
@@ -119,7 +114,6 @@ MEANINGS: Final[dict[str, dict[str, str]]] = {
         "torque_bias_n_m": "the same; default 0.005",
         "force_resolution_n": "default 0.0125",
         "torque_resolution_n_m": "default 0.0005",
-        "outlier_n": "an outlier adds so much, in any direction",
     },
 }
 
@@ -190,9 +184,9 @@ def _table(
 
 
 def _meaning(name: str, key: str) -> str:
-    """What a key means; the head of the page says it of every resolution."""
+    """What a key means; the head of the page says it of every resolution and outlier."""
     said = MEANINGS[name]
-    return said.get(key, "") if "resolution" in key else said[key]
+    return said.get(key, "") if re.search("resolution|outlier", key) else said[key]
 
 
 def _value(given: dict[str, Any]) -> str:
