@@ -138,9 +138,7 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bo
     if x.end == 0:
         return _NONE
     x.steady[half] = x.steady[half] + 1 if change <= jump else 0
-    if x.believed & (1 << half):
-        x.doubted[half] = 0
-    elif flies and x.doubted[half] > 0:
+    if flies and x.doubted[half] > 0 and not x.believed & (1 << half):
         if x.doubted[half] == STAYS and _is_back(x, half, reading, jump):
             x.doubted[half], x.calm[half] = 0, 0
     else:

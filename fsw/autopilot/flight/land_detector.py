@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.flight.failsafe.evidence import FALLING_US
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.state import FlightState, VehicleMemory
@@ -36,7 +37,9 @@ _SINKS: Final = 0.15  # m/s; slower than a landing, faster than the rebound of t
 _FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free fall, at worst
 _SIGMAS: Final = 3.0  # by which a height may be wrong
 _CLOSE: Final = 0.1  # m of the legs above the ground; from there it falls at 1.4 m/s
+_FALL: Final = 0.2  # m, of a vehicle whose rotors stop; the legs stand it
 _RANGE_AGE: Final = 0.3  # s, in which a distance is one of now
+_RANGE_MEMORY: Final = 0.1  # s, in which none must be longer
 _CONTACT_US: Final = 100_000  # of contact before loops open
 _SURE_US: Final = 200_000  # with open loops, in which a fall is seen
 
@@ -47,11 +50,15 @@ def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
 
 
 def with_range(vehicle: VehicleMemory, sample: RangeSample) -> VehicleMemory:
-    """The vehicle after a ``sample`` of the rangefinder; one that is too short does not count."""
-    last, used = vehicle.range_newest, sample
-    if last is not None and 0.0 <= sample.time - last.time < _RANGE_AGE:
-        used = replace(sample, distance=max(last.distance, sample.distance))
-    return replace(vehicle, range=used, range_newest=sample)
+    """The vehicle after a ``sample`` of the rangefinder; some that are too short do not count.
+
+    The longest of the last 0.1 s does, and of the last two: there is dust, and noise.
+    """
+    oldest = [_RANGE_MEMORY] * len(vehicle.ranges[:-1]) + [_RANGE_AGE]
+    seen = zip(vehicle.ranges, oldest, strict=False)
+    ranges = *[one for one, age in seen if 0.0 <= sample.time - one.time <= age], sample
+    longest = max([one.distance for one in ranges])
+    return replace(vehicle, range=replace(sample, distance=longest), ranges=ranges)
 
 
 def stands(config: FlightConfig, estimate: StateEstimate) -> bool:
@@ -85,42 +92,55 @@ def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate
 
 def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
     """Whether legs are less than 0.1 m above the ground: nothing that is known says otherwise."""
-    height, sigma = height_above_ground(config, estimate), state.aiding.height_sigma
+    height, room = height_above_ground(config, estimate), _SIGMAS * state.aiding.height_sigma
     measured = _measured_now(config, state, estimate)
-    if measured is None:
-        return height < _CLOSE and _SIGMAS * sigma < _CLOSE
-    return measured[0] < _CLOSE and height - _SIGMAS * sigma < _CLOSE
+    if measured is not None and measured[0] < _CLOSE:
+        return height - room < _CLOSE
+    doubtful = measured is None or _has_fault(state, 1e-6 * estimate.t_us, SensorFault.JUMP)
+    return doubtful and height < _CLOSE and height + room < _FALL
 
 
 def _measured_now(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> Vec2 | None:
     now, legs = 1e-6 * estimate.t_us, config.airframe.leg_length
-    return _measured_height(state.vehicle.range, now, estimate.R_WB[8], legs, _RANGE_AGE)
+    return _measured_height(state, now, estimate.R_WB[8], legs, _RANGE_AGE)
+
+
+def _has_fault(state: FlightState, now: float, *kinds: SensorFault) -> bool:
+    """Whether a reading of the rangefinder has lately had a fault of these ``kinds``."""
+    if state.fusion is None:
+        return False
+    health = state.fusion.of(Sensor.RANGEFINDER)
+    return health.fault in kinds and now - health.fault_at < _RANGE_AGE
 
 
 def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool:
     """Whether the vehicle flies so high at ``now`` [s] that its ``legs`` [m] cannot touch anything.
 
-    By the rangefinder's reading, if that is not ``oldest`` [s], because the estimate may be what is
-    wrong; else by that, as far as it knows its height.
+    By the rangefinder's reading, if that is not ``oldest`` [s], or by the estimate, as far as it
+    knows its height. Where they differ and sensors are in dispute, the estimate may be what is
+    wrong; else it is the rangefinder, and who else is wrong must be asked all the same.
     """
     r, vehicle = state.cascade, state.vehicle
     if not (r.has_estimate and vehicle.flies):
         return False
-    measured = _measured_height(vehicle.range, now, r.upright, legs, oldest)
-    if measured is not None:
+    measured = _measured_height(state, now, r.upright, legs, oldest)
+    if measured is not None and (measured[0] > _CLOSE or state.aiding.disputed_us):
         return measured[0] > _CLOSE
     return -r.down - legs - _SIGMAS * state.aiding.height_sigma > _CLOSE
 
 
 def _measured_height(
-    seen: RangeSample | None, now: float, upright: float, legs: float, oldest: float
+    state: FlightState, now: float, upright: float, legs: float, oldest: float
 ) -> Vec2 | None:
     """Height of the ``legs`` [m, long] above the ground [m], and its deviation [m].
 
-    By what the rangefinder has ``seen``; None if that is ``oldest`` [s] or more at ``now`` [s].
-    The cosine of the tilt is ``upright`` [1].
+    By the rangefinder; None if that is stuck, or ``oldest`` [s] or more at ``now`` [s]. The cosine
+    of the tilt is ``upright`` [1].
     """
+    seen = state.vehicle.range
     if seen is None or not 0.0 <= now - seen.time < oldest:
+        return None
+    if _has_fault(state, now, SensorFault.STUCK):
         return None
     return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
 

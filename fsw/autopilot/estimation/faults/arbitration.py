@@ -194,9 +194,12 @@ class Arbitration:
         x = memory.numbers.copy()
         memory = memory._replace(numbers=x)
         new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
-        # A half that has jumped is believed where the rotors are named for it, and where it agrees.
+        # A half that has jumped, and stays, is believed where the rotors are named for it, and
+        # where it agrees. Garbage does not stay.
         agrees = back or (before.is_on and not verdict.is_on and not verdict.wrong)
-        believes = bool(x["doubted"][0].any() and (agrees or verdict.named is Source.MODEL))
+        doubted, steady = x["doubted"][0], x["steady"][0]
+        stays = bool(((doubted > 0) & (steady >= doubted)).any())
+        believes = stays and (agrees or verdict.named is Source.MODEL)
         # So is what has jumped and come back meanwhile: an arm that hits its stop is a blow.
         unit = memory.of(Sensor.IMU)
         jumped = unit.fault is SensorFault.JUMP and now - unit.fault_at < _TRAIL

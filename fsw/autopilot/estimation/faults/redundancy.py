@@ -131,6 +131,7 @@ _KNOWN: Final = 0.4  # of that
 _GAINS: Final = 15.0  # m/s^2, half of it
 _SPEED: Final = 10.0  # m/s
 _RATE: Final = 4.0  # rad/s
+_FOLLOWS: Final = 0.5  # s, for which that tells garbage
 _NOISE: Final = 20.0  # deviations of a place that is extrapolated
 # Deciding.
 _LEAD: Final = 1.0
@@ -384,9 +385,12 @@ def _take(s: Any, kind: int, aid: Aid) -> bool:
     if kind != 2 and n - first >= 2:
         before = s.aids[kind, (n - 2) % _AIDS]
         v, about_v = _difference(last, before, _MEASURED, last[0] - before[0]), 0.0
-    room = _NOISE * sigma, about_v, 9.0 * about if kind == 0 else math.inf
+    turns = 9.0 * about if kind == 0 else math.inf
+    room = _NOISE * sigma, about_v, turns, _NOISE * about if kind == 1 else math.inf
     confirmed = s.waits[kind] > 0 and _is_near(new, time, place, q, v, room)
     near = n == first or _is_near(last, time, place, q, v, room)
+    # After a while nearly everything may follow the last one: of garbage two do not say the same.
+    follows = near and (n == first or time - last[0] < _FOLLOWS)
     known = _integrals(s, time, new)
     new[0] = time
     for i in range(3):
@@ -396,7 +400,7 @@ def _take(s: Any, kind: int, aid: Aid) -> bool:
     s.waits[kind] = 0
     if not known:
         return False
-    if not near and not confirmed:
+    if not follows and not confirmed:
         s.waits[kind] = 1
         return False
     if not near:  # the sensor has jumped: what it said before is of another frame
@@ -409,16 +413,20 @@ def _take(s: Any, kind: int, aid: Aid) -> bool:
 
 
 @compilable
-def _is_near(row: Array, time: float, place: Vec3, q: Vec4, v: Vec3, room: Vec3) -> bool:
-    """Whether a place and an attitude may follow a ``row`` [SI], at a velocity ``v`` [m/s, NED].
+def _is_near(row: Array, time: float, place: Vec3, q: Vec4, v: Vec3, room: Vec4) -> bool:
+    """Whether a place may follow a ``row`` [SI], at a velocity ``v`` [m/s, NED], with an attitude.
 
-    ``room`` [m, m/s, rad]: of the place, of the velocity, and of the attitude.
+    Or with a velocity, in ``q``. ``room`` [m, m/s, rad, m/s]: of the place, of the velocity ``v``,
+    of the attitude, and of the velocity.
     """
     dt, far = time - row[0], 0.0
     for i in range(3):
         off = place[i] - row[_MEASURED + i] - dt * v[i]
         far += off * off
     near: bool = math.sqrt(far) <= room[0] + room[1] * dt + _GAINS * dt * dt
+    if room[3] < math.inf:
+        gained = norm(subtract((q[0], q[1], q[2]), vec3(row, _MEASURED + 3)))
+        return near and gained <= 2.0 * _GAINS * dt + room[3]
     if not room[2] < math.inf:
         return near
     turn = rotation_vector(multiply(conjugate(_quaternion(row, _MEASURED + 3)), q))
@@ -759,8 +767,14 @@ def judged(
         if verdict.is_on and now - verdict.fired > _QUIET:
             return verdict.acquitted()
         return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
-    young = not verdict.is_on or now - verdict.since < _SHOWS
-    cost = _costs(ratios, sizes, of, used, verdict.wrong | lost, young)
+    gone, young = verdict.wrong | lost, not verdict.is_on or now - verdict.since < _SHOWS
+    young = young and now - _silent_at(verdict.evidence) >= _CONTAINED[3]
+    # Rotors that are known to be off say nothing of who else is wrong.
+    explained = verdict.explained or damaged
+    beside = [k for k in fires if not of[k] & M] if explained else []
+    if beside:
+        gone, fires, used = gone | M, beside, [k for k in used if not of[k] & M]
+    cost = _costs(ratios, sizes, of, used, gone, young)
     first, *others = sorted(cost, key=cost.__getitem__)
     lead = cost[others[0]] - cost[first] if others else math.inf
     suspects = NOBODY
@@ -774,11 +788,11 @@ def judged(
         total += verdict.sum
     named = leader if total > _SURE else NOBODY
     # What the rotors have been named for shows in some windows for longer than in others.
-    explained = verdict.explained or named is M or damaged
+    explained = explained or named is M
     verdict = verdict._replace(
         since=verdict.since if verdict.is_on else now,
         fired=now,
-        suspects=M if explained else suspects,
+        suspects=M if explained and not beside else suspects,
         explained=explained,
         leader=leader,
         sum=total,
@@ -792,6 +806,14 @@ def _convicted(verdict: Verdict, named: Source) -> Verdict:
     agreed[list(Source).index(named)] = math.inf
     convicted = verdict._replace(wrong=verdict.wrong | named, agreed=tuple(agreed))
     return convicted.acquitted()._replace(named=named)
+
+
+def _silent_at(evidence: Evidence | None) -> float:
+    """When what shows a change at once, the unit or the rotors, was silent last [s]."""
+    if evidence is None:
+        return -math.inf
+    silent: list[float] = evidence[0]["silent"].tolist()
+    return max(at for one, at in zip(Source, silent, strict=True) if one & (G | A | M))
 
 
 def _costs(
@@ -874,8 +896,8 @@ def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:
     if holds_attitude:
         return OF
     # A magnetometer that is used turns the heading, and with it what is felt.
-    turn = G | B & ~wrong
-    return tuple([one | turn if k in (AN, MN) else one for k, one in enumerate(OF)])
+    turn, turned = G | B & ~wrong, (AN, MN, *(_OF_PLACES if wrong & Q else ()))
+    return tuple([one | turn if k in turned else one for k, one in enumerate(OF)])
 
 
 def _with_return(

@@ -176,6 +176,20 @@ def test_what_stays_where_it_jumped_to_in_flight_is_believed_when_others_say_so(
     assert unit.last[at] == pytest.approx(size, abs=0.1)
 
 
+@pytest.mark.parametrize(("half", "size"), [(NO_FORCE, 50.0), (NO_RATE, 10.0)])
+def test_garbage_in_flight_is_not_believed_because_rotors_are_to_blame(
+    half: int, size: float
+) -> None:
+    """Beside a rotor that had failed each of its jumps was, and the estimate ran away."""
+    unit, believed = Unit(), 0
+    unit.x.believed = NOTHING
+    for _ in range(500):
+        said: Vec3 = tuple(unit.random.uniform(-size, size, 3).tolist())  # type: ignore[assignment]
+        name = "force" if half == NO_FORCE else "rate"
+        believed += unit.read(**{name: said}, model=FLIES) is SensorFault.NONE  # type: ignore[arg-type]
+    assert believed <= 5, "before it was found"
+
+
 @pytest.mark.parametrize(("half", "at"), [(NO_FORCE, FORCE), (NO_RATE, RATE)])
 def test_a_half_that_is_out_is_replaced_and_of_a_suspect_only_the_bias_is_unknown(
     half: int, at: int

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.autopilot.estimation.faults.sensor_checks import Health
+from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.flight.land_detector import (
     feel_ground,
     height_above_ground,
@@ -127,26 +131,62 @@ def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
 
 
 @pytest.mark.parametrize(
-    ("height", "sigma", "sample", "aloft"),
+    ("height", "sigma", "sample", "disputed_us", "aloft"),
     [
-        (0.11, 0.0, None, True),
-        (0.09, 0.0, None, False),
-        (0.4, 0.11, None, False),  # as far as it knows: in dead reckoning it may have landed
-        (0.4, 0.09, None, True),
-        (0.0, 0.5, seen(0.2), True),  # the rangefinder knows better
-        (2.0, 0.0, seen(0.05), False),
-        (2.0, 0.0, seen(0.05, age_s=0.6), True),  # it did
+        (0.11, 0.0, None, 0, True),
+        (0.09, 0.0, None, 0, False),
+        (0.4, 0.11, None, 0, False),  # as far as it knows: in dead reckoning it may have landed
+        (0.4, 0.09, None, 0, True),
+        (0.0, 0.5, seen(0.2), 0, True),  # the rangefinder knows better
+        (2.0, 0.7, seen(0.05), 0, False),
+        (2.0, 0.0, seen(0.05), 20_000, False),  # the estimate may be what is wrong
+        (2.0, 0.0, seen(0.05), 0, True),  # nobody says so: noise of it blinded the law
+        (2.0, 0.0, seen(0.05, age_s=0.6), 20_000, True),
     ],
 )
 def test_legs_that_may_touch_the_ground_are_not_aloft(
-    height: float, sigma: float, sample: RangeSample | None, aloft: bool
+    height: float, sigma: float, sample: RangeSample | None, disputed_us: int, aloft: bool
 ) -> None:
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
-    state = replace(flying(range=sample), aiding=Aiding(height_sigma=sigma))
+    state = flying(range=sample)
+    state = replace(state, aiding=Aiding(height_sigma=sigma, disputed_us=disputed_us))
     state = with_record(state, known=estimate)
     legs = CONFIG.airframe.leg_length
     assert is_aloft(state, 2.0, legs, oldest=0.5) is aloft
     assert not is_aloft(with_record(state, has_estimate=0), 2.0, legs, oldest=0.5)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("fault", "close"),
+    [(SensorFault.STUCK, True), (SensorFault.JUMP, True), (SensorFault.NOISY, False)],
+)
+def test_a_rangefinder_that_is_known_to_be_wrong_does_not_say_how_high_it_is(
+    fault: SensorFault, close: bool
+) -> None:
+    """Stuck at 2 m it kept rotors running on the ground, without a gyro, until the vehicle fell."""
+    health = Health(Sensor.RANGEFINDER).with_fault(fault, 1.99)
+    fusion = at_start(2)._replace(health=(health,))
+    low = vehicle_at((0.0, 0.0, GROUND_Z - 0.05), t_us=2_000_000)
+    state = replace(flying(Mode.DESCEND, range=seen(2.0)), fusion=fusion)
+    state = replace(state, aiding=Aiding(height_sigma=0.04, gyro_lost=True))
+    assert feel_ground(CONFIG, state, low)[1] is close
+    stuck = fault is SensorFault.STUCK
+    assert may_be_low(CONFIG, state, low) is stuck
+    legs = CONFIG.airframe.leg_length
+    assert is_aloft(with_record(state, known=low), 2.0, legs, oldest=0.5) is not stuck
+
+
+def test_distances_that_are_noise_do_not_say_that_the_ground_is_near() -> None:
+    """At 50 a second and 1.2 m above the ground, with a deviation of a metre, two often did."""
+    vehicle, random, short = flying().vehicle, np.random.default_rng(1), 0
+    for k in range(500):
+        distance = float(1.2 + random.standard_normal())
+        vehicle = with_range(vehicle, RangeSample(0.02 * k, distance, 0.01**2))
+        assert vehicle.range is not None
+        short += vehicle.range.distance < 0.42
+    assert short <= 2
+    assert len(vehicle.ranges) <= 6
 
 
 def test_a_distance_that_is_too_short_counts_once_a_second_one_says_so() -> None:

@@ -132,12 +132,15 @@ def test_what_turns_a_vehicle_whose_tool_touches_something_is_nobody_s_fault(tou
 
 
 @pytest.mark.requirement("REQ-EST-13")
-@pytest.mark.parametrize("damaged", [False, True])
-def test_of_a_rotor_that_is_known_to_have_failed_no_gyro_is_a_suspect(damaged: bool) -> None:
-    suspects = NOBODY
-    for memory in hovering(turns=0.3, damaged=damaged):
+@pytest.mark.parametrize("agrees", [False, True])
+def test_beside_a_rotor_that_has_failed_a_gyro_is_a_suspect_only_where_the_pose_says_so(
+    agrees: bool,
+) -> None:
+    suspects, angle = NOBODY, 0.3 if agrees else 0.0
+    turned_by = lambda t: (0.0, 0.0, angle * t)  # noqa: E731
+    for memory in hovering(turns=0.3, damaged=True, turned_by=turned_by):
         suspects |= memory.verdict.suspects
-    assert bool(suspects & Source.GYRO) is not damaged
+    assert bool(suspects & Source.GYRO) is not agrees
 
 
 @pytest.mark.requirement("REQ-EST-13")

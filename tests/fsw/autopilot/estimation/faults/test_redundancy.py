@@ -47,6 +47,7 @@ class Wrong(NamedTuple):
     magnetic: Vec3 = NONE  # rad/s, of the field
     iron: Vec3 = NONE  # Gauss, body
     outlier: Vec3 = NONE  # m, of one place of satellites, after which the next one is lost
+    garbage: float = 0.0  # m/s, up to which velocities of satellites are anything, and places are
 
 
 def flown(
@@ -57,11 +58,13 @@ def flown(
     yaw: float = 0.0,
     swing: float = 0.0,
     axes: float = 0.0,
+    sigma: float = 0.015,
 ) -> list[Verdict]:
     """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added.
 
     It turns about its vertical at up to a rate ``yaw`` [rad/s], and its arm makes torques of pushes
     of up to 0.8 m/s^2: ``swing`` [rad/m]. The gyro's axes are off by ``axes`` [rad].
+    Satellites say that places are known to ``sigma`` [m].
     """
     random = np.random.default_rng(seed)
     x: Any = np.zeros(1, FILTER)
@@ -116,7 +119,10 @@ def flown(
                 off = place_off + (np.array(wrong.outlier) if since == 5 else 0.0)
                 where = tuple((p + off + 0.01 * random.standard_normal(3)).tolist())
                 fast = (v + speed_off + 0.03 * random.standard_normal(3)).tolist()
-                fix = (True, now, where, (*fast, 0.0), 0.015, 0.1)  # type: ignore[assignment]
+                if late and wrong.garbage:
+                    where = tuple(random.uniform(-100.0, 100.0, 3).tolist())
+                    fast = random.uniform(-wrong.garbage, wrong.garbage, 3).tolist()
+                fix = (True, now, where, (*fast, 0.0), sigma, 0.1)  # type: ignore[assignment]
             seen = matrix_from_quaternion(turned(q, *field_off))
             body = np.array(rotate_back(seen, FIELD)) + 3e-3 * random.standard_normal(3)
             body += np.array(wrong.iron)
@@ -179,6 +185,14 @@ def test_pushes_that_turn_a_light_body_by_its_heavy_arm_are_no_gyro_s_fault(suit
 def test_one_reflection_names_no_satellites_though_the_next_place_is_lost(size: float) -> None:
     """The one place counted twice: 4 of 20 flights in the field came down for it."""
     verdicts = flown(Wrong(outlier=along((0.6, 0.6, 0.52), size)), "satellites", 2.0)
+    assert not suspected(verdicts)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("seed", range(3))
+def test_garbage_of_satellites_accuses_nobody(seed: int) -> None:
+    """It was compared with the others wherever a place of metres followed: the gyro was named."""
+    verdicts = flown(Wrong(garbage=20.0), "satellites", 3.5, seed, sigma=2.0)
     assert not suspected(verdicts)
 
 
@@ -335,6 +349,55 @@ def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a
     ratios[redundancy.GP] = ratios[redundancy.MP_TURN] = 0.0
     verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
     assert verdict.wrong == Source.POSE, "its attitude agrees"
+
+
+def looked_at(ratios: dict[int, float], sizes: dict[int, float], **known: Any) -> Verdict:
+    """The verdict after ten looks at the same residuals: ``ratios`` [1] and ``sizes`` [SI]."""
+    shown = tuple([ratios.get(k, 0.0) for k in range(redundancy.COUNT)])
+    off = tuple([sizes.get(k, 0.0) for k in range(redundancy.COUNT)])
+    verdict = known.pop("verdict", Verdict())
+    for look_ in range(10):
+        verdict = judged(verdict, shown, 10.0 + EVERY * look_, sizes=off, **known)
+    return verdict
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("known", ["damaged", "named"])
+def test_rotors_that_are_known_to_be_off_are_no_witness_against_others(known: str) -> None:
+    """Beside a limp joint a sound pose was named for an accelerometer that drifted: 51 m away."""
+    turns = {redundancy.GM: 3.0, redundancy.MP_TURN: 3.0}
+    drifts = {redundancy.AP: 4.0, redundancy.AM: 0.9}
+    before = looked_at(turns, {}, holds_attitude=True, damaged=known == "damaged")
+    assert before.suspects == Source.MODEL
+    assert before.explained
+    verdict = looked_at(
+        {**turns, **drifts}, {}, verdict=before, holds_attitude=True, damaged=known == "damaged"
+    )
+    assert not verdict.wrong
+    assert verdict.suspects & Source.ACCELEROMETER
+    assert verdict.contradicts, "it is told, and the vehicle lands"
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(("silent", "wrong"), [(6.0, Source.ATTITUDE), (8.4, Source(0))])
+def test_what_was_not_heard_could_not_show_a_change(silent: float, wrong: Source) -> None:
+    """After a gap in the unit a gyro that drifted by 0.2 rad/s^2 was taken for the pose's fault."""
+    evidence = redundancy.at_start()
+    redundancy.note_silence(evidence, Source.GYRO | Source.ACCELEROMETER, silent)
+    ratios = {redundancy.GP: 3.8, redundancy.GM: 0.5, redundancy.AM: 0.5, redundancy.AP: 0.4}
+    sizes = {redundancy.GP: 0.31, redundancy.GM: 0.1, redundancy.AM: 0.9, redundancy.AP: 0.2}
+    verdict = looked_at(ratios, sizes, verdict=Verdict(evidence), holds_attitude=True)
+    assert verdict.wrong == wrong
+    assert wrong or verdict.suspects == Source.GYRO | Source.ATTITUDE
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_without_the_attitude_of_a_pose_its_place_is_the_gyro_s_evidence_too() -> None:
+    """A gyro turns what is felt: the place was named for a tilt, and the vehicle fell."""
+    ratios = {redundancy.GM: 1.6, redundancy.AP: 1.7, redundancy.MP_FORCE: 1.1}
+    tilted = looked_at(ratios, {}, verdict=Verdict(wrong=Source.ATTITUDE), holds_attitude=False)
+    assert tilted.wrong & Source.GYRO
+    assert not tilted.wrong & Source.POSE
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
