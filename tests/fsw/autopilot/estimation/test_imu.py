@@ -154,6 +154,20 @@ def test_a_model_stands_in_for_the_half_that_is_lost_alone() -> None:
 FLIES: Vec4 = (0.0, 0.0, 0.0, 9.81)
 
 
+@pytest.mark.parametrize("known", [False, True])
+def test_a_modelled_force_is_what_the_rotors_give_and_leaves_the_mass_as_it_is(known: bool) -> None:
+    """The mass goes by the force: with what was felt beside the rotors it ran away, blind."""
+    unit = Unit()
+    unit.x.baseline[6:] = 0.3, -0.2, 0.15
+    unit.x.accel_bias[:] = 0.05, -0.04, 0.02
+    if known:  # the filter has come to the loss, and what it calls a bias is the model's error
+        unit.x.kept_bias[:3], unit.x.lost = unit.x.accel_bias, NO_FORCE
+        unit.x.accel_bias[2] = 0.5
+    unit.read(force=(float("nan"),) * 3, model=(0.0, 0.0, 0.0, 9.5))
+    np.testing.assert_array_equal(unit.last[FORCE : FORCE + 2], (0.3, -0.2))
+    assert unit.last[FORCE + 2] == pytest.approx(0.02 - 9.5)
+
+
 @pytest.mark.parametrize(("half", "at", "size"), [(NO_FORCE, FORCE, 40.0), (NO_RATE, RATE, 8.0)])
 def test_what_stays_where_it_jumped_to_in_flight_is_believed_when_others_say_so(
     half: int, at: int, size: float
