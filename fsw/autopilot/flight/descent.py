@@ -36,6 +36,8 @@ _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable ve
 _SPEED_GOOD: Final = 0.5  # m/s; from here to there the vehicle draws back ever slower
 _BACK: Final = 1.0  # m/s, as fast as it draws back at most
 _BACK_RATE: Final = 1.5  # 1/s
+# Where nothing but the rotors' model is left, it sinks ever faster from where the ground should be.
+_THROUGH: Final = 10.0  # m/s
 
 
 def is_hurried(aiding: Aiding, unaided_us: int) -> bool:
@@ -87,6 +89,8 @@ class Descent:
     def _hurried_speed(self, estimate: StateEstimate, aiding: Aiding) -> Vec2:
         """How fast to sink in a hurry, and to get there: [m/s], [m/s^2]."""
         height = self._legs_z - estimate.p_WB[2]
+        if height < 0.0 and aiding.feels_nothing:
+            return _THROUGH, _MOST
         slow = _HURRIED * self._speed
         sure = height - _SLOW - _SIGMAS * aiding.height_sigma
         usual = _HURRIED_HIGH * self._speed if height > _HIGH else slow

@@ -11,6 +11,9 @@ Where rotors' torques stand in for the gyro the ground must not carry any of the
 what the legs feel would be taken for a tilt. Then rotors stop as soon as the legs are close above
 the ground, and the vehicle falls less far than its legs stand.
 
+Where neither the height nor the force is measured no ground is noticed, and nothing that falls. A
+descent is faster from where the ground should be (``descent.py``); rotors stop 1 m below that.
+
 In every mode a vehicle whose rotors carry less than the weight for a second stands, whatever it
 believes of its height: the failsafe table lands it (``evidence.stands_on_ground``).
 
@@ -38,6 +41,7 @@ _FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free 
 _SIGMAS: Final = 3.0  # by which a height may be wrong
 _CLOSE: Final = 0.1  # m of the legs above the ground; from there it falls at 1.4 m/s
 _FALL: Final = 0.2  # m, of a vehicle whose rotors stop; the legs stand it
+_SUNK: Final = 1.0  # m below the ground; what falls faster and faster is there by then
 _RANGE_AGE: Final = 0.3  # s, in which a distance is one of now
 _RANGE_MEMORY: Final = 0.1  # s, in which none must be longer
 _CONTACT_US: Final = 100_000  # of contact before loops open
@@ -159,6 +163,8 @@ def feel_ground(
     """
     vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
     if state.aiding.gyro_lost and is_close(config, state, estimate):
+        return state, True
+    if state.aiding.feels_nothing and height_above_ground(config, estimate) < -_SUNK:
         return state, True
     if vehicle.unloaded is None:
         if not is_light(config, state):

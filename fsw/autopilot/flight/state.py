@@ -233,6 +233,9 @@ class LostSensor(NamedTuple):
         return f"{sentence(self.sensor, self.fault)}, for {seconds:.2f} s"
 
 
+HEIGHT_UNKNOWN: Final = 0.5  # m, standard deviation
+
+
 class Aiding(NamedTuple):
     """What keeps the estimate from drifting, and what of it is missing."""
 
@@ -260,6 +263,12 @@ class Aiding(NamedTuple):
     def has_lost(self, sensor: Sensor) -> bool:
         """Whether a sensor that every tick needs is of no use."""
         return any(one.sensor is sensor for one in self.lost)
+
+    @property
+    def feels_nothing(self) -> bool:
+        """Whether height and force are those of the rotors' model: no ground would be noticed."""
+        known = min(self.height_sigma, self.position_sigma) <= HEIGHT_UNKNOWN
+        return not known and self.has_lost(Sensor.IMU)
 
 
 AIDED: Final = Aiding()

@@ -26,6 +26,7 @@ ON_ROTORS = Aiding(
     pose=Sensor.GNSS, lost=(LostSensor(Sensor.IMU, SensorFault.STALE, 0),), height_sigma=9.0
 )
 LOST = BLIND._replace(velocity_sigma=1.1)
+NOTHING = BLIND._replace(position_sigma=9.0, lost=ON_ROTORS.lost)
 LIMITS = CONFIG.limits
 
 
@@ -79,6 +80,39 @@ def test_where_its_height_is_known_a_blind_vehicle_sinks_as_fast_as_it_can_brake
     here = vehicle_at((1.0, 2.0, GROUND_Z - height))
     vz = descended(4.0, BLIND._replace(height_sigma=sigma), (0.0, 0.0, 0.0), here)[2]
     assert vz == pytest.approx(speed, abs=0.01)
+
+
+@pytest.mark.requirement("REQ-EST-5")
+@pytest.mark.parametrize(
+    ("aiding", "height", "speed"),
+    [
+        (NOTHING, 0.1, 0.5),
+        (NOTHING, -0.1, 1.0),  # for a second at 1 m/s^2
+        (BLIND, -0.1, 0.5),  # the accelerometer feels the ground
+        (ON_ROTORS, -0.1, 0.5),  # satellites know the height, but for what lasts
+        (NOTHING._replace(height_sigma=0.3), -0.1, 0.5),
+    ],
+)
+def test_what_feels_nothing_sinks_ever_faster_from_where_the_ground_should_be(
+    aiding: Aiding, height: float, speed: float
+) -> None:
+    """By the rotors' model alone it hung in the air at 0.5 m/s, and rose."""
+    here = vehicle_at((1.0, 2.0, GROUND_Z - height))
+    vz = descended(1.0, aiding, (0.0, 0.0, 0.0), here)[2]
+    assert vz == pytest.approx(speed, abs=0.05)
+
+
+@pytest.mark.requirement("REQ-EST-5")
+@pytest.mark.parametrize(
+    ("aiding", "height", "ends"),
+    [(NOTHING, -0.9, False), (NOTHING, -1.1, True), (BLIND, -1.1, False)],
+)
+def test_rotors_of_what_feels_nothing_stop_below_the_ground(
+    aiding: Aiding, height: float, ends: bool
+) -> None:
+    state = replace(flying(Mode.DESCEND), aiding=aiding)
+    _, result = MODE.update(state, vehicle_at((1.0, 2.0, GROUND_Z - height)))
+    assert (result.next_mode is Mode.DISARMED) is ends
 
 
 @pytest.mark.requirement("REQ-EST-5")
