@@ -12,7 +12,8 @@ what the legs feel would be taken for a tilt. Then rotors stop as soon as the le
 the ground, and the vehicle falls less far than its legs stand.
 
 Where neither the height nor the force is measured no ground is noticed, and nothing that falls. A
-descent is faster from where the ground should be (``descent.py``); rotors stop 1 m below that.
+descent is faster from where the ground should be (``descent.py``); rotors stop 1 m below that, or
+there, without a gyro.
 
 In every mode a vehicle whose rotors carry less than the weight for a second stands, whatever it
 believes of its height: the failsafe table lands it (``evidence.stands_on_ground``).
@@ -164,7 +165,8 @@ def feel_ground(
     vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
     if state.aiding.gyro_lost and is_close(config, state, estimate):
         return state, True
-    if state.aiding.feels_nothing and height_above_ground(config, estimate) < -_SUNK:
+    sunk = 0.0 if state.aiding.gyro_lost else _SUNK
+    if state.aiding.feels_nothing and height_above_ground(config, estimate) < -sunk:
         return state, True
     if vehicle.unloaded is None:
         if not is_light(config, state):

@@ -105,7 +105,13 @@ def test_what_feels_nothing_sinks_ever_faster_from_where_the_ground_should_be(
 @pytest.mark.requirement("REQ-EST-5")
 @pytest.mark.parametrize(
     ("aiding", "height", "ends"),
-    [(NOTHING, -0.9, False), (NOTHING, -1.1, True), (BLIND, -1.1, False)],
+    [
+        (NOTHING, -0.9, False),
+        (NOTHING, -1.1, True),
+        (NOTHING._replace(gyro_lost=True), 0.05, False),
+        (NOTHING._replace(gyro_lost=True), -0.05, True),  # what legs carry looks like a tilt
+        (BLIND, -1.1, False),
+    ],
 )
 def test_rotors_of_what_feels_nothing_stop_below_the_ground(
     aiding: Aiding, height: float, ends: bool
