@@ -92,12 +92,5 @@ class JointSample:
     angles: JointVector  # rad
 
 
-Sample = (
-    ImuSample
-    | PoseSample
-    | GnssSample
-    | PressureSample
-    | MagneticSample
-    | RangeSample
-    | JointSample
-)
+AidingSample = PoseSample | GnssSample | PressureSample | MagneticSample | RangeSample
+Sample = ImuSample | JointSample | AidingSample

@@ -13,6 +13,9 @@ from typing import Any, Final, TypeVar, cast
 Tuning = tuple[tuple[str, float], ...]
 """Dotted path and value of every number that differs; what is absent is as configured."""
 
+Row = tuple[str, str, str, float, float, str] | tuple[str, str, str, float, float, str, float]
+"""A parameter: its name, the path of its number, unit, range, meaning; the number is so many."""
+
 Number = int | float | bool
 
 # Fields that are words and are tuned by the number of the word.

@@ -11,7 +11,6 @@ import math
 from operator import attrgetter
 from typing import Any, Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.estimate.estimator_report import (
     ABOVE_GROUND,
     ABSOLUTE,
@@ -334,8 +333,6 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
         math.sqrt(max(variance[15], variance[18])),
     )
     faults = ", ".join([f"{one.name}: {one.fault}" for one in known.sensors if one.fault])
-    pose = known.innovation(Sensor.POSE.value, 6)
-    fix = known.innovation(Sensor.GNSS.value, 6)
     return _ESTIMATOR.pack(
         t_us,
         (
@@ -345,12 +342,7 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
             *(known.pose_delay, known.resets & _U32, known.flags, faults.encode()),
             *(_unusable(known), _unaided(known), _refused(ratios), 0.0),
         ),
-        (
-            *(*fix[3:], *fix[:3], *pose),
-            *known.innovation(Sensor.BAROMETER.value, 1),
-            *known.innovation(Sensor.RANGEFINDER.value, 1),
-            *known.innovation(Sensor.MAGNETOMETER.value, 1),
-        ),
+        (*[x for name, count in topics.INNOVATIONS for x in known.innovation(name, count)],),
         (
             *(*known.gyro_bias, *known.gyro_bias_variance),
             *(*known.accel_bias, *known.accel_bias_variance),

@@ -9,16 +9,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.autopilot.measurements import (
-    GnssSample,
-    ImuSample,
-    JointSample,
-    MagneticSample,
-    PoseSample,
-    PressureSample,
-    RangeSample,
-    Sample,
-)
+from fsw.autopilot.estimation.sensors import SENSORS
+from fsw.autopilot.estimation.sensors.base import LogTopic
+from fsw.autopilot.measurements import ImuSample, JointSample, Sample
 from fsw.log import px4_topics
 from messages.ulog import Field, Topic, doubles, floats
 
@@ -326,71 +319,25 @@ SENSOR_COMBINED: Final = Topic(
         doubles("gyro_rad", 3, "rad/s, body"),
     ),
 )
-VEHICLE_VISUAL_ODOMETRY: Final = Topic(
-    "vehicle_visual_odometry",
-    "Pose from motion capture or visual odometry; input of the tick",
-    _MEASURED,
-    (
-        _MEASURED_AT,
-        doubles("position", 3, "m, NED"),
-        doubles("q", 4, "[w, x, y, z], body to NED"),
-        doubles("position_variance", 3, "m^2"),
-        doubles("orientation_variance", 3, "rad^2"),
-        Field("reset_counter", "uint32_t"),
-        Field("drifts", "bool", note="its frame does, as the variances say"),
-        Field(SAMPLED, "uint64_t", note="us; `time` again, as PX4 writes it"),
-    ),
-)
-GNSS_LOCAL: Final = Topic(
-    "gnss_local",
-    "Position and velocity from satellites, in the local frame; input of the tick",
-    _MEASURED,
-    (
-        _MEASURED_AT,
-        doubles("position", 3, "m, NED"),
-        doubles("velocity", 3, "m/s, NED"),
-        doubles("position_variance", 3, "m^2"),
-        doubles("velocity_variance", 3, "m^2/s^2"),
-        Field("fix_type", "uint32_t", note="GPS_FIX_TYPE"),
-        Field("satellites_used", "uint32_t", note="255: not said"),
-    ),
-)
-VEHICLE_AIR_DATA: Final = Topic(
-    "vehicle_air_data",
-    "Barometer; input of the tick",
-    _MEASURED,
-    (
-        _MEASURED_AT,
-        doubles("baro_alt_meter", 0, "m above the origin of the local frame"),
-        doubles("variance", 0, "m^2"),
-    ),
-)
-VEHICLE_MAGNETOMETER: Final = Topic(
-    "vehicle_magnetometer",
-    "Magnetometer; input of the tick",
-    _MEASURED,
-    (_MEASURED_AT, doubles("magnetometer_ga", 3, "Gauss, body")),
-)
-DISTANCE_SENSOR: Final = Topic(
-    "distance_sensor",
-    "Distance to what is below; input of the tick",
-    _MEASURED,
-    (_MEASURED_AT, doubles("current_distance", 0, "m"), doubles("variance", 0, "m^2")),
-)
 JOINT_ENCODERS: Final = Topic(
     "joint_encoders",
     "Encoders of the arm; input of the tick",
     _MEASURED,
     (_MEASURED_AT, _of_joints("angle", "double", "rad")),
 )
+
+
+def _of_sensor(topic: LogTopic) -> Topic:
+    fields = [Field(one.name, one.kind, one.size, one.note) for one in topic.fields]
+    return Topic(
+        topic.name, f"{topic.meaning}; input of the tick", _MEASURED, (_MEASURED_AT, *fields)
+    )
+
+
 # Each kind of sample and its topic, whose fields are the sample's, in their order, and SAMPLED.
 OF_SAMPLES: Final[dict[type[Sample], Topic]] = {
     ImuSample: SENSOR_COMBINED,
-    PoseSample: VEHICLE_VISUAL_ODOMETRY,
-    GnssSample: GNSS_LOCAL,
-    PressureSample: VEHICLE_AIR_DATA,
-    MagneticSample: VEHICLE_MAGNETOMETER,
-    RangeSample: DISTANCE_SENSOR,
+    **{kind.sample: _of_sensor(kind.topic) for kind in SENSORS},
     JointSample: JOINT_ENCODERS,
 }
 _ESTIMATED: Final = "every planning cycle; none with exact sensors"
@@ -426,17 +373,16 @@ ESTIMATOR_INNOVATIONS: Final = Topic(
     "Measured minus expected, of the last reading of each sensor; NaN: none",
     _ESTIMATED,
     (
-        _vector("gps_hvel", 2, "m/s"),
-        *floats("gps_vvel", note="m/s"),
-        _vector("gps_hpos", 2, "m"),
-        *floats("gps_vpos", note="m"),
-        _vector("ev_hpos", 2, "m"),
-        *floats("ev_vpos", note="m"),
-        _vector("ev_attitude", 3, "rad, body"),
-        *floats("baro_vpos", note="m"),
-        *floats("rng_vpos", note="m"),
-        *floats("heading", note="rad, of the magnetometer"),
+        *[
+            Field(name, "float", count, note)
+            for kind in SENSORS
+            for name, count, note in kind.innovations
+        ],
     ),
+)
+# Of each sensor how many numbers it has there.
+INNOVATIONS: Final = tuple(
+    (kind.sensor.value, sum(max(count, 1) for _, count, _ in kind.innovations)) for kind in SENSORS
 )
 ESTIMATOR_SENSOR_BIAS: Final = Topic(
     "estimator_sensor_bias",

@@ -4,7 +4,7 @@ The filter takes the errors of its readings for white noise, and is soon surer o
 of them is. But markers are not where they were measured, and satellites' errors wander within
 minutes. A clearance must count with all of it. The drift of an odometry is in the filter's
 covariance already (``fsw/autopilot/estimation/drift.py``); of its poses only the noise counts here.
-So is the offset of a magnetometer (``fsw/autopilot/estimation/compass.py``): beside satellites,
+So is the offset of a magnetometer (``sensors/magnetometer.py``): beside satellites,
 nothing of the attitude is added.
 
 Source: docs/equations.md T7.
@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.estimation.fusion import believable
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.measurement_noise import believable
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 
@@ -33,14 +33,14 @@ def correlated_error(memory: FusionMemory, tuning: EstimatorTuning) -> Vec6:
     if fix is not None and (
         pose is None or _used(memory, Sensor.GNSS) > _used(memory, Sensor.POSE)
     ):
-        return *believable(fix.position_variance, tuning.gnss_position_floor**2), 0.0, 0.0, 0.0
+        return *believable(fix.position_variance, tuning.gnss.position_floor**2), 0.0, 0.0, 0.0
     if pose is not None:
         place, attitude = pose.position_variance, pose.attitude_variance
         if pose.drifts:
             place, attitude = memory.frame.place_noise, memory.frame.attitude_noise
         return (
-            *believable(place, (_LASTING * tuning.position_floor) ** 2),
-            *believable(attitude, tuning.attitude_floor**2),
+            *believable(place, (_LASTING * tuning.pose.position_floor) ** 2),
+            *believable(attitude, tuning.pose.attitude_floor**2),
         )
     return _NONE
 

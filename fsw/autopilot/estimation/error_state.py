@@ -126,7 +126,7 @@ FILTER: Final = np.dtype(
         ("drifts", np.int64),
         ("shared", float, (ERRORS, FRAME)),
         ("innovated", float, (ROWS,)),
-        # Of a magnetometer's offset (compass.py): whether one was used, its covariance with the
+        # Of an offset (sensors/magnetometer.py): whether one was used, its covariance with the
         # error, and the slope over it of the heading that is being fused.
         ("compass", np.int64),
         ("with_offset", float, (ERRORS, FIELD)),
@@ -135,7 +135,7 @@ FILTER: Final = np.dtype(
     align=True,
 )
 Filter = NDArray[Any]  # (1,) of FILTER
-Law = NDArray[Any]  # (1,) of a packed EstimatorLaw
+Law = NDArray[Any]  # (1,) of a packed EstimatorTuning
 
 
 @compilable
@@ -265,9 +265,9 @@ def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: Array) -> No
         M[TH + i, TH + i] += turn
         M[BA + i, BA + i] += accel_walk * accel_walk * dt
         M[BG + i, BG + i] += gyro_walk * gyro_walk * dt
-    M[BARO, BARO] += law.baro_bias_walk * law.baro_bias_walk * dt
-    if law.pose_delay_sigma > 0.0:
-        M[DELAY, DELAY] += law.pose_delay_walk * law.pose_delay_walk * dt
+    M[BARO, BARO] += law.barometer.bias_walk * law.barometer.bias_walk * dt
+    if law.pose.delay_sigma > 0.0:
+        M[DELAY, DELAY] += law.pose.delay_walk * law.pose.delay_walk * dt
 
 
 @compilable

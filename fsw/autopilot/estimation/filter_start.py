@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from functools import reduce
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from fsw.autopilot.estimation import fusion, kernels
+from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.drift import FrameDrift, least
-from fsw.autopilot.estimation.error_state import IMU_CAPACITY, Filter
-from fsw.autopilot.estimation.faults.confirmation import Confirmation
+from fsw.autopilot.estimation.error_state import IMU_CAPACITY, Filter, Law
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, Waiting
-from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
+from fsw.autopilot.estimation.sensors.gnss import Gnss
+from fsw.autopilot.estimation.sensors.magnetometer import Magnetometer
+from fsw.autopilot.estimation.sensors.pose import Pose
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import normalised
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
@@ -27,17 +28,11 @@ _REST: Vec3 = (0.0, 0.0, 0.0)
 class FilterStart:
     """Begins a filter as soon as its samples allow."""
 
-    def __init__(
-        self,
-        tuning: EstimatorTuning,
-        law: Any,
-        stated: MeasurementNoise,
-        confirmation: Confirmation,
-    ) -> None:
+    def __init__(self, tuning: EstimatorTuning, law: Law) -> None:
         self._tuning = tuning
         self._law = law
-        self._stated = stated
-        self._confirmation = confirmation
+        self._pose, self._gnss = Pose(tuning.pose), Gnss(tuning.gnss)
+        self._magnetometer = Magnetometer(tuning.magnetometer)
 
     def __call__(self, memory: FusionMemory) -> FusionMemory:
         """Start from the newest pose that another one agrees with, for a first one may be wrong.
@@ -55,7 +50,7 @@ class FilterStart:
             if isinstance(sample, PoseSample):
                 others = [one.sample for one in memory.waiting if one.sample is not sample]
                 poses = [other for other in others if isinstance(other, PoseSample)]
-                if not any(self._confirmation.of_poses(other, sample) for other in poses):
+                if not any(self._pose.agree(other, sample) for other in poses):
                     continue
                 memory = self._from_pose(memory, sample)
                 break
@@ -67,12 +62,12 @@ class FilterStart:
         return memory._replace(
             started=True,
             waiting=(),
-            delay_sigma=self._tuning.pose_delay_sigma,
+            delay_sigma=self._tuning.pose.delay_sigma,
             began=float(memory.numbers["time"][0]),
         )
 
     def _from_pose(self, memory: FusionMemory, sample: PoseSample) -> FusionMemory:
-        stated = self._stated.of_pose(sample)
+        stated = self._pose.stated(sample)
         noise = self._min_stated(memory.waiting) if sample.drifts else stated
         state = sample.position, _REST, normalised(sample.attitude)
         self._begin(memory, sample.time, state, *noise)
@@ -85,15 +80,19 @@ class FilterStart:
         tilt = tuning.tilt**2
         self._begin(
             memory,
-            sample.time - tuning.gnss_delay,
-            (sample.position, sample.velocity, _levelled(x, field, tuning.declination)),
-            self._stated.of_gnss(sample)[0],
+            self._gnss.measured_at(memory, sample),
+            (
+                sample.position,
+                sample.velocity,
+                _levelled(x, field, tuning.magnetometer.declination),
+            ),
+            self._gnss.stated(sample)[0],
             (tilt, tilt, tuning.start_heading**2),
         )
         kernels.couple_level(x, self._law)
         # The heading was made of this field: what it does not know of it, with all of the tilt that
         # it comes through, is what it does not know of the field.
-        fusion.fuse_heading(x, self._law, float(x["time"][0]), field, True)
+        self._magnetometer.fuse_heading(x, float(x["time"][0]), field, believed=True)
 
     def _begin(
         self,
@@ -110,7 +109,7 @@ class FilterStart:
     def _min_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
         """The least variances of the poses so far: of a frame that drifts, the noise alone."""
         poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
-        return reduce(least, (self._stated.of_pose(pose) for pose in poses))
+        return reduce(least, (self._pose.stated(pose) for pose in poses))
 
 
 def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:

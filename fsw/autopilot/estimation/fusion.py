@@ -1,8 +1,8 @@
-r"""Measurements of the error-state filter: residual, slope over the error, and the gate.
+r"""What measurements of the error-state filter share: the gate, places, and what is forgotten.
 
-A measurement lies up to one period of the IMU beside the filter's time: the state is moved there by
-its own velocity, acceleration and rate. One whose chi-square is beyond its gate
-(``tuning.Gates``) is not fused. Each function returns chi-square over gate: fused if 1 or less.
+How a sensor is fused, its residual and slope over the error, is in its own file (``sensors/``). A
+measurement lies up to one period of the IMU beside the filter's time: the state is moved there by
+its own velocity, acceleration and rate. One whose chi-square is beyond its gate is not fused.
 
 Source: J. Solà, Quaternion kinematics for the error-state Kalman filter, 2017, section 6.1.
 """
@@ -12,36 +12,29 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fsw.autopilot.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.autopilot.estimation.error_state import (
     BA,
-    BARO,
     BG,
     DELAY,
     ERRORS,
     TH,
     Filter,
-    Law,
     P,
     V,
     correct,
     distance,
     reset_covariance,
-    vec3,
-    vec4,
 )
-from fsw.autopilot.estimation.measurement_noise import followed
-from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
-from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
-from fsw.autopilot.signals import Vec3, Vec4
+from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
-_MIN_FIELD = 0.02  # Gauss across the vertical; less says nothing about the heading
-_KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
 # What is not known of a state that poses contradict: standard deviations.
 _DOUBTED_SPEED = 0.5  # m/s
 _DOUBTED_FORCE = 3.0  # m/s^2
 _DOUBTED_RATE = 0.5  # rad/s
+# Of how a variance follows the noise that there is with each measurement, and by at most so much.
+_RATE = 0.06
+_MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
@@ -50,15 +43,35 @@ POSE, GNSS = 0, 2
 
 
 @compilable
-def _cleared(x: Any, rows: int) -> None:
+def believable(variance: Vec3, least: float) -> Vec3:
+    """A ``variance`` [any unit, any frame], at least ``least`` [same unit] where it is one."""
+    x, y, z = variance
+    # NaN and zero mean that the sensor does not know; both fail the comparison.
+    return (x if x > least else least, y if y > least else least, z if z > least else least)
+
+
+@compilable
+def followed(scale: float, squared: float, start: float) -> float:
+    """By how much variances are larger than stated, after a measurement; ``scale`` [1] before it.
+
+    ``squared`` [1] is the square of by how much its innovation differs from the last one, over the
+    variance of an innovation. Beyond twice ``start`` [1] they grow.
+    """
+    grown: float = max(scale, 1.0) * math.exp(_RATE * (min(0.5 * squared, _MOST) - start))
+    return max(grown, 1.0)
+
+
+@compilable
+def clear(x: Any, rows: int) -> None:
+    """Slopes of some ``rows`` [1] of a state ``x`` [SI]: none."""
     for k in range(rows):
         for j in range(ERRORS):
             x.H[k, j] = 0.0
 
 
 @compilable
-def _judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> float:
-    """Chi-square over gate of a part of a measurement; fuses what is within it.
+def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> float:
+    """Chi-square over ``gate`` [1] of a part of a measurement; fuses what is within it.
 
     The variance of what is ``scaled`` grows where innovations say that it is larger than stated.
     They say so by how they differ from one to the next: noise is what does not stay. What stays is
@@ -97,7 +110,7 @@ def position_rows(x: Any, z: Vec3, variance: Vec3, dt: float, delayed: float) ->
 
     ``delayed`` [1] is 1 where its delay is estimated, else 0.
     """
-    _cleared(x, 3)
+    clear(x, 3)
     for i in range(3):
         moving = x.v[i] + dt * x.acceleration[i]
         x.residual[i] = z[i] - (x.p[i] + dt * (x.v[i] + 0.5 * dt * x.acceleration[i]))
@@ -107,197 +120,21 @@ def position_rows(x: Any, z: Vec3, variance: Vec3, dt: float, delayed: float) ->
         x.variance[i] = variance[i]
 
 
-@compilable
-def attitude_rows(x: Any, z: Vec4, variance: Vec3, dt: float, delayed: float) -> None:
-    """Rows of an attitude ``z`` [1] of ``variance`` [rad^2, FRD], ``dt`` [s] after the state.
-
-    ``delayed`` [1] is 1 where its delay is estimated, else 0.
-    """
-    _cleared(x, 3)
-    w = vec3(x.rate, 0)
-    there = turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2])
-    residual = rotation_vector(multiply(conjugate(there), z))
+@machine_code
+@kernel
+def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
+    """Take ``p`` [m, NED] of ``time`` [s] as it is, ``variance`` [m^2, NED]; how far it jumped."""
+    s = x[0]
+    dt = time - s.time
+    jump = (
+        p[0] - s.p[0] - dt * s.v[0],
+        p[1] - s.p[1] - dt * s.v[1],
+        p[2] - s.p[2] - dt * s.v[2],
+    )
     for i in range(3):
-        x.residual[i] = residual[i]
-        x.H[i, TH + i] = 1.0
-        x.H[i, BG + i] = -dt
-        x.H[i, DELAY] = -delayed * w[i]
-        x.variance[i] = variance[i]
-    # The rotation between the state and the measurement turns the error's axes, to first order.
-    x.H[0, TH + 1], x.H[0, TH + 2] = dt * w[2], -dt * w[1]
-    x.H[1, TH + 0], x.H[1, TH + 2] = -dt * w[2], dt * w[0]
-    x.H[2, TH + 0], x.H[2, TH + 1] = dt * w[1], -dt * w[0]
-
-
-@machine_code
-@kernel
-def fuse_pose(
-    filters: Filter,
-    laws: Law,
-    time: float,
-    position: Vec3,
-    attitude: Vec4,
-    position_variance: Vec3,
-    attitude_variance: Vec3,
-) -> tuple[float, float]:
-    """Fuse a pose stamped ``time`` [s]: chi-square over gate of its two halves.
-
-    ``position`` [m, NED], ``attitude`` [1], ``position_variance`` [m^2, NED] and
-    ``attitude_variance`` [rad^2, FRD]. An attitude of infinite variance says nothing: infinite.
-    """
-    x, law, gates = filters[0], laws[0].tuning, laws[0].gates
-    delayed = 1.0 if law.pose_delay_sigma > 0.0 else 0.0
-    for i in range(V, V + 3):
-        # A delay is seen by the velocity that it is multiplied with. While that is not known, the
-        # two explain each other's errors, and run away together.
-        if x.covariance[i, i] > _KNOWN_VELOCITY * _KNOWN_VELOCITY:
-            delayed = 0.0
-    dt = time - x.pose_delay - x.time
-    position_rows(x, position, position_variance, dt, delayed)
-    first = _judged(x, 3, gates.pose, 0, POSE)
-    if not attitude_variance[0] < math.inf:
-        for i in range(3):
-            x.innovation[1, i] = 0.0
-        return first, math.inf
-    dt = time - x.pose_delay - x.time
-    attitude_rows(x, attitude, attitude_variance, dt, delayed)
-    return first, _judged(x, 3, gates.pose, 1, POSE + 1)
-
-
-@compilable
-def velocity_rows(x: Any, z: Vec3, variance: Vec3, dt: float) -> None:
-    """Rows of a velocity ``z`` [m/s, NED], ``variance`` [m^2/s^2, NED], ``dt`` [s] after x."""
-    _cleared(x, 3)
-    for i in range(3):
-        x.residual[i] = z[i] - (x.v[i] + dt * x.acceleration[i])
-        x.H[i, V + i] = 1.0
-        x.variance[i] = variance[i]
-
-
-@machine_code
-@kernel
-def fuse_gnss(
-    filters: Filter,
-    laws: Law,
-    time: float,
-    position: Vec3,
-    velocity: Vec3,
-    position_variance: Vec3,
-    velocity_variance: Vec3,
-) -> tuple[float, float]:
-    """Fuse position and velocity of ``time`` [s]: chi-square over gate of each.
-
-    ``position`` [m, NED], ``velocity`` [m/s, NED], ``position_variance`` [m^2, NED],
-    ``velocity_variance`` [m^2/s^2, NED].
-    """
-    x, gates = filters[0], laws[0].gates
-    dt = time - x.time
-    position_rows(x, position, position_variance, dt, 0.0)
-    first = _judged(x, 3, gates.gnss_position, 0, GNSS)
-    velocity_rows(x, velocity, velocity_variance, dt)
-    return first, _judged(x, 3, gates.gnss_velocity, 1, GNSS + 1)
-
-
-@compilable
-def pressure_rows(x: Any, altitude: float, variance: float, dt: float) -> None:
-    """The row of an ``altitude`` [m, up] of ``variance`` [m^2], ``dt`` [s] after the state."""
-    _cleared(x, 1)
-    x.residual[0] = altitude - (-(x.p[2] + dt * x.v[2]) + x.baro_bias)
-    x.H[0, P + 2] = -1.0
-    x.H[0, V + 2] = -dt
-    x.H[0, BARO] = 1.0
-    x.variance[0] = variance
-
-
-@machine_code
-@kernel
-def fuse_pressure(
-    filters: Filter, laws: Law, time: float, altitude: float, variance: float
-) -> float:
-    """Fuse an ``altitude`` [m, up] of ``time`` [s] with ``variance`` [m^2]."""
-    x, gates = filters[0], laws[0].gates
-    pressure_rows(x, altitude, variance, time - x.time)
-    return _judged(x, 1, gates.pressure)
-
-
-@compilable
-def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
-    """The row of a magnetic ``field`` [Gauss, FRD]: its heading alone, ``dt`` [s] after the state.
-
-    False where the field is too steep. Of the field's strength and dip nothing is believed.
-    """
-    _cleared(x, 1)
-    w = vec3(x.rate, 0)
-    R = matrix_from_quaternion(turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2]))
-    north, east, down = rotate(R, field)
-    level = north * north + east * east
-    if not level > _MIN_FIELD * _MIN_FIELD:
-        return False
-    x.residual[0] = wrap_angle(law.declination - math.atan2(east, north))
-    # Turning the body by its axis a turns the field's heading by a_z - z (x a_x + y a_y) / level.
-    # Of the field as expected: slopes from the measured one go with its noise, and pull at tilt.
-    size = math.sqrt(level)
-    north, east = size * math.cos(law.declination), size * math.sin(law.declination)
-    for i in range(3):
-        x.H[0, TH + i] = R[6 + i] - down * (north * R[i] + east * R[3 + i]) / level
-        x.offset_slope[i] = (east * R[i] - north * R[3 + i]) / level
-    x.variance[0] = law.mag_noise * law.mag_noise / level
-    return True
-
-
-@machine_code
-@kernel
-def fuse_heading(filters: Filter, laws: Law, time: float, field: Vec3, believed: bool) -> float:
-    """Fuse the heading of a magnetic ``field`` [Gauss, FRD] of ``time`` [s].
-
-    One that is not ``believed``, though it is within its gate, says nothing: infinite.
-    """
-    x, law, gates = filters[0], laws[0].tuning, laws[0].gates
-    if not heading_rows(x, law, field, time - x.time):
-        x.innovation[0, 0] = 0.0
-        return math.inf
-    x.innovation[0, 0] = x.residual[0]
-    ratio: float = distance_with_offset(x, law.mag_offset) / gates.heading
-    if ratio <= 1.0:
-        if not believed:
-            return math.inf
-        correct_with_offset(x, law.mag_offset)
-    return ratio
-
-
-@compilable
-def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) -> bool:
-    """The row of a ``measured`` [m] distance to level ground, ``dt`` [s] after the state.
-
-    ``variance`` [m^2]. False where the vehicle is tilted by more than 45 degrees. It measures the
-    height alone: what is not known of the tilt is noise. Over a tilt, a distance that is off would
-    tilt the estimate, and the more, the more that is tilted already.
-    """
-    _cleared(x, 1)
-    R = matrix_from_quaternion(vec4(x.q))
-    if not R[8] > math.sqrt(0.5):
-        return False
-    expected = (law.ground - (x.p[2] + dt * x.v[2])) / R[8]
-    x.residual[0] = measured - expected
-    x.H[0, P + 2] = -1.0 / R[8]
-    x.H[0, V + 2] = -dt / R[8]
-    # R33 changes by R31 dtheta_y - R32 dtheta_x.
-    by_roll, by_pitch = expected * R[7] / R[8], expected * R[6] / R[8]
-    M = x.covariance
-    tilt = by_roll * by_roll * M[TH, TH] + by_pitch * by_pitch * M[TH + 1, TH + 1]
-    x.variance[0] = variance + tilt
-    return True
-
-
-@machine_code
-@kernel
-def fuse_range(filters: Filter, laws: Law, time: float, measured: float, variance: float) -> float:
-    """Fuse a ``measured`` [m] distance to level ground of ``time`` [s] and ``variance`` [m^2]."""
-    x, law, gates = filters[0], laws[0].tuning, laws[0].gates
-    if not range_rows(x, law, measured, variance, time - x.time):
-        x.innovation[0, 0] = 0.0
-        return math.inf
-    return _judged(x, 1, gates.range)
+        s.p[i] += jump[i]
+    forget(s, P, variance)
+    return jump
 
 
 @compilable

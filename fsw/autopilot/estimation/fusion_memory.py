@@ -13,9 +13,8 @@ from fsw.autopilot.estimation.error_state import FILTER, Filter
 from fsw.autopilot.estimation.faults.confirmation import Run
 from fsw.autopilot.estimation.faults.redundancy import MIN_WALKS, Verdict
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate
-from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
-from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample, Sample
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
+from fsw.autopilot.measurements import AidingSample, GnssSample, MagneticSample, PoseSample, Sample
 from fsw.autopilot.signals import JointVector, Vec3, Vec4
 
 _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer
@@ -33,7 +32,7 @@ class Waiting(NamedTuple):
 
     time: float  # s
     number: int
-    sample: Aiding
+    sample: AidingSample
     half: bool = False  # of a pose, only the place is used
 
 
@@ -181,7 +180,7 @@ class FusionMemory(NamedTuple):
             memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
         return memory
 
-    def hearing(self, sample: Aiding) -> FusionMemory:
+    def hearing(self, sample: AidingSample) -> FusionMemory:
         """The memory after a ``sample`` that is plausible, whether it is used or not."""
         match sample:
             case PoseSample():

@@ -22,8 +22,8 @@ from typing import Any, Final, NamedTuple
 
 from fsw.autopilot.estimation.error_state import PUSHES
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
+from fsw.autopilot.estimation.fusion import followed
 from fsw.autopilot.estimation.imu import doubt
-from fsw.autopilot.estimation.measurement_noise import followed
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.signals import JointVector
 from fsw.compiled import compilable

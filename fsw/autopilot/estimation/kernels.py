@@ -15,7 +15,6 @@ from fsw.autopilot.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
-    FIELD,
     FRAME,
     IMU_CAPACITY,
     LOST,
@@ -113,7 +112,7 @@ def tick(
     ``ADVANCE`` ``until`` [s]; and at the ``END`` predict the present ``now`` [s] from there, which
     may be no number.
     """
-    x, t, a = filters[0], law[0].tuning, requests[0]
+    x, t, a = filters[0], law[0], requests[0]
     model = a.model[0], a.model[1], a.model[2], a.model[3]
     if parts & PUSH:
         joint_filter.push(x, t, now, a.dt, a.u)
@@ -161,7 +160,7 @@ def set_joints(x: Filter, law: Law, time: float, angles: JointVector) -> None:
 
     Its ``angles`` [rad] are as many as a record has room for.
     """
-    joint_filter.begin(x[0], law[0].tuning, time, angles)
+    joint_filter.begin(x[0], law[0], time, angles)
 
 
 @machine_code
@@ -186,7 +185,7 @@ def begin(
     then the vehicle moved as it did, but for what is not known of its velocity and its turning. To
     take the first reading, with all its vibration, for those before it would make up a velocity.
     """
-    s, t = x[0], law[0].tuning
+    s, t = x[0], law[0]
     M = s.covariance
     for i in range(ERRORS):
         for j in range(ERRORS):
@@ -203,11 +202,11 @@ def begin(
         s.acceleration[i] = 0.0
     for i in range(4):
         s.q[i] = q[i]
-    M[BARO, BARO] = t.baro_bias * t.baro_bias
-    M[DELAY, DELAY] = t.pose_delay_sigma * t.pose_delay_sigma
-    s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose_delay, 0
-    s.noise_scale[fusion.POSE] = t.pose_noise_at_start * t.pose_noise_at_start
-    s.time = time - t.pose_delay
+    M[BARO, BARO] = t.barometer.bias * t.barometer.bias
+    M[DELAY, DELAY] = t.pose.delay_sigma * t.pose.delay_sigma
+    s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose.delay, 0
+    s.noise_scale[fusion.POSE] = t.pose.noise_at_start * t.pose.noise_at_start
+    s.time = time - t.pose.delay
     while s.first < s.end - 1 and s.imu[s.first % IMU_CAPACITY, TIME] <= s.time:
         s.first += 1
     before = s.imu[(s.first - 1) % IMU_CAPACITY]
@@ -233,7 +232,7 @@ def couple_level(x: Filter, law: Law) -> None:
     """
     s = x[0]
     M, R = s.covariance, matrix_from_quaternion(vec4(s.q))
-    g, variance = GRAVITY, law[0].tuning.accel_bias * law[0].tuning.accel_bias
+    g, variance = GRAVITY, law[0].accel_bias * law[0].accel_bias
     a, b, c = R[6] / g, R[7] / g, R[8] / g
     rows = ((0.0, c, -b), (-c, 0.0, a), (b, -a, 0.0))
     for i in range(3):
@@ -248,64 +247,9 @@ def couple_level(x: Filter, law: Law) -> None:
 
 @machine_code
 @kernel
-def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
-    """Take ``p`` [m, NED] of ``time`` [s] as it is, ``variance`` [m^2, NED]; how far it jumped."""
-    s = x[0]
-    dt = time - s.time
-    jump = (
-        p[0] - s.p[0] - dt * s.v[0],
-        p[1] - s.p[1] - dt * s.v[1],
-        p[2] - s.p[2] - dt * s.v[2],
-    )
-    for i in range(3):
-        s.p[i] += jump[i]
-    fusion.forget(s, P, variance)
-    return jump
-
-
-@machine_code
-@kernel
-def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
-    """Take ``v`` [m/s, NED] as it is, ``variance`` [m^2/s^2, NED]; by how much it has jumped."""
-    s = x[0]
-    jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
-    for i in range(3):
-        s.v[i] = v[i]
-    fusion.forget(s, V, variance)
-    return jump
-
-
-@machine_code
-@kernel
-def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
-    """Take an attitude ``q`` [1] of ``variance`` [rad^2, FRD] as it is."""
-    s = x[0]
-    for i in range(4):
-        s.q[i] = q[i]
-    fusion.forget(s, TH, variance)
-
-
-@machine_code
-@kernel
-def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> None:
-    """Explain an ``altitude`` [m, up] of ``time`` [s], ``variance`` [m^2], by the bias."""
-    s = x[0]
-    s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
-    for j in range(FRAME):
-        s.shared[BARO, j] = 0.0
-    for j in range(FIELD):
-        s.with_offset[BARO, j] = s.with_offset[P + 2, j]
-    for j in range(ERRORS):  # what is wrong with the height is in it
-        s.covariance[BARO, j] = s.covariance[P + 2, j]
-        s.covariance[j, BARO] = s.covariance[j, P + 2]
-    s.covariance[BARO, BARO] = s.covariance[P + 2, P + 2] + variance
-
-
-@machine_code
-@kernel
 def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> None:
     """Write the covariance ``M`` (17, 17) [SI] at ``now`` [s] and a frame's ``X`` (17, 4) [SI]."""
-    s, t = x[0], law[0].tuning
+    s, t = x[0], law[0]
     for i in range(ERRORS):
         for j in range(ERRORS):
             M[i, j] = s.covariance[i, j]

@@ -1,6 +1,6 @@
 """The estimator: samples of all sensors in, the present state with its uncertainty out.
 
-A sample is looked at when it comes (``sensor_checks.py``), waits until the filter has reached the
+A sample is looked at when it comes (``sensors/base.py``), waits until the filter has reached the
 time at which it was measured, and is fused there. What the gate refuses for long is taken as it is,
 and the jump that this makes is reported, so that a plan can jump along.
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -27,16 +28,9 @@ from fsw.autopilot.estimation.error_state import (
 )
 from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
-from fsw.autopilot.estimation.faults.confirmation import Confirmation, Run
-from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, NOBODY, Source, Verdict
-from fsw.autopilot.estimation.faults.sensor_checks import (
-    SENSOR_OF,
-    Aiding,
-    Health,
-    arrived,
-    is_attitude_stuck,
-)
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.confirmation import Run, extended
+from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, Source, Verdict
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
@@ -60,25 +54,25 @@ from fsw.autopilot.estimation.kernels import (
     READING,
     Asked,
 )
-from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
-from fsw.autopilot.estimation.measurement_update import MeasurementUpdate, attitude
-from fsw.autopilot.estimation.tuning import EstimatorLaw, EstimatorTuning
+from fsw.autopilot.estimation.sensors import SENSORS
+from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of
+from fsw.autopilot.estimation.sensors.pose import Pose, is_attitude_stuck
+from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
 from fsw.autopilot.geometry.vectors import add_scaled, norm
 from fsw.autopilot.measurements import (
+    AidingSample,
     GnssSample,
     ImuSample,
     JointSample,
-    MagneticSample,
     PoseSample,
-    PressureSample,
-    RangeSample,
     Sample,
 )
 from fsw.autopilot.signals import JointVector, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import estimate_in
 from fsw.compiled import machine_code, packed
+from fsw.frozen import replace
 from fsw.record import JOINTS as JOINT_CAPACITY
 from fsw.record import padded
 
@@ -94,11 +88,6 @@ _SMALL_TURN: Final = 0.1  # rad
 _LEVEL: Final = 0.05  # rad
 _SIGMAS: Final = 3.0
 _JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
-_SOURCES: Final = {
-    PoseSample: Source.POSE | Source.ATTITUDE,
-    GnssSample: Source.GNSS,
-    MagneticSample: Source.COMPASS,
-}
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
 UNPUSHED: Final[Vec3] = (0.0, 0.0, 0.0)  # by what the tool touches
@@ -112,12 +101,13 @@ class SensorFusion:
     def __init__(self, tuning: EstimatorTuning, joints: int) -> None:
         """Estimate a vehicle of so many ``joints`` [1]."""
         self.tuning, self._joints = tuning, joints
-        self.law = packed(EstimatorLaw(tuning, tuning.gates))
-        self._stated = MeasurementNoise(tuning)
-        self._confirmation = Confirmation(tuning, self._stated)
-        self._start = FilterStart(tuning, self.law, self._stated, self._confirmation)
-        self._update = MeasurementUpdate(tuning, self.law, self._stated)
-        self._arbitration = Arbitration(tuning, self._stated, self._update, self._again)
+        self.law = packed(tuning)
+        self._sensors: dict[type, AidingSensor[Any, Any]] = {
+            kind.sample: kind(getattr(tuning, kind.sensor.name.lower())) for kind in SENSORS
+        }
+        self._pose = Pose(tuning.pose)
+        self._start = FilterStart(tuning, self.law)
+        self._arbitration = Arbitration(self._sensors, tuning.stale_time, self._again)
         self._asked, x = Asked(), at_start(joints).numbers  # written anew in each call
         self._requests = self._asked.array
         self._tick = machine_code(kernels.tick, x, self.law, self._requests, 0, 0.0, 0.0)
@@ -129,9 +119,8 @@ class SensorFusion:
             t = 1.0 + 0.01 * k
             memory, estimate = self.step(memory, _at_rest(t, self._joints), t)
         assert estimate is not None
-        for sample in _at_rest(t, self._joints):
-            if isinstance(sample, PoseSample | GnssSample | PressureSample):
-                self._update.take(memory, Waiting(t, 0, sample), (math.inf, math.inf))
+        for sensor in self._sensors.values():
+            sensor.take(memory, sensor.at_rest, t, (2.0, 2.0))
         fusion.doubt(memory.numbers, 0.0, 0.0, True)
         redundancy.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
@@ -318,20 +307,17 @@ class SensorFusion:
             return found
         return memory.frame.in_world(found, shared, memory.numbers[0])
 
-    def take(self, memory: FusionMemory, sample: Aiding, now: float) -> FusionMemory:
+    def take(self, memory: FusionMemory, sample: AidingSample, now: float) -> FusionMemory:
         """Check a ``sample`` that came at ``now`` [s] and let it wait for its time."""
-        x, before = memory.numbers, memory.of(SENSOR_OF[type(sample)])
-        health, fault = arrived(
-            before,
-            sample,
-            now,
-            self.tuning,
-            lambda: bool(x["same"][0].min() >= STUCK_READINGS),
+        x, sensor = memory.numbers, self._sensors[type(sample)]
+        before = memory.of(sensor.sensor)
+        health, fault = sensor.receive(
+            before, sample, now, lambda: bool(x["same"][0].min() >= STUCK_READINGS)
         )
         half = fault is SensorFault.STUCK and is_attitude_stuck(health)
         if half:
             fault = SensorFault.NONE
-        time = self._update.measured_at(memory, sample)
+        time = sensor.measured_at(memory, sample)
         if not fault and memory.started and time < x["time"][0] - LATE:
             fault = SensorFault.TOO_OLD
             # Measured before the filter began, it came as soon as it could.
@@ -343,7 +329,7 @@ class SensorFusion:
         others, used = memory.without(health.sensor), False
         if not fault:
             memory = memory.hearing(sample)
-            health, used, half = _as_judged(memory.verdict, sample, health, now, half)
+            health, used, half = _as_judged(memory.verdict, sensor.source, health, now, half)
         if not used:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
                 memory = memory._replace(without_fix=sample)
@@ -356,9 +342,9 @@ class SensorFusion:
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""
-        x, sigma = memory.numbers[0], self.tuning.pose_delay_sigma
+        x, sigma = memory.numbers[0], self.tuning.pose.delay_sigma
         if not sigma:
-            x["pose_delay"] = self.tuning.pose_delay
+            x["pose_delay"] = self.tuning.pose.delay
         if sigma == memory.delay_sigma or not memory.started:
             return memory
         M = x["covariance"]
@@ -388,10 +374,11 @@ class SensorFusion:
                 memory = self._with_frame(memory, sample, announced)
         refused = self._long_refused(memory, now) if isinstance(sample, PoseSample) else ()
         kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
-        ratio = self._update.fuse(memory, one)
+        sensor = self._sensors[type(sample)]
+        ratio = sensor.fuse(memory, sample, one.half)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
         if not (announced or any(refused)) and max(ratio) <= 1.0:  # as nearly always
-            health = memory.of(SENSOR_OF[type(sample)])
+            health = memory.of(sensor.sensor)
             shown = innovation if len(ratio) > 1 else innovation[:1]
             return memory.after(
                 one, health.with_fused((now,) * len(ratio), ratio, shown), memory.runs
@@ -429,26 +416,25 @@ class SensorFusion:
         jumped (``announced``), from the filter's ``previous`` state if it drifts. How far, two
         poses must agree upon: the one that announces it may be wrong as well.
         """
-        sample = one.sample
-        health = memory.of(SENSOR_OF[type(sample)])
+        sample, sensor = one.sample, self._sensors[type(one.sample)]
+        health = memory.of(sensor.sensor)
         # What is infinite says nothing here.
         refused = any(1.0 < r < math.inf for r in ratio)
-        if refused and isinstance(sample, PressureSample) and not health.fused:
-            # The weather is not known until the first reading.
-            refused, ratio = False, (1.0,)
-            self._update.take_pressure(memory, one.time, sample)
+        if refused and sensor.starts_anywhere and not health.fused:
+            refused, memory = False, sensor.take(memory, sample, one.time, ratio)
+            ratio = (1.0,) * len(ratio)
         runs, run = memory.runs, None
         used = [at for at, r in zip(health.fused, ratio, strict=False) if r < math.inf]
         long_refused = bool(used) and now - min(used) > self.tuning.reset_time
         if refused:
-            run = self._run(memory, sample, innovation)
+            run = self._run(memory, sensor, sample, innovation)
             runs = (*[other for other in runs if other.kind is not run.kind], run)
             little = _is_small(sample, innovation)
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)
             if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
                 fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN, max(ratio) < math.inf)
-                ratio = self._update.fuse_pose(memory, sample, half=one.half)
+                ratio = sensor.fuse(memory, sample, one.half)
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
@@ -462,7 +448,7 @@ class SensorFusion:
         if announced and run is not None and not believed:
             memory = memory._replace(reset_counter=counter)
         if believed and any(1.0 < r < math.inf for r in ratio):
-            memory = self._update.take(memory, one, ratio)
+            memory = sensor.take(memory, sample, one.time, ratio)
             if not announced and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
                 fusion.doubt(memory.numbers, 0.0, 0.0, max(ratio) < math.inf)
@@ -473,18 +459,25 @@ class SensorFusion:
             memory = memory.jumped(*_jump(previous, memory.numbers[0]))
         return memory
 
-    def _run(self, memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...]) -> Run:
+    def _run(
+        self,
+        memory: FusionMemory,
+        sensor: AidingSensor[Any, Any],
+        sample: AidingSample,
+        innovation: tuple[float, ...],
+    ) -> Run:
         """The run of refused samples that this one goes on with, or begins."""
-        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0).tolist()
-        scales = scale[:2] if isinstance(sample, PoseSample) else scale[2:]
-        seldom = memory.of(SENSOR_OF[type(sample)]).apart >= 0.25
-        return self._confirmation.run(memory.runs, sample, innovation, tuple(scales), seldom)
+        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)[sensor.noise_scales].tolist()
+        rooms = partial(sensor.rooms, sample, tuple(scale))
+        new = Run(type(sample), sample.time, sample.time, innovation)
+        seldom = memory.of(sensor.sensor).apart >= 0.25
+        return extended(memory.runs, new, rooms, seldom=seldom)
 
     def _with_frame(
         self, memory: FusionMemory, sample: PoseSample, announced: bool
     ) -> FusionMemory:
         """The memory after a frame that drifts has moved, to where a pose says it is."""
-        moved = memory.frame.moved(memory.numbers[0], self._stated.of_pose(sample), announced)
+        moved = memory.frame.moved(memory.numbers[0], self._pose.stated(sample), announced)
         return memory._replace(frame=moved)
 
 
@@ -531,7 +524,7 @@ def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFa
     return SensorFault.RATE_TOO_LOW if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
 
 
-def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
+def _is_small(sample: AidingSample, innovation: tuple[float, ...]) -> bool:
     """Whether a pose is refused by so little that it need not be the pose that is wrong."""
     if not isinstance(sample, PoseSample):
         return False
@@ -540,15 +533,14 @@ def _is_small(sample: Aiding, innovation: tuple[float, ...]) -> bool:
 
 
 def _as_judged(
-    verdict: Verdict, sample: Aiding, health: Health, now: float, half: bool
+    verdict: Verdict, source: Source, health: Health, now: float, half: bool
 ) -> tuple[Health, bool, bool]:
-    """A sensor's health at ``now`` [s], whether its ``sample`` is used, and whether by ``half``.
+    """A ``source``'s health at ``now`` [s], whether its sample is used, and whether by ``half``.
 
     Of a pose whose attitude repeats itself, or is named, the place is used alone.
     """
     if not (verdict.wrong or verdict.suspects):
         return health, True, half
-    source = _SOURCES.get(type(sample), NOBODY)
     wrong = verdict.wrong & source
     if wrong:
         health = health.with_fault(SensorFault.DISAGREES, now)
@@ -558,7 +550,9 @@ def _as_judged(
     return health, True, half or bool(wrong)
 
 
-def _tilts(memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...], now: float) -> bool:
+def _tilts(
+    memory: FusionMemory, sample: AidingSample, innovation: tuple[float, ...], now: float
+) -> bool:
     """Whether a pose has jumped in a way that no frame does: down stays where it is.
 
     In flight the filter knows where, but for what a gyro may have turned it by that others
@@ -572,7 +566,7 @@ def _tilts(memory: FusionMemory, sample: Aiding, innovation: tuple[float, ...], 
         used = max(memory.of(Sensor.POSE).fused[1], verdict.since)
         room = (now - used) * redundancy.size_of(evidence, Source.GYRO)
     rx, ry, rz = innovation[3:]
-    down = rotate_back(matrix_from_quaternion(attitude(x)), (0.0, 0.0, 1.0))
+    down = rotate_back(matrix_from_quaternion(attitude_of(x)), (0.0, 0.0, 1.0))
     along = rx * down[0] + ry * down[1] + rz * down[2]
     known = math.sqrt(max(x["covariance"].diagonal()[TH : TH + 3].tolist()))
     tilt = norm(add_scaled((rx, ry, rz), down, -along))
@@ -583,19 +577,24 @@ def _jump(before: Any, after: Any) -> tuple[Vec3, Vec3, Vec4]:
     """Position [m, NED], velocity [m/s, NED] and turn [1] from one state to another."""
     px, py, pz = (after["p"] - before["p"]).tolist()
     vx, vy, vz = (after["v"] - before["v"]).tolist()
-    return (px, py, pz), (vx, vy, vz), multiply(attitude(after), conjugate(attitude(before)))
+    return (px, py, pz), (vx, vy, vz), multiply(attitude_of(after), conjugate(attitude_of(before)))
 
 
 def _at_rest(t: float, joints: int) -> tuple[Sample, ...]:
     """A reading of every sensor, of a vehicle of so many ``joints`` that stands."""
-    none, fine, small = (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-4), 1e-3 * t
+    none = (0.0, 0.0, 0.0)
     return (
         ImuSample(t - 1e-3, (0.0, 0.0, -9.81), none),
-        ImuSample(t, (0.0, 0.0, -9.81 + small), none),
+        ImuSample(t, (0.0, 0.0, -9.81 + 1e-3 * t), none),
         JointSample(t, (0.0,) * joints),
-        PoseSample(t, (small, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), fine, fine),
-        GnssSample(t, (0.0, small, 0.0), none, fine, fine),
-        PressureSample(t, 0.0, 1.0),
-        MagneticSample(t, (0.2, 0.0, 0.4)),
-        RangeSample(t, 1.0, 1.0),
+        *[_moved(kind, t) for kind in SENSORS],
     )
+
+
+def _moved(kind: type[AidingSensor[Any, Any]], t: float) -> AidingSample:
+    """A reading at ``t`` [s] that is never the same, as those of a sensor that is stuck are."""
+    name, by = kind.measures[0], 1e-3 * t
+    value = getattr(kind.at_rest, name)
+    moved = tuple(x + by for x in value) if isinstance(value, tuple) else value + by
+    changes: dict[str, Any] = {"time": t, name: moved}
+    return replace(kind.at_rest, **changes)

@@ -14,11 +14,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Final
+from typing import Final, cast
 
+from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.float32 import nearest_decimal
-from fsw.autopilot.tuning import Tuning, number_at
+from fsw.autopilot.tuning import Row, Tuning, number_at
 
 ACCEL_RANGE: Final = "EST_ACC_RANGE"
 _DEGREE: Final = math.pi / 180.0
@@ -81,10 +82,9 @@ class Parameter:
 
 _Pid = tuple[float, float, float, float]  # P, I, D and the limit
 _NIL: Final[_Pid] = (0.0, 0.0, 0.0, 0.01)
-_Row = tuple[str, str, str, float, float, str] | tuple[str, str, str, float, float, str, float]
 
 
-def _pid(name: str, path: str, unit: str, most: _Pid, what: str, least: _Pid = _NIL) -> list[_Row]:
+def _pid(name: str, path: str, unit: str, most: _Pid, what: str, least: _Pid = _NIL) -> list[Row]:
     p, i, d, limit = zip(least, most, strict=True)
     return [
         (f"{name}_P", f"{path}.kp", "1/s^2", *p, f"{what}: proportional gain"),
@@ -94,7 +94,7 @@ def _pid(name: str, path: str, unit: str, most: _Pid, what: str, least: _Pid = _
     ]
 
 
-def _barrier(name: str, path: str, what: str) -> list[_Row]:
+def _barrier(name: str, path: str, what: str) -> list[Row]:
     return [
         (
             f"{name}_ALPHA",
@@ -117,11 +117,16 @@ def _barrier(name: str, path: str, what: str) -> list[_Row]:
     ]
 
 
+def _of_sensor(name: str, row: Row) -> Row:
+    parameter, number, *rest = row
+    return cast(Row, (parameter, f"{_EST}.{name}.{number}", *rest))
+
+
 _TRACKING = "tuning.tracking"
 _WEIGHTS = "planner.weights"
 _SOFT = "planner.soft"
 _EST = "estimator"
-_ROWS: Final[dict[str, list[_Row]]] = {
+_ROWS: Final[dict[str, list[Row]]] = {
     "Tracking loop": [
         ("TRK_EFFORT", f"{_TRACKING}.input_weight", "1e-6 s^8", 0.05, 100.0,
          "Horizontal LQR weight on snap; smaller tracks tighter until the rotors saturate",
@@ -280,43 +285,9 @@ _ROWS: Final[dict[str, list[_Row]]] = {
     "Estimator": [
         (ACCEL_RANGE, f"{_EST}.accel_full_scale", "m/s^2", 1.0, 10000.0,
          "Accelerometer: its range; readings at an end of it are counted in VIBRATION"),
-        ("EKF2_EV_DELAY", f"{_EST}.pose_delay", "ms", 0.0, 200.0,
-         "Pose: delay beyond what its time stamp says", _MILLI),
-        ("EST_EV_DELAY_SD", f"{_EST}.pose_delay_sigma", "ms", 0.0, 100.0,
-         "Pose: standard deviation of EKF2_EV_DELAY, which is then estimated in flight; 0: exact",
-         _MILLI),
-        ("EKF2_EVP_NOISE", f"{_EST}.position_floor", "m", 0.0001, 10.0,
-         "Pose: least standard deviation of the position"),
-        ("EKF2_EVA_NOISE", f"{_EST}.attitude_floor", "rad", 0.0001, 1.0,
-         "Pose: least standard deviation of the attitude"),
-        ("EKF2_EVP_GATE", f"{_EST}.pose_gate", "SD", 1.0, 20.0,
-         "Pose: gate of position and attitude"),
-        ("EKF2_GPS_DELAY", f"{_EST}.gnss_delay", "ms", 0.0, 200.0,
-         "GNSS: delay beyond what its time stamp says", _MILLI),
-        ("EKF2_GPS_P_NOISE", f"{_EST}.gnss_position_floor", "m", 0.001, 10.0,
-         "GNSS: least standard deviation of the position"),
-        ("EKF2_GPS_V_NOISE", f"{_EST}.gnss_velocity_floor", "m/s", 0.01, 5.0,
-         "GNSS: least standard deviation of the velocity"),
-        ("EKF2_GPS_P_GATE", f"{_EST}.gnss_position_gate", "SD", 1.0, 20.0,
-         "GNSS: gate of the position"),
-        ("EKF2_GPS_V_GATE", f"{_EST}.gnss_velocity_gate", "SD", 1.0, 20.0,
-         "GNSS: gate of the velocity"),
-        ("EKF2_BARO_NOISE", f"{_EST}.pressure_floor", "m", 0.01, 15.0,
-         "Barometer: least standard deviation of the height"),
-        ("EKF2_BARO_GATE", f"{_EST}.pressure_gate", "SD", 1.0, 20.0, "Barometer: gate"),
-        ("EKF2_MAG_NOISE", f"{_EST}.mag_noise", "gauss", 0.001, 1.0,
-         "Magnetometer: standard deviation of each axis"),
-        ("EST_MAG_OFFSET", f"{_EST}.mag_offset", "gauss", 0.0, 0.2,
-         "Magnetometer: standard deviation of what stays of each axis after a calibration"),
-        ("EKF2_HDG_GATE", f"{_EST}.heading_gate", "SD", 1.0, 20.0,
-         "Magnetometer: gate of the heading"),
-        ("EKF2_MAG_DECL", f"{_EST}.declination", "deg", -180.0, 180.0,
-         "Magnetic declination, east positive", _DEGREE),
-        ("EKF2_RNG_NOISE", f"{_EST}.range_floor", "m", 0.01, 10.0,
-         "Rangefinder: least standard deviation"),
-        ("EKF2_RNG_SFE", f"{_EST}.range_share", "m/m", 0.0, 0.2,
-         "Rangefinder: standard deviation in proportion to the distance"),
-        ("EKF2_RNG_GATE", f"{_EST}.range_gate", "SD", 1.0, 20.0, "Rangefinder: gate"),
+        *[
+            _of_sensor(kind.sensor.name.lower(), row) for kind in SENSORS for row in kind.parameters
+        ],
         ("EKF2_GYR_NOISE", f"{_EST}.gyro_noise", "rad/s", 0.0001, 0.1,
          "Gyro: noise, in PX4's steps of 10 ms", _PX4_STEP),
         ("EKF2_ACC_NOISE", f"{_EST}.accel_noise", "m/s^2", 0.01, 1.0,
@@ -559,7 +530,7 @@ _WHOLE: Final = frozenset(("COM_DL_LOSS_T", "FD_FAIL_P", "FD_FAIL_R", "RTL_TIME_
 _UNTUNED: Final = FlightConfig()
 
 
-def _parameter(group: str, row: _Row) -> Parameter:
+def _parameter(group: str, row: Row) -> Parameter:
     name, path, unit, least, most, meaning = row[:6]
     scale = row[6] if len(row) == 7 else 1.0
     choices = _CHOICES.get(name, ())

@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, fault_name
+from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.signals import (
     BatteryState,
@@ -21,7 +22,6 @@ from fsw.link.wire.telemetry_context import TelemetryContext
 # receiver say whether heading and position are known, which is what clients ask them for; where
 # there are such sensors, also whether those are well.
 _GYRO, _ACCELEROMETER, _HEADING, _PLACE, _EXTERNAL_POSE = 0x1, 0x2, 0x4, 0x20, 0x80
-_PRESSURE, _RANGE = 0x8, 0x100
 _RATE_CONTROL, _ATTITUDE, _YAW, _HEIGHT, _POSITION = 0x400, 0x800, 0x1000, 0x2000, 0x4000
 _MOTORS, _FENCE, _AHRS, _BATTERY, _PREARM = 0x8000, 0x100000, 0x200000, 0x2000000, 0x10000000
 _LOGGING: Final = 0x1000000
@@ -52,13 +52,7 @@ _LOST: Final[dict[str, int]] = {
     Sensor.ENCODERS.value: _MOTORS,
 }
 # Those that are there if they are heard.
-_HEARD: Final[dict[str, int]] = {
-    Sensor.POSE.value: _EXTERNAL_POSE,
-    Sensor.GNSS.value: _PLACE,
-    Sensor.BAROMETER.value: _PRESSURE,
-    Sensor.MAGNETOMETER.value: _HEADING,
-    Sensor.RANGEFINDER.value: _RANGE,
-}
+_HEARD: Final = {kind.sensor.value: kind.status_bit for kind in SENSORS}
 # Faults with which a sensor is in use.
 _IN_USE: Final = frozenset(
     ("", fault_name(SensorFault.REPEATED), fault_name(SensorFault.RATE_TOO_LOW))

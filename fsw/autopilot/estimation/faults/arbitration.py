@@ -9,7 +9,7 @@ Source: docs/decisions/0041-one-law-for-who-is-wrong.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -33,20 +33,14 @@ from fsw.autopilot.estimation.faults.redundancy import (
     EVIDENCE,
     NO_AID,
     NOBODY,
-    Aid,
     Source,
     Verdict,
 )
-from fsw.autopilot.estimation.faults.sensor_checks import Aiding, Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
-from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory, TickInputs, Trail
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
+from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
-from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
-from fsw.autopilot.estimation.measurement_update import MeasurementUpdate
-from fsw.autopilot.estimation.tuning import EstimatorTuning
-from fsw.autopilot.geometry.quaternion import normalised
-from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample
+from fsw.autopilot.estimation.sensors.base import AidingSensor
 from fsw.autopilot.signals import StateEstimate
 
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
@@ -77,14 +71,12 @@ class Arbitration:
 
     def __init__(
         self,
-        tuning: EstimatorTuning,
-        stated: MeasurementNoise,
-        update: MeasurementUpdate,
+        sensors: Mapping[type, AidingSensor[Any, Any]],
+        stale: float,
         again: Again,
     ) -> None:
-        self._tuning = tuning
-        self._stated = stated
-        self._update = update
+        """Of some ``sensors``, each silent after ``stale`` [s]."""
+        self._sensors, self._stale = sensors, stale
         self._again = again
 
     def step(
@@ -134,7 +126,9 @@ class Arbitration:
         evidence[:] = before.evidence
         newest = memory.newest_pose, memory.gnss, memory.newest_field
         pose, fix, field = [
-            NO_AID if sample is None or sample is last else self._aid(memory, sample)
+            NO_AID
+            if sample is None or sample is last
+            else self._sensors[type(sample)].aid(memory, sample)
             for sample, last in zip(newest, before.seen, strict=True)
         ]
         silent = _silent(memory, now) | _stuck(memory) | (Source.MODEL if touches else NOBODY)
@@ -160,21 +154,6 @@ class Arbitration:
             memory, state = self._convicted(memory, before, now, found)
         return _with_trail(memory, now), state
 
-    def _aid(self, memory: FusionMemory, sample: Aiding) -> Aid:
-        """What a measurement says to the law for who is wrong."""
-        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)
-        time = self._update.measured_at(memory, sample)
-        if isinstance(sample, PoseSample):
-            place, about = self._update.noise(memory, sample)
-            sigma, angle = math.sqrt(max(place) * scale[0]), math.sqrt(max(about) * scale[1])
-            return True, time, sample.position, normalised(sample.attitude), sigma, angle
-        if isinstance(sample, GnssSample):
-            place, speed = self._stated.of_gnss(sample)
-            sigma, fast = math.sqrt(max(place) * scale[2]), math.sqrt(max(speed) * scale[3])
-            return True, time, sample.position, (*sample.velocity, 0.0), sigma, fast
-        assert isinstance(sample, MagneticSample)
-        return True, time, sample.field, NO_TURN, self._tuning.mag_noise, 0.0
-
     def _aided(self, memory: FusionMemory, now: float) -> Source:
         """Who measures places, and attitudes, that are used at ``now`` [s], and is not named."""
         found, wrong = NOBODY, memory.verdict.wrong
@@ -182,7 +161,7 @@ class Arbitration:
             health = memory.of(sensor)
             fused = zip(parts, health.fused, strict=False)
             used = min([at for part, at in fused if not part & wrong], default=-math.inf)
-            if now - used <= _USED and now - health.came <= self._tuning.stale_time:
+            if now - used <= _USED and now - health.came <= self._stale:
                 found |= parts[0] | parts[1]
         return found & ~wrong
 

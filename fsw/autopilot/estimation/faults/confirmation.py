@@ -1,6 +1,6 @@
 """Whether samples that the filter refuses agree with each other: one alone may be wrong.
 
-Two poses agree but for their noise and what a vehicle moves meanwhile. What is refused in flight is
+What is refused in flight is
 compared by its innovation, which knows how the vehicle has moved: a run of refused samples goes on
 where value and direction nearly stay, of which noise makes no long one. How long a run must be
 until it is believed grows with how far it would move the estimate.
@@ -9,23 +9,14 @@ until it is believed grows with how far it would move the estimate.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from fsw.autopilot.estimation.faults.sensor_checks import Aiding
-from fsw.autopilot.estimation.measurement_noise import MeasurementNoise
-from fsw.autopilot.estimation.tuning import EstimatorTuning
-from fsw.autopilot.geometry.quaternion import conjugate, multiply, normalised, rotation_vector
-from fsw.autopilot.geometry.vectors import norm
-from fsw.autopilot.measurements import GnssSample, PoseSample, PressureSample
+from fsw.autopilot.measurements import GnssSample, PoseSample
 
-# How fast a vehicle moves between two poses.
-_SPEED: Final = 2.0  # m/s
-_RATE: Final = 2.0  # rad/s
-# How fast an innovation changes, because velocity and rate are not known any better, and by which
-# share of itself, because an inertial unit that is wrong leads the filter astray ever faster.
-_CREEPS: Final = 0.5  # m/s and rad/s
+# By which share of itself an innovation changes besides, because an inertial unit that is wrong
+# leads the filter astray ever faster.
 _GROWS: Final = 0.5
-_GAINS: Final = 2.0  # m/s^2, of a velocity's
 _NO_CHANCE: Final = 3
 _APART: Final = 0.25  # s; readings farther apart do not confirm each other
 _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
@@ -70,72 +61,24 @@ class Run(NamedTuple):
         return self.is_confirmed and self.last - self.since >= max(least, *takes)
 
 
-class Confirmation:
-    """Compares samples, but for their noise."""
+def extended(
+    runs: tuple[Run, ...],
+    new: Run,
+    rooms: Callable[[float], tuple[float, ...]],
+    *,
+    seldom: bool,
+) -> Run:
+    """The run that a ``new`` one of a single refused sample goes on with, or is itself.
 
-    def __init__(self, tuning: EstimatorTuning, stated: MeasurementNoise) -> None:
-        self._tuning = tuning
-        self._stated = stated
-
-    def of_poses(self, one: PoseSample, other: PoseSample) -> bool:
-        """Whether two poses say the same."""
-        place, about = self._stated.of_pose(one)
-        apart = abs(one.time - other.time)
-        gate = self._tuning.pose_gate * math.sqrt(2.0)
-        turn = rotation_vector(
-            multiply(conjugate(normalised(one.attitude)), normalised(other.attitude))
-        )
-        step = gate * math.sqrt(sum(place)) + _SPEED * apart
-        angle = gate * math.sqrt(sum(about)) + _RATE * apart
-        return math.dist(one.position, other.position) <= step and norm(turn) <= angle
-
-    def run(
-        self,
-        runs: tuple[Run, ...],
-        sample: Aiding,
-        innovation: tuple[float, ...],
-        scales: tuple[float, ...],
-        seldom: bool,
-    ) -> Run:
-        """The run that a refused ``sample`` goes on with, or begins.
-
-        Its ``innovation`` [SI], and by how much its variances are larger than stated, ``scales``
-        [1, 1]. A sensor is heard ``seldom`` if its readings come more than 0.25 s apart.
-        """
-        kind, new = type(sample), Run(type(sample), sample.time, sample.time, innovation)
-        for one in runs:
-            apart = sample.time - one.last
-            if one.kind is not kind or apart > (_SELDOM_APART if seldom else _APART):
-                continue
-            rooms = self._rooms(sample, scales, apart)
-            parts = zip(
-                (one.innovation[:3], one.innovation[3:]), (innovation[:3], innovation[3:]), rooms,
-                strict=False,
-            )  # fmt: skip
-            if all(math.dist(a, b) <= room + _GROWS * math.hypot(*a) for a, b, room in parts):
-                return Run(kind, one.since, sample.time, innovation, one.samples + 1)
-        return new
-
-    def _rooms(self, sample: Aiding, scales: tuple[float, ...], apart: float) -> tuple[float, ...]:
-        """By how much two innovations may differ that are ``apart`` [s]."""
-        gates = self._tuning
-        match sample:
-            case PoseSample():
-                (place, about), gate = self._stated.of_pose(sample), gates.pose_gate
-                return (
-                    gate * math.sqrt(2.0 * scales[0] * max(place)) + _CREEPS * apart,
-                    gate * math.sqrt(2.0 * scales[1] * max(about)) + _CREEPS * apart,
-                )
-            case GnssSample():
-                place, speed = self._stated.of_gnss(sample)
-                return (
-                    gates.gnss_position_gate * math.sqrt(2.0 * scales[0] * max(place))
-                    + _CREEPS * apart,
-                    gates.gnss_velocity_gate * math.sqrt(2.0 * scales[1] * max(speed))
-                    + _GAINS * apart,
-                )
-            case PressureSample():
-                noise = math.sqrt(2.0 * self._stated.of_pressure(sample))
-                return (gates.pressure_gate * noise + _SPEED * apart,)
-            case _:
-                return (0.0,)
+    By how much innovations of its parts may differ [SI] after a time [s], ``rooms`` says. A sensor
+    is heard ``seldom`` if its readings come more than 0.25 s apart.
+    """
+    for one in runs:
+        apart = new.last - one.last
+        if one.kind is not new.kind or apart > (_SELDOM_APART if seldom else _APART):
+            continue
+        a, b = one.innovation, new.innovation
+        parts = zip((a[:3], a[3:]), (b[:3], b[3:]), rooms(apart), strict=False)
+        if all(math.dist(p, q) <= room + _GROWS * math.hypot(*p) for p, q, room in parts):
+            return new._replace(since=one.since, samples=one.samples + 1)
+    return new

@@ -7,9 +7,9 @@ from operator import itemgetter
 from typing import Final
 
 from fsw.autopilot.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
-from fsw.autopilot.estimation.faults.sensor_checks import Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, fault_name
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, fault_name
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
+from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.autopilot.signals import (
     EstimatorReport,
@@ -35,6 +35,7 @@ _KNOWN_ANGLE: Final = 0.2  # rad
 _KNOWN_SPEED: Final = 0.5  # m/s
 _KNOWN_PLACE: Final = 0.5  # m, in dead reckoning
 AIDS_PLACE: Final = (Sensor.POSE, Sensor.GNSS)
+_TESTED: Final = {kind.sensor.value: kind.ratios for kind in SENSORS}
 _UPPER: Final = tuple((i, j) for i in range(6) for j in range(i, 6))
 _OF_POSE: Final = (P, P + 1, P + 2, TH, TH + 1, TH + 2)
 _pose: Final = itemgetter(*[ERRORS * _OF_POSE[i] + _OF_POSE[j] for i, j in _UPPER])
@@ -150,20 +151,12 @@ def _sensor(health: Health, came: float, now: float, stale: float) -> SensorRepo
 
 
 def _ratios(sensors: tuple[SensorReport, ...]) -> TestRatios:
-    of = {one.name: one.ratio for one in sensors if one.ratio}
-    pose, fix = of.get(Sensor.POSE.value, ()), of.get(Sensor.GNSS.value, ())
-    place = (*pose[:1], *fix[:1])
-    return TestRatios(
-        velocity=_largest(fix[1:]),
-        place=_largest(place),
-        height=_largest((*place, *of.get(Sensor.BAROMETER.value, ()))),
-        heading=_largest((*pose[1:], *of.get(Sensor.MAGNETOMETER.value, ()))),
-        above_ground=_largest(of.get(Sensor.RANGEFINDER.value, ())),
-    )
-
-
-def _largest(ratios: tuple[float, ...]) -> float:
-    return max(ratios, default=math.nan)
+    """Of each kind the largest one."""
+    found: dict[str, float] = {}
+    for one in sensors:
+        for kinds, ratio in zip(_TESTED.get(one.name, ()), one.ratio, strict=False):
+            found.update({kind: max(found.get(kind, 0.0), ratio) for kind in kinds})
+    return TestRatios(**found)
 
 
 def _flags(variances: list[float], sensors: tuple[SensorReport, ...], *, aided: bool) -> int:

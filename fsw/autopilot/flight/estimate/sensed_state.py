@@ -14,8 +14,7 @@ from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
 from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names, scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
-from fsw.autopilot.estimation.faults.sensor_checks import Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
     FusionMemory,

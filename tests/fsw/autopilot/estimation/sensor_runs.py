@@ -8,6 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fsw.autopilot.estimation.sensors.barometer import BarometerTuning
+from fsw.autopilot.estimation.sensors.gnss import GnssTuning
+from fsw.autopilot.estimation.sensors.magnetometer import MagnetometerTuning
+from fsw.autopilot.estimation.sensors.pose import PoseTuning
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.measurements import (
     GnssSample,
@@ -164,8 +168,7 @@ _QUIET = EstimatorTuning(
     gyro_noise=3e-4,
     accel_bias_walk=1e-3,
     gyro_bias_walk=5e-5,
-    position_floor=2e-4,
-    pose_noise_at_start=1.0,
+    pose=PoseTuning(position_floor=2e-4, noise_at_start=1.0),
 )
 MOCAP = Suite(_QUIET, pose=PoseSensor(120.0, 0.015, 5e-4, np.radians(0.2)))
 VIO = Suite(
@@ -174,7 +177,7 @@ VIO = Suite(
         gyro_noise=3e-4,
         accel_bias_walk=1e-3,
         gyro_bias_walk=5e-5,
-        pose_noise_at_start=1.0,
+        pose=PoseTuning(noise_at_start=1.0),
     ),
     pose=PoseSensor(30.0, 0.045, 3e-3, np.radians(0.5), drift=5e-3, turn=np.radians(0.05)),
 )
@@ -186,11 +189,9 @@ RTK = Suite(
         gyro_bias_walk=5e-5,
         accel_bias=0.05,
         gyro_bias=0.005,
-        baro_bias=1.0,
-        declination=0.0,
-        gnss_position_floor=1e-3,
-        gnss_velocity_floor=0.01,
-        pressure_floor=0.01,
+        barometer=BarometerTuning(floor=0.01, bias=1.0),
+        magnetometer=MagnetometerTuning(declination=0.0),
+        gnss=GnssTuning(position_floor=1e-3, velocity_floor=0.01),
     ),
     gnss=GnssSensor(10.0, 0.12, 0.014, 0.05),
     baro=0.1,
@@ -235,7 +236,7 @@ def run(suite: Suite, seed: int, duration: float) -> Run:
     force = truth.force[::every] + accel_bias + accel_noise
     rate = truth.rate[::every] + gyro_bias + gyro_noise
     due: list[tuple[float, Sample]] = []
-    baro_bias = random.standard_normal() * tuning.baro_bias
+    baro_bias = random.standard_normal() * tuning.barometer.bias
     if suite.pose is not None:
         due += list(_poses(suite.pose, truth, random))
     if suite.gnss is not None:
@@ -246,10 +247,10 @@ def run(suite: Suite, seed: int, duration: float) -> Run:
             measured = height + suite.baro * random.standard_normal()
             due.append((time + 0.01, PressureSample(time, measured, suite.baro**2)))
     if suite.mag:
-        offset = tuning.mag_offset * random.standard_normal(3)
+        offset = tuning.magnetometer.offset * random.standard_normal(3)
         for time in np.arange(t[0], t[-1], 0.02):
             R = rotations(truth.q[truth.at(time)][None])[0]
-            measured = R.T @ EARTH + offset + tuning.mag_noise * random.standard_normal(3)
+            measured = R.T @ EARTH + offset + tuning.magnetometer.noise * random.standard_normal(3)
             due.append((time + 0.005, MagneticSample(time, tuple(measured.tolist()))))
     due.sort(key=lambda one: one[0])
     ticks, k = [], 0

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import ERRORS
-from fsw.autopilot.estimation.faults.sensor_checks import Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
@@ -65,6 +64,6 @@ def test_the_position_that_was_used_last_counts(
 def test_without_a_pose_satellites_count_and_without_both_nothing() -> None:
     fix = GnssSample(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1e-5, 1e-5, 0.05**2), FINE)
     found = correlated_error(at_start(2)._replace(gnss=fix), TUNING)
-    least = TUNING.gnss_position_floor
+    least = TUNING.gnss.position_floor
     assert deviations(found) == pytest.approx([least, least, 0.05, 0.0, 0.0, 0.0])
     assert not any(correlated_error(at_start(2), TUNING))

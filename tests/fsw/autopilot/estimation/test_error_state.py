@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation import fusion
 from fsw.autopilot.estimation.error_state import (
     BA,
     BARO,
@@ -33,6 +32,12 @@ from fsw.autopilot.estimation.error_state import (
     step_to,
     transition,
 )
+from fsw.autopilot.estimation.fusion import position_rows
+from fsw.autopilot.estimation.sensors.barometer import pressure_rows
+from fsw.autopilot.estimation.sensors.gnss import velocity_rows
+from fsw.autopilot.estimation.sensors.magnetometer import MagnetometerTuning, heading_rows
+from fsw.autopilot.estimation.sensors.pose import PoseTuning, attitude_rows
+from fsw.autopilot.estimation.sensors.rangefinder import RangefinderTuning, range_rows
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
@@ -40,7 +45,9 @@ from fsw.compiled import packed
 from tests.fsw.autopilot.estimation.sensor_runs import TICK, flight
 
 Array = NDArray[np.float64]
-LAW = packed(EstimatorTuning(pose_delay_sigma=0.01, declination=0.1)).view(np.recarray)[0]
+LAW = packed(EstimatorTuning(pose=PoseTuning(delay_sigma=0.01))).view(np.recarray)[0]
+COMPASS = packed(MagnetometerTuning(declination=0.1)).view(np.recarray)[0]
+RANGES = packed(RangefinderTuning()).view(np.recarray)[0]
 FORCE, RATE = (0.7, -1.2, -9.0), (0.4, -1.1, 0.8)
 STEP = 1e-6
 TILT = (TH, TH + 1)
@@ -71,17 +78,17 @@ def moved(filter_: Records, error: int, by: float) -> Records:
 
 
 ROWS: list[tuple[str, int, Callable[[Any], object]]] = [
-    ("position", 3, lambda x: fusion.position_rows(x, (1.0, 2.0, 3.0), (1.0,) * 3, 1e-3, 0.0)),
+    ("position", 3, lambda x: position_rows(x, (1.0, 2.0, 3.0), (1.0,) * 3, 1e-3, 0.0)),
     (
         "attitude",
         3,
-        lambda x: fusion.attitude_rows(
+        lambda x: attitude_rows(
             x, turned(tuple(some_state()[0]["q"]), 1e-4, 2e-4, -1e-4), (1.0,) * 3, 1e-3, 0.0
         ),
     ),
-    ("velocity", 3, lambda x: fusion.velocity_rows(x, (1.0, 2.0, 3.0), (1.0,) * 3, 1e-3)),
-    ("pressure", 1, lambda x: fusion.pressure_rows(x, 5.0, 1.0, 1e-3)),
-    ("range", 1, lambda x: fusion.range_rows(x, LAW, 3.1, 1.0, 0.0)),
+    ("velocity", 3, lambda x: velocity_rows(x, (1.0, 2.0, 3.0), (1.0,) * 3, 1e-3)),
+    ("pressure", 1, lambda x: pressure_rows(x, 5.0, 1.0, 1e-3)),
+    ("range", 1, lambda x: range_rows(x, RANGES, 3.1, 1.0, 0.0)),
 ]
 
 
@@ -109,10 +116,10 @@ def test_a_distance_corrects_no_tilt_and_what_that_makes_of_it_is_noise() -> Non
 
     def residual_at(tilt: int, by: float) -> float:
         other = moved(filter_, tilt, by)
-        fusion.range_rows(other[0], LAW, 3.1, 1.0, 0.0)
+        range_rows(other[0], RANGES, 3.1, 1.0, 0.0)
         return float(other[0]["residual"][0])
 
-    fusion.range_rows(filter_[0], LAW, 3.1, 1.0, 0.0)
+    range_rows(filter_[0], RANGES, 3.1, 1.0, 0.0)
     assert not filter_[0]["H"][0, list(TILT)].any()
     M = filter_[0]["covariance"]
     slopes = [(residual_at(k, STEP) - residual_at(k, -STEP)) / (2 * STEP) for k in TILT]
@@ -126,12 +133,12 @@ def test_the_heading_slopes_are_those_of_a_field_that_agrees_with_the_state() ->
     R = np.array(matrix_from_quaternion(tuple(filter_[0]["q"]))).reshape(3, 3)
     field = R.T @ np.array([0.2 * math.cos(0.1), 0.2 * math.sin(0.1), 0.4])
     measured = tuple(field.tolist())
-    assert fusion.heading_rows(filter_[0], LAW, measured, 0.0)
+    assert heading_rows(filter_[0], COMPASS, measured, 0.0)
     slopes = filter_[0]["H"][0].copy()
     for error in range(ERRORS):
         ahead, behind = moved(filter_, error, STEP), moved(filter_, error, -STEP)
-        fusion.heading_rows(ahead[0], LAW, measured, 0.0)
-        fusion.heading_rows(behind[0], LAW, measured, 0.0)
+        heading_rows(ahead[0], COMPASS, measured, 0.0)
+        heading_rows(behind[0], COMPASS, measured, 0.0)
         difference = ahead[0]["residual"][0] - behind[0]["residual"][0]
         assert -difference / (2 * STEP) == pytest.approx(slopes[error], abs=1e-6)
 
@@ -143,15 +150,15 @@ def test_heading_slopes_do_not_go_with_the_noise_of_the_field() -> None:
     slopes = []
     for noise in (-0.02, 0.02):
         field = R.T @ np.array([0.2 * math.cos(0.1), 0.2 * math.sin(0.1) + noise, 0.4])
-        fusion.heading_rows(filter_[0], LAW, tuple(field.tolist()), 0.0)
+        heading_rows(filter_[0], COMPASS, tuple(field.tolist()), 0.0)
         slopes.append(filter_[0]["H"][0, TH : TH + 3].copy())
     np.testing.assert_allclose(slopes[0], slopes[1], atol=0.05)
 
 
 def test_a_longer_delay_moves_the_expected_pose_back() -> None:
     filter_ = some_state()
-    for rows in (fusion.position_rows, fusion.attitude_rows):
-        z = (1.0, 2.0, 3.0) if rows is fusion.position_rows else tuple(filter_[0]["q"])
+    for rows in (position_rows, attitude_rows):
+        z = (1.0, 2.0, 3.0) if rows is position_rows else tuple(filter_[0]["q"])
 
         def residual(delay: float, rows: Callable[..., None] = rows, z: object = z) -> Array:
             rows(filter_[0], z, (1.0,) * 3, 0.001 - delay, 1.0)
@@ -198,7 +205,7 @@ def test_a_correction_is_that_of_the_textbook() -> None:
     A = random.standard_normal((ERRORS, ERRORS))
     P = A @ A.T / ERRORS
     x["covariance"] = P
-    fusion.position_rows(x, (1.01, -2.02, -2.97), (0.01, 0.02, 0.03), 1e-3, 1.0)
+    position_rows(x, (1.01, -2.02, -2.97), (0.01, 0.02, 0.03), 1e-3, 1.0)
     H, r, N = x["H"][:3].copy(), x["residual"].copy(), np.diag(x["variance"])
     S = H @ P @ H.T + N
     K = P @ H.T @ np.linalg.inv(S)

@@ -14,7 +14,8 @@ from scipy.stats import chi2
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
-from fsw.autopilot.estimation.tuning import EstimatorTuning, chi_square
+from fsw.autopilot.estimation.sensors.base import chi_square
+from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.flight.estimate.estimator_report import estimator_report
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import (
@@ -27,6 +28,7 @@ from fsw.autopilot.measurements import (
     Sample,
 )
 from fsw.autopilot.signals import StateEstimate
+from fsw.autopilot.tuning import tuned
 from tests.fsw.autopilot.estimation.sensor_runs import (
     ARM,
     MOCAP,
@@ -166,7 +168,7 @@ def innovations(suite: Suite, seed: int, duration: float) -> tuple[float, int]:
 
 # An offset that is not estimated makes innovations alike, and the bounds are those of innovations
 # that know nothing of each other. Errors are bounded with it, above.
-NO_OFFSET = replace(RTK, tuning=replace(RTK.tuning, mag_offset=0.0))
+NO_OFFSET = replace(RTK, tuning=tuned(RTK.tuning, (("magnetometer.offset", 0.0),)))
 
 
 @pytest.mark.requirement("REQ-EST-2")
@@ -188,7 +190,7 @@ def test_what_odometry_drifts_before_the_filter_starts_is_no_noise() -> None:
 
 
 def test_a_hidden_delay_of_the_pose_is_found_within_2_ms() -> None:
-    tuning = replace(MOCAP.tuning, pose_delay_sigma=0.01)
+    tuning = tuned(MOCAP.tuning, (("pose.delay_sigma", 0.01),))
     pose = MOCAP.pose
     assert pose is not None
     suite = replace(MOCAP, tuning=tuning, pose=replace(pose, hidden_delay=0.012))
@@ -622,7 +624,7 @@ def test_the_delay_of_the_pose_can_be_set_and_estimated_from_one_tick_to_the_nex
     suite = replace(MOCAP, pose=replace(MOCAP.pose, hidden_delay=0.012))
     flown = run(suite, 0, 4.0)
     before = SensorFusion(MOCAP.tuning, 2)
-    tuning = replace(MOCAP.tuning, pose_delay=known, pose_delay_sigma=estimated)
+    tuning = tuned(MOCAP.tuning, (("pose.delay", known), ("pose.delay_sigma", estimated)))
     after, memory, estimate = SensorFusion(tuning, 2), at_start(2), None
     for now, samples in flown:
         fusion = before if now < START + 1.0 else after
@@ -635,7 +637,7 @@ def test_the_delay_of_the_pose_can_be_set_and_estimated_from_one_tick_to_the_nex
 
 def test_a_delay_of_satellites_that_is_known_is_taken_out() -> None:
     assert RTK.gnss is not None
-    late = replace(RTK, tuning=replace(RTK.tuning, gnss_delay=0.06))
+    late = replace(RTK, tuning=tuned(RTK.tuning, (("gnss.delay", 0.06),)))
 
     def stamped_late(now: float, sample: Sample) -> Sample:
         return (
@@ -655,7 +657,7 @@ def replace_suite(flown: Run, suite: Suite) -> Run:
 def test_a_wider_gate_lets_a_farther_reading_in() -> None:
     # One that is off by little may be the IMU's fault, and nothing is said of it.
     aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.06, *s.position[1:])))
-    wide = replace(MOCAP, tuning=replace(MOCAP.tuning, pose_gate=200.0))
+    wide = replace(MOCAP, tuning=tuned(MOCAP.tuning, (("pose.gate", 200.0),)))
     narrow = Flown(run(MOCAP, 4, 2.0), aside)
     assert narrow.found == {(Sensor.POSE, SensorFault.JUMP)}
     assert not Flown(replace_suite(run(MOCAP, 4, 2.0), wide), aside).found
@@ -911,7 +913,7 @@ def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> f
         if now >= due:
             k = flown.truth.at(now)
             down = rotations(flown.truth.q[k][None])[0][2, 2]
-            distance = 1.02 * (tuning.ground - flown.truth.p[k, 2]) / down
+            distance = 1.02 * (tuning.rangefinder.ground - flown.truth.p[k, 2]) / down
             read = distance + 0.025 * random.standard_normal()
             samples.append(RangeSample(now, float(read), 0.025**2))
             due += 0.02
@@ -920,7 +922,7 @@ def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> f
 
 @pytest.mark.requirement("REQ-EST-2")
 def test_a_rangefinder_that_is_wrong_in_proportion_does_not_tilt_the_estimate() -> None:
-    tuning = replace(RTK.tuning, ground=4.0)
+    tuning = tuned(RTK.tuning, (("rangefinder.ground", 4.0),))
     assert max(in_sigmas_beside_a_long_rangefinder(tuning, seed) for seed in range(4)) < 3.0
-    blind = replace(tuning, range_share=0.0)
+    blind = tuned(tuning, (("rangefinder.share", 0.0),))
     assert max(in_sigmas_beside_a_long_rangefinder(blind, seed) for seed in range(4)) < 3.0

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate, looked
-from fsw.autopilot.estimation.faults.sensor_checks import Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor
 
 
 def told(samples: Callable[[int], int], looks: int) -> list[int]:

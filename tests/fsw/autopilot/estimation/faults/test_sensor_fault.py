@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from fsw.autopilot.estimation.faults.sensor_checks import Health
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
 
 
 def told(times: list[float], fault: SensorFault = SensorFault.JUMP) -> list[float]:

@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation import fusion
-from fsw.autopilot.estimation.compass import correct_with_offset, distance_with_offset
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
+from fsw.autopilot.estimation.sensors.gnss import velocity_rows
+from fsw.autopilot.estimation.sensors.magnetometer import (
+    MagnetometerTuning,
+    correct_with_offset,
+    distance_with_offset,
+    heading_rows,
+)
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
@@ -24,9 +29,13 @@ from fsw.compiled import packed
 from tests.fsw.autopilot.estimation.sensor_runs import EARTH, RTK, START, run
 
 Array = NDArray[np.float64]
-LAW = packed(EstimatorTuning(declination=0.1)).view(np.recarray)[0]
+LAW = packed(MagnetometerTuning(declination=0.1)).view(np.recarray)[0]
 OFFSET = 0.02  # Gauss
 STEP = 1e-6
+
+
+def with_offset(offset: float) -> EstimatorTuning:
+    return replace(RTK.tuning, magnetometer=replace(RTK.tuning.magnetometer, offset=offset))
 
 
 def some_state(X: Array, P: Array) -> Any:
@@ -57,14 +66,14 @@ def some_covariance() -> Array:
 def test_the_heading_falls_with_the_offset_by_its_slope() -> None:
     x = some_state(np.zeros((ERRORS, FIELD)), np.eye(ERRORS))
     field = measured(x)
-    assert fusion.heading_rows(x, LAW, field, 0.0)
+    assert heading_rows(x, LAW, field, 0.0)
     slope = x["offset_slope"].copy()
     for axis in range(FIELD):
         found = []
         for by in (STEP, -STEP):
             shifted = list(field)
             shifted[axis] += by
-            fusion.heading_rows(x, LAW, tuple(shifted), 0.0)
+            heading_rows(x, LAW, tuple(shifted), 0.0)
             found.append(float(x["residual"][0]))
         assert (found[0] - found[1]) / (2 * STEP) == pytest.approx(slope[axis], abs=1e-6)
 
@@ -74,7 +83,7 @@ def test_a_considered_offset_is_one_that_a_larger_filter_does_not_correct() -> N
     P, X = whole[:ERRORS, :ERRORS], whole[:ERRORS, ERRORS:]
     np.testing.assert_allclose(whole[ERRORS:, ERRORS:], OFFSET**2 * np.eye(FIELD), atol=1e-12)
     x = some_state(X, P)
-    fusion.heading_rows(x, LAW, measured(x), 0.0)
+    heading_rows(x, LAW, measured(x), 0.0)
     H = np.concatenate([x["H"][0], x["offset_slope"]])
     r, R = 0.03, float(x["variance"][0])
     x["residual"][0] = r
@@ -93,7 +102,7 @@ def test_a_considered_offset_is_one_that_a_larger_filter_does_not_correct() -> N
 def test_other_measurements_carry_the_offsets_share_of_the_error() -> None:
     whole = some_covariance()
     x = some_state(whole[:ERRORS, ERRORS:], whole[:ERRORS, :ERRORS])
-    fusion.velocity_rows(x, (0.1, -0.1, 0.2), (0.01, 0.02, 0.03), 0.0)
+    velocity_rows(x, (0.1, -0.1, 0.2), (0.01, 0.02, 0.03), 0.0)
     H, N = x["H"][:3].copy(), np.diag(x["variance"])
     P, X = whole[:ERRORS, :ERRORS], whole[:ERRORS, ERRORS:]
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + N)
@@ -104,7 +113,7 @@ def test_other_measurements_carry_the_offsets_share_of_the_error() -> None:
 
 def heading_sigma(suite_offset: float) -> float:
     """Deviation of the heading [rad] after 6 s with satellites and a magnetometer."""
-    tuning = replace(RTK.tuning, mag_offset=suite_offset)
+    tuning = with_offset(suite_offset)
     fusion_, memory = SensorFusion(tuning, 2), at_start(2)
     flown, now = run(replace(RTK, tuning=tuning), 4, 6.0), 0.0
     for now, samples in flown:
@@ -121,12 +130,12 @@ def test_no_number_of_readings_takes_an_offset_away() -> None:
 @pytest.mark.requirement("REQ-EST-2")
 def test_a_heading_that_is_off_for_good_is_off_by_what_is_told() -> None:
     """Every reading is turned by 0.045 rad, as hard iron turns it where a vehicle stays level."""
-    tuning = replace(RTK.tuning, mag_offset=0.011)
+    tuning = with_offset(0.011)
     shift = np.array([0.0, 0.0099, 0.0])
     chi = []
     for seed in range(6):
         fusion_, memory, now = SensorFusion(tuning, 2), at_start(2), 0.0
-        flown = run(replace(RTK, tuning=replace(tuning, mag_offset=0.0)), 40 + seed, 3.0)
+        flown = run(replace(RTK, tuning=with_offset(0.0)), 40 + seed, 3.0)
         estimate = None
         for now, samples in flown:
             memory, estimate = fusion_.step(memory, [_shifted(one, shift) for one in samples], now)
