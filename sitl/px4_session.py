@@ -16,7 +16,7 @@ from sitl.link.px4_server import Px4Exchange, serve_px4
 from sitl.link.stream_endpoint import ByteStream
 from sitl.link.udp_endpoint import PeerSocket, parse_address
 from sitl.plant.state import P_WB
-from sitl.sensors.measurements import Measurement
+from sitl.sensors.channel import Measurement
 from sitl.simulation import START_US, STEP_US, Simulation
 from sitl.start import hovering
 

@@ -265,18 +265,7 @@ def fault_problem(fault: Fault, scenario: Scenario) -> str | None:
 def units_aboard(scenario: Scenario) -> tuple[str, ...]:
     """Sensors of a scenario that can fail; cameras of either kind are ``vio``."""
     sensors = scenario.sensors
-    if not isinstance(sensors, MeasuredSensors):
-        return EXACT
-    cameras = sensors.motion_capture is not None or sensors.visual_odometry is not None
-    there = {
-        "vio": cameras,
-        "attitude": cameras,
-        "gps": sensors.gnss is not None,
-        "baro": sensors.barometer is not None,
-        "mag": sensors.magnetometer is not None,
-        "distance": sensors.rangefinder is not None,
-    }
-    return ("gyro", "accel", *(unit for unit, has in there.items() if has), "encoder")
+    return sensors.units if isinstance(sensors, MeasuredSensors) else EXACT
 
 
 def check_start(keys: tuple[str, ...], margins: tuple[float, ...]) -> None:

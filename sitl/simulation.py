@@ -37,9 +37,9 @@ from sitl.result import EndKind, EndReason, TruthResult
 from sitl.scenario import V3, Scenario, Sensors
 from sitl.scenario_file import ScenarioError
 from sitl.scenario_validation import check, fault_problem
+from sitl.sensors.channel import Measurement
 from sitl.sensors.exact import V4, ExactSensors, SensorReadings
 from sitl.sensors.keys import MeasuredSensors
-from sitl.sensors.measurements import Measurement
 from sitl.sensors.suite import SensorSuite
 from sitl.start import effects, first_state, flown_vehicle
 from sitl.touch import TouchRecord

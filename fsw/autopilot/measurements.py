@@ -7,6 +7,8 @@ axis; entries that are not positive or not finite mean that the sensor does not 
 
 from __future__ import annotations
 
+from enum import Enum
+
 from fsw.frozen import dataclass
 
 # Named here, because ``fsw.autopilot.signals`` builds upon this file.
@@ -16,6 +18,18 @@ Vec4 = tuple[float, float, float, float]
 JointVector = tuple[float, ...]  # (j,), a number a joint of the vehicle, from the base on
 RotorVector = tuple[float, ...]  # (r,), a number a rotor of the vehicle, as actuators are numbered
 _LEVEL_FIX = 2  # GPS_FIX_TYPE_2D_FIX; those above it have a height
+
+
+class Sensor(Enum):
+    """A source of measurements."""
+
+    IMU = "IMU"
+    POSE = "pose"
+    GNSS = "GNSS"
+    BAROMETER = "barometer"
+    MAGNETOMETER = "magnetometer"
+    RANGEFINDER = "rangefinder"
+    ENCODERS = "joint encoders"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from sitl.faults.keys import SENSORS, Fault
 from sitl.faults.sensors import FrameFault, SuiteFault
 from sitl.faults.signal import Windows
 from sitl.seeds import stream
+from sitl.sensors.channel import Measurement
 from sitl.sensors.exact import SensorReadings
-from sitl.sensors.measurements import Measurement
 
 
 @dataclass

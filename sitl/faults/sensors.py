@@ -8,29 +8,11 @@ import numpy as np
 
 from sitl.faults.keys import Fault
 from sitl.faults.signal import SignalFault
+from sitl.sensors.channel import Measurement
 from sitl.sensors.exact import SensorReadings
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    JointMeasurement,
-    MagneticMeasurement,
-    Measurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-)
+from sitl.sensors.suite import MODELS
 
-_TYPES: Final[dict[str, type[Any]]] = {
-    "gyro": ImuMeasurement,
-    "accel": ImuMeasurement,
-    "mag": MagneticMeasurement,
-    "baro": PressureMeasurement,
-    "gps": GnssMeasurement,
-    "vio": PoseMeasurement,
-    "attitude": PoseMeasurement,
-    "distance": RangeMeasurement,
-    "encoder": JointMeasurement,
-}
+_TYPES: Final = {unit: model.says for kind, model in MODELS.items() for unit in kind.units}
 
 
 class FrameFault:

@@ -21,7 +21,8 @@ from sitl.link.pilot import FlightPlan, Phase, PilotState
 from sitl.link.pilot_messages import Ack, Heard
 from sitl.link.udp_endpoint import PeerSocket
 from sitl.scenario import V3
-from sitl.sensors.measurements import JointMeasurement, Measurement
+from sitl.sensors.channel import Measurement
+from sitl.sensors.encoders import JointMeasurement
 from sitl.simulation import Simulation
 
 _HOLD: Final = 4 << 16 | 3 << 24

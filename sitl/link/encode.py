@@ -19,8 +19,8 @@ from sitl.link.pilot_messages import (
     SendTarget,
 )
 from sitl.scenario import Touch
+from sitl.sensors.channel import Measurement
 from sitl.sensors.exact import SensorReadings
-from sitl.sensors.measurements import Measurement
 from sitl.shapes.kind import NUMBERS
 
 WireValues = tuple[float | bytes, ...]

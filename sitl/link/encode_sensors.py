@@ -14,18 +14,15 @@ from messages.frames import FrameWriter
 from messages.joint_arrays import BASE, base, more
 from messages.lockstep_codec import LockstepFrame
 from sitl.earth import Place, place_of
-from sitl.sensors.barometer import standard_altitude
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    JointMeasurement,
-    MagneticMeasurement,
-    Measurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-    WrenchMeasurement,
-)
+from sitl.sensors.barometer import PressureMeasurement, standard_altitude
+from sitl.sensors.channel import Measurement
+from sitl.sensors.encoders import JointMeasurement
+from sitl.sensors.force_torque import WrenchMeasurement
+from sitl.sensors.gnss import GnssMeasurement
+from sitl.sensors.imu import ImuMeasurement
+from sitl.sensors.magnetometer import MagneticMeasurement
+from sitl.sensors.motion_capture import PoseMeasurement
+from sitl.sensors.rangefinder import RangeMeasurement
 
 # HIL_SENSOR_UPDATED_FLAGS
 INERTIAL: Final = 0x3F

@@ -24,15 +24,13 @@ from sitl.link.encode_sensors import (
     gps_values,
     pressure_values,
 )
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    MagneticMeasurement,
-    Measurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-)
+from sitl.sensors.barometer import PressureMeasurement
+from sitl.sensors.channel import Measurement
+from sitl.sensors.gnss import GnssMeasurement
+from sitl.sensors.imu import ImuMeasurement
+from sitl.sensors.magnetometer import MagneticMeasurement
+from sitl.sensors.motion_capture import PoseMeasurement
+from sitl.sensors.rangefinder import RangeMeasurement
 from vehicles.description import Vehicle
 
 # MAV_ESTIMATOR_TYPE: motion capture (6) is read and used by nothing in EKF2, vision is.

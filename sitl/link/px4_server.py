@@ -20,7 +20,7 @@ from sitl.link.exchange import ExchangeCounts, SimulatorError
 from sitl.link.px4_messages import Px4Answer, Px4Encoder, read_answer
 from sitl.link.server import PROGRESS_S, PROGRESS_STEPS, Progress, RunTiming, end_if_over
 from sitl.result import EndKind
-from sitl.sensors.measurements import Measurement
+from sitl.sensors.channel import Measurement
 from sitl.servos import PositionServos
 from sitl.simulation import STEP_US, Controls, Simulation
 from sitl.start import effects

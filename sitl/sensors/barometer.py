@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from sitl.sensors.channel import Aboard, SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Barometer
-from sitl.sensors.measurements import PressureMeasurement
 from sitl.sensors.noise import GaussMarkov, normal, rounded
 
 SEA_LEVEL_PA = 101_325.0
 _SEA_LEVEL_K = 288.15
 _LAPSE_K_M = 0.0065
 _EXPONENT = 9.80665 * 0.0289644 / (8.31446 * _LAPSE_K_M)
+
+
+class PressureMeasurement(NamedTuple):
+    """Static pressure."""
+
+    t_us: int
+    pressure_pa: float
 
 
 def standard_pressure(altitude: float) -> float:
@@ -31,8 +39,11 @@ def standard_altitude(pressure_pa: float) -> float:
     return float(_SEA_LEVEL_K / _LAPSE_K_M * (1.0 - ratio))
 
 
-class BarometerSensor:
+class BarometerSensor(SensorModel):
     """The barometer of one flight."""
+
+    kind = Barometer
+    says = PressureMeasurement
 
     def __init__(
         self, keys: Barometer, random: np.random.Generator, origin_altitude: float = 0.0
@@ -44,6 +55,11 @@ class BarometerSensor:
         self._offset_pa = normal(random, keys.offset_pa, 1)[0]
         period_s = 1.0 / keys.rate_hz
         self._drift = GaussMarkov((keys.drift_pa,), keys.drift_time_s, period_s, random)
+
+    @classmethod
+    def aboard(cls, keys: Barometer, random: np.random.Generator, where: Aboard) -> BarometerSensor:
+        """One at the height of its vehicle's origin."""
+        return cls(keys, random, where.origin.altitude)
 
     def measure(
         self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool

@@ -3,21 +3,53 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections import deque
-from typing import Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 
+from sitl.earth import Place
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Timing
-from sitl.sensors.measurements import Measurement
+from vehicles.description import Vehicle
 
 _MAX_DEVIATIONS = 8.0  # of a jitter: one draw in 1e15 is below minus that
 
 
-class Sensor(Protocol):
-    """One sensor of one flight."""
+class Measurement(Protocol):
+    """What a sensor says; each kind has its own, a NamedTuple."""
 
+    @property
+    def t_us(self) -> int:
+        """The stamp of the measurement [µs]."""
+
+    def _replace(self, *, t_us: int = ...) -> Self: ...
+
+
+class Aboard(NamedTuple):
+    """What a sensor may know of where it is."""
+
+    vehicle: Vehicle
+    hover_thrust: float  # N, of one rotor
+    origin: Place  # of the local frame
+
+
+class SensorModel(ABC):
+    """One sensor of one flight; each kind has a file in this folder."""
+
+    kind: ClassVar[type[Timing]]  # of its keys
+    says: ClassVar[type[Measurement]]
+
+    @abstractmethod
+    def __init__(self, keys: Any, random: np.random.Generator) -> None: ...
+
+    @classmethod
+    def aboard(cls, keys: Any, random: np.random.Generator, _: Aboard) -> SensorModel:
+        """The sensor with these ``keys`` on a vehicle."""
+        return cls(keys, random)
+
+    @abstractmethod
     def measure(
         self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool
     ) -> Measurement | None:
@@ -25,7 +57,6 @@ class Sensor(Protocol):
 
         The rotors give ``thrust`` [N].
         """
-        ...
 
 
 class Channel:
@@ -37,7 +68,7 @@ class Channel:
     """
 
     def __init__(
-        self, sensor: Sensor, keys: Timing, random: np.random.Generator, start_us: int
+        self, sensor: SensorModel, keys: Timing, random: np.random.Generator, start_us: int
     ) -> None:
         """Begin at the stamp ``start_us``."""
         self._sensor = sensor

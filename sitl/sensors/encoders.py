@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from sitl.sensors.channel import Aboard, SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Encoders
-from sitl.sensors.measurements import JointMeasurement
 from sitl.sensors.noise import normal
 
 _BLOCK = 250  # numbers drawn at once
 
 
-class EncoderSensor:
+class JointMeasurement(NamedTuple):
+    """Angles of the joints."""
+
+    t_us: int
+    angles: tuple[float, ...]  # (j,) rad
+
+
+class EncoderSensor(SensorModel):
     """The encoders of one flight."""
+
+    kind = Encoders
+    says = JointMeasurement
 
     def __init__(self, keys: Encoders, random: np.random.Generator, joints: int) -> None:
         self._keys = keys
@@ -22,6 +34,11 @@ class EncoderSensor:
         self._rest: list[float] = []  # of the numbers drawn, too few for all joints
         # With the noise, of the samples to come, the next one last.
         self._offsets: list[tuple[float, ...]] = []
+
+    @classmethod
+    def aboard(cls, keys: Encoders, random: np.random.Generator, where: Aboard) -> EncoderSensor:
+        """Those of all joints of its vehicle."""
+        return cls(keys, random, len(where.vehicle.joints))
 
     def measure(
         self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sitl.ranges import V3
+from sitl.sensors.channel import SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import ForceTorque
-from sitl.sensors.measurements import WrenchMeasurement
 from sitl.sensors.noise import anywhere, digits, normal
 
 
-class ForceTorqueSensor:
+class WrenchMeasurement(NamedTuple):
+    """What acts on the tool from outside, about the end-effector, in the axes of the last link."""
+
+    t_us: int
+    force: V3  # N
+    torque: V3  # N·m
+
+
+class ForceTorqueSensor(SensorModel):
     """The force/torque sensor of one flight."""
+
+    kind = ForceTorque
+    says = WrenchMeasurement
 
     def __init__(self, keys: ForceTorque, random: np.random.Generator) -> None:
         self._keys = keys

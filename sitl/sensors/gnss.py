@@ -3,18 +3,42 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from sitl.earth import RADIUS
+from sitl.ranges import V3
+from sitl.sensors.channel import Aboard, SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Gnss
-from sitl.sensors.measurements import GnssMeasurement
 from sitl.sensors.noise import GaussMarkov, anywhere, digits
 
+PLAIN_FIX, RTK_FIXED = 3, 6  # GPS_FIX_TYPE
 
-class GnssSensor:
+
+class GnssMeasurement(NamedTuple):
+    """Position and velocity from satellites."""
+
+    t_us: int
+    p_WB: V3  # m, NED
+    v_WB: V3  # m/s, NED
+    horizontal_deviation: float  # m, as the receiver states it
+    vertical_deviation: float  # m
+    rtk: bool
+    satellites: int = 18  # that it sees
+
+    @property
+    def fix_type(self) -> int:
+        """GPS_FIX_TYPE of MAVLink."""
+        return RTK_FIXED if self.rtk else PLAIN_FIX
+
+
+class GnssSensor(SensorModel):
     """The receiver of one flight."""
+
+    kind = Gnss
+    says = GnssMeasurement
 
     def __init__(self, keys: Gnss, random: np.random.Generator, latitude: float = 0.0) -> None:
         """Draw its errors; the local frame begins at a ``latitude`` [deg]."""
@@ -27,6 +51,11 @@ class GnssSensor:
         self._wander = GaussMarkov(sigmas, keys.wander_time_s, 1.0 / keys.rate_hz, random)
         self._horizontal = math.hypot(keys.horizontal_m, level)
         self._vertical = math.hypot(keys.vertical_m, down)
+
+    @classmethod
+    def aboard(cls, keys: Gnss, random: np.random.Generator, where: Aboard) -> GnssSensor:
+        """One at the latitude of its vehicle's origin."""
+        return cls(keys, random, where.origin.latitude)
 
     def measure(
         self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool

@@ -15,14 +15,22 @@ from sitl.compiled import kernel, machine_code
 from sitl.plant.packing import pack_params
 from sitl.plant.state import ROTORS_MAX
 from sitl.plant.vector import V3, V6, V8, Array, times
+from sitl.sensors.channel import Aboard, SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Imu
-from sitl.sensors.measurements import ImuMeasurement
 from sitl.sensors.noise import GaussMarkov, normal
 
 _BLOCK = 25  # samples for which a bias is held
 _BLOCKS = 10  # drawn at once, in the order in which one by one would be
 _SPIKE = 1e9  # rad/s or m/s², beyond every range
+
+
+class ImuMeasurement(NamedTuple):
+    """Gyro and accelerometer."""
+
+    t_us: int
+    gyro_B: V3  # rad/s
+    accel_B: V3  # m/s², specific force
 
 
 class _Errors(NamedTuple):
@@ -92,8 +100,11 @@ def _measure(units: Sequence[_Errors], rate: V3, force: V3, thrust: V8, offset: 
     )
 
 
-class ImuSensor:
+class ImuSensor(SensorModel):
     """One unit of one flight."""
+
+    kind = Imu
+    says = ImuMeasurement
 
     def __init__(
         self,
@@ -134,6 +145,12 @@ class ImuSensor:
         none = (0.0, 0.0, 0.0)
         still = (0.0,) * ROTORS_MAX
         self._code = machine_code(_measure, self._units, none, none, still, (*none, *none))
+
+    @classmethod
+    def aboard(cls, keys: Imu, random: np.random.Generator, where: Aboard) -> ImuSensor:
+        """One that the rotors of its vehicle shake."""
+        spins = [1.0 if rotor.spin == "ccw" else -1.0 for rotor in where.vehicle.rotors]
+        return cls(keys, random, where.hover_thrust, spins)
 
     def measure(
         self, exact: SensorReadings, thrust: Thrusts, stamp_us: int, outlier: bool

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from sitl.ranges import V3
+from sitl.sensors.channel import SensorModel
 from sitl.sensors.exact import V4, SensorReadings, Thrusts
 from sitl.sensors.keys import Magnetometer
-from sitl.sensors.measurements import MagneticMeasurement
 from sitl.sensors.noise import anywhere, normal, rounded
 
 
-class MagnetometerSensor:
+class MagneticMeasurement(NamedTuple):
+    """Magnetic field."""
+
+    t_us: int
+    field_B: V3  # Gauss
+
+
+class MagnetometerSensor(SensorModel):
     """The magnetometer of one flight."""
+
+    kind = Magnetometer
+    says = MagneticMeasurement
 
     def __init__(self, keys: Magnetometer, random: np.random.Generator) -> None:
         self._keys = keys

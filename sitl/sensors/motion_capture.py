@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from sitl.sensors.exact import SensorReadings, Thrusts, turned
+from sitl.ranges import V3
+from sitl.sensors.channel import SensorModel
+from sitl.sensors.exact import V4, SensorReadings, Thrusts, turned
 from sitl.sensors.keys import MotionCapture
-from sitl.sensors.measurements import PoseMeasurement
 from sitl.sensors.noise import anywhere, digits, rounded
 
 
-class MotionCaptureSensor:
+class PoseMeasurement(NamedTuple):
+    """Position and attitude."""
+
+    t_us: int
+    p_WB: V3  # m, NED
+    q_WB: V4  # [w, x, y, z], maps B to W
+    position_variance: V3  # m², as the sensor states it
+    attitude_variance: V3  # rad², roll, pitch, yaw
+    resets: int  # how often the sensor's frame has jumped
+    from_cameras_on_board: bool  # visual odometry, or motion capture
+
+
+class MotionCaptureSensor(SensorModel):
     """The system of one flight."""
+
+    kind = MotionCapture
+    says = PoseMeasurement
 
     def __init__(self, keys: MotionCapture, random: np.random.Generator) -> None:
         self._keys = keys

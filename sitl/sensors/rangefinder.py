@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from sitl.sensors.channel import SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
 from sitl.sensors.keys import Rangefinder
-from sitl.sensors.measurements import RangeMeasurement
 from sitl.sensors.noise import normal, rounded
 
 
-class RangefinderSensor:
+class RangeMeasurement(NamedTuple):
+    """Distance along the base's z axis."""
+
+    t_us: int
+    distance: float  # m
+    variance: float  # m²
+    least: float  # m, that it can measure
+    most: float  # m
+
+
+class RangefinderSensor(SensorModel):
     """The rangefinder of one flight."""
+
+    kind = Rangefinder
+    says = RangeMeasurement
 
     def __init__(self, keys: Rangefinder, random: np.random.Generator) -> None:
         self._keys = keys

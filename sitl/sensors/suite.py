@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
+import pkgutil
+from typing import Final
+
+import sitl.sensors
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.seeds import stream
-from sitl.sensors.barometer import BarometerSensor
-from sitl.sensors.channel import Channel, Sensor
-from sitl.sensors.encoders import EncoderSensor
+from sitl.sensors.channel import Aboard, Channel, Measurement, SensorModel
 from sitl.sensors.exact import SensorReadings, Thrusts
-from sitl.sensors.force_torque import ForceTorqueSensor
-from sitl.sensors.gnss import GnssSensor
-from sitl.sensors.imu import ImuSensor
 from sitl.sensors.keys import MeasuredSensors, Timing
-from sitl.sensors.magnetometer import MagnetometerSensor
-from sitl.sensors.measurements import Measurement
-from sitl.sensors.motion_capture import MotionCaptureSensor
-from sitl.sensors.rangefinder import RangefinderSensor
-from sitl.sensors.visual_odometry import VisualOdometrySensor
 from vehicles.description import Vehicle
+
+
+def _found() -> dict[type[Timing], type[SensorModel]]:
+    """The model of each module of this folder that has one, by its keys."""
+    for module in pkgutil.iter_modules(sitl.sensors.__path__):
+        importlib.import_module(f"sitl.sensors.{module.name}")
+    return {model.kind: model for model in SensorModel.__subclasses__()}
+
+
+MODELS: Final = _found()
 
 
 class SensorSuite:
@@ -41,41 +47,14 @@ class SensorSuite:
 
         A rotor gives ``hover_thrust`` [N] in hover; the local frame begins at ``origin``.
         """
+        where = Aboard(vehicle, hover_thrust, origin)
         self._channels: list[Channel] = []
-
-        def add(name: str, keys: Timing, sensor: Sensor) -> None:
-            random = stream(seed, "sensor", name, "channel")
-            self._channels.append(Channel(sensor, keys, random, start_us))
-
-        one = sensors
-        if one.motion_capture is not None:
-            name, keys = "motion capture", one.motion_capture
-            add(name, keys, MotionCaptureSensor(keys, stream(seed, "sensor", name)))
-        if one.visual_odometry is not None:
-            name, eyes = "visual odometry", one.visual_odometry
-            add(name, eyes, VisualOdometrySensor(eyes, stream(seed, "sensor", name)))
-        if one.gnss is not None:
-            random = stream(seed, "sensor", "gnss")
-            add("gnss", one.gnss, GnssSensor(one.gnss, random, origin.latitude))
-        if one.barometer is not None:
-            name, air = "barometer", one.barometer
-            random = stream(seed, "sensor", name)
-            add(name, air, BarometerSensor(air, random, origin.altitude))
-        if one.magnetometer is not None:
-            name, compass = "magnetometer", one.magnetometer
-            add(name, compass, MagnetometerSensor(compass, stream(seed, "sensor", name)))
-        if one.rangefinder is not None:
-            name, ray = "rangefinder", one.rangefinder
-            add(name, ray, RangefinderSensor(ray, stream(seed, "sensor", name)))
-        if one.force_torque is not None:
-            name, touch = "force torque", one.force_torque
-            add(name, touch, ForceTorqueSensor(touch, stream(seed, "sensor", name)))
-        name = "encoders"
-        encoders = EncoderSensor(one.encoders, stream(seed, "sensor", name), len(vehicle.joints))
-        add(name, one.encoders, encoders)
-        spins = [1.0 if rotor.spin == "ccw" else -1.0 for rotor in vehicle.rotors]
-        unit = ImuSensor(one.imu, stream(seed, "sensor", "imu"), hover_thrust, spins)
-        add("imu", one.imu, unit)
+        for field in dataclasses.fields(sensors):
+            keys, name = getattr(sensors, field.name), field.name.replace("_", " ")
+            if isinstance(keys, Timing):
+                sensor = MODELS[type(keys)].aboard(keys, stream(seed, "sensor", name), where)
+                random = stream(seed, "sensor", name, "channel")
+                self._channels.append(Channel(sensor, keys, random, start_us))
         self._late = [channel for channel in self._channels if channel.late]
         self._last: tuple[SensorReadings, Thrusts] | None = None  # which they have not measured yet
 

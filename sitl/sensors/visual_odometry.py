@@ -7,19 +7,22 @@ import math
 import numpy as np
 
 from sitl.ranges import V3
+from sitl.sensors.channel import SensorModel
 from sitl.sensors.exact import V4, SensorReadings, Thrusts
 from sitl.sensors.keys import VisualOdometry
-from sitl.sensors.measurements import PoseMeasurement
-from sitl.sensors.motion_capture import MotionCaptureSensor, in_digits
+from sitl.sensors.motion_capture import MotionCaptureSensor, PoseMeasurement, in_digits
 from sitl.sensors.noise import normal
 
 
-class VisualOdometrySensor:
+class VisualOdometrySensor(SensorModel):
     """The cameras of one flight; at its begin the frame is the true one.
 
     It knows how it drifts, and states the variance that has come together since the frame was the
     true one, or was recognised. That the frame is turned shows in places far from its origin.
     """
+
+    kind = VisualOdometry
+    says = PoseMeasurement
 
     def __init__(self, keys: VisualOdometry, random: np.random.Generator) -> None:
         self._keys = keys

@@ -42,7 +42,7 @@ from fsw.autopilot.signals import (
 )
 from sitl.scenario import Scenario
 from sitl.scenario_file import ScenarioError
-from sitl.sensors.measurements import WrenchMeasurement
+from sitl.sensors.force_torque import WrenchMeasurement
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from studies.flight.collector import collector_off
 from studies.flight.mission import announced, moves, target

@@ -7,32 +7,21 @@ as the link's decoder states them.
 from __future__ import annotations
 
 import math
-from typing import Final
+from dataclasses import fields
+from typing import Any, Final, get_args
 
-from fsw.autopilot.measurements import (
-    GnssSample,
-    ImuSample,
-    JointSample,
-    MagneticSample,
-    PoseSample,
-    PressureSample,
-    RangeSample,
-    Sample,
-)
+from fsw.autopilot.measurements import GnssSample, ImuSample, PressureSample, Sample
 from fsw.autopilot.signals import SensorFrame
-from sitl.sensors.barometer import standard_altitude
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    JointMeasurement,
-    MagneticMeasurement,
-    Measurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-)
+from sitl.sensors.barometer import PressureMeasurement, standard_altitude
+from sitl.sensors.channel import Measurement
+from sitl.sensors.gnss import GnssMeasurement
+from sitl.sensors.imu import ImuMeasurement
 
 _NOT_STATED: Final = 0.0  # a variance that the message has no field for
+# By the name that a kind has on both sides; where nothing else is said, in the same order.
+_KINDS: Final[dict[str, Any]] = {
+    kind.__name__.removesuffix("Sample"): kind for kind in get_args(Sample)
+}
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 
 
@@ -42,18 +31,6 @@ def sample(said: Measurement) -> Sample:
     match said:
         case ImuMeasurement():
             return ImuSample(time, said.accel_B, said.gyro_B)
-        case JointMeasurement():
-            return JointSample(time, said.angles)
-        case PoseMeasurement():
-            return PoseSample(
-                time,
-                said.p_WB,
-                said.q_WB,
-                said.position_variance,
-                said.attitude_variance,
-                said.resets,
-                said.from_cameras_on_board,
-            )
         case GnssMeasurement():
             level, down = said.horizontal_deviation**2, said.vertical_deviation**2
             speed = (_NOT_STATED,) * 3
@@ -68,11 +45,12 @@ def sample(said: Measurement) -> Sample:
             )
         case PressureMeasurement():
             return PressureSample(time, standard_altitude(said.pressure_pa), _NOT_STATED)
-        case MagneticMeasurement():
-            return MagneticSample(time, said.field_B)
-        case RangeMeasurement():
-            return RangeSample(time, said.distance, said.variance)
-    raise TypeError(f"{said} is nothing that the flight software takes in")
+    kind = _KINDS.get(type(said).__name__.removesuffix("Measurement"))
+    if kind is None:
+        raise TypeError(f"{said} is nothing that the flight software takes in")
+    values: Any = said
+    found: Sample = kind(time, *values[1 : len(fields(kind))])
+    return found
 
 
 def only_the_time(t_us: int, samples: tuple[Sample, ...], joints: int) -> SensorFrame:

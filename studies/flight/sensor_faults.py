@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
-from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
 from fsw.autopilot.signals import SensorFrame, Vec4
 from sitl.simulation import START_US
 

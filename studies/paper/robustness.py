@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import tuned

@@ -18,7 +18,7 @@ from messages.frames import Losses, split
 from sitl.earth import DEFAULT_ORIGIN
 from sitl.link.px4_messages import Px4Answer, Px4Encoder, read_answer
 from sitl.scenario import Scenario, vehicle_of
-from sitl.sensors.measurements import JointMeasurement
+from sitl.sensors.encoders import JointMeasurement
 from sitl.servos import PositionServos
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from sitl.start import effects

@@ -9,8 +9,15 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
-from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
+from fsw.autopilot.measurements import (
+    GnssSample,
+    ImuSample,
+    JointSample,
+    PoseSample,
+    Sample,
+    Sensor,
+)
 from sitl.scenario import Hold
 from sitl.scenario_file import load_scenario
 from sitl.simulation import START_US

@@ -11,8 +11,8 @@ from messages.joint_arrays import STATE_AT, STATE_COUNT_AT, base, joined, more
 from sitl.earth import DEFAULT_ORIGIN
 from sitl.link.encode import StepEncoder
 from sitl.link.encode_sensors import SensorEncoder
+from sitl.sensors.encoders import JointMeasurement
 from sitl.sensors.exact import SensorReadings
-from sitl.sensors.measurements import JointMeasurement
 
 COUNTS = range(1, 9)
 ARM, ENCODERS = 60200, 60212

@@ -15,15 +15,13 @@ import pytest
 from messages.frames import Frame, split
 from sitl.earth import DEFAULT_ORIGIN
 from sitl.link.px4_messages import Px4Encoder, read_answer
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    JointMeasurement,
-    MagneticMeasurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-)
+from sitl.sensors.barometer import PressureMeasurement
+from sitl.sensors.encoders import JointMeasurement
+from sitl.sensors.gnss import GnssMeasurement
+from sitl.sensors.imu import ImuMeasurement
+from sitl.sensors.magnetometer import MagneticMeasurement
+from sitl.sensors.motion_capture import PoseMeasurement
+from sitl.sensors.rangefinder import RangeMeasurement
 from tests.px4_stand_in import (
     COMMAND_LONG,
     HEARTBEAT,

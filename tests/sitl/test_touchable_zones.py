@@ -20,7 +20,7 @@ from sitl.scenario import Hold, Pilot, Push, Scenario, Start, Touch, WayPoint, W
 from sitl.scenario_file import ScenarioError, parse_scenario
 from sitl.scenario_text import scenario_text
 from sitl.scenario_validation import check
-from sitl.sensors.measurements import WrenchMeasurement
+from sitl.sensors.force_torque import WrenchMeasurement
 from sitl.shapes.ball import Ball
 from sitl.shapes.half_space import HalfSpace
 from sitl.simulation import Controls, Simulation

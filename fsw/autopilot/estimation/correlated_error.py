@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import math
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion import believable
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
+from fsw.autopilot.measurements import Sensor
 
 _NONE: Vec6 = (0.0,) * 6
 _LASTING = 0.25  # of the least deviation of a pose: most of that is noise

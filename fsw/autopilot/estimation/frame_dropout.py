@@ -11,9 +11,10 @@ from typing import Final, NamedTuple
 
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import FORCE_LIMIT, INERTIAL, JOINTS, POSE
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import JointVector, SensorFrame, StateEstimate, Vec3
 

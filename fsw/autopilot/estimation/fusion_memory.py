@@ -13,8 +13,15 @@ from fsw.autopilot.estimation.error_state import FILTER, Filter
 from fsw.autopilot.estimation.faults.confirmation import Run
 from fsw.autopilot.estimation.faults.redundancy import MIN_WALKS, Verdict
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
-from fsw.autopilot.measurements import AidingSample, GnssSample, MagneticSample, PoseSample, Sample
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.measurements import (
+    AidingSample,
+    GnssSample,
+    MagneticSample,
+    PoseSample,
+    Sample,
+    Sensor,
+)
 from fsw.autopilot.signals import JointVector, Vec3, Vec4
 
 _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for longer

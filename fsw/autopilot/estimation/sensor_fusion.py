@@ -30,7 +30,7 @@ from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, extended
 from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, Source, Verdict
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
@@ -68,6 +68,7 @@ from fsw.autopilot.measurements import (
     JointSample,
     PoseSample,
     Sample,
+    Sensor,
 )
 from fsw.autopilot.signals import JointVector, StateEstimate, Vec3, Vec4
 from fsw.autopilot.tick_record import estimate_in

@@ -17,7 +17,6 @@ from fsw.autopilot.control.joints import arm_damping
 from fsw.autopilot.control.safety_gate import gate, stopped
 from fsw.autopilot.control.tube import beyond_covered
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
@@ -55,7 +54,7 @@ from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.autopilot.geometry.rotation import wrap_angle
-from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.battery import Levels, corrected, drained
 from fsw.autopilot.model.body import body_of

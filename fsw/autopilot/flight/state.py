@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import field
 from typing import Final, NamedTuple
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.estimation.frame_dropout import Dropout
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.commands.dedup import AnsweredCommand
@@ -15,7 +15,7 @@ from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.setpoints.offboard import Tilt
-from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import (

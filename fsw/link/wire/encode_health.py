@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, fault_name
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, fault_name
 from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import (
     BatteryState,
     BatteryWarning,

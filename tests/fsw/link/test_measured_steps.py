@@ -30,19 +30,15 @@ from messages.frames import FrameWriter, split
 from sitl import earth
 from sitl.link.encode import StepEncoder
 from sitl.link.pilot_messages import SendCommand
-from sitl.sensors.barometer import standard_pressure
-from sitl.sensors.gnss import GnssSensor
+from sitl.sensors.barometer import PressureMeasurement, standard_pressure
+from sitl.sensors.channel import Measurement
+from sitl.sensors.encoders import JointMeasurement
+from sitl.sensors.gnss import GnssMeasurement, GnssSensor
+from sitl.sensors.imu import ImuMeasurement
 from sitl.sensors.keys import Gnss
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    JointMeasurement,
-    MagneticMeasurement,
-    Measurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-)
+from sitl.sensors.magnetometer import MagneticMeasurement
+from sitl.sensors.motion_capture import PoseMeasurement
+from sitl.sensors.rangefinder import RangeMeasurement
 from tests.fsw.link.snapshots import FACTS, outputs_at
 from tests.sitl.sensors.readings import HOVER, reading
 

@@ -41,8 +41,10 @@ from sitl.link.pilot_messages import SendCommand
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Scenario, Workspace
 from sitl.scenario_file import load_scenario
+from sitl.sensors.barometer import PressureMeasurement
+from sitl.sensors.encoders import JointMeasurement
 from sitl.sensors.exact import SensorReadings
-from sitl.sensors.measurements import ImuMeasurement, JointMeasurement, PressureMeasurement
+from sitl.sensors.imu import ImuMeasurement
 from sitl.shapes.box import Box
 from sitl.simulation import Controls, Simulation
 from studies.flight.mission import safe_set as safe_set_of

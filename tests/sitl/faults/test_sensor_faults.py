@@ -11,17 +11,15 @@ import pytest
 
 from sitl.faults.active import Faults
 from sitl.faults.keys import EXACT, KINDS, SENSORS, Fault, Kind, Unit, problem
+from sitl.sensors.barometer import PressureMeasurement
+from sitl.sensors.channel import Measurement
+from sitl.sensors.encoders import JointMeasurement
 from sitl.sensors.exact import SensorReadings
-from sitl.sensors.measurements import (
-    GnssMeasurement,
-    ImuMeasurement,
-    JointMeasurement,
-    MagneticMeasurement,
-    Measurement,
-    PoseMeasurement,
-    PressureMeasurement,
-    RangeMeasurement,
-)
+from sitl.sensors.gnss import GnssMeasurement
+from sitl.sensors.imu import ImuMeasurement
+from sitl.sensors.magnetometer import MagneticMeasurement
+from sitl.sensors.motion_capture import PoseMeasurement
+from sitl.sensors.rangefinder import RangeMeasurement
 from vehicles.vehicle_file import load_vehicle
 
 FIRST, END, STEPS = 100, 400, 500

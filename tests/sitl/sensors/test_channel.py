@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from sitl.sensors.channel import Channel
+from sitl.sensors.channel import Channel, Measurement
+from sitl.sensors.encoders import JointMeasurement
 from sitl.sensors.exact import V4, SensorReadings
 from sitl.sensors.keys import Timing
-from sitl.sensors.measurements import JointMeasurement, Measurement
 from tests.sitl.sensors.readings import HOVER, START_US, STEP_US, reading
 
 

@@ -21,8 +21,7 @@ from sitl.sensors.keys import (
     VisualOdometry,
 )
 from sitl.sensors.magnetometer import MagnetometerSensor
-from sitl.sensors.measurements import PoseMeasurement
-from sitl.sensors.motion_capture import MotionCaptureSensor
+from sitl.sensors.motion_capture import MotionCaptureSensor, PoseMeasurement
 from sitl.sensors.rangefinder import RangefinderSensor
 from sitl.sensors.visual_odometry import VisualOdometrySensor
 from tests.sitl.sensors.readings import HOVER, reading

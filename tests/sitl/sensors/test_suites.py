@@ -9,13 +9,11 @@ import pytest
 
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.scenario_file import SUITE_NAMES, ScenarioError, load_scenario, parse_scenario
+from sitl.sensors.channel import Measurement
+from sitl.sensors.encoders import JointMeasurement
+from sitl.sensors.imu import ImuMeasurement
 from sitl.sensors.keys import Magnetometer, MeasuredSensors
-from sitl.sensors.measurements import (
-    ImuMeasurement,
-    JointMeasurement,
-    Measurement,
-    PoseMeasurement,
-)
+from sitl.sensors.motion_capture import PoseMeasurement
 from sitl.sensors.suite import SensorSuite
 from sitl.simulation import Controls, Simulation
 from tests.sitl.sensors.readings import HOVER, START_US, STEP_US, reading

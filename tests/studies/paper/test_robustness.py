@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.control.tube import beyond_covered
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
-from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import SensorFrame

@@ -36,11 +36,12 @@ from fsw.autopilot.estimation.faults.redundancy import (
     Source,
     Verdict,
 )
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.autopilot.estimation.sensors.base import AidingSensor
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import StateEstimate
 
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back

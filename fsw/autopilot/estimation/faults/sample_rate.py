@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Health
+from fsw.autopilot.measurements import Sensor
 
 _LOOKS: Final = 10  # of 0.1 s, over which samples are counted
 _SELDOM: Final = 0.7  # of what is usual; markers that are hidden once leave 0.8

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import math
-from enum import Enum, IntEnum
+from enum import IntEnum
 from typing import Final, NamedTuple
+
+from fsw.autopilot.measurements import Sensor
 
 _SHOWN: Final = 1.0  # s, for which a fault counts after it was seen
 _QUIET: Final = 10.0  # s without a fault, until the same one is told again at once
 _LASTS: Final = 1.0  # s, for which one that came back sooner must last; gaps are no longer
-
-
-class Sensor(Enum):
-    """A source of measurements."""
-
-    IMU = "IMU"
-    POSE = "pose"
-    GNSS = "GNSS"
-    BAROMETER = "barometer"
-    MAGNETOMETER = "magnetometer"
-    RANGEFINDER = "rangefinder"
-    ENCODERS = "joint encoders"
 
 
 class SensorFault(IntEnum):

@@ -6,8 +6,8 @@ import importlib
 import pkgutil
 from typing import Any, Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.sensors.base import AidingSensor
+from fsw.autopilot.measurements import Sensor
 
 
 def _found() -> tuple[type[AidingSensor[Any, Any]], ...]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from fsw.autopilot.estimation.error_state import BARO, ERRORS, FIELD, FRAME, Filter, P, V
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion import clear, judged
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors.base import (
@@ -17,7 +16,7 @@ from fsw.autopilot.estimation.sensors.base import (
     Ratios,
     chi_square,
 )
-from fsw.autopilot.measurements import PressureSample
+from fsw.autopilot.measurements import PressureSample, Sensor
 from fsw.compiled import compilable, kernel, machine_code
 
 

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.special import gammainccinv
 
 from fsw.autopilot.estimation.faults.redundancy import NO_AID, NOBODY, Aid, Source
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.imu import TIME_TOLERANCE
-from fsw.autopilot.measurements import AidingSample
+from fsw.autopilot.measurements import AidingSample, Sensor
 from fsw.autopilot.tuning import Row
 from fsw.compiled import packed
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import Filter, V
 from fsw.autopilot.estimation.faults.redundancy import Aid, Source
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.fusion import (
     GNSS,
     believable,
@@ -28,7 +28,7 @@ from fsw.autopilot.estimation.sensors.base import (
     chi_square,
 )
 from fsw.autopilot.geometry.vectors import norm
-from fsw.autopilot.measurements import GnssSample
+from fsw.autopilot.measurements import GnssSample, Sensor
 from fsw.autopilot.signals import Vec2, Vec3
 from fsw.compiled import compilable, kernel, machine_code
 

@@ -23,7 +23,6 @@ from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, TH, Filter, Law, correct, vec3, vec4
 from fsw.autopilot.estimation.faults.redundancy import Aid, Source
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion import clear
 from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory
 from fsw.autopilot.estimation.sensors.base import (
@@ -36,7 +35,7 @@ from fsw.autopilot.estimation.sensors.base import (
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
 from fsw.autopilot.geometry.vectors import norm
-from fsw.autopilot.measurements import MagneticSample
+from fsw.autopilot.measurements import MagneticSample, Sensor
 from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable, kernel, machine_code
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import BG, DELAY, TH, Filter, Law, V, vec3, vec4
 from fsw.autopilot.estimation.faults.redundancy import Aid, Source
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Health
 from fsw.autopilot.estimation.fusion import (
     POSE,
     believable,
@@ -37,7 +37,7 @@ from fsw.autopilot.geometry.quaternion import (
     turned,
 )
 from fsw.autopilot.geometry.vectors import norm
-from fsw.autopilot.measurements import PoseSample
+from fsw.autopilot.measurements import PoseSample, Sensor
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import TH, Filter, Law, P, V, vec4
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion import clear, judged
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors.base import (
@@ -18,7 +17,7 @@ from fsw.autopilot.estimation.sensors.base import (
     chi_square,
 )
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
-from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.compiled import compilable, kernel, machine_code
 
 _FARTHEST: Final = 200.0  # m

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.commands.arming import NO_ESTIMATE, joined
 from fsw.autopilot.flight.estimate.estimator_report import AIDS_PLACE
@@ -12,6 +12,7 @@ from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.modes.offboard import report
 from fsw.autopilot.flight.state import FlightState, PlanMemory
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import (
     ArmingReport,
     ConstraintReport,

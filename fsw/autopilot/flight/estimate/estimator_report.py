@@ -7,10 +7,11 @@ from operator import itemgetter
 from typing import Final
 
 from fsw.autopilot.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, fault_name
+from fsw.autopilot.estimation.faults.sensor_fault import Health, fault_name
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import (
     EstimatorReport,
     SatelliteFix,

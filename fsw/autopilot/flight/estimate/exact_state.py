@@ -13,10 +13,11 @@ from functools import partial
 from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import read_frame
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.frame_dropout import Dropout, filled
 from fsw.autopilot.flight.estimate.jump import returned
 from fsw.autopilot.flight.state import AIDED, COMPLETE, Aiding, FlightState, LostSensor
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import Severity, StateEstimate, StatusText, TickInputs
 from fsw.autopilot.tick_record import Tick
 from fsw.frozen import replace

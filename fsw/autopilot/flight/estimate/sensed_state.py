@@ -14,7 +14,7 @@ from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
 from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names, scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import (
     EncoderWatch,
     FusionMemory,
@@ -35,7 +35,7 @@ from fsw.autopilot.flight.estimate.jump import on_return, told
 from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
-from fsw.autopilot.measurements import JointSample, Sample
+from fsw.autopilot.measurements import JointSample, Sample, Sensor
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.rotors import agility, swing
 from fsw.autopilot.signals import (

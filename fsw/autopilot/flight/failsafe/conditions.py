@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final, NamedTuple
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import Mode
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.safety.uncertain_clearance import SHORTFALL
 from fsw.autopilot.flight.state import FlightState, LostSensor
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.signals import Mode, StateEstimate

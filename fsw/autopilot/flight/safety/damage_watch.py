@@ -12,8 +12,9 @@ from typing import Final
 
 from fsw.autopilot.control.actuator_watch import watch, watch_law
 from fsw.autopilot.control.rotor_loss import balancing_posture
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.flight.state import Damage
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.rotors import rotor_decay, rotor_names

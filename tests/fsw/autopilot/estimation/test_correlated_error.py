@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import ERRORS
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Health
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 from fsw.autopilot.flight.safety.uncertain_clearance import pose_covariance
-from fsw.autopilot.measurements import GnssSample, PoseSample
+from fsw.autopilot.measurements import GnssSample, PoseSample, Sensor
 from tests.fsw.random_states import estimate_of
 
 TUNING = EstimatorTuning()

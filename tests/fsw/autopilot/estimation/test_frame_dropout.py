@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.estimation.estimator import estimate_state, read_frame
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.frame_dropout import Dropout, filled
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import SensorFrame, StateEstimate, Vec3
 from fsw.autopilot.tick_record import new_tick
 

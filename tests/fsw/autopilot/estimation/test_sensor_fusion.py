@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.sensors.base import chi_square
@@ -26,6 +26,7 @@ from fsw.autopilot.measurements import (
     PressureSample,
     RangeSample,
     Sample,
+    Sensor,
 )
 from fsw.autopilot.signals import StateEstimate
 from fsw.autopilot.tuning import tuned

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.descent import Descent
 from fsw.autopilot.flight.modes.descend import Descend
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import Aiding, LostSensor
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import Mode, SafeSet, StateEstimate, Vec3
 from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fsw.autopilot.estimation.faults.sensor_checks import Health
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.estimation.faults.sensor_checks import Health
 from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.flight.land_detector import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fsw.autopilot.control.safety_gate import stopped
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.state import (
     Aiding,
     LostSensor,
@@ -14,6 +14,7 @@ from fsw.autopilot.flight.state import (
     first_state,
     is_young,
 )
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import Mode, PlannerCounters, SafeSet, SolverStatus
 

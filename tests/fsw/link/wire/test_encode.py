@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import (
     AttitudeSetpoint,

@@ -35,7 +35,7 @@ from messages import dialect, message_ids
 from sitl.link import decode as sitl_decode
 from sitl.link import encode as sitl_encode
 from sitl.link import encode_sensors, failures
-from sitl.sensors import measurements as sitl_measurements
+from sitl.sensors import gnss as sitl_gnss
 
 # What stands in a module, and of which entries it is made: one, several bits (a set joined by |),
 # or one after the other.
@@ -224,8 +224,8 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (encode_sensors, "_MOTION_CAPTURE", "MAV_ESTIMATOR_TYPE", "MOCAP"),
     (encode_sensors, "_LASER", "MAV_DISTANCE_SENSOR", "LASER"),
     (encode_sensors, "_DOWNWARD", "MAV_SENSOR_ROTATION", "PITCH_270"),
-    (sitl_measurements, "RTK_FIXED", "GPS_FIX_TYPE", "RTK_FIXED"),
-    (sitl_measurements, "PLAIN_FIX", "GPS_FIX_TYPE", "3D_FIX"),
+    (sitl_gnss, "RTK_FIXED", "GPS_FIX_TYPE", "RTK_FIXED"),
+    (sitl_gnss, "PLAIN_FIX", "GPS_FIX_TYPE", "3D_FIX"),
     (failures, "_WORKS", "FAILURE_TYPE", "OK"),
     (message_ids, "CMD_LAND", "MAV_CMD", "NAV_LAND"),
     (message_ids, "CMD_TAKEOFF", "MAV_CMD", "NAV_TAKEOFF"),

@@ -11,12 +11,12 @@ import pytest
 from fsw.autopilot.estimation.error_state import BG, IMU_CAPACITY, LOST, NO_RATE
 from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned
-from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample
+from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
 from fsw.autopilot.signals import Vec3, Vec4
 
 FUSION = SensorFusion(EstimatorTuning(), 2)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate, looked
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor
+from fsw.autopilot.estimation.faults.sensor_fault import Health
+from fsw.autopilot.measurements import Sensor
 
 
 def told(samples: Callable[[int], int], looks: int) -> list[int]:

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from fsw.autopilot.estimation.faults.sensor_fault import Health, Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.measurements import Sensor
 
 
 def told(times: list[float], fault: SensorFault = SensorFault.JUMP) -> list[float]:

@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.sensors.gnss import velocity_rows
@@ -24,7 +23,7 @@ from fsw.autopilot.estimation.sensors.magnetometer import (
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
-from fsw.autopilot.measurements import MagneticSample, Sample
+from fsw.autopilot.measurements import MagneticSample, Sample, Sensor
 from fsw.compiled import packed
 from tests.fsw.autopilot.estimation.sensor_runs import EARTH, RTK, START, run
 

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.arming import Subject
 from fsw.autopilot.flight.commands.arming_health import ArmingHealth, arming_health
 from fsw.autopilot.flight.state import Aiding, Damage, LostSensor, first_state
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import BatteryState, ConstraintReport, HostHealth, Mode, SensorReport
 from tests.fsw.autopilot.flight.contexts import STANDING

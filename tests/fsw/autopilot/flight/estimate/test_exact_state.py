@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from fsw.autopilot.estimation.estimator import estimate_state
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.state import AIDED, COMPLETE, FlightState, first_state
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import SensorFrame, StateEstimate, StatusText, TickInputs
 from fsw.frozen import replace
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying

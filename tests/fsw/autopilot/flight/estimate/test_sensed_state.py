@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.estimation.error_state import LOST, RATE, TIME
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.state import first_state
-from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample
+from fsw.autopilot.measurements import GnssSample, ImuSample, JointSample, PoseSample, Sensor
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.wire.encode_health import estimator_status

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
@@ -27,6 +27,7 @@ from fsw.autopilot.flight.state import (
     PlanMemory,
     SafetyMemory,
 )
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     ActuatorReport,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, way_home_s
 from fsw.autopilot.flight.failsafe.response import report
@@ -27,6 +27,7 @@ from fsw.autopilot.flight.state import (
     VehicleMemory,
     first_state,
 )
+from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.parameters.flight_config import FlightConfig, FlightLimits, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import (
