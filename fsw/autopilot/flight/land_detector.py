@@ -26,11 +26,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.flight.failsafe.evidence import FALLING_US
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.state import FlightState, VehicleMemory
-from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import StateEstimate, Vec2

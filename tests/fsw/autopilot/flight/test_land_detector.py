@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fsw.autopilot.estimation.faults.sensor_checks import Health
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.estimation.faults.sensor_fault import Sensor, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.flight.land_detector import (
     feel_ground,
@@ -22,7 +21,7 @@ from fsw.autopilot.flight.land_detector import (
     with_range,
 )
 from fsw.autopilot.flight.state import AIDED, Aiding, first_state
-from fsw.autopilot.measurements import RangeSample
+from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.signals import Mode, Vec3
 from tests.fsw.autopilot.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
 from tests.fsw.records import changed, with_record
