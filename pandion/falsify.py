@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from fsw.autopilot.parameters.flight_config import FlightConfig
     from sitl.scenario import Scenario
     from studies.search.falsify import Found, Outcome, Replayed, WholeFound, WholeOutcome
+    from studies.search.surfaces import Met
 
 HOLDS, BROKEN = 0, 1  # exit codes
 _FORMAT: Final = "pandion-disturbance-1"
@@ -129,6 +130,10 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
     flown = folder / "worst.toml"
     comment = f"found by pandion falsify {options.scenario}: {_found(outcome.worst)}"
     flown.write_text(scenario_text(as_scenario(scenario, outcome.worst), comment), encoding="utf-8")
+    hardest = outcome.worst_force
+    if hardest is not None:
+        pressed = folder / "hardest.json"
+        pressed.write_text(json_text(_as_file(scenario, hardest)), encoding="utf-8")
     for sentence in _sentences(outcome, options.amplitude) + _of_whole_stack(whole_stack):
         display.say(sentence)
     display.say(f"worst disturbance {kept}; pandion falsify {options.scenario} --replay {kept}")
@@ -159,6 +164,12 @@ def _sentences(outcome: Outcome, amplitude: float) -> list[str]:
             f"           up to {bounds.all_axes_up_to:.2f} m/s² on all axes the rotors suffice; "
             f"at {amplitude:g} they can saturate"
         )
+    if outcome.worst_force is not None:
+        found = outcome.worst_force
+        verdict = _verdict(bounds.claims_force, outcome.breaks_force, found.force_share)
+        told.append(
+            f"force      {found.force_share:.0%} of the largest, {_against(found)}: {verdict}"
+        )
     margin = "" if math.isinf(least.margin_m) else f", least margin {least.margin_m * _MM:+.1f} mm"
     told.append(f"along the recorded plan {outcome.evaluations} evaluations{margin}")
     return told
@@ -173,7 +184,7 @@ def _verdict(claimed: bool, broken: bool, share: float) -> str:
 def _of_whole_stack(outcome: WholeOutcome) -> list[str]:
     closest, margin = outcome.closest.flown, outcome.closest.flown.margin_m
     near = "" if math.isinf(margin) else f", least margin {margin * _MM:+.1f} mm"
-    verdict = "claim holds" if outcome.holds else f"claim BROKEN: {closest.contact}"
+    verdict = f"claim BROKEN: {closest.contact}" if outcome.contacts else "claim holds"
     told = []
     if outcome.step is not None:
         step = outcome.step
@@ -182,12 +193,38 @@ def _of_whole_stack(outcome: WholeOutcome) -> list[str]:
             f"step       begun {step.start.step * 0.002:.1f} s, near the calm flight's least margin"
             + ("" if math.isinf(least) else f": least margin {least * _MM:+.1f} mm")
         )
+    hardest = outcome.hardest
+    if hardest is not None:
+        says = "claim BROKEN" if outcome.presses_too_hard else "claim holds"
+        share = hardest.flown.force_share
+        told.append(f"force      {share:.0%} of the largest, whole stack ({hardest.kind}): {says}")
+    if outcome.beyond:
+        told.append(_of_what_is_not_claimed(outcome))
     return [
         *told,
         f"no contact {outcome.evaluations} stretches of the whole stack: {outcome.contacts} with "
         f"contact, {outcome.breaches} beyond the safe set, {outcome.departures} out of the "
         f"tube{near}: {verdict}",
     ]
+
+
+def _of_what_is_not_claimed(outcome: WholeOutcome) -> str:
+    """How often a surface was pressed on too hard beyond what is claimed, and what was said."""
+    hard, silent = outcome.too_hard, outcome.silent
+    names = ", ".join(sorted({one.met.name for one in hard if one.met is not None}))
+    which = f" ({names})" if names else ""
+    verdict = "claim holds" if not silent else f"claim BROKEN, {len(silent)} in silence"
+    return (
+        f"unclaimed  {len(outcome.beyond)} stretches of surfaces and sensors that the analysis "
+        f"makes no claim about: {len(hard)} pressed on too hard{which}, none of them to be in "
+        f"silence: {verdict}"
+    )
+
+
+def _against(found: Found) -> str:
+    met = found.disturbance.met
+    surface = "surface as it is" if met is None else f"surface {met.name}"
+    return f"{surface} ({found.kind}, from {found.start.step * 0.002:.1f} s)"
 
 
 def _found(found: Found) -> str:
@@ -215,6 +252,7 @@ def _as_json(
         "worst_of_one_axis": _summary(outcome.worst_of_one_axis),
         "worst_of_all_axes": _summary(outcome.worst_of_all_axes),
         "least_margin": _summary(outcome.min_margin),
+        "worst_force": _summary(outcome.worst_force),
         "whole_stack": {
             "evaluations": whole_stack.evaluations,
             "contacts": whole_stack.contacts,
@@ -223,6 +261,8 @@ def _as_json(
             "furthest": _whole(whole_stack.furthest),
             "closest": _whole(whole_stack.closest),
             "step": None if whole_stack.step is None else _whole(whole_stack.step),
+            "hardest": None if whole_stack.hardest is None else _whole(whole_stack.hardest),
+            "unclaimed": [_whole(one) for one in whole_stack.beyond],
         },
     }
 
@@ -235,7 +275,19 @@ def _claims(outcome: Outcome, whole_stack: WholeOutcome) -> dict[str, bool | Non
     return {
         "one_axis": not outcome.breaks_one_axis if one else None,
         "all_axes": not outcome.breaks_all_axes if many else None,
-        "no_contact": whole_stack.holds,
+        "no_contact": whole_stack.contacts == 0,
+        **_force_claims(outcome, whole_stack),
+    }
+
+
+def _force_claims(outcome: Outcome, whole_stack: WholeOutcome) -> dict[str, bool | None]:
+    """Of the force on surfaces; nothing where the tool is to touch none."""
+    if outcome.worst_force is None:
+        return {}
+    kept = not (outcome.breaks_force or whole_stack.presses_too_hard)
+    return {
+        "force": kept if outcome.bounds.claims_force else None,
+        "not_in_silence": not whole_stack.silent,
     }
 
 
@@ -247,6 +299,10 @@ def _whole(found: WholeFound) -> dict[str, Any]:
         "contact": flown.contact,
         "kind": found.kind,
         "first_step": found.start.step,
+        "force_share": flown.force_share,
+        "surface": None if found.met is None else found.met.as_json(),
+        "told": list(flown.told),
+        "left_the_trajectory": flown.left,
     }
 
 
@@ -261,6 +317,8 @@ def _summary(found: Found | None) -> dict[str, Any] | None:
         "kind": found.kind,
         "filtered_ticks": found.filtered_ticks,
         "first_step": found.start.step,
+        "force_share": found.force_share,
+        "surface": None if found.disturbance.met is None else found.disturbance.met.as_json(),
     }
 
 
@@ -270,6 +328,7 @@ def _as_file(scenario: Scenario, found: Found) -> dict[str, Any]:
         "scenario": scenario.name,
         "first_step": found.start.step,
         "off_plan_m": list(found.off_m),
+        "surface": None if found.disturbance.met is None else found.disturbance.met.name,
         "acceleration_m_s2": [list(push) for push in found.pushes],
     }
 
@@ -277,7 +336,7 @@ def _as_file(scenario: Scenario, found: Found) -> dict[str, Any]:
 def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
     from studies.search.falsify import bounds, replay
 
-    first_step, pushes = _read(path, scenario)
+    first_step, pushes, met = _read(path, scenario)
     config = _config(options, scenario)
     amplitude = max(abs(value) for push in pushes for value in push)
     console = console_beside(options.json)
@@ -291,6 +350,7 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
             lambda what, done, total: display.report(
                 what, done, total, f"{done:.0f} of {total:.0f} s"
             ),
+            met,
         )
     bound = bounds(config, amplitude)
     one = sum(any(push[axis] != 0.0 for push in pushes) for axis in range(3)) == 1
@@ -305,10 +365,14 @@ def _replay(options: FalsifyOptions, scenario: Scenario, path: Path) -> int:
     )
     if math.isfinite(flown.margin_m):
         display.say(f"least margin {flown.margin_m * _MM:+.1f} mm")
+    too_hard = bound.claims_force and flown.force_share > 1.0
+    if flown.force_share > 0.0:
+        verdict = _verdict(bound.claims_force, too_hard, flown.force_share)
+        display.say(f"force of {flown.force_share:.1%} of the largest: {verdict}")
     if flown.ended is not None:
         display.say(flown.ended)
     write_text(options.json, json_text(_replayed(flown), 2) + "\n")
-    return BROKEN if broken or flown.ended is not None else HOLDS
+    return BROKEN if broken or too_hard or flown.ended is not None else HOLDS
 
 
 def _replayed(flown: Replayed) -> dict[str, Any]:
@@ -316,11 +380,17 @@ def _replayed(flown: Replayed) -> dict[str, Any]:
         "off_plan_m": list(flown.off_m),
         "margin_m": flown.margin_m if math.isfinite(flown.margin_m) else None,
         "ended": flown.ended,
+        "force_share": flown.force_share,
     }
 
 
-def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float, float], ...]]:
-    """The first step and the values of a kept disturbance."""
+def _read(
+    path: Path, scenario: Scenario
+) -> tuple[int, tuple[tuple[float, float, float], ...], Met | None]:
+    """The first step and the values of a kept disturbance, and what the tool met."""
+    from studies.search.surfaces import WITHIN
+
+    surfaces: dict[str | None, Met | None] = {None: None, **{met.name: met for met in WITHIN}}
     try:
         kept = json_object(read_bounded(path, _MAX_BYTES))
         if kept["format"] != _FORMAT:
@@ -328,6 +398,7 @@ def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float
         first = kept["first_step"]
         if isinstance(first, bool) or not isinstance(first, int):
             raise TypeError("first_step")
+        met = surfaces[kept.get("surface")]
         pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept["acceleration_m_s2"])
     except JsonError as problem:
         raise UnusableError(f"{path} {problem}; it is no disturbance") from None
@@ -340,4 +411,4 @@ def _read(path: Path, scenario: Scenario) -> tuple[int, tuple[tuple[float, float
         raise UnusableError(f"{path} was found in {kept.get('scenario')}, not in {scenario.name}")
     if first >= scenario.duration_s * _STEPS_A_SECOND:
         raise UnusableError(f"{path}: first_step is after the end, {scenario.duration_s:g} s")
-    return first, pushes
+    return first, pushes, met

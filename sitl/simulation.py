@@ -445,6 +445,18 @@ class Simulation:
             margins_m=self._evaluator.margins(places, self.time_s),
         )
 
+    def meet(self, scenario: Scenario) -> None:
+        """From now on surfaces are as another ``scenario`` has them, and the vehicle is not told.
+
+        Force on the tool and margins count anew.
+
+        Raises:
+            TooStiffError: Contact is too stiff for the plant.
+            ScenarioError: Something is outside the safe set now.
+        """
+        self._touch.meet(scenario)
+        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
+
     @property
     def tip_force(self) -> V3:
         """Of what the tool touches on its tip now [N, NED]."""

@@ -63,7 +63,7 @@ class TouchRecord:
 
     def __init__(self, scenario: Scenario, vehicle: Vehicle, plants: Any) -> None:
         """Of a ``vehicle`` in the scenario, in ``plants`` (1,), records that the kernels write."""
-        self._radius = tip_radius(vehicle)
+        self._vehicle, self._radius = vehicle, tip_radius(vehicle)
         self._zones = touched_zones(scenario)
         self._held: Any = plants["surfaces"]
         self._squares = self._asked_squares = self._asked_s = 0.0
@@ -81,6 +81,24 @@ class TouchRecord:
                 placed = zone.at(time_s)
                 held["numbers"][0, s, : len(placed.numbers)] = placed.numbers
                 held["velocity"][0, s] = placed.velocity
+
+    def meet(self, scenario: Scenario) -> None:
+        """From now on meet what another ``scenario`` says of the same surfaces, and count anew.
+
+        Raises:
+            TooStiffError: Contact is too stiff for the plant.
+        """
+        inertia = scenario.actuators.motor_inertia_kg_m2
+        effects = surface_effects(scenario, self._vehicle, inertia)
+        self._zones = touched_zones(scenario)
+        self._held["finer"][0] = effects["finer"]
+        for s, one in enumerate(effects["surfaces"]):
+            self._held["stiffness"][0, s] = one.stiffness
+            self._held["dissipation"][0, s] = one.dissipation
+            self._held["friction"][0, s] = one.friction
+        for counted in ("force_max", "when_s", "contacts", "contact_s", "path"):
+            self._held[counted][0] = 0.0
+        self._squares = self._asked_squares = self._asked_s = 0.0
 
     def force(self) -> V3:
         """On the tip now [N, NED]."""

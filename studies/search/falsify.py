@@ -8,8 +8,13 @@ are tried as well: pushes that begin in still air and last. What counts is the d
 of the bound that the start-up analysis prints: of the bound for one axis where one axis is pushed,
 of the bound for all of them otherwise.
 
+Where the tool is to press on a surface, half of the searches are for the largest force on it, as a
+share of what the surface allows, with surfaces of any stiffness and friction that the vehicle is
+told of.
+
 The worst of every kind and instant then flies again with everything that flies, and CMA-ES goes on
-from the worst of these. That decides about contact.
+from the worst of these. That decides about contact. Beyond what the vehicle is told, where a
+surface comes or a sensor fails, a force may be too large, but not in silence.
 """
 
 from __future__ import annotations
@@ -33,6 +38,7 @@ from sitl.result import EndKind
 from sitl.scenario import V3, Scenario, Sequence
 from sitl.simulation import STEP_US, Simulation
 from studies.search.plan_record import EVERY, PlanRecord, Start, fly, record
+from studies.search.surfaces import BEYOND, WITHIN, Met, met_by, touches, unclaimed
 from studies.search.tracked_flight import FEATURES, FILTERED, OFF, PUSH, Disturbance, TrackedFlight
 from studies.search.whole_flight import Flown, WholeFlight
 
@@ -73,6 +79,7 @@ class Bounds:
     all_axes_up_to: float  # m/s²; above it the rotors can saturate and across and up are no claim
     claims_one_axis: bool  # for this amplitude: no limit of the loop is reached
     claims_all_axes: bool
+    claims_force: bool = False  # the same for the force on a surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +95,28 @@ class Found:
     filtered_ticks: int  # in which the safety filter acted
     pushes: tuple[V3, ...]  # m/s², one a tick
     disturbance: Disturbance
+    force_share: float = 0.0  # of what the surface allows; 0: nothing was touched
+
+
+Objective = Callable[[Found], float]
+"""What a search makes as large as it can."""
+
+
+def _off_plan(found: Found) -> float:
+    return found.share
+
+
+def _force(found: Found) -> float:
+    return found.force_share
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """What a search looks for, and what the tool meets meanwhile."""
+
+    objective: Objective = _off_plan
+    met: Met | None = None
+    start: Start | None = None  # None: anywhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +129,13 @@ class Outcome:
     worst_of_one_axis: Found | None  # None: no such disturbance was tried
     worst_of_all_axes: Found | None  # more than one
     min_margin: Found
+    worst_force: Found | None = None  # None: the tool is to touch nothing
+
+    @property
+    def breaks_force(self) -> bool:
+        """A surface was pressed on harder than it allows, for an amplitude that is claimed."""
+        found = self.worst_force
+        return self.bounds.claims_force and found is not None and found.force_share > 1.0
 
     @property
     def breaks_one_axis(self) -> bool:
@@ -116,7 +152,7 @@ class Outcome:
     @property
     def holds(self) -> bool:
         """No deviation beyond a bound that is claimed for this amplitude."""
-        return not (self.breaks_one_axis or self.breaks_all_axes)
+        return not (self.breaks_one_axis or self.breaks_all_axes or self.breaks_force)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +162,7 @@ class WholeFound:
     start: Start
     kind: str
     flown: Flown
+    met: Met | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +176,28 @@ class WholeOutcome:
     furthest: WholeFound  # off the plan in force
     closest: WholeFound  # least margin; of those with contact, if there are any
     step: WholeFound | None = None  # least margin of the steps; None: too few evaluations
+    hardest: WholeFound | None = None  # largest force within what is claimed
+    beyond: tuple[WholeFound, ...] = ()  # with what the analysis makes no claim about
+
+    @property
+    def too_hard(self) -> tuple[WholeFound, ...]:
+        """Beyond what is claimed: where a surface was pressed on harder than it allows."""
+        return tuple(one for one in self.beyond if one.flown.force_share > 1.0)
+
+    @property
+    def silent(self) -> tuple[WholeFound, ...]:
+        """Of these: where the vehicle pressed on without a word."""
+        return tuple(one for one in self.too_hard if not one.flown.left)
+
+    @property
+    def presses_too_hard(self) -> bool:
+        """A surface was pressed on harder than it allows, within what is claimed."""
+        return self.hardest is not None and self.hardest.flown.force_share > 1.0
 
     @property
     def holds(self) -> bool:
-        """Nothing was touched."""
-        return self.contacts == 0
+        """Nothing was hit, or pressed on too hard but with a word, beyond what is claimed."""
+        return not (self.contacts or self.presses_too_hard or self.silent)
 
 
 def bounds(config: FlightConfig, disturbance: float) -> Bounds:
@@ -159,6 +213,7 @@ def bounds(config: FlightConfig, disturbance: float) -> Bounds:
         all_axes_up_to=all_axes_up_to(airframe, loop, config.surroundings.disturbance),
         claims_one_axis=max(used.values()) <= 1.0,
         claims_all_axes=all_axes_up_to(airframe, loop, disturbance) >= disturbance,
+        claims_force=disturbance <= config.surroundings.disturbance,
     )
 
 
@@ -172,6 +227,7 @@ class Search:
         self.evaluations = 0
         self._flight = TrackedFlight(scenario, config, flown)
         self._amplitude = amplitude
+        self.met: tuple[Met | None, ...] = (None, *WITHIN) if touches(scenario) else (None,)
         last = len(flown.states) - STRETCH_TICKS - 1
         usable = [start for start in flown.starts if start.row <= max(last, 0)]
         usable = [start for start in usable if start.row >= SETTLED_TICKS] or usable[-1:]
@@ -183,13 +239,14 @@ class Search:
         self._kept: dict[str, Found] = {}
         self._telling: dict[tuple[str, int, str, int], Found] = {}
 
-    def adversary(self, start: Start, every: int, weights: Array) -> float:
-        """Fly against an adversary of ``weights`` (3, FEATURES) [SI]; its share of the bound."""
-        return self._judge(start, Disturbance(self._amplitude, every, _NO_TABLE, weights))
+    def adversary(self, start: Start, every: int, weights: Array, met: Met | None = None) -> Found:
+        """Fly against an adversary of ``weights`` (3, FEATURES) [SI]; the tool meets ``met``."""
+        return self._judge(start, Disturbance(self._amplitude, every, _NO_TABLE, weights, met))
 
-    def sequence(self, start: Start, table: Array) -> float:
+    def sequence(self, start: Start, table: Array, met: Met | None = None) -> Found:
         """Fly under ``table`` (n, 3) [1, NED], -1 to 1, each held for 0.1 s; as ``adversary``."""
-        return self._judge(start, Disturbance(self._amplitude, HELD_TICKS, table, _NO_WEIGHTS))
+        pushed = Disturbance(self._amplitude, HELD_TICKS, table, _NO_WEIGHTS, met)
+        return self._judge(start, pushed)
 
     def steps(self, most: int) -> list[Found]:
         """Up to ``most`` steps with the least margins, of instants and numbers of axes."""
@@ -200,6 +257,18 @@ class Search:
         ]
         return sorted(found, key=lambda one: one.margin_m)[:most]
 
+    def hard(self, most: int, *, free: bool = False) -> list[Found]:
+        """Up to ``most`` finds that press hardest, of kinds, instants and numbers of axes.
+
+        With ``free`` only those that begin without contact.
+        """
+        found = [
+            one
+            for (name, *_), one in self._telling.items()
+            if name == "force" and not (free and one.start.touches)
+        ]
+        return sorted(found, key=lambda one: -one.force_share)[:most]
+
     def outcome(self) -> Outcome:
         """The worst so far."""
         return Outcome(
@@ -209,6 +278,7 @@ class Search:
             self._kept.get("one axis"),
             self._kept.get("all axes"),
             self._kept["margin"],
+            self._kept["force"] if len(self.met) > 1 else None,
         )
 
     def telling(self, most: int) -> list[Found]:
@@ -218,13 +288,15 @@ class Search:
             key=lambda item: item[1].margin_m if item[0][0] == "margin" else -item[1].share,
         )
         margins = [one for key, one in found if key[0] == "margin"]
-        shares = [one for key, one in found if key[0] != "margin"]
+        shares = [one for key, one in found if key[0] not in ("margin", "force")]
         mixed = itertools.chain.from_iterable(itertools.zip_longest(margins, shares))
         unique = {id(one): one for one in mixed if one is not None}
         return list(unique.values())[:most]
 
-    def _judge(self, start: Start, disturbance: Disturbance) -> float:
-        kept, margin = self._flight.fly(start, STRETCH_TICKS, disturbance)
+    def _judge(self, start: Start, disturbance: Disturbance) -> Found:
+        if start.touches:
+            disturbance = replace(disturbance, met=None)
+        kept, margin, force = self._flight.fly(start, STRETCH_TICKS, disturbance)
         self.evaluations += 1
         off = np.abs(kept[:, OFF : OFF + 3]).max(axis=0)
         pushed = int(np.count_nonzero(np.abs(kept[:, PUSH : PUSH + 3]).max(axis=0)))
@@ -244,22 +316,27 @@ class Search:
             filtered_ticks=int(kept[:, FILTERED].sum()),
             pushes=(),
             disturbance=disturbance,
+            force_share=force,
         )
         axes = "one axis" if one else "all axes"
-        for name in ("share", axes, "margin"):
+        # A tool in contact takes the base with it: the bounds are of free flight.
+        bounded = () if force > 0.0 else (axes,)
+        for name in ("share", *bounded, "margin", "force"):
             best = self._kept.get(name)
             if best is None or _rank(name, found) > _rank(name, best):
                 pushes = tuple((float(x), float(y), float(z)) for x, y, z in kept[:, PUSH:FILTERED])
                 self._kept[name] = replace(found, pushes=pushes)
-        for name in (axes, "margin"):
+        for name in (axes, "margin", *(("force",) if force > 0.0 else ())):
             key = (name, start.step, found.kind, pushed)
             rival = self._telling.get(key)
             if rival is None or _rank(name, found) > _rank(name, rival):
                 self._telling[key] = found
-        return share
+        return found
 
 
 def _rank(name: str, found: Found) -> float:
+    if name == "force":
+        return found.force_share
     return -found.margin_m if name == "margin" else found.share
 
 
@@ -328,19 +405,34 @@ def _searched(
     if len(listed) > 0.4 * evaluations:
         chosen = random.permutation(len(listed))[: max(round(0.4 * evaluations), 1)]
         listed = [listed[k] for k in sorted(chosen)]
-    for start, every, weights in listed:
-        hunt.adversary(start, every, weights)
+    for (start, every, weights), met in zip(listed, itertools.cycle(hunt.met)):
+        hunt.adversary(start, every, weights, met)
         told()
     while hunt.evaluations < evaluations:
         budget = min(evaluations - hunt.evaluations, 150)
         start = hunt.starts[int(random.integers(len(hunt.starts)))]
         axes = np.array(_AXES[int(random.integers(len(_AXES)))])
+        aim = Aim()
+        if len(hunt.met) > 1:
+            aim = _drawn_aim(hunt, random)
+            start = aim.start or start
         if random.random() < 0.5:
             every = int(random.choice(_SWITCHED))
-            _improve_adversary(hunt, start, axes, every, budget, int(random.integers(2**31)), told)
+            _improve_adversary(
+                hunt, start, axes, every, budget, int(random.integers(2**31)), told, aim
+            )
         else:
-            _improve_sequence(hunt, start, axes, budget, int(random.integers(2**31)), told)
+            _improve_sequence(hunt, start, axes, budget, int(random.integers(2**31)), told, aim)
     return hunt
+
+
+def _drawn_aim(hunt: Search, random: np.random.Generator) -> Aim:
+    """Half of the time the largest force, from an instant before which there was a large one."""
+    met = hunt.met[int(random.integers(len(hunt.met)))]
+    hard = hunt.hard(8, free=met is not None)
+    if not hard or random.random() < 0.5:
+        return Aim(met=met)
+    return Aim(_force, met, hard[int(random.integers(len(hard)))].start)
 
 
 def _fly_whole(
@@ -352,6 +444,18 @@ def _fly_whole(
     report: Report,
 ) -> WholeOutcome:
     """Fly the worst finds again with the whole stack; improve the worst of each kind there."""
+    whole = evaluations
+    hard = hunt.hard(math.ceil(0.2 * evaluations))
+    # Each with what is not claimed, in turn.
+    free = hunt.hard(math.ceil(0.1 * evaluations), free=True)
+    count = round(0.3 * evaluations) if free else 0
+    past = [
+        replace(one, disturbance=replace(one.disturbance, met=met))
+        for _, one, met in zip(
+            range(count), itertools.cycle(free), itertools.cycle(unclaimed(scenario))
+        )
+    ]
+    evaluations -= len(hard) + len(past)
     steps = hunt.steps(math.ceil(0.25 * evaluations))
     telling = [one for one in hunt.telling(math.ceil(0.5 * evaluations)) if one.kind != STEP]
     improved: dict[str, Found] = {}
@@ -360,17 +464,22 @@ def _fly_whole(
         if kind not in improved or found.margin_m < improved[kind].margin_m:
             improved[kind] = found
     each = (evaluations - len(telling) - len(steps)) // max(len(improved), 1)
-    flight, flown = WholeFlight(scenario, config), list[WholeFound]()
+    flight, flown, beyond = WholeFlight(scenario, config), list[WholeFound](), list[WholeFound]()
+
+    def fly_one(start: Start, disturbance: Disturbance) -> WholeFound:
+        stretch = flight.stretch(STRETCH_TICKS, disturbance)
+        one = WholeFound(start, _kind(disturbance), stretch, disturbance.met)
+        (beyond if disturbance.met in BEYOND else flown).append(one)
+        report("flown whole", len(flown) + len(beyond), whole)
+        return one
 
     def value(start: Start, disturbance: Disturbance) -> float:
-        one = WholeFound(start, _kind(disturbance), flight.stretch(STRETCH_TICKS, disturbance))
-        flown.append(one)
-        report("flown whole", len(flown), evaluations)
+        one = fly_one(start, disturbance)
         margin = one.flown.margin_m if math.isfinite(one.flown.margin_m) else 0.0
         return max(one.flown.off_m) - margin + (0.0 if one.flown.contact is None else 1.0)
 
     for step, here in itertools.groupby(
-        sorted([*telling, *steps], key=lambda found: found.start.step),
+        sorted([*telling, *steps, *hard, *past], key=lambda found: found.start.step),
         key=lambda found: found.start.step,
     ):
         flight.go_to(step, lambda done, total: report("calm flight of the stack", done, total))
@@ -388,6 +497,8 @@ def _fly_whole(
         furthest=max(flown, key=lambda one: max(one.flown.off_m)),
         closest=min(touching or flown, key=lambda one: one.flown.margin_m),
         step=min(stepped, key=lambda one: one.flown.margin_m, default=None),
+        hardest=max(flown, key=lambda one: one.flown.force_share) if hard else None,
+        beyond=tuple(beyond),
     )
 
 
@@ -430,13 +541,16 @@ def _improve_adversary(
     budget: int,
     seed: int,
     told: Callable[[], None],
+    aim: Aim,
 ) -> None:
     mean = np.tile((0.0, 1.0, 0.0), (3, 1)).ravel()
     optimiser = CMA(mean=mean, sigma=0.7, seed=seed % 2**31)
     _improve(
         optimiser,
         budget,
-        lambda z: hunt.adversary(start, every, z.reshape(3, -1) * _SCALE * axes[:, None]),
+        lambda z: aim.objective(
+            hunt.adversary(start, every, z.reshape(3, -1) * _SCALE * axes[:, None], aim.met)
+        ),
         told,
     )
 
@@ -448,6 +562,7 @@ def _improve_sequence(
     budget: int,
     seed: int,
     told: Callable[[], None],
+    aim: Aim,
 ) -> None:
     values = 3 * STRETCH_TICKS // HELD_TICKS
     random = np.random.default_rng(seed)
@@ -457,7 +572,9 @@ def _improve_sequence(
     _improve(
         optimiser,
         budget,
-        lambda z: hunt.sequence(start, axes * np.where(z.reshape(-1, 3) >= 0.0, 1.0, -1.0)),
+        lambda z: aim.objective(
+            hunt.sequence(start, axes * np.where(z.reshape(-1, 3) >= 0.0, 1.0, -1.0), aim.met)
+        ),
         told,
     )
 
@@ -482,7 +599,9 @@ def as_scenario(scenario: Scenario, found: Found) -> Scenario:
     step_s = 1e-6 * STEP_US
     pushes = Sequence(found.pushes[::every], every * step_s, first * step_s, name="worst")
     ends_s = min(scenario.duration_s, (first + len(found.pushes)) * step_s)
-    return replace(scenario, disturbances=(pushes,), duration_s=ends_s)
+    met = found.disturbance.met
+    changed = scenario if met is None else met_by(scenario, met)
+    return replace(changed, disturbances=(pushes,), duration_s=ends_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -492,6 +611,7 @@ class Replayed:
     off_m: V3
     margin_m: float  # smallest of the stretch, infinite without zones
     ended: str | None  # what was touched, or that the flight diverged
+    force_share: float = 0.0  # largest normal force over what its surface allows [1]
 
 
 def replay(
@@ -500,8 +620,12 @@ def replay(
     first_step: int,
     pushes: tuple[V3, ...],
     report: Report,
+    met: Met | None = None,
 ) -> Replayed:
-    """Fly the whole stack, calm up to ``first_step``, then pushed by one value [m/s²] a step."""
+    """Fly the whole stack, calm up to ``first_step``, then pushed by one value [m/s²] a step.
+
+    From then on the tool meets ``met``.
+    """
     worst, last = np.zeros(3), first_step + len(pushes) - 1
     arrived: list[Array] = []
     least = [math.inf]
@@ -518,11 +642,17 @@ def replay(
         if simulation.step % 500 == 0:
             report("flown", simulation.time_s, last * 1e-6 * STEP_US)
 
-    calm = replace(scenario, disturbances=())
-    simulation = fly(calm, config, (Played(pushes, first_step, 1),), see, last_step=last + 1)
+    def meet(simulation: Simulation, _: FlightState) -> None:
+        if simulation.touch and simulation.step == first_step:
+            simulation.meet(scenario if met is None else met_by(scenario, met))
+
+    calm, pushed = replace(scenario, disturbances=()), (Played(pushes, first_step, 1),)
+    simulation = fly(calm, config, pushed, see, sense=meet, last_step=last + 1)
+    uses = simulation.touch.uses().values()
     ended = simulation.ended
     return Replayed(
         (float(worst[0]), float(worst[1]), float(worst[2])),
         least[0],
         None if ended is None or ended.kind is EndKind.DURATION else ended.sentence,
+        max((one.force_max_n / one.force_bound_n for one in uses), default=0.0),
     )

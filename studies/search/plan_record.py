@@ -42,6 +42,7 @@ class Start:
     state: Array  # (17 + 2j,) [SI] of the plant
     memory: Tick
     margin_m: float = math.inf  # of the calm flight here
+    touches: bool = False  # the tool does, of what cannot become another surface then
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +65,20 @@ def record(
     zones = _ZonesSeen()
     starts: list[Start] = []
     before: list[tuple[Array, Tick]] = []
+    touched: list[bool] = []
 
     def sense(simulation: Simulation, state: FlightState) -> None:
         if len(states) % EVERY == 0:
             now = np.frombuffer(simulation.state_bytes()).copy()
             before[:] = [(now, state.cascade)]
+            touched[:] = [simulation.touch.depth() > 0.0]
 
     def see(simulation: Simulation, state: FlightState, outputs: TickOutputs) -> None:
         if outputs.snapshot.plan_state is None:
             return
         if len(states) % EVERY == 0:
             margin = min(simulation.truth().margins_m, default=math.inf)
-            starts.append(Start(len(states), simulation.step - 1, *before[0], margin))
+            starts.append(Start(len(states), simulation.step - 1, *before[0], margin, *touched))
         states.append(state.cascade.plan.numbers.tobytes())
         inputs.append(state.cascade.u.numbers.tobytes())
         zones.add(state)

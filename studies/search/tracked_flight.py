@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numba
 import numpy as np
@@ -30,9 +30,11 @@ from sitl.plant.state import JOINTS_MAX, ROTORS_MAX, THRUST
 from sitl.scenario import Scenario
 from sitl.simulation import START_US, STEP_US, SUBSTEPS, Simulation
 from sitl.start import effects, flown_vehicle
+from sitl.touch import touched_zones
 from sitl.trajectory import place_on_curve
 from sitl.world import Headroom, World, ZoneTable, fill_margins, headroom, record_if_clear
 from studies.search.plan_record import PlanRecord, Start
+from studies.search.surfaces import Met, met_by
 
 # A row of what is kept: deviation and disturbance, each (3,), and whether the safety filter acted.
 OFF, PUSH, FILTERED, KEPT = 0, 3, 6, 7
@@ -52,6 +54,15 @@ class Disturbance:
     every: int  # ticks
     table: Array  # (n, 3), or (0, 3) for an adversary
     weights: Array  # (3, FEATURES)
+    met: Met | None = None  # by the tool; None: what the scenario says
+
+
+class Stretch(NamedTuple):
+    """What a stretch was like."""
+
+    kept: Array  # (ticks, KEPT) [SI]; fewer ticks where the flight diverged
+    margin_m: float  # smallest; infinite without zones
+    force_share: float  # largest normal force on the tool over what its surface allows [1]
 
 
 class TrackedFlight:
@@ -61,24 +72,32 @@ class TrackedFlight:
         cascade = loops_of(config)
         self._law = np.asarray(packed(cascade.law))
         self._probes = cascade.probes
-        self._plants = np.array([plant(flown_vehicle(scenario), effects(scenario))])
+        self._scenario = scenario
+        self._plants: dict[Met | None, NDArray[Any]] = {}
+        self._forces = [one.table.touch.force_max_n for one in touched_zones(scenario)
+                        if one.table.touch is not None]  # fmt: skip
         self._record = flown
         self._world, clock = World(scenario), MissionClock(scenario)
         assert clock.starts_s is not None  # it starts in the air
         self._aim = (clock.curve if self._world.follows else _NO_CURVE, clock.starts_s)
         self._rows = len(Simulation(scenario, 0).places())
 
-    def fly(self, start: Start, ticks: int, disturbance: Disturbance) -> tuple[Array, float]:
-        """What is kept of each tick, (ticks, KEPT) [SI], and the smallest margin [m].
+    def _meeting(self, met: Met | None) -> NDArray[Any]:
+        """The plant where the tool meets this, as before any contact."""
+        if met not in self._plants:
+            scenario = self._scenario if met is None else met_by(self._scenario, met)
+            self._plants[met] = np.array([plant(flown_vehicle(scenario), effects(scenario))])
+        return self._plants[met].copy()
 
-        Fewer ticks where the flight diverged; an infinite margin without zones.
-        """
+    def fly(self, start: Start, ticks: int, disturbance: Disturbance) -> Stretch:
+        """Fly ``ticks`` from a start."""
+        plants = self._meeting(disturbance.met)
         states = self._record.states[start.row : start.row + ticks + 1]
         kept = np.zeros((len(states) - 1, KEPT))
         places = np.empty((SUBSTEPS, self._rows, 3))
         lowest = np.full(len(self._world.keys), np.inf)
         flown = _track(
-            self._plants,
+            plants,
             self._law,
             self._probes,
             start.state.copy(),
@@ -101,7 +120,9 @@ class TrackedFlight:
             headroom(self._world.table, len(lowest), places.shape[1]),
             held(),
         )
-        return kept[:flown], float(lowest.min(initial=np.inf))
+        pressed = plants["surfaces"]["force_max"][0]
+        shares = [float(most) / bound for most, bound in zip(pressed, self._forces, strict=False)]
+        return Stretch(kept[:flown], float(lowest.min(initial=np.inf)), max(shares, default=0.0))
 
 
 def _compiled(function: Callable[..., int]) -> Callable[..., int]:

@@ -27,6 +27,7 @@ from sitl.scenario import V3, Scenario
 from sitl.simulation import STEP_US, Simulation, Truth
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.own_parts import planner_of
+from studies.search.surfaces import Met, met_by
 from studies.search.tracked_flight import Disturbance
 
 _GRAVITY = np.array([0.0, 0.0, 9.81])  # m/s², NED
@@ -42,6 +43,9 @@ class Flown:
     departures: int  # from the tube, after which it planned anew
     breaches: int  # of the safe set that it noticed
     pushes: tuple[V3, ...]  # m/s², one a tick
+    force_share: float = 0.0  # largest normal force on the tool over what its surface allows [1]
+    told: tuple[str, ...] = ()  # what the vehicle said
+    left: bool = False  # the trajectory, for what a failsafe does
 
 
 class WholeFlight:
@@ -75,7 +79,10 @@ class WholeFlight:
         simulation = self._simulation
         worst, least = np.zeros(3), math.inf
         pushes: list[V3] = []
+        told: list[str] = []
         arrived: V3 | None = None
+        if disturbance.met is not None:
+            self._meet(disturbance.met)
 
         def steer(outputs: TickOutputs) -> None:
             plan, truth = outputs.snapshot.plan_state, simulation.truth()
@@ -90,6 +97,7 @@ class WholeFlight:
             outputs = self._step(steer)
             truth = simulation.truth()
             arrived = truth.p_WB
+            told += [text.text for text in outputs.texts]
             if outputs.mode is not Mode.TRAJECTORY:
                 simulation.leave_trajectory(simulation.t_us, "a failsafe took over")
             least = min(least, *truth.margins_m, math.inf)
@@ -102,7 +110,21 @@ class WholeFlight:
             departures=safety.counters.departures,
             breaches=safety.counters.breaches,
             pushes=tuple(pushes),
+            force_share=max(
+                (one.force_max_n / one.force_bound_n for one in simulation.touch.uses().values()),
+                default=0.0,
+            ),
+            told=tuple(told),
+            left=outputs is not None and outputs.mode is not Mode.TRAJECTORY,
         )
+
+    def _meet(self, met: Met) -> None:
+        simulation = self._simulation
+        simulation.meet(met_by(simulation.scenario, met, simulation.time_s))
+        for fault in met.faults:
+            refusal = simulation.inject(fault)
+            if refusal is not None:
+                raise ValueError(refusal)
 
 
 def _value(

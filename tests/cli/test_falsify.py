@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from pandion.falsify import main
 from studies.search.falsify import Bounds, Found, Outcome, WholeFound, WholeOutcome
 from studies.search.plan_record import PlanRecord, Start
+from studies.search.surfaces import BEYOND
 from studies.search.tracked_flight import Disturbance
 from studies.search.whole_flight import Flown
 
@@ -140,3 +142,44 @@ def test_the_exit_code_follows_what_is_claimed(
         "all_axes": many <= 1.0 if claims_many else None,
         "no_contact": contact is None,
     }
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+@pytest.mark.parametrize(
+    ("share", "whole_share", "unclaimed", "left", "code", "said"),
+    [
+        (0.7, 0.7, 0.9, False, 0, "force      70% of the largest, surface as it is"),
+        (1.1, 0.7, 0.9, False, 1, "claim BROKEN, 110% of it"),
+        (0.7, 1.1, 0.9, False, 1, "force      110% of the largest, whole stack"),
+        (0.7, 0.7, 1.5, True, 0, "1 pressed on too hard (comes)"),
+        (0.7, 0.7, 1.5, False, 1, "claim BROKEN, 1 in silence"),
+    ],
+)  # fmt: skip
+def test_the_exit_code_follows_the_force_and_what_was_said_of_it(
+    share: float,
+    whole_share: float,
+    unclaimed: float,
+    left: bool,
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bounds = Bounds(0.07, 0.01, 0.09, 0.02, 0.5, True, True, claims_force=True)
+    found = replace(_found(0.9, 3), force_share=share)
+    outcome = Outcome(bounds, 9, found, None, found, found, found)
+    flown = Flown((0.1, 0.0, 0.0), 0.01, None, 0, 0, (), whole_share)
+    stretch = WholeFound(START, "adversary, held 100 ms", flown)
+    comes = next(met for met in BEYOND if met.name == "comes")
+    past = replace(stretch, met=comes, flown=replace(flown, force_share=unclaimed, left=left))
+    whole = WholeOutcome(1, 0, 0, 0, stretch, stretch, None, stretch, (past,))
+    monkeypatch.setattr("studies.search.falsify.search_and_fly", lambda *_: (outcome, whole))
+    written = tmp_path / "result.json"
+    assert main(["probe", "--out", str(tmp_path), "--json", str(written)]) == code
+    assert said in capsys.readouterr().out
+    claims = json.loads(written.read_text())["claims"]
+    assert claims["force"] == (max(share, whole_share) <= 1.0)
+    assert claims["not_in_silence"] == (unclaimed <= 1.0 or left)
+    assert claims["no_contact"]
+    assert (tmp_path / "hardest.json").exists()

@@ -10,7 +10,7 @@ import pytest
 
 from fsw.autopilot.control.tube import WIND_COVERED
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from sitl.scenario import vehicle_of
+from sitl.scenario import Push, Scenario, vehicle_of
 from sitl.scenario_file import load_scenario, parse_scenario
 from sitl.scenario_text import scenario_text
 from studies.flight.closed_loop import simulate
@@ -24,6 +24,7 @@ from studies.search.falsify import (
     search_and_fly,
 )
 from studies.search.plan_record import PlanRecord, record
+from studies.search.surfaces import WITHIN, Met, met_by, unclaimed
 from studies.search.tracked_flight import Disturbance
 from studies.search.whole_flight import WholeFlight
 
@@ -202,6 +203,81 @@ def test_the_safety_filter_of_the_search_is_the_one_that_flies() -> None:
     assert found.filtered_ticks > 10
     flown = replay(SCENARIO, eager, found.start.step, found.pushes, _silent)
     assert flown.off_m == pytest.approx(found.off_m, abs=1e-4)
+
+
+def _pressing() -> Scenario:
+    """One place of ``probe``, pressed on for a shorter time."""
+    whole = load_scenario("probe")
+    assert isinstance(whole.trajectory, Push)
+    one = replace(
+        whole.trajectory, position_m=whole.trajectory.position_m[:1], force_n=(5.0,), hold_s=(2.0,)
+    )
+    return replace(whole, trajectory=one, duration_s=10.0, disturbances=())
+
+
+@cache
+def _hardest() -> Outcome:
+    return search(_pressing(), _config_of(_pressing()), 0.8, 60, 3, _silent)
+
+
+def _config_of(scenario: Scenario) -> FlightConfig:
+    return flight_config(body=scenario.body, vehicle=vehicle_of(scenario))
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_no_push_and_no_surface_in_the_range_makes_the_tool_press_too_hard() -> None:
+    outcome = _hardest()
+    worst = outcome.worst_force
+    assert outcome.bounds.claims_force
+    assert worst is not None
+    assert 0.55 < worst.force_share <= 1.0  # 5.5 N of 10 N: an adversary finds more than is asked
+    assert not outcome.breaks_force
+    assert replace(outcome, worst_force=replace(worst, force_share=1.01)).breaks_force
+    none = search(SCENARIO, NOW, 0.8, 20, 3, _silent)
+    assert none.worst_force is None  # nothing is to be touched
+
+
+def test_the_force_that_was_found_flies_with_the_whole_stack() -> None:
+    scenario, worst = _pressing(), _hardest().worst_force
+    assert worst is not None
+    met = worst.disturbance.met
+    flown = replay(
+        scenario, _config_of(scenario), worst.start.step, worst.pushes, _silent, met
+    )  # fmt: skip
+    assert 0.5 < flown.force_share <= 1.0
+    changed = as_scenario(scenario, worst)
+    (panel,), (before,) = changed.zones, scenario.zones
+    assert (panel.touch == before.touch) == (met is None)
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+def test_beyond_what_is_claimed_the_vehicle_says_what_it_does() -> None:
+    """A wall that comes by 0.1 m/s, and joints that are measured wrong."""
+    scenario = _pressing()
+    flight = WholeFlight(scenario, _config_of(scenario))
+    flight.go_to(1400, lambda _, __: None)  # 2.8 s: before the tool touches
+    known = {met.name: met for met in unclaimed(scenario)}
+    still = np.zeros((1, 3))
+    flown = flight.stretch(2500, Disturbance(0.8, 50, still, np.zeros((3, 3)), known["comes"]))
+    assert any("surface not where announced" in text for text in flown.told), flown.told
+    assert flown.contact is None
+    assert flown.force_share <= 1.0
+    calm = flight.stretch(2500, Disturbance(0.8, 50, still, np.zeros((3, 3))))
+    assert calm.told == ()
+    assert 0.4 < calm.force_share < 0.7
+
+
+def test_a_surface_is_as_stiff_and_as_rough_as_the_search_says() -> None:
+    scenario = _pressing()
+    low, high = (met_by(scenario, Met("", hardness, 0.5)).zones[0].touch for hardness in (0.0, 1.0))
+    assert low is not None
+    assert high is not None
+    assert (low.stiffness_n_m, high.stiffness_n_m) == (500.0, 2000.0)
+    assert low.friction == 0.25
+    twice = met_by(scenario, Met("", 2.0, 1.0)).zones[0].touch
+    assert twice is not None
+    assert twice.stiffness_n_m == 4000.0
+    assert not any("as stiff" in met.name and met in WITHIN for met in unclaimed(scenario))
 
 
 def test_a_process_flies_both_bodies_alike() -> None:
