@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
+from fsw.autopilot.flight.failsafe.conditions import Action
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Mode
 from fsw.frozen import replace
@@ -63,6 +66,36 @@ def test_a_gripper_that_holds_nothing_weighs_next_to_nothing() -> None:
     flight.step(command(DO_GRIPPER, 1.0, GRAB))
     flight.run(3.0)
     assert flight.state.cascade.payload.mass < 0.005
+
+
+@pytest.mark.requirement("REQ-SAFE-16")
+def test_a_payload_that_is_too_heavy_is_told_and_landed_with_until_it_is_let_go_of() -> None:
+    """The range of ``probe-2r`` ends at 427 g; what is heavier by 5 % is told."""
+    flight = gripping("probe-2r", 0.48)
+    flight.step(command(DO_GRIPPER, 1.0, GRAB))
+    flight.run(3.0)
+    (told,) = (text for text in flight.texts if "payload" in text)
+    assert re.fullmatch(
+        r"failsafe: payload too heavy: 4\d\d g of 427 g, landing in \d s", told
+    ), flight.texts  # fmt: skip
+    assert flight.mode is Mode.HOLD
+    assert flight.state.vehicle.failsafe.pending is Action.LAND
+    flight.step(command(DO_GRIPPER, 1.0, RELEASE))
+    flight.run(7.0)
+    assert any("over: payload too heavy" in text for text in flight.texts)
+    assert flight.mode is Mode.HOLD  # nothing is left to land with
+    assert flight.snapshot.safety.breaches == 0
+
+
+@pytest.mark.requirement("REQ-SAFE-16")
+@pytest.mark.parametrize("disturbance", [SHAKEN, PUSHED_DOWN])
+def test_a_payload_in_the_range_is_no_matter(disturbance: Disturbance) -> None:
+    flight = gripping("probe-2r", 0.42, disturbance)
+    flight.step(command(DO_GRIPPER, 1.0, GRAB))
+    flight.run(4.0)
+    assert flight.mode is Mode.HOLD
+    assert not any("payload" in text for text in flight.texts), flight.texts
+    assert flight.snapshot.safety.breaches == 0
 
 
 def test_a_gripper_knows_three_wishes() -> None:

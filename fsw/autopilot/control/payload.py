@@ -29,7 +29,12 @@ from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable
 
 WEIGHING_TIME: Final = 0.4  # s, T
-HEAVIEST: Final = 0.2  # of the vehicle's mass; more is not put down to a payload
+HEAVIEST: Final = 0.2  # of the vehicle's mass, that may be carried
+_BELIEVED: Final = 1.25 * HEAVIEST  # more is not put down to a payload
+_LOST: Final = 0.5  # share of it, that is missed at once where it has fallen
+_LOSING_TIME: Final = (
+    0.04  # s, T then: with a payload that is not there the joints' loops are too hard
+)
 _HANGING: Final = 0.25  # m^4/s^4: levers of 50 mm, below which little is believed
 
 
@@ -58,7 +63,9 @@ def weigh_payload(r: Tick, airframe: Airframe, field: Vec3, dt: float) -> None:
         each = dot(lever_of(m, i, tip), field)
         found += each * r.joints.disturbance[i]
         all_levers += each * each
-    more = p.mass + dt / WEIGHING_TIME * found / all_levers
-    more = clamp(more, 0.0, HEAVIEST * airframe.mass)
+    missing = found / all_levers
+    takes = _LOSING_TIME if missing < -_LOST * p.mass else WEIGHING_TIME
+    more = p.mass + dt / takes * missing
+    more = clamp(more, 0.0, _BELIEVED * airframe.mass)
     r.mass += more - p.mass
     p.mass = more

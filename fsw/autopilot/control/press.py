@@ -84,7 +84,7 @@ class PressTuning:
     back: float = 0.3  # m/s, at most, out of the band
     share: float = 0.3  # rho, of the largest force, that an impact may give
     search: float = 2.0  # N, at most, to move the tool in free air
-    rise: float = 6.0  # N/s, of the force
+    rise: float = 15.0  # N/s, of the force
     fall: float = 10.0  # N/s, the same in contact: what leans on a surface is to be caught
     drop: float = 150.0  # N/s, where there is none
     felt: float = 0.4  # N, from which on there is contact
@@ -272,7 +272,8 @@ def _force_on_tool(r: Tick, shape: V6, tip: Vec3, n: int) -> Vec3:
 def presses(r: Tick, tuning: PressTuning) -> bool:
     """Whether the tool's motion along the normal is a matter of force now."""
     k = r.pressing
-    return k.near > 0 and (k.contact > 0 or k.asked > 0.0 or k.distance < tuning.band)
+    struck = k.pressed > k.unsure + tuning.struck  # by what is not where it was announced
+    return k.near > 0 and (k.contact > 0 or k.asked > 0.0 or k.distance < tuning.band or struck)
 
 
 @compilable

@@ -36,6 +36,7 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGener
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
 from fsw.autopilot.model.body import body_of
+from fsw.autopilot.parameters.carrying import payload_range
 from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
 from fsw.autopilot.parameters.contradictions import contradictions
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -65,7 +66,9 @@ class Commander:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._tube_radius = base_reach(loop_tube(config), config.surroundings)
+        loop = loop_tube(config)
+        self._tube_radius = base_reach(loop, config.surroundings)
+        self._heaviest = payload_range(config, loop).most
         self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)
         self._horizon = ReferenceHorizon(config)
@@ -171,7 +174,9 @@ class Commander:
         vehicle = state.vehicle
         if vehicle.mode is Mode.FAULT:
             return state  # what ended the flight stays on show
-        context = FailsafeContext(state, estimate, self._config, self._contradiction)
+        context = FailsafeContext(
+            state, estimate, self._config, self._contradiction, self._heaviest
+        )
         rows = active(context) if slowly else quickly_active(context)
         before = vehicle.conditions
         if not rows and not before:

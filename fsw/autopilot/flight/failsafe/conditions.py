@@ -71,6 +71,7 @@ class Condition(Enum):
     CONTACT_LOST = "contact lost"
     SURFACE_MOVED = "surface not where announced"
     TOOL_SLIPS = "tool slips"
+    PAYLOAD_HEAVY = "payload too heavy"
     TUBE_LEFT = "off the plan"
     FILTER_ACTIVE = "too fast towards a zone"
     PLAN_STALE = "no plan for three periods"

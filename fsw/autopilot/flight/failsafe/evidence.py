@@ -28,6 +28,7 @@ JUMP_US: Final = 500_000  # of the wall clock in a second, that is no slewing
 CONTACT_LOST_S: Final = 1.0  # without contact while it is asked for
 SURFACE_OFF: Final = 0.06  # m, from where it was announced
 SLIP: Final = 0.3  # m/s along the surface, beside the plan
+WEIGHED: Final = 1.05  # what a payload is weighed within
 _HALF_LOST_US: Final = 1_000_000  # in which a half that has jumped may be believed again
 _LACKING_US: Final = 500_000  # without room enough; hidden markers, 0.2 s, are none
 
@@ -40,6 +41,7 @@ class FailsafeContext:
     estimate: StateEstimate
     config: FlightConfig
     against: str = ""  # which parameters contradict each other, whatever the safe set
+    heaviest: float = math.inf  # kg, of a payload that is safe
 
     @property
     def limits(self) -> FlightLimits:
@@ -109,9 +111,9 @@ def lacks_room(context: FailsafeContext) -> bool:
 
 
 def presses_too_hard(context: FailsafeContext) -> bool:
-    """In flight, the tool is pressed upon by more than its surface allows, as far as is known."""
-    pressing = context.state.cascade.pressing
-    return bool(pressing.near and pressing.pressed > pressing.most) and _flies(context)
+    """In flight, the tool may be pressed upon by more than its surface allows."""
+    k = context.state.cascade.pressing
+    return bool(k.near and k.pressed + k.unsure > k.most) and _flies(context)
 
 
 def has_lost_contact(context: FailsafeContext) -> bool:
@@ -131,6 +133,12 @@ def tool_slips(context: FailsafeContext) -> bool:
     if not pressing.contact:
         return False
     return math.hypot(*pressing.slip.tolist()) > SLIP and _flies(context)
+
+
+def payload_is_heavy(context: FailsafeContext) -> bool:
+    """In flight, the gripper holds more than is safe, by more than it is weighed within."""
+    held = context.state.cascade.payload.mass
+    return bool(held > WEIGHED * context.heaviest) and _flies(context)
 
 
 def _flies(context: FailsafeContext) -> bool:

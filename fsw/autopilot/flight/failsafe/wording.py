@@ -107,7 +107,8 @@ def by_mm(length: float) -> str:
 def force(context: FailsafeContext) -> str:
     """How hard the tool is pressed upon, and what is allowed."""
     pressing = context.state.cascade.pressing
-    return f": {pressing.pressed:.1f} N of {pressing.most:.1f} N"
+    found, unsure = pressing.pressed, pressing.unsure
+    return f": {found:.1f} N, or {unsure:.1f} N more, of {pressing.most:.1f} N"
 
 
 def without_contact(context: FailsafeContext) -> str:
@@ -118,6 +119,12 @@ def without_contact(context: FailsafeContext) -> str:
 def surface_moved(context: FailsafeContext) -> str:
     """How far a surface is from where it was announced."""
     return by_mm(abs(context.state.cascade.pressing.moved))
+
+
+def payload(context: FailsafeContext) -> str:
+    """What the gripper holds, and what it may."""
+    held = context.state.cascade.payload.mass
+    return f": {1e3 * held:.0f} g of {1e3 * context.heaviest:.0f} g"
 
 
 def carried(context: FailsafeContext) -> str:

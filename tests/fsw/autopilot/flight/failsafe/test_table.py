@@ -40,7 +40,7 @@ from fsw.autopilot.signals import (
     Severity,
     SolverStatus,
 )
-from fsw.autopilot.tick_record import Pressing, Tick
+from fsw.autopilot.tick_record import Payload, Pressing, Tick
 from tests.fsw.random_states import random_estimate
 from tests.fsw.records import changed
 
@@ -76,6 +76,7 @@ class Evidence:
     damage: Damage = field(default_factory=Damage)
     plan: PlanMemory = field(default_factory=PlanMemory)
     pressing: dict[str, Any] = field(default_factory=dict)
+    held: float = 0.0  # kg, in the gripper
 
     def context(self) -> FailsafeContext:
         last_received_us = NOW_US - self.gcs_silent_us if self.gcs_silent_us >= 0 else -1
@@ -100,10 +101,16 @@ class Evidence:
             host=self.host,
             damage=self.damage,
             kept=self.kept,
-            cascade=changed(Tick(), pressing=changed(Pressing(), **self.pressing)),
+            cascade=changed(
+                Tick(),
+                pressing=changed(Pressing(), **self.pressing),
+                payload=changed(Payload(), mass=self.held),
+            ),
         )
         estimate = random_estimate(np.random.default_rng(1))._replace(t_us=NOW_US)
-        return FailsafeContext(state, estimate, replace(self.config, limits=self.limits))
+        return FailsafeContext(
+            state, estimate, replace(self.config, limits=self.limits), heaviest=0.4
+        )
 
 
 FINE = Evidence()
@@ -194,10 +201,14 @@ def test_nothing_wrong_is_no_condition() -> None:
         (replace(FINE, safety=OUTSIDE), Condition.BREACH),
         (replace(FINE, safety=OFF_PLAN), Condition.TUBE_LEFT),
         (replace(FINE, kept=CRAMPED), Condition.ROOM_LACKING),
-        (replace(FINE, pressing={"near": 1, "pressed": 5.1, "most": 5.0}), Condition.FORCE_HIGH),
+        (
+            replace(FINE, pressing={"near": 1, "pressed": 4.8, "unsure": 0.3, "most": 5.0}),
+            Condition.FORCE_HIGH,
+        ),
         (replace(FINE, pressing={"near": 1, "lost_for": 1.1}), Condition.CONTACT_LOST),
         (replace(FINE, pressing={"near": 1, "moved": -0.07}), Condition.SURFACE_MOVED),
         (replace(FINE, pressing={"contact": 1, "slip": (0.3, 0.1, 0.0)}), Condition.TOOL_SLIPS),
+        (replace(FINE, held=0.421), Condition.PAYLOAD_HEAVY),
         (OFFBOARD, Condition.SETPOINTS_LOST),
         (replace(FINE, silent_zones=1), Condition.ZONES_SILENT),
         (replace(FINE, gcs_silent_us=10_000_000), Condition.DATALINK_LOST),
@@ -559,6 +570,7 @@ ALARMING = (
     replace(FINE, safety=OVER_THE_FENCE),
     replace(FINE, safety=OFF_PLAN),
     replace(FINE, safety=SafetyMemory(filter_us=0)),
+    replace(FINE, pressing={"near": 1, "pressed": 4.8, "unsure": 0.3, "most": 5.0}),
     replace(FINE, damage=Damage("rotor 1", report=ActuatorReport(1, lost=True))),
     replace(FINE, plan_age_us=3 * PERIOD_US + 1),
     replace(FINE, plan_refused=True),
@@ -646,6 +658,7 @@ def test_a_fault_is_the_vehicles_own() -> None:
     others |= {Condition.LINK_FLOODED, Condition.LOG_STOPPED, Condition.DISK_FULL}
     others |= {Condition.ROOM_LACKING, Condition.PARAMETERS_CONTRADICT}
     others |= {Condition.CONTACT_LOST, Condition.SURFACE_MOVED, Condition.TOOL_SLIPS}
+    others |= {Condition.PAYLOAD_HEAVY}
     others |= {Condition.BATTERY_CRITICAL, Condition.BATTERY_EMERGENCY}
     assert set(Condition) - others == FAULTS
 
@@ -707,6 +720,6 @@ def test_what_is_wrong_with_a_contact_leads_off_the_surface() -> None:
     too_hard = replace(FINE, pressing={"near": 1, "pressed": 5.06, "most": 5.0})
     assert action(too_hard) is Action.RETREAT
     (row,) = active(too_hard.context())
-    assert row.detail(too_hard.context()) == ": 5.1 N of 5.0 N"
+    assert row.detail(too_hard.context()) == ": 5.1 N, or 0.0 N more, of 5.0 N"
     on_the_ground = replace(too_hard, mode=Mode.DISARMED)
     assert conditions(on_the_ground) == ()
