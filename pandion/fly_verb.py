@@ -25,7 +25,7 @@ from pandion.supervisor import Flown, ProcessFailed, Supervisor
 from pandion.view_beside import ViewBeside
 from sitl.arguments import RunOptions, SitlOptions
 from sitl.earth import Place
-from sitl.scenario import vehicle_of
+from sitl.scenario import Push, Scenario, vehicle_of
 from sitl.scenario_file import (
     ScenarioError,
     check_pacing,
@@ -108,7 +108,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
     """Check everything that can be checked before a process is started.
 
     Raises:
-        ScenarioError: There is no such scenario.
+        ScenarioError: There is no such scenario, or it asks for more than the vehicle can do.
         LinkError: An address of a link is none.
         OSError: The directory for the logs cannot be made.
     """
@@ -116,6 +116,8 @@ def planned(options: FlyOptions) -> PlannedFlight:
     check_pacing(scenario, realtime=options.realtime)
     believed = options.believed_vehicle or scenario.vehicle
     check_alike(vehicle_of(scenario), believed)
+    if scenario.payload is not None or isinstance(scenario.trajectory, Push):
+        _check_task(scenario, believed)
     addresses(options.links)
     if options.realtime and options.speed not in (None, 1.0):
         raise ScenarioError("--realtime flies at speed 1; --speed needs --lockstep")
@@ -153,6 +155,15 @@ def check_alike(flown: Vehicle, believed: str) -> None:
                 f"--believed-vehicle {believed} has {count} {what}, and {flown.name}, which "
                 f"flies, has {wanted}"
             )
+
+
+def _check_task(scenario: Scenario, believed: str) -> None:
+    from fsw.autopilot.parameters.flight_config import flight_config
+    from studies.flight.closed_loop import check_payload, check_pressing
+
+    config = flight_config(body=scenario.body, vehicle=load_vehicle(believed))
+    check_payload(scenario, config)
+    check_pressing(scenario, config)
 
 
 def _banner(flight: PlannedFlight, display: Display) -> None:

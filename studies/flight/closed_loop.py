@@ -20,7 +20,10 @@ from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.measurements import Sample
 from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.parameters.carrying import payload_range
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.touching import Pressed, against_pressing
 from fsw.autopilot.ports import PlanningCycle, PlanService
 from fsw.autopilot.signals import (
     ActuatorCommand,
@@ -40,12 +43,12 @@ from fsw.autopilot.signals import (
     TickInputs,
     TickOutputs,
 )
-from sitl.scenario import Scenario
+from sitl.scenario import Push, Scenario
 from sitl.scenario_file import ScenarioError
 from sitl.sensors.force_torque import WrenchMeasurement
 from sitl.simulation import START_US, STEP_US, Controls, Simulation
 from studies.flight.collector import collector_off
-from studies.flight.mission import announced, moves, target
+from studies.flight.mission import announced, moves, safe_set, target
 from studies.flight.own_parts import OURS, OwnParts, planner_of
 from studies.flight.result import (
     TRACE_STEPS,
@@ -275,10 +278,13 @@ class ScenarioFlight:
         """The arguments are those of :func:`simulate`.
 
         Raises:
-            ScenarioError: The body of the configuration starts outside the safe set.
+            ScenarioError: The body of the configuration starts outside the safe set, the payload is
+                too heavy, or a force too large.
             OwnPartError: A part cannot be used.
         """
         check_body(simulation.scenario, config)
+        check_payload(simulation.scenario, config)
+        check_pressing(simulation.scenario, config)
         self.recorder = FlightRecorder()
         self.autopilot = Autopilot(config)
         law = parts.law(self.autopilot, simulation.clock, self.recorder)
@@ -403,6 +409,41 @@ def check_body(scenario: Scenario, config: FlightConfig) -> None:
             f"body {body!r} keeps clear, the scenario is for {scenario.body!r}: {error}; use "
             f"flight_config(body={scenario.body!r})"
         ) from None
+
+
+def check_payload(scenario: Scenario, config: FlightConfig) -> None:
+    """Refuse a payload that is heavier than the vehicle of a configuration may carry.
+
+    Raises:
+        ScenarioError: With its mass, what is allowed and what bounds that.
+    """
+    if scenario.payload is None:
+        return
+    held, (most, by) = scenario.payload.mass_kg, payload_range(config, loop_tube(config))
+    if held > most:
+        raise ScenarioError(
+            f"payload.mass_kg = {held:g}: the vehicle may carry at most {most:.3f} kg, bounded "
+            f"by {by}"
+        )
+
+
+def check_pressing(scenario: Scenario, config: FlightConfig) -> None:
+    """Refuse a reference that presses harder, or slides so, than the vehicle can balance.
+
+    Raises:
+        ScenarioError: With the force, what is allowed and why.
+    """
+    curve = scenario.trajectory
+    if not isinstance(curve, Push):
+        return
+    zones = [zone for zone in safe_set(scenario).zones if zone.touch is not None]
+    loop = loop_tube(config)
+    slides = curve.slide_m or ((0.0, 0.0, 0.0),) * len(curve.force_n)
+    for k, (force, slide) in enumerate(zip(curve.force_n, slides, strict=True)):
+        for zone in zones:
+            against = against_pressing(config, zone, loop, Pressed(curve.normal, force, slide))
+            if against:
+                raise ScenarioError(f"trajectory.force_n[{k}] = {force:g}: {against}")
 
 
 def _trace_point(simulation: Simulation) -> TracePoint:

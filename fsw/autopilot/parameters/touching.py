@@ -7,6 +7,8 @@ the surface's normal is nearer to:
   unknown of it, or the bound on it leaves nothing to press with;
 * the hardest surface must be met no faster than the tool can stop, and that at a speed at all;
 * the thrust that presses must be left by the tilt after the worst disturbance;
+* what the force on the tool, friction included, turns the base by must be left by each rotor after
+  the worst disturbance, and by what rotors may spend on yaw;
 * the arm must take up what the base is pushed off its plan, both ways.
 
 Source: docs/equations.md T8.
@@ -19,8 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fsw.autopilot.control.allocation import AXES, PITCH, ROLL, THRUST, YAW
 from fsw.autopilot.control.press import PressTuning
-from fsw.autopilot.control.tube import Tube
+from fsw.autopilot.control.tube import Tube, limits_used
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
 from fsw.autopilot.model.multibody import place_of_tip, posture
@@ -34,6 +37,9 @@ _LEAST = 0.5  # N, worth pressing with
 _STEP = 0.005  # m, of a search for the arm's room
 _ASTRAY = 0.002  # m, that the tool is off the line in that search
 _FARTHEST = 0.3  # m
+_NONE = 1e-9
+_LEVEL = 0.3  # of a normal, that is horizontal, below which the arm is not turned to it
+_TURNED = 0.8  # share of what rotors may spend on yaw
 
 
 class Grip(NamedTuple):
@@ -119,6 +125,75 @@ def against_touching(config: FlightConfig, zone: Zone, loop: Tube) -> str:
         or _against_thrust(config, loop)
         or _against_room(found, disturbance * (loop.height if _is_level(zone) else loop.base))
     )
+
+
+class Pressed(NamedTuple):
+    """What is asked for at a surface."""
+
+    normal: Vec3  # [1, NED], out of it
+    force: float  # N, along that
+    slide: Vec3  # NED, along the surface, of any length; none: it presses in one place
+
+
+def against_pressing(config: FlightConfig, zone: Zone, loop: Tube, asked: Pressed) -> str:
+    """Why a vehicle cannot press as ``asked`` on a surface that it may touch; empty: it can."""
+    most = max_force(config, zone, loop)
+    if asked.force > most:
+        return f"{asked.force:.1f} N are asked for; at most {most:.1f} N can be promised"
+    room = sideways_force(config, zone, loop, asked)
+    if asked.force > room:
+        return (
+            f"pressing with {asked.force:.1f} N and sliding turns the vehicle by more than its "
+            f"rotors leave beside the worst disturbance; at most {room:.1f} N"
+        )
+    return ""
+
+
+def sideways_force(config: FlightConfig, zone: Zone, loop: Tube, asked: Pressed) -> float:
+    """The largest force [N] along the normal whose friction and itself the rotors can balance."""
+    assert zone.touch is not None
+    airframe, disturbance = config.airframe, config.surroundings.disturbance
+    normal, slide = _in_body(asked)
+    length = float(np.linalg.norm(slide))
+    each = normal - (zone.touch.friction / length * slide if length > 0.0 else 0.0)  # of one newton
+    m = posture(airframe.bodies, airframe.home)
+    torque = np.cross(_tip(airframe, airframe.home) - np.array(m.centre), each)
+    used = limits_used(airframe, config.tuning.tracking, loop, disturbance)["rotor torque"]
+    hover = airframe.mass * GRAVITY / airframe.rotors
+    share = np.array(airframe.share).reshape(-1, AXES)[: airframe.rotors]
+    asks = np.zeros(AXES)
+    asks[[ROLL, PITCH, YAW]], asks[THRUST] = torque, abs(each[2])
+    top = np.array(airframe.rotor_thrust_max[: airframe.rotors])
+    left = (1.0 - min(used, 1.0)) * np.minimum(hover, top - hover)
+    of_yaw = np.abs(share[:, YAW]) * abs(torque[2])
+    rooms = [
+        *(left / np.maximum(np.abs(share @ asks), _NONE)),
+        *(_TURNED * config.tuning.yaw_thrust_limit / np.maximum(of_yaw, _NONE)),
+    ]
+    return float(min(rooms))
+
+
+def _in_body(asked: Pressed) -> tuple[Array, Array]:
+    """Normal and slide (3,) [B] of a vehicle that is level and whose arm is turned to both."""
+    normal, slide = np.array(asked.normal), np.array(asked.slide)
+    ahead = -normal * (1.0, 1.0, 0.0)
+    if not np.linalg.norm(ahead) > _LEVEL:  # nothing but the slide says where the arm is
+        ahead = slide * (1.0, 1.0, 0.0)
+        if not np.linalg.norm(ahead) > 0.0:
+            return normal, slide
+    x = ahead / np.linalg.norm(ahead)
+    axes = np.array((x, (-x[1], x[0], 0.0), (0.0, 0.0, 1.0)))
+    return axes @ normal, axes @ slide
+
+
+def max_force(config: FlightConfig, zone: Zone, loop: Tube) -> float:
+    """The largest force [N] that can be asked for at a surface that may be touched."""
+    touch, tuning = zone.touch, config.tuning.press
+    if touch is None:
+        return 0.0
+    found = grip(config.airframe, tuning, _normal_in_body(zone), config.surroundings.disturbance)
+    bounded = touch.force_max - found.unsure - tuning.damping
+    return max(min(bounded, config.airframe.mass * _left(config, loop)), 0.0)
 
 
 def _left(config: FlightConfig, loop: Tube) -> float:

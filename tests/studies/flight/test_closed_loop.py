@@ -11,6 +11,7 @@ from fsw.autopilot.control.control_metrics import ControlMetrics
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import PlanInput
 from sitl.scenario_file import ScenarioError, load_scenario
+from sitl.simulation import Simulation
 from studies.flight import closed_loop
 from studies.flight.job import Job, fly_job, score
 from studies.paper.cases import configuration, scenario
@@ -118,3 +119,33 @@ def test_a_body_that_starts_outside_the_safe_set_is_refused() -> None:
     assert "starts outside its safe set: margin" in str(found.value)
     assert Job("full", flown, flight_config(), 0).row().error
     assert closed_loop.simulate(flown, 0, flight_config(body="points")).truth.completed
+
+
+@pytest.mark.requirement("REQ-SAFE-16")
+@pytest.mark.parametrize(
+    ("name", "keys", "why"),
+    [
+        (
+            "pick",
+            {"payload": {"mass_kg": 0.43}},
+            "payload.mass_kg = 0.43: the vehicle may carry at most 0.427 kg, bounded by joint 1's",
+        ),
+        (
+            "wipe",
+            {"trajectory": {"slide_m": ((0.0, 0.5, 0.0),)}},
+            r"trajectory.force_n\[0\] = 3: pressing with 3.0 N and sliding turns the vehicle by",
+        ),
+        ("wipe", {"trajectory": {"force_n": (9.5,)}}, "9.5 N are asked for; at most 8.6 N"),
+    ],
+)
+def test_what_a_vehicle_can_neither_carry_nor_balance_is_refused_before_it_flies(
+    name: str, keys: dict[str, dict[str, object]], why: str
+) -> None:
+    flown = load_scenario(name)
+    config = flight_config(body=flown.body, vehicle=load_vehicle(flown.vehicle))
+    simulation = Simulation(flown, 1)
+    closed_loop.ScenarioFlight(simulation, config)
+    for table, changes in keys.items():
+        flown = replace(flown, **{table: replace(getattr(flown, table), **changes)})
+    with pytest.raises(ScenarioError, match=why):
+        closed_loop.ScenarioFlight(Simulation(flown, 1), config)

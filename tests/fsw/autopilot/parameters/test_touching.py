@@ -5,15 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.parameters.consistency import analyse, loop_tube, refusals
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
-from fsw.autopilot.parameters.touching import against_touching, grip
+from fsw.autopilot.parameters.touching import (
+    Pressed,
+    against_pressing,
+    against_touching,
+    grip,
+    max_force,
+    sideways_force,
+)
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import SafeSet, Touch, Zone
+from sitl.plant.trim import end_effector
 from tests.fsw.autopilot.control.test_press import pressed_upon
+from tests.sitl.pinocchio_model import configuration, pinocchio_model
 from vehicles.vehicle_file import load_vehicle
 
 AHEAD = (-1.0, 0.0, 0.0)
@@ -74,3 +84,37 @@ def test_disturbances_take_from_what_the_tilt_can_press_with() -> None:
 
 def test_an_arm_in_a_plane_presses_on_nothing_beside_it() -> None:
     assert grip(PROBE.airframe, PressTuning(), (0.0, 1.0, 0.0), 0.8).mass == float("inf")
+
+
+def test_sliding_sideways_is_bounded_by_what_rotors_spend_on_yaw() -> None:
+    """By statics on Pinocchio's model: the friction's lever about the centre of mass."""
+    vehicle = load_vehicle("probe-2r")
+    model = pinocchio_model(vehicle)
+    data, home = model.createData(), np.array(vehicle.home_posture)
+    q = configuration(np.zeros(3), np.array((1.0, 0.0, 0.0, 0.0)), home)
+    centre = pin.centerOfMass(model, data, q)
+    lever = end_effector(vehicle, vehicle.home_posture)[0] - centre[0]
+    friction, loop = 0.3, loop_tube(PROBE)
+    yaw = 0.8 * 3.0 * sum(rotor.torque_per_thrust for rotor in vehicle.rotors)  # of 3 N each
+    zone = touched(friction=friction)
+    aside = Pressed(AHEAD, 3.0, (0.0, 0.5, 0.0))
+    most = sideways_force(PROBE, zone, loop, aside)
+    assert most == pytest.approx(yaw / (friction * lever), rel=1e-3)
+    assert against_pressing(PROBE, zone, loop, aside).startswith("pressing with 3.0 N and sliding")
+    up = aside._replace(slide=(0.0, 0.0, -0.5))
+    assert against_pressing(PROBE, zone, loop, up) == ""
+    # What counts is how the surface lies to the slide, wherever both are turned to.
+    turned = Pressed((0.0, -1.0, 0.0), 3.0, (0.5, 0.0, 0.0))
+    assert sideways_force(PROBE, zone, loop, turned) == pytest.approx(most)
+    hard = against_pressing(PROBE, zone, loop, up._replace(force=9.5))
+    assert hard.startswith("9.5 N are asked for; at most 8.")
+
+
+def test_weak_rotors_leave_less_to_press_with() -> None:
+    airframe, loop, zone = PROBE.airframe, loop_tube(PROBE), touched(force_max=100.0)
+    up = Pressed(AHEAD, 3.0, (0.0, 0.0, -0.5))
+    hover = airframe.mass * 9.81 / airframe.rotors
+    weak = tuple(1.05 * hover for _ in airframe.rotor_thrust_max)
+    before = sideways_force(PROBE, zone, loop, up)
+    config = replace(PROBE, airframe=replace(airframe, rotor_thrust_max=weak))
+    assert sideways_force(config, zone, loop, up) < 0.1 * before
