@@ -96,6 +96,7 @@ JOINT_ENCODERS: Final = 60212
 MPC_HORIZON_ARM: Final = 60213
 FORCE_TORQUE: Final = 60214
 TOOL_CONTACT: Final = 60215
+PAYLOAD_STATUS: Final = 60216
 
 SYSTEM_ID: Final = 1  # the vehicle
 AUTOPILOT: Final = 1  # MAV_COMP_ID_AUTOPILOT1: speaks common.xml

@@ -28,6 +28,7 @@ from view.flight_data import FlightData, Table, UlogError, read_flight
 from view.flight_events import events
 from view.scene import (
     Event,
+    Held,
     Horizon,
     Margin,
     Posture,
@@ -35,6 +36,7 @@ from view.scene import (
     Scene,
     Solver,
     Timing,
+    Tool,
     Worst,
 )
 from view.vehicle import airframe_of, horizon
@@ -117,6 +119,8 @@ class LogFlight:
             solver=self._solver(t),
             timing=self._timing(t),
             safety=safety,
+            tool=self._tool(t),
+            held=self._held(t),
         )
 
     def safe_set(self, t: float) -> SafeSet | None:
@@ -311,6 +315,20 @@ class LogFlight:
             missed=int(row["missed_deadlines"]),
             fallbacks=int(row["fallbacks"]),
         )
+
+    def _tool(self, t: float) -> Tool | None:
+        row = self._row("tool_contact", t, lasts=0.1)
+        if row is None:
+            return None
+        force = _finite(row["force"])
+        if force is None:
+            return None
+        pressed, asked, most = (float(row[name]) for name in ("pressed", "asked", "most"))
+        return Tool(force, pressed, asked, most, bool(row["contact"]))
+
+    def _held(self, t: float) -> Held | None:
+        row = self._row("payload", t)
+        return None if row is None else Held(bool(row["closed"]), float(row["mass"]))
 
     def _timing(self, t: float) -> tuple[Timing, ...]:
         table = self._table("loop_timing")

@@ -26,7 +26,7 @@ def now_html(now: Scene, airframe: Airframe, begin: float) -> str:
     """Mode, margins, inputs and the rest of one instant; times count from ``begin`` [s]."""
     return (
         f'<div data-pandion="now" style="{_BOX}">'
-        f"{_headline(now, begin)}{_margins(now)}{_inputs(now, airframe)}{_planner(now)}"
+        f"{_headline(now, begin)}{_margins(now)}{_tool(now)}{_inputs(now, airframe)}{_planner(now)}"
         f"{_timing(now.timing)}</div>"
     )
 
@@ -167,6 +167,22 @@ def _margin_row(one: Margin, least: float) -> str:
     return _row(
         f'<span style="{weight}">{escape(one.name)}</span>', millimetres(one.margin), bar, acting
     )
+
+
+def _tool(now: Scene) -> str:
+    """The force on the tool, and what is in the gripper."""
+    rows, one, held = [], now.tool, now.held
+    if one is not None:
+        share = one.pressed / one.most if one.most > 0.0 else math.nan
+        colour = colours.BLUE if share < 0.8 else colours.ORANGE if share < 1.0 else colours.RED
+        value = f'<b data-pandion="force" data-newtons="{one.pressed!r}">{one.pressed:.1f} N</b>'
+        name = "in contact" if one.contact else "free"
+        rows.append(_row(name, value, _bar(share, colour), f"of {one.most:.4g}"))
+        rows.append(_row("asked for", f"{one.asked:.1f} N"))
+    if held is not None:
+        mass = f'<b data-pandion="payload" data-kg="{held.mass!r}">{1e3 * held.mass:.0f} g</b>'
+        rows.append(_row("gripper", mass, "", "closed" if held.closed else "open"))
+    return _section("Tool", _table(rows)) if rows else ""
 
 
 def _inputs(now: Scene, airframe: Airframe) -> str:

@@ -70,6 +70,23 @@ class Timing(NamedTuple):
     skipped: int  # ticks, since the start
 
 
+class Tool(NamedTuple):
+    """What the tool does at a surface that it may touch."""
+
+    force: Vec3  # N, NED, on it, observed
+    pressed: float  # N, of that along the normal
+    asked: float  # N
+    most: float  # N, that the surface allows
+    contact: bool
+
+
+class Held(NamedTuple):
+    """What is in the gripper."""
+
+    closed: bool
+    mass: float  # kg, weighed
+
+
 class Safety(NamedTuple):
     """Episodes since the start."""
 
@@ -111,6 +128,8 @@ class Scene:
     solver: Solver | None = None
     timing: tuple[Timing, ...] = ()
     safety: Safety = _SAFE
+    tool: Tool | None = None  # None: nothing that it may touch is near
+    held: Held | None = None  # None: the gripper was never told anything
 
 
 class Event(NamedTuple):

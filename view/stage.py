@@ -26,6 +26,9 @@ Array = NDArray[Any]
 _UP: Final[Vec4] = (0.0, 1.0, 0.0, 0.0)  # z of a part points up: half a turn about x
 _STRAIGHT: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 _ARROW: Final = 0.32  # m, of a rotor's full thrust
+_FORCE: Final = 0.03  # m/N, of the arrow on the tool
+_PAYLOAD: Final = 0.06  # m, of the box that stands for what is held
+_SHOWN: Final = 0.005  # kg
 _SIGMAS: Final = 3.0
 _EDGE: Final[Rgb] = (232, 150, 156)
 
@@ -170,6 +173,18 @@ class Stage:
         scene.configure_environment_map("studio", environment_intensity=0.3)
         self._vehicle = VehicleFigure(scene, "/vehicle", airframe)
         self._truth = VehicleFigure(scene, "/truth", airframe, ghost=colours.ORANGE)
+        vertices, faces = _arrow()
+        self._force = scene.add_mesh_simple(
+            "/force on the tool", vertices=vertices, faces=faces, color=colours.RED,
+            side="double", cast_shadow=False, visible=False,
+        )  # fmt: skip
+        self._newtons = scene.add_label("/force", "", visible=False)
+        self._payload = scene.add_box(
+            "/payload", color=colours.ORANGE, dimensions=(_PAYLOAD,) * 3, opacity=0.85,
+            visible=False,
+        )  # fmt: skip
+        self._grams = scene.add_label("/payload mass", "", visible=False)
+        self._airframe = airframe
         self._target = scene.add_icosphere(
             "/target", radius=0.022, color=colours.GREEN, opacity=0.85, visible=False,
             cast_shadow=False,
@@ -231,6 +246,32 @@ class Stage:
             if len(path) > 1:
                 handle.points = _segments(np.array(path))
         self._show_zones(now)
+        self._show_tool(now)
+
+    def _show_tool(self, now: Scene) -> None:
+        """The force on the tool, as an arrow to it with its size; and what it holds."""
+        tip = None if now.estimate is None else chain(now.estimate, self._airframe)[-1]
+        force = None if now.tool is None else now.tool.force
+        size = 0.0 if force is None else math.hypot(*force)
+        pressed = tip is not None and now.tool is not None and now.tool.contact and size > 0.0
+        for handle in (self._force, self._newtons):
+            self._see(handle, pressed)
+        if pressed and tip is not None and force is not None:
+            # From the surface: it ends where the tool is.
+            begin = [p - _FORCE * f for p, f in zip(tip, force, strict=True)]
+            _, turn = _between((begin[0], begin[1], begin[2]), tip)
+            self._force.position, self._force.wxyz = (begin[0], begin[1], begin[2]), turn
+            self._force.scale = (1.0, 1.0, _FORCE * size / _ARROW)
+            self._newtons.position = self._force.position
+            self._newtons.text = f"{size:.1f} N"
+        holds = tip is not None and now.held is not None and now.held.mass > _SHOWN
+        for part in (self._payload, self._grams):
+            self._see(part, holds)
+        if holds and tip is not None and now.held is not None:
+            x, y, z = tip
+            self._payload.position = (x, y, z + 0.5 * _PAYLOAD)
+            self._grams.position = (x, y, z + 1.5 * _PAYLOAD)
+            self._grams.text = f"{1e3 * now.held.mass:.0f} g"
 
     def draw_trail(self, trail: Trail) -> None:
         """Draw a path in the colours of its margins."""

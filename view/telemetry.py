@@ -34,6 +34,7 @@ from view.log_flight import GROUPS, status_name
 from view.scene import (
     Battery,
     Event,
+    Held,
     Horizon,
     Margin,
     Posture,
@@ -41,6 +42,7 @@ from view.scene import (
     Scene,
     Solver,
     Timing,
+    Tool,
 )
 from view.vehicle import horizon
 
@@ -175,7 +177,20 @@ class Telemetry:
             solver=None if solver is None else _solver(solver),
             timing=tuple(self._timings[group] for group in sorted(self._timings)),
             safety=safety,
+            tool=self._tool(),
+            held=self._held(),
         )
+
+    def _tool(self) -> Tool | None:
+        values = self._newest(ids.TOOL_CONTACT, lasts=_SHORT_S)
+        if values is None or not all(map(math.isfinite, values[1:8])):
+            return None
+        pressed, asked, most = (float(values[k]) for k in (4, 7, 8))
+        return Tool(_vec3(values[1:4]), pressed, asked, most, bool(values[10]))
+
+    def _held(self) -> Held | None:
+        values = self._newest(ids.PAYLOAD_STATUS)
+        return None if values is None else Held(bool(values[2]), float(values[1]))
 
     def _failures(self, beat: tuple[Any, ...] | None) -> str:
         """By their names, which EVENT has; HEARTBEAT alone says only that there are any."""
@@ -493,4 +508,6 @@ _READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
     ids.LOOP_TIMING: Telemetry.read_timing,
     ids.OBSTACLE_SHAPE: Telemetry.read_zone,
     ids.MPC_HORIZON: _nothing,
+    ids.TOOL_CONTACT: _nothing,
+    ids.PAYLOAD_STATUS: _nothing,
 }

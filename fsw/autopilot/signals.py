@@ -894,6 +894,13 @@ class ContactReport(NamedTuple):
     distance: float  # m, of the tool to where the surface is
 
 
+class PayloadReport(NamedTuple):
+    """What the gripper does, and what it holds."""
+
+    closed: bool
+    mass: float  # kg, at the end-effector, weighed
+
+
 @dataclass(frozen=True, slots=True)
 class FlightSnapshot:
     """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
@@ -929,6 +936,7 @@ class FlightSnapshot:
     actuators_found: ActuatorReport = ActuatorReport()
     sensors_lost: tuple[str, ...] = ()  # that are of no use, beside the pose
     touching: ContactReport | None = None  # None: no surface that may be touched is near
+    payload: PayloadReport | None = None  # None: the gripper was never told anything
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,6 +72,7 @@ _RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
 _PLANNING: Final = Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
 _MPC: Final = Packed(topics.MPC_STATUS)
 _CONTACT: Final = Packed(topics.TOOL_CONTACT)
+_PAYLOAD: Final = Packed(topics.PAYLOAD)
 _ASKED: Final = Packed(topics.VEHICLE_COMMAND)
 _ANSWERED: Final = Packed(topics.VEHICLE_COMMAND_ACK)
 _INPUT: Final = Packed(topics.TICK_INPUT)
@@ -172,6 +173,8 @@ class LogEncoder:
             if snapshot.touching is not None:
                 contact, force, *numbers = snapshot.touching
                 out += _CONTACT.pack(t_us, (*force, *numbers, contact))
+            if snapshot.payload is not None:
+                out += _PAYLOAD.pack(t_us, (snapshot.payload.mass, snapshot.payload.closed))
         if snapshot.plan_state is not None and self._plans.is_due(t_us):
             out += self._in_flight(snapshot)
         if self._rates.is_due(t_us):

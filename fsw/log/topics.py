@@ -174,6 +174,15 @@ TOOL_CONTACT: Final = Topic(
         Field("contact", "bool"),
     ),
 )
+PAYLOAD: Final = Topic(
+    "payload",
+    "What the gripper holds",
+    "from the first command to it, 50 Hz; every tick with `LOG_PROFILE` 1",
+    (
+        *floats("mass", note="kg, at the end-effector, weighed by the joints"),
+        Field("closed", "bool", note="the gripper"),
+    ),
+)
 END_EFFECTOR: Final = Topic(
     "end_effector",
     "Estimate and the reference in use",
@@ -424,6 +433,7 @@ TOPICS: Final = (
     TICK,
     *px4_topics.PX4_TOPICS,
     TOOL_CONTACT,
+    PAYLOAD,
 )
 """Everything the flight software writes; a topic's place is its number in the file.
 

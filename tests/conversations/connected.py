@@ -38,6 +38,7 @@ from fsw.runtime.assembly import vehicle_facts
 from fsw.storage.parameter_store import ParameterStore
 from messages import dialect
 from messages.frames import as_version_1
+from sitl.scenario import Scenario
 from tests.closed_loop.harness import Flight, on_the_ground
 
 Message = Any
@@ -139,13 +140,15 @@ class Connected:
 
 
 @contextlib.contextmanager
-def connected(folder: Path, config: FlightConfig) -> Iterator[Connected]:
-    """A vehicle that stands disarmed, with an earlier flight's log beside its own."""
+def connected(
+    folder: Path, config: FlightConfig, scenario: Scenario | None = None
+) -> Iterator[Connected]:
+    """A vehicle that stands disarmed or in a scenario, an earlier flight's log beside its own."""
     station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     station.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
     station.bind(("127.0.0.1", 0))
     station.setblocking(False)
-    flight, inbox = Flight(on_the_ground(), config=config), Inbox()
+    flight, inbox = Flight(scenario or on_the_ground(), config=config), Inbox()
     parameters = ParameterStore(config, lambda tuning: None)
     parameters.open(AtOnce(), lambda values: None)
     site = Site(

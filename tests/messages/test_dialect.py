@@ -25,6 +25,7 @@ PINNED = {
     "MPC_HORIZON_ARM": (60213, 222, 38),
     "FORCE_TORQUE": (60214, 32, 198),
     "TOOL_CONTACT": (60215, 45, 89),
+    "PAYLOAD_STATUS": (60216, 13, 36),
 }
 
 # From pymavlink's development.xml and upstream.xml, as MAVLink's common.xml and QGroundControl have

@@ -1,11 +1,12 @@
 """Tests of what the page says beside the picture."""
 
 import math
+from dataclasses import replace
 
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.signals import SafeSet
 from view import colours, panels
-from view.scene import Battery, Event, Margin, Posture, Scene, Solver, Timing, Worst
+from view.scene import Battery, Event, Held, Margin, Posture, Scene, Solver, Timing, Tool, Worst
 
 LEVEL = Posture((0.0, 0.0, -1.0), (1.0, 0.0, 0.0, 0.0), (0.5, 0.25))
 SCENE = Scene(
@@ -31,6 +32,16 @@ def test_one_instant_says_what_a_pilot_asks_for() -> None:
         assert said in html, said
     assert html.index("front/base") < html.index("left/base"), "the least margin comes first"
     assert "of 17.17" in html
+
+
+def test_the_force_on_the_tool_is_shown_against_what_is_allowed_and_the_payload_by_its_mass() -> (
+    None
+):
+    tool, held = Tool((-6.0, 0.0, 0.0), 6.04, 5.0, 10.0, True), Held(True, 0.312)
+    html = panels.now_html(replace(SCENE, tool=tool, held=held), AIRFRAME, begin=2.0)
+    for said in ("in contact", "6.0 N", "of 10", "asked for", "5.0 N", "312 g", "closed"):
+        assert said in html, said
+    assert "gripper" not in panels.now_html(SCENE, AIRFRAME, begin=2.0)
 
 
 def test_what_is_not_known_is_not_made_up() -> None:

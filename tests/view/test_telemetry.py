@@ -24,6 +24,7 @@ from messages.frames import FrameWriter, split
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
 from view import tlog_flight
 from view.flight_data import UlogError
+from view.scene import Held, Tool
 from view.telemetry import Telemetry
 from view.tlog_flight import TlogFlight
 
@@ -106,6 +107,8 @@ def test_the_scene_is_the_snapshot_that_was_sent() -> None:
     assert scene.battery is not None
     assert scene.battery.remaining == pytest.approx(0.62)
     assert scene.safe_set == WALLS
+    assert scene.tool == Tool((-5.0, 0.5, 1.5), 5.25, 4.75, 10.0, True)
+    assert scene.held == Held(True, 0.28125)
     assert {one.name for one in scene.timing} == {"inner", "mpc", "telemetry", "housekeeping"}
 
 

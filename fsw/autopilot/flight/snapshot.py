@@ -5,7 +5,7 @@ from __future__ import annotations
 from fsw.autopilot.flight.failsafe.table import FAULTS
 from fsw.autopilot.flight.modes.offboard import report
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.signals import ContactReport, FlightSnapshot, Mode, SensorFrame
+from fsw.autopilot.signals import ContactReport, FlightSnapshot, Mode, PayloadReport, SensorFrame
 from fsw.autopilot.tick_record import Pressing
 
 
@@ -65,6 +65,9 @@ def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
         actuators_found=state.damage.report,
         sensors_lost=tuple([one.sensor.value for one in state.aiding.lost]),
         touching=contact_report(r.pressing) if r.pressing.near else None,
+        payload=PayloadReport(vehicle.gripper > 0.0, float(r.payload.mass))
+        if vehicle.gripper
+        else None,
     )
 
 

@@ -105,6 +105,7 @@ STREAMS: Final = (
     Stream(message_ids.MPC_HORIZON, 0, 0, PANDION, encode_dialect.mpc_horizon),
     Stream(message_ids.MPC_HORIZON_ARM, 0, 0, PANDION, encode_dialect.mpc_horizon_arm),
     Stream(message_ids.TOOL_CONTACT, 10, 20, PANDION, encode_dialect.tool_contact),
+    Stream(message_ids.PAYLOAD_STATUS, 2, 10, PANDION, encode_dialect.payload_status),
 )
 
 # These leave at once when mode, arming, landing or health change.

@@ -105,6 +105,13 @@ def tool_contact(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | 
     return (snapshot.t_us, *force, *numbers, int(contact))
 
 
+def payload_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues | None:
+    """PAYLOAD_STATUS once the gripper was told something."""
+    if snapshot.payload is None:
+        return None
+    return (snapshot.t_us, snapshot.payload.mass, int(snapshot.payload.closed))
+
+
 def mpc_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues | None:
     """MPC_STATUS of the last plan that was accepted, with the status of the last cycle."""
     plan, facts = snapshot.plan, context.facts

@@ -22,6 +22,7 @@ from fsw.autopilot.signals import (
     Mode,
     OffboardReport,
     Orbit,
+    PayloadReport,
     Plan,
     PlanInput,
     PlannerCounters,
@@ -136,6 +137,7 @@ SNAPSHOT = FlightSnapshot(
     accel_B=(0.1, 0.2, -9.7),
     estimator=REPORT,
     touching=ContactReport(True, (-5.0, 0.5, 1.5), 5.25, 0.375, 5.125, 4.75, 10.0, -0.0625),
+    payload=PayloadReport(True, 0.28125),
 )  # fmt: skip
 
 

@@ -137,6 +137,7 @@ TELLING: dict[int, dict[str, Any]] = {
         "force": [-5.0, 0.5, 1.5], "pressed": 5.25, "unsure": 0.375, "commanded": 5.125,
         "asked": 4.75, "force_max": 10.0, "distance": -0.0625, "contact": 1,
     },
+    ids.PAYLOAD_STATUS: {"mass": 0.28125, "gripper": 1},
     ids.MPC_HORIZON_ARM: {
         "time_usec": 3_000_000, "position": [0.0] * 8, "velocity": [0.0] * 8,
         "acceleration": [0.0] * 36, "plan_id": 7, "steps": 0, "joint_count": 2,
