@@ -16,7 +16,6 @@ from fsw.autopilot.parameters.touching import (
     against_pressing,
     against_touching,
     grip,
-    max_force,
     sideways_force,
 )
 from fsw.autopilot.shapes.half_space import wall
