@@ -251,11 +251,12 @@ def test_the_force_that_was_found_flies_with_the_whole_stack() -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-14")
-def test_beyond_what_is_claimed_the_vehicle_says_what_it_does() -> None:
-    """A wall that comes by 0.1 m/s, and joints that are measured wrong."""
+@pytest.mark.parametrize("first_step", [300, 1400])
+def test_beyond_what_is_claimed_the_vehicle_says_what_it_does(first_step: int) -> None:
+    """A wall that comes by 0.1 m/s: where the tool is about to touch, and where nobody looks."""
     scenario = _pressing()
     flight = WholeFlight(scenario, _config_of(scenario))
-    flight.go_to(1400, lambda _, __: None)  # 2.8 s: before the tool touches
+    flight.go_to(first_step, lambda _, __: None)
     known = {met.name: met for met in unclaimed(scenario)}
     still = np.zeros((1, 3))
     flown = flight.stretch(2500, Disturbance(0.8, 50, still, np.zeros((3, 3)), known["comes"]))
@@ -263,7 +264,7 @@ def test_beyond_what_is_claimed_the_vehicle_says_what_it_does() -> None:
     assert flown.contact is None
     assert flown.force_share <= 1.0
     calm = flight.stretch(2500, Disturbance(0.8, 50, still, np.zeros((3, 3))))
-    assert calm.told == ()
+    assert not calm.left
     assert 0.4 < calm.force_share < 0.7
 
 
