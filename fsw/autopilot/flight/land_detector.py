@@ -98,16 +98,18 @@ def may_be_low(config: FlightConfig, state: FlightState, estimate: StateEstimate
 def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> bool:
     """Whether legs are less than 0.1 m above the ground: nothing that is known says otherwise."""
     height, room = height_above_ground(config, estimate), _SIGMAS * state.aiding.height_sigma
-    measured = _measured_now(config, state, estimate)
+    measured = _measured_now(config, state, estimate, newest=2)  # 0.1 s later legs carry
     if measured is not None and measured[0] < _CLOSE:
         return height - room < _CLOSE
     doubtful = measured is None or _has_fault(state, 1e-6 * estimate.t_us, SensorFault.JUMP)
     return doubtful and height < _CLOSE and height + room < _FALL
 
 
-def _measured_now(config: FlightConfig, state: FlightState, estimate: StateEstimate) -> Vec2 | None:
+def _measured_now(
+    config: FlightConfig, state: FlightState, estimate: StateEstimate, newest: int = 0
+) -> Vec2 | None:
     now, legs = 1e-6 * estimate.t_us, config.airframe.leg_length
-    return _measured_height(state, now, estimate.R_WB[8], legs, _RANGE_AGE)
+    return _measured_height(state, now, estimate.R_WB[8], legs, _RANGE_AGE, newest)
 
 
 def _has_fault(state: FlightState, now: float, *kinds: SensorFault) -> bool:
@@ -135,19 +137,21 @@ def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool
 
 
 def _measured_height(
-    state: FlightState, now: float, upright: float, legs: float, oldest: float
+    state: FlightState, now: float, upright: float, legs: float, oldest: float, newest: int = 0
 ) -> Vec2 | None:
     """Height of the ``legs`` [m, long] above the ground [m], and its deviation [m].
 
     By the rangefinder; None if that is stuck, or ``oldest`` [s] or more at ``now`` [s]. The cosine
-    of the tilt is ``upright`` [1].
+    of the tilt is ``upright`` [1]. So many of the ``newest`` readings count, 0: all that are kept.
     """
     seen = state.vehicle.range
     if seen is None or not 0.0 <= now - seen.time < oldest:
         return None
     if _has_fault(state, now, SensorFault.STUCK):
         return None
-    return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
+    counted = [one.distance for one in state.vehicle.ranges[-newest:]] if newest else []
+    distance = max(counted, default=seen.distance)
+    return distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
 
 
 def is_light(config: FlightConfig, state: FlightState) -> bool:

@@ -176,6 +176,20 @@ def test_a_rangefinder_that_is_known_to_be_wrong_does_not_say_how_high_it_is(
     assert is_aloft(with_record(state, known=low), 2.0, legs, oldest=0.5) is not stuck
 
 
+@pytest.mark.requirement("REQ-EST-13")
+def test_without_a_gyro_rotors_stop_by_the_last_two_distances() -> None:
+    """By the longest of 0.1 s they stopped so late that the legs carried, and the vehicle fell."""
+    state = flying(Mode.DESCEND)
+    for k, height in enumerate((0.15, 0.14, 0.09, 0.08)):
+        sample = replace(seen(height), time=1.92 + 0.02 * k)
+        state = replace(state, vehicle=with_range(state.vehicle, sample))
+    assert state.vehicle.range is not None
+    assert state.vehicle.range.distance == seen(0.15).distance
+    low = vehicle_at((0.0, 0.0, GROUND_Z - 0.08), t_us=2_000_000)
+    state = replace(state, aiding=Aiding(height_sigma=2.0, gyro_lost=True))
+    assert feel_ground(CONFIG, state, low)[1]
+
+
 def test_distances_that_are_noise_do_not_say_that_the_ground_is_near() -> None:
     """At 50 a second and 1.2 m above the ground, with a deviation of a metre, two often did."""
     vehicle, random, short = flying().vehicle, np.random.default_rng(1), 0
