@@ -19,7 +19,6 @@ from fsw.autopilot.signals import (
     PredictionState,
     StateEstimate,
     Vec2,
-    Vec3,
 )
 from fsw.record import (
     JOINTS,
@@ -347,12 +346,6 @@ class Tick(Record):
         return north, east
 
     @property
-    def pushed(self) -> Vec3:
-        """What a surface accelerates the base by that the tool presses on [m/s^2, NED]."""
-        x, y, z = _THREE.unpack_from(self.memory, _PUSHED_AT)
-        return x, y, z
-
-    @property
     def touches(self) -> bool:
         """Whether the tool is at something or asked to be, or holds something."""
         (contact,) = _WHOLE.unpack_from(self.memory, _CONTACT_AT)
@@ -443,7 +436,6 @@ _HEAD: Final = struct.Struct("<4q")  # has_estimate, has_plan, rotor_count, join
 _WHOLE: Final = struct.Struct("<q")
 _ONE: Final = struct.Struct("<d")
 _TWO: Final = struct.Struct("<2d")
-_THREE: Final = struct.Struct("<3d")
 
 
 _DOWN_AT: Final = Tick.place("estimate", "p_WB") + 2 * 8
@@ -456,7 +448,6 @@ _WORK_AT: Final = Tick.place("bodies", "work")
 _COUNTS_AT: Final = Tick.place("rotor_count")
 _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")
-_PUSHED_AT: Final = Tick.place("observed", "known")
 _UNDONE_AT: Final = Tick.place("watch", "undone")
 _CONTACT_AT: Final = Tick.place("pressing", "contact")
 _ASKED_AT: Final = Tick.place("pressing", "asked")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -17,39 +17,31 @@ from fsw.autopilot.signals import SafeSet
 class Rows(NamedTuple):
     """The numbers of a block, for kernels."""
 
-    start: Array  # (starts,)
+    start: Array  # (starts,) the value of each zone and part at node 0
     value: Array  # (rows,)
     lower_bound: Array  # (rows,)
     gradient: Array  # (rows, inputs n)
 
 
-@dataclass(frozen=True)
 class ConstraintBlock:
     """Rows ``value + gradient (U - U_guess) + slack >= lower_bound``, slack >= 0.
 
     Which slack softens a row never changes; the numbers are refilled in place each iteration.
     """
 
-    node: NDArray[np.intp]  # (rows,) node of each row, 1..n
-    slack: NDArray[np.intp]  # (rows,) index of its slack among this block's slacks
-    unknowns: int  # inputs n
-    starts: int  # values at node 0
-    start: Array = field(init=False)  # (starts,) the value of each zone and part at node 0
-    value: Array = field(init=False)  # (rows,)
-    lower_bound: Array = field(init=False)  # (rows,)
-    gradient: Array = field(init=False)  # (rows, inputs n)
+    def __init__(
+        self, node: NDArray[np.intp], slack: NDArray[np.intp], unknowns: int, starts: int
+    ) -> None:
+        """Rows of so many ``unknowns`` (inputs n), and so many values at the start, node 0.
 
-    def __post_init__(self) -> None:
-        rows = len(self.node)
-        object.__setattr__(self, "start", np.zeros(self.starts))
-        object.__setattr__(self, "value", np.zeros(rows))
-        object.__setattr__(self, "lower_bound", np.zeros(rows))
-        object.__setattr__(self, "gradient", np.zeros((rows, self.unknowns)))
-
-    @property
-    def rows(self) -> Rows:
-        """The arrays themselves."""
-        return Rows(self.start, self.value, self.lower_bound, self.gradient)
+        ``node`` (rows,) [1] is that of each row, 1..n, ``slack`` (rows,) [1] its slack's index.
+        """
+        rows = len(node)
+        self.node, self.slack = node, slack
+        self.rows = Rows(
+            np.zeros(starts), np.zeros(rows), np.zeros(rows), np.zeros((rows, unknowns))
+        )
+        self.start, self.value, self.lower_bound, self.gradient = self.rows
 
     @property
     def slacks(self) -> int:

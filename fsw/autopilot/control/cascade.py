@@ -43,7 +43,7 @@ from fsw.autopilot.control.tracking import (
 )
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround, beyond_covered
 from fsw.autopilot.geometry.rotation import rotate_back, wrap_angle
-from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, subtract
+from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, subtract, three
 from fsw.autopilot.model.actuator_health import (
     HEALTHY,
     SOUND,
@@ -191,14 +191,13 @@ class Cascade:
         now.known = estimate
         return self._motion(self.packed, now.array)
 
-    def expected(self, r: Tick) -> tuple[JointVector, Model]:
-        """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle."""
-        model = self._expected(self.packed, r.array)
-        return r.joint_acceleration, model
+    def expected(self, r: Tick) -> tuple[JointVector, Model, Vec3]:
+        """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle.
 
-    def joint_acceleration(self, r: Tick) -> JointVector:
-        """The joints' part of ``expected`` [rad/s^2]."""
-        return self.expected(r)[0]
+        And what a surface that the tool presses on makes of it besides [m/s^2, NED].
+        """
+        model, known = self._expected(self.packed, r.array)
+        return r.joint_acceleration, model, known
 
     def setpoint(self, r: Tick) -> Setpoint | None:
         """What another autopilot is asked for; None: these loops command rotors."""
@@ -440,7 +439,7 @@ def _close_loops(
 
 
 @kernel
-def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> Model:
+def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Model, Vec3]:
     airframe, r = laws[0].airframe, ticks[0]
     for i in range(int(airframe.rotors)):
         settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
@@ -451,7 +450,8 @@ def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> Model:
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)
     turning = motion.turning
-    return turning[0], turning[1], turning[2], motion.thrust / r.mass
+    model = turning[0], turning[1], turning[2], motion.thrust / r.mass
+    return model, three(r.observed.known, 0)
 
 
 @kernel

@@ -226,12 +226,7 @@ def end_effector(bodies: Bodies, estimate: StateEstimate) -> tuple[Vec3, Vec3]:
 @machine_code
 @kernel
 def _tip(frame: Array, bodies: NDArray[Any]) -> tuple[Vec3, Vec3]:
-    return _moving_tip(frame, bodies[0])
-
-
-@compilable
-def _moving_tip(frame: Array, b: Bodies) -> tuple[Vec3, Vec3]:
-    """Position [m, NED] and velocity [m/s, NED] of the end-effector of a frame."""
+    b = bodies[0]
     tip, last = (b.tip[0], b.tip[1], b.tip[2]), int(b.joints)
     return position(frame, last, tip), velocity(frame, last, tip)
 
@@ -258,9 +253,9 @@ def end_effector_when_level(bodies: Bodies, q_arm: JointVector, yaw: float) -> V
 @compilable
 def predicted_end_effector(b: Bodies, state: Array) -> tuple[Vec3, Vec3]:
     """Its position [m, NED] and velocity [m/s, NED] in a prediction ``state`` (states,) [SI]."""
-    frame = np.zeros(FRAME)
+    frame, tip = np.zeros(FRAME), (b.tip[0], b.tip[1], b.tip[2])
     fill_frame(state, b, frame)
-    return _moving_tip(frame, b)
+    return position(frame, int(b.joints), tip), velocity(frame, int(b.joints), tip)
 
 
 @compiled

@@ -9,7 +9,6 @@ time-invariant: what an input does depends on how long ago it acted, not on the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,27 +100,20 @@ class Tracked(NamedTuple):
     d_arm_com: Array  # (n + 1, 2, inputs n)
 
 
-@dataclass(frozen=True)
 class Linearisation:
     """Preallocated results of one linearisation."""
 
-    model: CondensedModel
-    states: Array = field(init=False)  # (n + 1, states)
-    horizon: Horizon = field(init=False)
-    tracked: Tracked = field(init=False)
-
-    def __post_init__(self) -> None:
-        model, nodes = self.model, self.model.horizon + 1
-        unknowns = model.inputs * model.horizon
-        states = np.zeros((nodes, model.states))
-        horizon = Horizon(
-            states=states,
+    def __init__(self, model: CondensedModel) -> None:
+        nodes, unknowns = model.horizon + 1, model.inputs * model.horizon
+        self.model, self.states = model, np.zeros((nodes, model.states))
+        self.horizon = Horizon(
+            states=self.states,
             frames=np.zeros((nodes, FRAME)),
             impulse=impulses(model),
             inputs=np.zeros(unknowns),
         )
-        tracked = Tracked(
-            yaw=states[:, YAW : YAW_RATE + 1],
+        self.tracked = Tracked(
+            yaw=self.states[:, YAW : YAW_RATE + 1],
             position=np.zeros((nodes, 3)),
             velocity=np.zeros((nodes, 3)),
             arm_com=np.zeros((nodes, 2)),
@@ -130,9 +122,6 @@ class Linearisation:
             d_velocity=np.zeros((nodes, 3, unknowns)),
             d_arm_com=np.zeros((nodes, 2, unknowns)),
         )
-        object.__setattr__(self, "states", states)
-        object.__setattr__(self, "horizon", horizon)
-        object.__setattr__(self, "tracked", tracked)
 
     def refill(self, start: Array, inputs: Array, pushes: Array | None = None) -> None:
         """Linearise from ``start`` (states,) [SI] around the ``inputs`` (inputs n,) [SI].

@@ -294,31 +294,15 @@ def _note(
     moment: Vec3,
 ) -> None:
     """What one link adds, about the origin: moments of mass, momentum, force that it takes."""
-    i = _VECTORS * k
-    square = dot(c, c)
-    put_three(sums, 3 * i, (mass * c[0], mass * c[1], mass * c[2]))
-    put_three(
-        sums,
-        3 * (i + 1),
-        (
-            inertia[0] + mass * (square - c[0] * c[0]),
-            inertia[1] + mass * (square - c[1] * c[1]),
-            inertia[2] + mass * (square - c[2] * c[2]),
-        ),
-    )
-    put_three(
-        sums,
-        3 * (i + 2),
-        (
-            inertia[3] - mass * c[0] * c[1],
-            inertia[4] - mass * c[0] * c[2],
-            inertia[5] - mass * c[1] * c[2],
-        ),
-    )
-    put_three(sums, 3 * (i + 3), (mass * v[0], mass * v[1], mass * v[2]))
-    put_three(sums, 3 * (i + 4), add_scaled(spin, cross(c, v), mass))
-    put_three(sums, 3 * (i + 5), (mass * a[0], mass * a[1], mass * a[2]))
-    put_three(sums, 3 * (i + 6), add_scaled(moment, cross(c, a), mass))
+    at, square, (x, y, z), (xx, yy, zz, xy, xz, yz) = _SUMS * k, dot(c, c), c, inertia
+    own = (xx + mass * (square - x * x), yy + mass * (square - y * y), zz + mass * (square - z * z))
+    put_three(sums, at, (mass * x, mass * y, mass * z))
+    put_three(sums, at + 3, own)
+    put_three(sums, at + 6, (xy - mass * x * y, xz - mass * x * z, yz - mass * y * z))
+    put_three(sums, at + 9, (mass * v[0], mass * v[1], mass * v[2]))
+    put_three(sums, at + 12, add_scaled(spin, cross(c, v), mass))
+    put_three(sums, at + 15, (mass * a[0], mass * a[1], mass * a[2]))
+    put_three(sums, at + 18, add_scaled(moment, cross(c, a), mass))
 
 
 @compilable

@@ -188,8 +188,6 @@ def _timings(search: Search, total_us: float) -> PlanTimings:
 def _as_plan_inputs(inputs: Array, request: PlanRequest) -> tuple[PlanInput, ...]:
     pushes = request.pushes or ((0.0, 0.0, 0.0),) * len(inputs)
     return tuple(
-        [
-            PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:]), push, target.force)
-            for u, push, target in zip(inputs.tolist(), pushes, request.targets, strict=False)
-        ]
+        PlanInput((u[0], u[1], u[2]), u[YAW_ACC], tuple(u[QDD_ARM:]), push, target.force)
+        for u, push, target in zip(inputs.tolist(), pushes, request.targets, strict=False)
     )

@@ -8,8 +8,6 @@ missing is in ``estimation/frame_dropout.py``. On the ground a frame is taken wh
 
 from __future__ import annotations
 
-from functools import partial
-
 from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import read_frame
@@ -80,8 +78,8 @@ class ExactState:
         texts.extend(StatusText(Severity.WARNING, text) for text in sentences)
         aiding = AIDED
         if missing:
-            joints = partial(self._cascade.joint_acceleration, state.cascade)
-            found = filled(missing, inputs.sensors, found, before, joints)
+            r, expected = state.cascade, self._cascade.expected
+            found = filled(missing, inputs.sensors, found, before, lambda: expected(r)[0])
             aiding = _aiding(dropout, found.t_us)
         if away and dropout.pose.since_us < 0:
             state = returned(state, found, before, texts)

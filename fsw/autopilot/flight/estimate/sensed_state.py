@@ -91,7 +91,7 @@ class SensedState:
     def warm_up(self) -> None:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
-        self._cascade.joint_acceleration(in_hover(self._cascade.law.airframe, estimate))
+        self._cascade.expected(in_hover(self._cascade.law.airframe, estimate))
 
     def _memory(self, state: FlightState, now: float) -> FusionMemory:
         """The filter's memory at ``now`` [s].
@@ -129,8 +129,7 @@ class SensedState:
         pushed: JointVector = ()
         model, surfaces = UNKNOWN, UNPUSHED
         if state.cascade.has_estimate:
-            pushed, model = self._cascade.expected(state.cascade)
-            surfaces = state.cascade.pushed
+            pushed, model, surfaces = self._cascade.expected(state.cascade)
             # On the ground thrust does not explain how the vehicle moves.
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN

@@ -109,7 +109,7 @@ def test_no_row_feels_an_input_from_its_node_on(walls: tuple[Zone, ...]) -> None
     random = np.random.default_rng(4)
     for _ in range(10):
         rows = refilled(walls, random_case(random)).rows
-        later = np.arange(rows.unknowns) >= INPUTS * rows.node[:, None]
+        later = np.arange(rows.gradient.shape[1]) >= INPUTS * rows.node[:, None]
         assert not rows.gradient[later].any()
         assert rows.gradient[~later].any()
 
