@@ -250,7 +250,7 @@ def _described(name: str, value: float) -> dict[str, Any]:
 
 
 def _number(value: float) -> str:
-    from fsw.autopilot.parameters.float32 import as_text
+    from fsw.autopilot.parameters.param_type import as_text
 
     return as_text(value)
 

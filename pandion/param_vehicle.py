@@ -8,8 +8,7 @@ import select
 import time
 from typing import Final, cast
 
-from fsw.autopilot.parameters.float32 import nearest_decimal
-from fsw.autopilot.parameters.param_type import field_of, value_of
+from fsw.autopilot.parameters.param_type import field_of, nearest_decimal, value_of
 from fsw.link.endpoints import open_endpoint
 from messages import message_ids as ids
 from messages import status_text

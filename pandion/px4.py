@@ -117,7 +117,7 @@ def parameters(options: _Plant) -> dict[str, int | float]:
 
 
 def _print_parameters(options: _Params) -> int:
-    from fsw.autopilot.parameters.float32 import as_text
+    from fsw.autopilot.parameters.param_type import as_text
 
     values = parameters(options)
     for name, value in values.items():
@@ -154,7 +154,7 @@ def _set_all(options: _Params, values: dict[str, int | float]) -> int:
 
 
 def _print_environment(options: _Plant) -> int:
-    from fsw.autopilot.parameters.float32 import as_text
+    from fsw.autopilot.parameters.param_type import as_text
     from sitl.px4_parameters import AIRFRAME, MODEL
 
     print(f"PX4_SYS_AUTOSTART={AIRFRAME}\nPX4_SIM_MODEL={MODEL}")

@@ -10,7 +10,7 @@ from typing import Final
 from fsw.autopilot.flight.commands.arming import CHECKS, ArmingCheck
 from fsw.autopilot.flight.failsafe.conditions import Action
 from fsw.autopilot.flight.failsafe.table import FAILSAFES, Failsafe
-from fsw.autopilot.parameters.float32 import as_text
+from fsw.autopilot.parameters.param_type import as_text
 from fsw.autopilot.parameters.registry import BY_NAME
 
 

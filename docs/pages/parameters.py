@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from fsw.autopilot.parameters.facts import FACTS, Fact
-from fsw.autopilot.parameters.float32 import as_text
-from fsw.autopilot.parameters.param_type import type_name
+from fsw.autopilot.parameters.param_type import as_text, type_name
 from fsw.autopilot.parameters.registry import GROUPS, PARAMETERS, Parameter
 
 _HEAD = """\

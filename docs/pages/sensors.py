@@ -9,12 +9,12 @@ import tomllib
 import typing
 from typing import Annotated, Any, Final
 
-from sitl.scenario_file import SUITES
+from sitl.scenario_file import PERFECT, SUITE_NAMES, SUITES
 from sitl.sensors import keys
 
 BEGIN: Final = "<!-- sensors: make pages -->\n"
 END: Final = "<!-- end -->"
-NAMES: Final = ("mocap", "vio", "rtk", "gnss")
+NAMES: Final = tuple(name for name in SUITE_NAMES if name != PERFECT)
 TABLES: Final[dict[str, type[keys.Timing]]] = {
     name: kind
     for name, hint in typing.get_type_hints(keys.MeasuredSensors).items()

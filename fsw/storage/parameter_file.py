@@ -18,8 +18,7 @@ from typing import Final
 
 from command_line.bounded_file import read_bounded
 from fsw.autopilot.parameters.facts import ALIASES, FACT_BY_NAME
-from fsw.autopilot.parameters.float32 import as_text, nearest_decimal
-from fsw.autopilot.parameters.param_type import field_of
+from fsw.autopilot.parameters.param_type import as_text, field_of, nearest_decimal
 from fsw.autopilot.parameters.registry import BY_NAME
 
 VEHICLE: Final = 1  # MAVLink system of the vehicle

@@ -23,7 +23,7 @@ LONGEST = 8192  # bytes of an input
 SLOWEST = 10  # s for one input
 PACKAGES = {  # of each target: in which an input may reach something new
     "scenario": ["sitl.scenario_file", "sitl.scenario_validation", "tomllib"],
-    "parameters": ["fsw.storage.parameter_file", "fsw.autopilot.parameters.float32"],
+    "parameters": ["fsw.storage.parameter_file", "fsw.autopilot.parameters.param_type"],
     "key": ["fsw.link.signing", "json"],
     "flight-log": ["messages.ulog_reader", "messages.ulog", "pandion.log_summary"],
     "datagrams": ["messages.frames"],

@@ -18,7 +18,7 @@ from typing import Final, cast
 
 from fsw.autopilot.estimation.sensors import SENSORS
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.parameters.float32 import nearest_decimal
+from fsw.autopilot.parameters.param_type import nearest_decimal
 from fsw.autopilot.tuning import Row, Tuning, number_at
 
 ACCEL_RANGE: Final = "EST_ACC_RANGE"

@@ -16,8 +16,13 @@ from collections.abc import Sequence
 from typing import Final, cast
 
 from fsw.autopilot.parameters.facts import ALIASES, FACT_BY_NAME, REPEATED
-from fsw.autopilot.parameters.float32 import as_text, nearest_decimal
-from fsw.autopilot.parameters.param_type import as_bytes, field_of, value_of
+from fsw.autopilot.parameters.param_type import (
+    as_bytes,
+    as_text,
+    field_of,
+    nearest_decimal,
+    value_of,
+)
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
 from fsw.link.services.service import LinkService, Outcome

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.gains import LoopGains
-from fsw.autopilot.control.height import height_pid
+from fsw.autopilot.control.pid import height_pid
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
 from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate
 from tests.fsw.random_states import estimate_of

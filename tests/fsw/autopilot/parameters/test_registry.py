@@ -12,7 +12,7 @@ import pytest
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.facts import FACTS
 from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
-from fsw.autopilot.parameters.float32 import as_text, nearest_decimal
+from fsw.autopilot.parameters.param_type import as_text, nearest_decimal
 from fsw.autopilot.parameters.registry import BY_NAME, PARAMETERS, Parameter
 from fsw.autopilot.tuning import flat, number_at, tuned
 from tests.fsw.autopilot.parameters import px4_types
