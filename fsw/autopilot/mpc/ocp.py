@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 
-from fsw.autopilot.barriers.constraint_block import ConstraintBlock, TargetPoints, block
+from fsw.autopilot.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.autopilot.model.linearisation import Linearisation
-from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array, CondensedModel
+from fsw.autopilot.model.prediction import Array, CondensedModel
 from fsw.autopilot.mpc.clarabel_solver import WholeSolver
 from fsw.autopilot.mpc.costs import Quadratic
 from fsw.autopilot.mpc.dual_solver import DualSolver
+from fsw.autopilot.mpc.joint_limits import JointLimits
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.qp_data import InputLimits, QpData
+from fsw.autopilot.mpc.qp_data import QpData
 from fsw.autopilot.mpc.solution import QpSolver, Solution
 from fsw.autopilot.mpc.variants import parts_of
 from fsw.autopilot.signals import SafeSet
-from fsw.record import JOINTS
 
 QP_SOLVERS: dict[str, Callable[[QpData], QpSolver]] = {"dual": DualSolver, "whole": WholeSolver}
-_RATE_SHARE: Final = 0.6  # of what a joint can do; the rest is for the loops
 
 
 class Ocp:
@@ -74,40 +71,3 @@ class Ocp:
         """Largest slack of the barrier's rows in a solution ``x`` (unknowns,) [SI], [m/s]."""
         slacks = x[self._first_barrier_slack :]
         return float(slacks.max()) if len(slacks) else 0.0
-
-
-class JointLimits:
-    """Angles (Table I), sums of angles and rates of the joints within limits at every node.
-
-    One slack a node, of as many rad as rad/s: where the arm is found outside, either may give way.
-    """
-
-    def __init__(self, model: CondensedModel, limits: InputLimits) -> None:
-        bounded = _rows(model, limits)
-        minus = -np.array([row for row, _ in bounded])  # (rows, states)
-        self._minus = np.ascontiguousarray(minus.T)
-        self.rows = block((len(bounded),), 1, model.horizon, model.inputs)
-        self.rows.lower_bound[:] = np.tile([-bound for _, bound in bounded], model.horizon)
-        self.rows.gradient[:] = (minus @ model.gamma[1:]).reshape(self.rows.gradient.shape)
-        self._value = self.rows.value.reshape(model.horizon, -1)
-
-    def refill(self, horizon: Linearisation) -> None:
-        """Bring angles and rates up to date; the gradient never changes."""
-        np.dot(horizon.states[1:], self._minus, out=self._value)
-
-
-def _rows(model: CondensedModel, limits: InputLimits) -> list[tuple[Array, float]]:
-    """Of a state what is to be at most how much: (states,) [1], and rad or rad/s."""
-    airframe, rows = model.airframe, []
-    joints, angles = airframe.bodies.joints, airframe.angle_limits
-    for k in range(angles.rows):
-        row = np.zeros(model.states)
-        row[Q_ARM::2] = angles.row[JOINTS * k : JOINTS * k + joints]
-        rows += [(row, angles.high[k] - limits.joint_margin)]
-        rows += [(-row, -angles.low[k] - limits.joint_margin)]
-    for joint in range(joints):
-        row = np.zeros(model.states)
-        row[QD_ARM + 2 * joint] = 1.0
-        rate = min(limits.joint_rate, _RATE_SHARE * airframe.joint_rate_max[joint])
-        rows += [(row, rate), (-row, rate)]
-    return [(row, bound) for row, bound in rows if bound < math.inf]

@@ -6,7 +6,7 @@ import numpy as np
 
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array, condense
-from fsw.autopilot.mpc.ocp import JointLimits
+from fsw.autopilot.mpc.joint_limits import JointLimits
 from fsw.autopilot.mpc.qp_data import InputLimits
 from tests.fsw.paper_arm import INPUTS, with_angle_limits
 from tests.fsw.random_states import prediction_vector
