@@ -49,6 +49,7 @@ from fsw.autopilot.tuning import Tuning
 from fsw.frozen import dataclass
 
 _NOWHERE: Vec3 = (0.0, 0.0, 0.0)
+HEIGHT_UNKNOWN: Final = 0.5  # m, standard deviation
 _DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT
 
 
@@ -233,9 +234,6 @@ class LostSensor(NamedTuple):
         return f"{sentence(self.sensor, self.fault)}, for {seconds:.2f} s"
 
 
-HEIGHT_UNKNOWN: Final = 0.5  # m, standard deviation
-
-
 class Aiding(NamedTuple):
     """What keeps the estimate from drifting, and what of it is missing."""
 
@@ -267,8 +265,8 @@ class Aiding(NamedTuple):
     @property
     def feels_nothing(self) -> bool:
         """Whether height and force are those of the rotors' model: no ground would be noticed."""
-        known = min(self.height_sigma, self.position_sigma) <= HEIGHT_UNKNOWN
-        return not known and self.has_lost(Sensor.IMU)
+        sigma = min(self.height_sigma, self.position_sigma)
+        return sigma > HEIGHT_UNKNOWN and self.has_lost(Sensor.IMU)
 
 
 AIDED: Final = Aiding()

@@ -244,27 +244,23 @@ FAILSAFES: Final = (
         within_us=_TWICE,
         parameters=("SAFE_SIGMAS", "COM_AID_LOSS_T", "COM_POS_LOW_EPH"),
     ),
-    Failsafe(
+    _of_contact(
         Condition.FORCE_HIGH,
         evidence.presses_too_hard,
-        Action.RETREAT,
-        Severity.CRITICAL,
-        wording.force,
+        detail=wording.force,
         of_vehicle=True,
+        slow=False,
         within_us=2 * AT_ONCE_US,
     ),
     _of_contact(Condition.CONTACT_LOST, evidence.has_lost_contact, detail=wording.without_contact),
     _of_contact(Condition.SURFACE_MOVED, evidence.surface_has_moved, detail=wording.surface_moved),
     _of_contact(Condition.TOOL_SLIPS, evidence.tool_slips),
-    Failsafe(
+    _of_contact(
         Condition.PAYLOAD_HEAVY,
         evidence.payload_is_heavy,
-        Action.LAND,
-        Severity.CRITICAL,
-        wording.payload,
-        slow=True,
+        asks=Action.LAND,
+        detail=wording.payload,
         delayed=True,
-        within_us=_SLOWLY,
         parameters=("COM_FAIL_ACT_T",),
     ),
     Failsafe(
