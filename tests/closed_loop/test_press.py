@@ -12,6 +12,8 @@ from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import Mode
 from sitl.scenario import Push, Scenario, Uniform, vehicle_of
 from sitl.scenario_file import load_scenario
+from sitl.simulation import START_US, Simulation
+from studies.flight.closed_loop import ScenarioFlight
 from tests.closed_loop.harness import Flight
 
 HOLD_S = 2.0
@@ -90,3 +92,14 @@ def test_a_tool_that_slides_over_a_wall_keeps_the_force() -> None:
     held = np.abs(seen[:, 3] - 3.0) < 0.01
     assert held.sum() * 0.002 > 4.5
     assert math.sqrt(float(((seen[held, 0] - 3.0) ** 2).mean())) < 0.6  # 20 %
+
+
+def test_a_tool_that_friction_holds_swings_no_arm_straight() -> None:
+    """What was to move the tool aside pressed with 7.5 N of 5, and pushed the base away."""
+    scenario = load_scenario("probe", "mocap")
+    config = flight_config(body=scenario.body, vehicle=vehicle_of(scenario))
+    flight = ScenarioFlight(Simulation(scenario, 315), config)
+    while flight.loop.simulation.truth().t_us < START_US + 5_500_000:
+        flight.step()
+        assert max(np.abs(flight.loop.simulation.truth().qd_arm)) < 5.0
+    assert flight.recorder.modes == [], flight.recorder.texts

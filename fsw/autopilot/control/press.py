@@ -84,7 +84,7 @@ class PressTuning:
     back: float = 0.3  # m/s, at most, out of the band
     share: float = 0.3  # rho, of the largest force, that an impact may give
     search: float = 2.0  # N, at most, to move the tool in free air
-    rise: float = 15.0  # N/s, of the force
+    rise: float = 10.0  # N/s, of the force; with 12 and more an arm may be swung straight by it
     fall: float = 10.0  # N/s, the same in contact: what leans on a surface is to be caught
     drop: float = 150.0  # N/s, where there is none
     felt: float = 0.4  # N, from which on there is contact
@@ -212,7 +212,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     k.speed = k.surface_speed - speed
     # Joints feel the part of a force that they move the tool along; of what is normal to the
     # surface the rest is known. It turns a vehicle farther aside that is turned aside.
-    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt / max(whole, _AHEAD)
+    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt / max(whole, AHEAD)
     # Rates of s give the tool unit speed along n: an arm that is nearly straight has to turn fast.
     # A part of n that no joint moves the tool along, as with a vehicle turned aside, is no matter.
     reach = whole / math.sqrt(turned) if turned > 0.0 else 0.0
@@ -238,7 +238,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         r.observed.known[i] = (into * normal[i] + share * aside[i]) / r.mass
 
 
-_AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
+AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
 _BLOCKED = 0.5  # share of the speed asked for below which something is in the way
 _DAMPED = 1e-4  # m^2, of levers without which a direction is left out
 
