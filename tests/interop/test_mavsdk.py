@@ -154,7 +154,7 @@ def test_the_arming_checks_are_read_from_events_and_their_document(system: Syste
         names = {component.name for component in report.health_components}
         return {"battery", "attitude_estimate", "storage"} <= names
 
-    assert eventually(reported)
+    assert eventually(reported, 30.0)  # a document is downloaded first, beside all other tests
     report = events.get_health_and_arming_checks_report()
     assert report.current_mode_intention.can_arm_or_run
     assert report.all_problems == []
