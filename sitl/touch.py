@@ -124,6 +124,12 @@ class TouchRecord:
         """Largest of the tip below a surface [m]; 0 where it touches none."""
         return float(self._held["depth"][0].max())
 
+    def force_share(self) -> float:
+        """Largest normal force so far over what its surface allows [1]; 0 without surfaces."""
+        return max(
+            (use.force_max_n / use.force_bound_n for use in self.uses().values()), default=0.0
+        )
+
     def add(self, asked: float, step_s: float) -> None:
         """Compare the normal force with what was ``asked`` [N] for the ``step_s`` [s] before."""
         if asked > 0.0:

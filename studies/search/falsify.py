@@ -648,11 +648,10 @@ def replay(
 
     calm, pushed = replace(scenario, disturbances=()), (Played(pushes, first_step, 1),)
     simulation = fly(calm, config, pushed, see, sense=meet, last_step=last + 1)
-    uses = simulation.touch.uses().values()
     ended = simulation.ended
     return Replayed(
         (float(worst[0]), float(worst[1]), float(worst[2])),
         least[0],
         None if ended is None or ended.kind is EndKind.DURATION else ended.sentence,
-        max((one.force_max_n / one.force_bound_n for one in uses), default=0.0),
+        simulation.touch.force_share(),
     )

@@ -110,10 +110,7 @@ class WholeFlight:
             departures=safety.counters.departures,
             breaches=safety.counters.breaches,
             pushes=tuple(pushes),
-            force_share=max(
-                (one.force_max_n / one.force_bound_n for one in simulation.touch.uses().values()),
-                default=0.0,
-            ),
+            force_share=simulation.touch.force_share(),
             told=tuple(told),
             left=outputs is not None and outputs.mode is not Mode.TRAJECTORY,
         )

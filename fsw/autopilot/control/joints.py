@@ -28,7 +28,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.pid import PidGains, pid_step
-from fsw.autopilot.control.press import AHEAD, PressTuning, press, presses
+from fsw.autopilot.control.press import PressTuning, press, pressed_by, presses
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
@@ -184,19 +184,17 @@ def _press_with(r: Tick, airframe: Airframe, into: float, qdd: Floats) -> None:
     observed there is not made up for: it is what is wanted. Reads bodies; writes pressing.work.
     """
     p, m, n = r.pressing, r.bodies, int(airframe.bodies.joints)
-    along = whole = felt = 0.0
+    along = 0.0
     for i in range(n):
         along += p.along[i] * qdd[i]
-        whole += p.share[i] * p.along[i]
     for i in range(n):
         qdd[i] -= p.share[i] * along
     for i in range(n):
         p.work[i] = 0.0
         for j in range(n):
             p.work[i] += m.qq[JOINTS * i + j] * qdd[j]
-        felt += p.share[i] * p.work[i]
     # What moves the tool aside must not press: where friction holds it, the surface takes it all.
-    aside = felt / max(whole, AHEAD) if p.contact > 0 else 0.0
+    aside = pressed_by(p, p.work, n) if p.contact > 0 else 0.0
     for i in range(n):
         besides = p.external[i] - p.along[i] * p.pressed
         p.work[i] -= clamp_magnitude(besides, _DISTURBANCE * airframe.joint_torque_max[i])

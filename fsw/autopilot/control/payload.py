@@ -32,9 +32,8 @@ WEIGHING_TIME: Final = 0.4  # s, T
 HEAVIEST: Final = 0.2  # of the vehicle's mass, that may be carried
 _BELIEVED: Final = 1.25 * HEAVIEST  # more is not put down to a payload
 _LOST: Final = 0.5  # share of it, that is missed at once where it has fallen
-_LOSING_TIME: Final = (
-    0.04  # s, T then: with a payload that is not there the joints' loops are too hard
-)
+# s, T then: with a payload that is not there the joints' loops are too hard.
+_LOSING_TIME: Final = 0.04
 _HANGING: Final = 0.25  # m^4/s^4: levers of 50 mm, below which little is believed
 
 

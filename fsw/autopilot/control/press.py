@@ -66,9 +66,9 @@ from fsw.autopilot.shapes.zones import (
     velocity_of,
 )
 from fsw.autopilot.signals import Vec3
-from fsw.autopilot.tick_record import Tick
+from fsw.autopilot.tick_record import Pressing, Tick
 from fsw.compiled import compilable
-from fsw.record import JOINTS
+from fsw.record import JOINTS, Floats
 from vehicles.description import V6
 
 
@@ -84,7 +84,7 @@ class PressTuning:
     back: float = 0.3  # m/s, at most, out of the band
     share: float = 0.3  # rho, of the largest force, that an impact may give
     search: float = 2.0  # N, at most, to move the tool in free air
-    rise: float = 10.0  # N/s, of the force; with 12 and more an arm may be swung straight by it
+    rise: float = 10.0  # N/s, of the force; 15 swung an arm straight, in 1 of 20 flights
     fall: float = 10.0  # N/s, the same in contact: what leans on a surface is to be caught
     drop: float = 150.0  # N/s, where there is none
     felt: float = 0.4  # N, from which on there is contact
@@ -199,12 +199,11 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         reached = add_scaled(reached, lever, k.along[i])
     factorise(m.factor, m.qq, n)
     solve(m.factor, k.work, n)
-    eased = felt = whole = turned = 0.0
+    eased = whole = turned = 0.0
     for i in range(n):
         eased += k.along[i] * k.work[i]
         whole += k.share[i] * k.along[i]
         turned += k.share[i] * k.share[i]
-        felt += k.share[i] * k.external[i]
     v = rotate(R, velocity_of_tip(m, b))
     speed = dot(
         normal, (v[0] + r.estimate.v_WB[0], v[1] + r.estimate.v_WB[1], v[2] + r.estimate.v_WB[2])
@@ -212,7 +211,7 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     k.speed = k.surface_speed - speed
     # Joints feel the part of a force that they move the tool along; of what is normal to the
     # surface the rest is known. It turns a vehicle farther aside that is turned aside.
-    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), felt / max(whole, AHEAD)
+    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), pressed_by(k, k.external, n)
     # Rates of s give the tool unit speed along n: an arm that is nearly straight has to turn fast.
     # A part of n that no joint moves the tool along, as with a vehicle turned aside, is no matter.
     reach = whole / math.sqrt(turned) if turned > 0.0 else 0.0
@@ -238,7 +237,17 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         r.observed.known[i] = (into * normal[i] + share * aside[i]) / r.mass
 
 
-AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
+@compilable
+def pressed_by(k: Pressing, torque: Floats, joints: int) -> float:
+    """Force [N] along the normal that a ``torque`` (j,) [N m] makes where the tool cannot move."""
+    felt = whole = 0.0
+    for i in range(joints):
+        felt += k.share[i] * torque[i]
+        whole += k.share[i] * k.along[i]
+    return felt / max(whole, _AHEAD)
+
+
+_AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
 _BLOCKED = 0.5  # share of the speed asked for below which something is in the way
 _DAMPED = 1e-4  # m^2, of levers without which a direction is left out
 

@@ -55,15 +55,22 @@ def height_above_ground(config: FlightConfig, estimate: StateEstimate) -> float:
 
 
 def with_range(vehicle: VehicleMemory, sample: RangeSample) -> VehicleMemory:
-    """The vehicle after a ``sample`` of the rangefinder; some that are too short do not count.
-
-    The longest of the last 0.1 s does, and of the last two: there is dust, and noise.
-    """
+    """The vehicle after a ``sample`` of the rangefinder: it keeps those of 0.1 s, and two."""
     oldest = [_RANGE_MEMORY] * len(vehicle.ranges[:-1]) + [_RANGE_AGE]
     seen = zip(vehicle.ranges, oldest, strict=False)
-    ranges = *[one for one, age in seen if 0.0 <= sample.time - one.time <= age], sample
-    longest = max([one.distance for one in ranges])
-    return replace(vehicle, range=replace(sample, distance=longest), ranges=ranges)
+    kept = [one for one, age in seen if 0.0 <= sample.time - one.time <= age]
+    return replace(vehicle, ranges=(*kept, sample))
+
+
+def longest_range(vehicle: VehicleMemory, newest: int = 0) -> RangeSample | None:
+    """The rangefinder's last reading, with the longest distance of some: there is dust, and noise.
+
+    So many of the ``newest`` count, 0: all that are kept.
+    """
+    counted = vehicle.ranges[-newest:]
+    if not counted:
+        return None
+    return replace(counted[-1], distance=max([one.distance for one in counted]))
 
 
 def stands(config: FlightConfig, estimate: StateEstimate) -> bool:
@@ -112,12 +119,12 @@ def _measured_now(
     return _measured_height(state, now, estimate.R_WB[8], legs, _RANGE_AGE, newest)
 
 
-def _has_fault(state: FlightState, now: float, *kinds: SensorFault) -> bool:
-    """Whether a reading of the rangefinder has lately had a fault of these ``kinds``."""
+def _has_fault(state: FlightState, now: float, kind: SensorFault) -> bool:
+    """Whether a reading of the rangefinder has lately had a fault of this ``kind``."""
     if state.fusion is None:
         return False
     health = state.fusion.of(Sensor.RANGEFINDER)
-    return health.fault in kinds and now - health.fault_at < _RANGE_AGE
+    return health.fault is kind and now - health.fault_at < _RANGE_AGE
 
 
 def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool:
@@ -142,16 +149,14 @@ def _measured_height(
     """Height of the ``legs`` [m, long] above the ground [m], and its deviation [m].
 
     By the rangefinder; None if that is stuck, or ``oldest`` [s] or more at ``now`` [s]. The cosine
-    of the tilt is ``upright`` [1]. So many of the ``newest`` readings count, 0: all that are kept.
+    of the tilt is ``upright`` [1]; for ``newest`` see ``longest_range``.
     """
-    seen = state.vehicle.range
+    seen = longest_range(state.vehicle, newest)
     if seen is None or not 0.0 <= now - seen.time < oldest:
         return None
     if _has_fault(state, now, SensorFault.STUCK):
         return None
-    counted = [one.distance for one in state.vehicle.ranges[-newest:]] if newest else []
-    distance = max(counted, default=seen.distance)
-    return distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
+    return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
 
 
 def is_light(config: FlightConfig, state: FlightState) -> bool:

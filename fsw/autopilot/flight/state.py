@@ -62,7 +62,6 @@ class VehicleMemory:
     moved_us: int = 0  # when the vehicle last moved, for the land detector
     # On contact with the ground rotors idle: since when, and the velocity down [m/s] at that time.
     unloaded: tuple[int, float] | None = None
-    range: RangeSample | None = None  # the longest of ``ranges``: dust is too close
     ranges: tuple[RangeSample, ...] = ()  # of the rangefinder, of the last 0.1 s
     mode_origin: Vec3 = _NOWHERE  # where a mode's own reference begins, end-effector [m]
     mode_yaw: float = 0.0  # rad, there

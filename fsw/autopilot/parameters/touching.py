@@ -140,7 +140,7 @@ def against_pressing(config: FlightConfig, zone: Zone, loop: Tube, asked: Presse
     most = max_force(config, zone, loop)
     if asked.force > most:
         return f"{asked.force:.1f} N are asked for; at most {most:.1f} N can be promised"
-    room = sideways_force(config, zone, loop, asked)
+    room = balanced_force(config, zone, loop, asked)
     if asked.force > room:
         return (
             f"pressing with {asked.force:.1f} N and sliding turns the vehicle by more than its "
@@ -149,7 +149,7 @@ def against_pressing(config: FlightConfig, zone: Zone, loop: Tube, asked: Presse
     return ""
 
 
-def sideways_force(config: FlightConfig, zone: Zone, loop: Tube, asked: Pressed) -> float:
+def balanced_force(config: FlightConfig, zone: Zone, loop: Tube, asked: Pressed) -> float:
     """The largest force [N] along the normal whose friction and itself the rotors can balance."""
     assert zone.touch is not None
     airframe, disturbance = config.airframe, config.surroundings.disturbance

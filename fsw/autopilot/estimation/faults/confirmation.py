@@ -1,9 +1,8 @@
 """Whether samples that the filter refuses agree with each other: one alone may be wrong.
 
-What is refused in flight is
-compared by its innovation, which knows how the vehicle has moved: a run of refused samples goes on
-where value and direction nearly stay, of which noise makes no long one. How long a run must be
-until it is believed grows with how far it would move the estimate.
+What is refused in flight is compared by its innovation, which knows how the vehicle has moved: a
+run of refused samples goes on where value and direction nearly stay, of which noise makes no long
+one. How long a run must be until it is believed grows with how far it would move the estimate.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from fsw.autopilot.flight.land_detector import (
     feel_ground,
     height_above_ground,
     is_aloft,
+    longest_range,
     may_be_low,
     standing_unclear,
     stands,
@@ -81,6 +82,11 @@ def seen(distance: float, age_s: float = 0.05) -> RangeSample:
     return RangeSample(2.0 - age_s, distance + CONFIG.airframe.leg_length, 0.01**2)
 
 
+def kept(sample: RangeSample | None) -> tuple[RangeSample, ...]:
+    """What is kept of the rangefinder after a sample, if there was one."""
+    return () if sample is None else (sample,)
+
+
 @pytest.mark.parametrize(
     ("height", "sigma", "sample", "low"),
     [
@@ -98,7 +104,7 @@ def seen(distance: float, age_s: float = 0.05) -> RangeSample:
 def test_the_rangefinder_says_whether_the_ground_is_near_else_the_estimate(
     height: float, sigma: float, sample: RangeSample | None, low: bool
 ) -> None:
-    state = replace(flying(Mode.LAND, range=sample), aiding=Aiding(height_sigma=sigma))
+    state = replace(flying(Mode.LAND, ranges=kept(sample)), aiding=Aiding(height_sigma=sigma))
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
     assert may_be_low(CONFIG, state, estimate) is low
 
@@ -120,7 +126,7 @@ def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
     height: float, sigma: float, sample: RangeSample | None, landed: bool
 ) -> None:
     """And with a gyro they carry it down to the ground."""
-    state = flying(Mode.DESCEND, range=sample)
+    state = flying(Mode.DESCEND, ranges=kept(sample))
     carries = changed(state.cascade, rotors=(0.25 * WEIGHT,) * 4)
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
     for lost in (True, False):
@@ -147,7 +153,7 @@ def test_legs_that_may_touch_the_ground_are_not_aloft(
     height: float, sigma: float, sample: RangeSample | None, disputed_us: int, aloft: bool
 ) -> None:
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
-    state = flying(range=sample)
+    state = flying(ranges=kept(sample))
     state = replace(state, aiding=Aiding(height_sigma=sigma, disputed_us=disputed_us))
     state = with_record(state, known=estimate)
     legs = CONFIG.airframe.leg_length
@@ -167,7 +173,7 @@ def test_a_rangefinder_that_is_known_to_be_wrong_does_not_say_how_high_it_is(
     health = Health(Sensor.RANGEFINDER).with_fault(fault, 1.99)
     fusion = at_start(2)._replace(health=(health,))
     low = vehicle_at((0.0, 0.0, GROUND_Z - 0.05), t_us=2_000_000)
-    state = replace(flying(Mode.DESCEND, range=seen(2.0)), fusion=fusion)
+    state = replace(flying(Mode.DESCEND, ranges=(seen(2.0),)), fusion=fusion)
     state = replace(state, aiding=Aiding(height_sigma=0.04, gyro_lost=True))
     assert feel_ground(CONFIG, state, low)[1] is close
     stuck = fault is SensorFault.STUCK
@@ -183,8 +189,9 @@ def test_without_a_gyro_rotors_stop_by_the_last_two_distances() -> None:
     for k, height in enumerate((0.15, 0.14, 0.09, 0.08)):
         sample = replace(seen(height), time=1.92 + 0.02 * k)
         state = replace(state, vehicle=with_range(state.vehicle, sample))
-    assert state.vehicle.range is not None
-    assert state.vehicle.range.distance == seen(0.15).distance
+    longest = longest_range(state.vehicle)
+    assert longest is not None
+    assert longest.distance == seen(0.15).distance
     low = vehicle_at((0.0, 0.0, GROUND_Z - 0.08), t_us=2_000_000)
     state = replace(state, aiding=Aiding(height_sigma=2.0, gyro_lost=True))
     assert feel_ground(CONFIG, state, low)[1]
@@ -196,8 +203,9 @@ def test_distances_that_are_noise_do_not_say_that_the_ground_is_near() -> None:
     for k in range(500):
         distance = float(1.2 + random.standard_normal())
         vehicle = with_range(vehicle, RangeSample(0.02 * k, distance, 0.01**2))
-        assert vehicle.range is not None
-        short += vehicle.range.distance < 0.42
+        longest = longest_range(vehicle)
+        assert longest is not None
+        short += longest.distance < 0.42
     assert short <= 2
     assert len(vehicle.ranges) <= 6
 
@@ -207,12 +215,15 @@ def test_a_distance_that_is_too_short_counts_once_a_second_one_says_so() -> None
     used = []
     for k, distance in enumerate(distances):
         vehicle = with_range(vehicle, RangeSample(0.1 * k, distance, 0.01**2))
-        assert vehicle.range is not None
-        used.append((vehicle.range.time, vehicle.range.distance))
+        longest = longest_range(vehicle)
+        assert longest is not None
+        used.append((longest.time, longest.distance))
     times = [0.1 * k for k in range(6)]
     assert used == list(zip(times, (1.0, 1.0, 0.9, 0.9, 0.2, 0.8), strict=True))
     vehicle = with_range(vehicle, RangeSample(2.0, 0.1, 0.01**2))
-    assert vehicle.range == RangeSample(2.0, 0.1, 0.01**2), "the last one is of another time"
+    assert longest_range(vehicle) == RangeSample(2.0, 0.1, 0.01**2), (
+        "the last one is of another time"
+    )
 
 
 def landed_after(

@@ -15,8 +15,8 @@ from fsw.autopilot.parameters.touching import (
     Pressed,
     against_pressing,
     against_touching,
+    balanced_force,
     grip,
-    sideways_force,
 )
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import SafeSet, Touch, Zone
@@ -97,14 +97,14 @@ def test_sliding_sideways_is_bounded_by_what_rotors_spend_on_yaw() -> None:
     yaw = 0.8 * 3.0 * sum(rotor.torque_per_thrust for rotor in vehicle.rotors)  # of 3 N each
     zone = touched(friction=friction)
     aside = Pressed(AHEAD, 3.0, (0.0, 0.5, 0.0))
-    most = sideways_force(PROBE, zone, loop, aside)
+    most = balanced_force(PROBE, zone, loop, aside)
     assert most == pytest.approx(yaw / (friction * lever), rel=1e-3)
     assert against_pressing(PROBE, zone, loop, aside).startswith("pressing with 3.0 N and sliding")
     up = aside._replace(slide=(0.0, 0.0, -0.5))
     assert against_pressing(PROBE, zone, loop, up) == ""
     # What counts is how the surface lies to the slide, wherever both are turned to.
     turned = Pressed((0.0, -1.0, 0.0), 3.0, (0.5, 0.0, 0.0))
-    assert sideways_force(PROBE, zone, loop, turned) == pytest.approx(most)
+    assert balanced_force(PROBE, zone, loop, turned) == pytest.approx(most)
     hard = against_pressing(PROBE, zone, loop, up._replace(force=9.5))
     assert hard.startswith("9.5 N are asked for; at most 8.")
 
@@ -114,6 +114,6 @@ def test_weak_rotors_leave_less_to_press_with() -> None:
     up = Pressed(AHEAD, 3.0, (0.0, 0.0, -0.5))
     hover = airframe.mass * 9.81 / airframe.rotors
     weak = tuple(1.05 * hover for _ in airframe.rotor_thrust_max)
-    before = sideways_force(PROBE, zone, loop, up)
+    before = balanced_force(PROBE, zone, loop, up)
     config = replace(PROBE, airframe=replace(airframe, rotor_thrust_max=weak))
-    assert sideways_force(config, zone, loop, up) < 0.1 * before
+    assert balanced_force(config, zone, loop, up) < 0.1 * before
