@@ -17,6 +17,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.architecture.sources import tree_of
+
 _QUANTITIES = re.compile(r"^(float|Vec[234]|V3|Quaternion|Matrix\w*|Array|NDArray.*|.*ndarray.*)$")
 _VECTOR = re.compile(r"^(Vec3|V3|Quaternion|Matrix\w*)$")
 _ARRAY = re.compile(r"^(Array|NDArray.*|.*ndarray.*)$")
@@ -50,7 +52,7 @@ def quantities(function: ast.FunctionDef) -> Iterator[tuple[str, str]]:
 def problems(path: Path) -> list[str]:
     """One sentence for each quantity of the file whose unit, frame or shape is missing."""
     found = []
-    for function in functions(ast.parse(path.read_text())):
+    for function in functions(tree_of(path)):
         text = ast.get_docstring(function) or ""
         for name, kind in quantities(function):
             wrong = _problem(name, kind, text)
