@@ -44,7 +44,7 @@ READY := $(call ready,.venv,requirements-dev.lock pyproject.toml messages/build_
 
 .DEFAULT_GOAL := help
 .PHONY: help setup run test test-long px4 nightly faults soak wheel code-checks tests-of-clocks tests-of-clients \
-	tests-of-processes tests-of-the-plant tests-of-studies tests-of-the-rest \
+	tests-of-processes tests-of-studies tests-of-the-rest \
 	fsw-kernels sitl-kernels mutate fuzz interop lock docs docs-test pictures pages clean
 
 help: ## show this list
@@ -70,12 +70,11 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 # Folders are in rows that take about as long. Four rows for two cores: those of processes and clients
 # often wait for clocks, and the others have their core meanwhile. Kernels are compiled once, before
 # whoever needs them, because rows that compile the same kernels at once take twice the time; what
-# needs none comes before.
+# needs none comes before. Few rows: each imports everything and loads the kernels, for eight seconds.
 OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages
 OF_CLIENTS := tests/conversations tests/interop
 OF_PROCESSES := tests/benchmarks tests/cli tests/processes tests/timing
-OF_THE_PLANT := tests/architecture tests/fuzz tests/mutation tests/sitl
-OF_STUDIES := tests/docs tests/library tests/replay tests/studies tests/view \
+OF_STUDIES := $(addprefix tests/,architecture docs fuzz library mutation replay sitl studies view) \
 	$(addprefix tests/fsw/autopilot/,control estimation)
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
@@ -88,13 +87,11 @@ tests-of-clients: tests-of-clocks fsw-kernels sitl-kernels
 	$(call check,clients,$(PYTEST) -m "not long" $(OF_CLIENTS))
 tests-of-processes: fsw-kernels sitl-kernels
 	$(call check,processes,$(PYTEST) -m "not long" $(OF_PROCESSES))
-tests-of-the-plant: sitl-kernels
-	$(call check,plant,$(PYTEST) -m "not long" $(OF_THE_PLANT))
-tests-of-studies: tests-of-the-plant fsw-kernels
+tests-of-studies: fsw-kernels sitl-kernels
 	$(call check,studies,$(PYTEST) -m "not long" $(OF_STUDIES))
-tests-of-the-rest: fsw-kernels
+tests-of-the-rest: fsw-kernels sitl-kernels
 	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=, \
-		$(OF_CLOCKS) $(OF_CLIENTS) $(OF_PROCESSES) $(OF_THE_PLANT) $(OF_STUDIES)))
+		$(OF_CLOCKS) $(OF_CLIENTS) $(OF_PROCESSES) $(OF_STUDIES)))
 fsw-kernels sitl-kernels: %-kernels:
 	@$(BIN)/python -m studies.flight.kernels $*
 
