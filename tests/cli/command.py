@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
+from pandion.__main__ import main
 from tests.waiting import becomes
 
 PANDION = [sys.executable, "-m", "pandion"]
@@ -25,6 +27,21 @@ def pandion(*arguments: str, cwd: Path, timeout: float = 90.0) -> subprocess.Com
         timeout=timeout,
         check=False,
     )
+
+
+def pandion_here(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The same in this process, which has imported what a verb that does not fly needs."""
+    printed, reported = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(cwd),
+        contextlib.redirect_stdout(printed),
+        contextlib.redirect_stderr(reported),
+    ):
+        try:
+            code = main(list(arguments))
+        except SystemExit as left:
+            code = int(left.code or 0)
+    return subprocess.CompletedProcess(arguments, code, printed.getvalue(), reported.getvalue())
 
 
 def environment() -> dict[str, str]:

@@ -18,11 +18,13 @@ from mcap.reader import make_reader
 from pyulog import ULog
 
 from sitl.scenario_file import PACKAGED
-from tests.cli.command import clean_up, one_sentence, pandion, read_until, start
+from tests.cli.command import clean_up, one_sentence, pandion, pandion_here, read_until, start
+from tests.cli.heard_flight import Flight
 from tests.processes.both_processes import free_port
 from tests.waiting import wait_for
 
 FLIGHT = ("fly", "walls", "--lockstep", "--seed", "5", "--duration", "2")
+TICKS = 1500  # of the log
 
 
 @contextlib.contextmanager
@@ -40,33 +42,32 @@ def busy_machine() -> Iterator[None]:
             hog.wait()
 
 
-@pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("flight") / "one"
-    gcs = f"--gcs=udp:127.0.0.1:{free_port()}"
-    done = pandion(*FLIGHT, gcs, "--out", str(out), cwd=out.parent)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return out / "flight.ulg"
+@pytest.fixture
+def log(lockstep: Flight) -> Path:
+    return lockstep.directory / "flight.ulg"
 
 
 @pytest.mark.long
-def test_the_same_seed_is_the_same_file_at_any_speed_on_a_busy_machine(log: Path) -> None:
+def test_the_same_seed_is_the_same_file_at_any_speed_on_a_busy_machine(tmp_path: Path) -> None:
     gcs = f"--gcs=udp:127.0.0.1:{free_port()}"
-    flight = start(*FLIGHT, gcs, "--out", "two", "--speed", "1", cwd=log.parent.parent)
+    done = pandion(*FLIGHT, gcs, "--out", "one", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    flight = start(*FLIGHT, gcs, "--out", "two", "--speed", "1", cwd=tmp_path)
     try:
         read_until(flight, "flying")  # to start in time is not the point
         with busy_machine():
             assert flight.wait(timeout=60.0) == 0
     finally:
         clean_up(flight)
-    assert (log.parent.parent / "two" / "flight.ulg").read_bytes() == log.read_bytes()
+    one, two = (tmp_path / name / "flight.ulg" for name in ("one", "two"))
+    assert two.read_bytes() == one.read_bytes()
 
 
 def test_it_says_what_was_flown_and_holds_every_tick_and_the_truth(log: Path) -> None:
     read = ULog(str(log))
     assert not read.file_corruption
     facts = read.msg_info_dict
-    assert (facts["scenario"], facts["seed"], facts["pacing"]) == ("walls", 5, "lockstep")
+    assert (facts["scenario"], facts["seed"], facts["pacing"]) == ("walls", 2, "lockstep")
     content = (PACKAGED / "walls.toml").read_bytes()
     assert facts["scenario_digest"] == hashlib.sha256(content).hexdigest()[:12]
     assert facts["ver_sw"]
@@ -74,11 +75,11 @@ def test_it_says_what_was_flown_and_holds_every_tick_and_the_truth(log: Path) ->
     assert len(read.initial_parameters) > 200
     for name in ("sensor_frame", "actuator_command"):
         times = read.get_dataset(name).data["timestamp"]
-        assert times.tolist() == [1_000_000 + 2000 * k for k in range(1000)], name
+        assert times.tolist() == [1_000_000 + 2000 * k for k in range(TICKS)], name
     for name in ("vehicle_attitude", "vehicle_local_position", "actuator_motors",
                  "arm_joint_state", "sim_ground_truth"):  # fmt: skip
         times = read.get_dataset(name).data["timestamp"]
-        assert times.tolist() == [1_000_000 + 20_000 * k for k in range(100)], name
+        assert times.tolist() == [1_000_000 + 20_000 * k for k in range(TICKS // 10)], name
     for name in ("mpc_status", "barrier_margin", "vehicle_status", "loop_timing", "sim_tracking"):
         assert len(read.get_dataset(name).data["timestamp"]) >= 1, name
     estimate = read.get_dataset("vehicle_local_position").data
@@ -114,10 +115,10 @@ def test_replay_finds_no_difference_and_says_so_in_json(log: Path, tmp_path: Pat
     done = pandion("replay", str(log.parent), "--verify", "--json", "-", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {
-        "log": str(log), "same": True, "ticks": 1000, "difference": None, "lost_ms": 0,
+        "log": str(log), "same": True, "ticks": TICKS, "difference": None, "lost_ms": 0,
         "whole": True, "other_numbers": [],
     }  # fmt: skip
-    assert "no difference in 1000 ticks" in done.stderr
+    assert f"no difference in {TICKS} ticks" in done.stderr
 
 
 def test_replay_names_the_first_difference(log: Path, tmp_path: Path) -> None:
@@ -135,9 +136,9 @@ def test_replay_names_the_first_difference(log: Path, tmp_path: Path) -> None:
 
 
 def test_without_verify_replay_shows_what_is_there(log: Path, tmp_path: Path) -> None:
-    done = pandion("replay", str(log), cwd=tmp_path)
+    done = pandion_here("replay", str(log), cwd=tmp_path)
     assert done.returncode == 0
-    for word in ("walls", "lockstep", "sensor_frame", "1000", "hold to trajectory"):
+    for word in ("walls", "lockstep", "sensor_frame", str(TICKS), "hold to trajectory"):
         assert word in done.stdout
 
 
@@ -163,7 +164,7 @@ def test_a_flight_killed_in_real_time_is_readable_and_replays(tmp_path: Path) ->
 
 
 def test_export_to_csv_has_a_table_a_topic(log: Path, tmp_path: Path) -> None:
-    done = pandion("export", str(log), "--csv", "tables", cwd=tmp_path)
+    done = pandion_here("export", str(log), "--csv", "tables", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     with (tmp_path / "tables" / "actuator_command.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -177,7 +178,7 @@ def test_export_to_csv_has_a_table_a_topic(log: Path, tmp_path: Path) -> None:
 
 
 def test_export_to_mcap_reads_with_its_own_library(log: Path, tmp_path: Path) -> None:
-    done = pandion("export", str(log), "--mcap", "flight.mcap", cwd=tmp_path)
+    done = pandion_here("export", str(log), "--mcap", "flight.mcap", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     with (tmp_path / "flight.mcap").open("rb") as file:
         reader = make_reader(file)
@@ -190,7 +191,6 @@ def test_export_to_mcap_reads_with_its_own_library(log: Path, tmp_path: Path) ->
     assert [values["q"][1] for _, values in found] == read["q[1]"].tolist()
 
 
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -204,7 +204,7 @@ def test_what_cannot_be_read_is_refused_in_one_sentence(
     arguments: tuple[str, ...], words: str, tmp_path: Path
 ) -> None:
     (tmp_path / "text.ulg").write_text("this is a text, and no log")
-    done = pandion(*arguments, cwd=tmp_path)
+    done = pandion_here(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert one_sentence(done.stderr)
     assert words in done.stderr

@@ -197,6 +197,7 @@ def test_numbers_of_a_urdf_are_kept_in_their_ranges(
     assert "must be -10 to 10" in err
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("name", vehicle_names())
 def test_every_vehicle_that_comes_with_pandion_is_sound(
     capsys: pytest.CaptureFixture[str], name: str, tmp_path: Path

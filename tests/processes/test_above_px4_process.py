@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cli.command import pandion_here
 from tests.processes.test_px4_process import AIRFRAME
 from tests.px4_companion_stand_in import OFFBOARD, Px4Companion
 
@@ -84,24 +85,16 @@ def test_it_streams_takes_over_gives_back_and_writes_what_it_found(tmp_path: Pat
         ),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_sentence(words: list[str], why: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pandion", "fsw", *words],
-        capture_output=True,
-        text=True,
-        timeout=120.0,
-    )
+def test_what_cannot_be_is_refused_in_one_sentence(
+    words: list[str], why: str, tmp_path: Path
+) -> None:
+    done = pandion_here("fsw", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert why in done.stderr
     assert done.stderr.count("\n") == 1
 
 
-def test_a_line_that_is_too_slow_for_the_estimate_is_refused() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pandion", "fsw", "--autopilot-link", "serial:/dev/null:57600"],
-        capture_output=True,
-        text=True,
-        timeout=120.0,
-    )
+def test_a_line_that_is_too_slow_for_the_estimate_is_refused(tmp_path: Path) -> None:
+    done = pandion_here("fsw", "--autopilot-link", "serial:/dev/null:57600", cwd=tmp_path)
     assert done.returncode == 2
     assert "use 460800 baud or more" in done.stderr

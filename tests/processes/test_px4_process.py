@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from tests.cli.command import pandion_here
 from tests.px4_stand_in import Airframe, Connected, Px4StandIn, Wish
 from vehicles.vehicle_file import load_vehicle
 
@@ -106,24 +107,16 @@ def test_a_px4_that_leaves_ends_the_flight_with_the_step() -> None:
         (["--rate", "1000"], "'1000' is neither 250 nor 500"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_sentence(words: list[str], why: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pandion", "sitl", "ground", "--for", "px4", *words],
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-    )
+def test_what_cannot_be_is_refused_in_one_sentence(
+    words: list[str], why: str, tmp_path: Path
+) -> None:
+    done = pandion_here("sitl", "ground", "--for", "px4", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert why in done.stderr
     assert done.stderr.count("\n") == 1
 
 
-def test_a_rate_without_px4_is_refused() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pandion", "sitl", "ground", "--rate", "500"],
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-    )
+def test_a_rate_without_px4_is_refused(tmp_path: Path) -> None:
+    done = pandion_here("sitl", "ground", "--rate", "500", cwd=tmp_path)
     assert done.returncode == 2
     assert "--rate is of the exchange with PX4; add --for px4" in done.stderr
