@@ -15,7 +15,7 @@ put_first()
 
 # The same examples on every machine and in every run: a failure on one is a failure on all. No
 # deadline per example, because the first one may compile a kernel or wait for a busy core.
-settings.register_profile("reproducible", max_examples=50, derandomize=True, deadline=None)
+settings.register_profile("reproducible", max_examples=25, derandomize=True, deadline=None)
 # Those of make test-long: others in every run, and many more.
 settings.register_profile("thorough", max_examples=1500, deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("PROPERTIES", "reproducible"))

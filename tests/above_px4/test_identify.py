@@ -49,6 +49,7 @@ class Frame:
         self.q_WB = tuple(np.array(q) / np.linalg.norm(q))
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("kp", "kd", "delay"), [(119.0, 17.0, 0.02), (60.0, 14.0, 0.04)])
 def test_a_lag_that_is_known_is_found(kp: float, kd: float, delay: float) -> None:
     true = replace(Px4Tuning(), tilt_kp=kp, tilt_kd=kd, delay=delay, velocity_integral=0.0)

@@ -100,8 +100,6 @@ def in_one_line(path: Path) -> str:
 def test_no_sentence_that_was_removed_comes_back(sentence: str) -> None:
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
     back = [
-        str(path.relative_to(ROOT))
-        for path in (*files(), *pages)
-        if sentence in in_one_line(path)
+        str(path.relative_to(ROOT)) for path in (*files(), *pages) if sentence in in_one_line(path)
     ]
     assert back == []

@@ -158,6 +158,13 @@ class Flight:
             self.step()
             assert self.sim.ended is None, self.sim.ended
 
+    def until(self, mode: Mode, within_s: float) -> None:
+        """Fly on into a mode; not to be in it after so many seconds is an error."""
+        end_s = self.sim.time_s + within_s
+        while self.mode is not mode:
+            assert self.sim.time_s < end_s, (self.mode, self.texts)
+            self.run(0.02)
+
     def step(self, *commands: Command, tuning: Tuning | None = None) -> TickOutputs:
         """Sense, tick, plan, advance."""
         sensors, samples = self.closed.observe()

@@ -31,7 +31,7 @@ def flown(one: Scenario, seed: int = 0) -> FlightResult:
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(("vehicle", "suite"), list(product(OTHERS, (None, "mocap"))))
 def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | None) -> None:
-    truth = flown(scenario("walls", vehicle, 25.0, suite)).truth
+    truth = flown(scenario("walls", vehicle, 13.0, suite)).truth
     assert truth.completed, truth.end_reason
     assert truth.min_margin_m is not None
     assert truth.min_margin_m > 0.01
@@ -51,11 +51,11 @@ def test_a_second_vehicle_compiles_nothing() -> None:
     config = flight_config()
     Planner(config.planner, config.airframe, lambda: 0.0).warm_up()  # as before any flight
     Autopilot(config).warm_up()
-    flown(scenario("walls", "paper", 3.0, "mocap"))
-    flown(scenario("walls", "paper", 3.0))
+    flown(scenario("walls", "paper", 1.0, "mocap"))
+    flown(scenario("walls", "paper", 1.0))
     before = compiled_so_far()
     assert before > 10
     for vehicle in OTHERS:
-        flown(scenario("walls", vehicle, 3.0, "mocap"))
-        flown(scenario("walls", vehicle, 3.0))
+        flown(scenario("walls", vehicle, 1.0, "mocap"))
+        flown(scenario("walls", vehicle, 1.0))
     assert compiled_so_far() == before

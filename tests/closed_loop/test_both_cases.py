@@ -16,7 +16,7 @@ from tests.closed_loop.harness import Flight
 
 @pytest.mark.requirement("REQ-SAFE-1", "REQ-ACT-8")
 @pytest.mark.parametrize(
-    ("name", "seconds"), [("walls", 20.0), ("workspace", 15.0), ("branches", 13.0)]
+    ("name", "seconds"), [("walls", 13.0), ("workspace", 10.0), ("branches", 13.0)]
 )
 def test_every_margin_stays_positive_and_every_limit_is_kept_between_samples_too(
     name: str, seconds: float
@@ -62,6 +62,7 @@ def test_a_point_among_walls_is_kept_with_them() -> None:
     assert margins["front/end_effector"] < 0.2, "or it was no test"
 
 
+@pytest.mark.long
 def test_without_the_barrier_the_path_leads_too_close_to_a_branch() -> None:
     flight = Flight(
         load_scenario("branches"), seed=11, config=flight_config("naive", "tracking", body="points")
@@ -84,6 +85,7 @@ def test_the_heading_makes_no_difference_to_safety(yaw_deg: float) -> None:
     assert flight.sim.min_margin_m > 0.0
 
 
+@pytest.mark.drawn(5)
 @pytest.mark.parametrize(
     ("controller", "inner"), [*((name, "tracking") for name in CONTROLLERS), ("blf", "pid")]
 )

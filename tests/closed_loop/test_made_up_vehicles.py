@@ -18,7 +18,7 @@ from vehicles.vehicle_file import vehicle_text
 COUNT = 30
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("number", range(COUNT))
 def test_it_hops_within_its_limits(number: int, tmp_path: Path) -> None:
     vehicle = multirotor_with_arm(np.random.default_rng(5_000 + number))
@@ -42,8 +42,7 @@ def test_it_hops_within_its_limits(number: int, tmp_path: Path) -> None:
     assert math.isclose(stood[2] - z, config.limits.takeoff_climb, abs_tol=0.05)
     assert math.hypot(x - stood[0], y - stood[1]) < 0.15
     flight.step(command(LAND))
-    flight.run(config.limits.takeoff_climb / config.limits.land_speed + 4.0)
-    assert flight.mode is Mode.DISARMED, flight.texts
+    flight.until(Mode.DISARMED, config.limits.takeoff_climb / config.limits.land_speed + 4.0)
     assert math.isclose(flight.sim.truth().p_WB[2], stood[2], abs_tol=0.02)
     assert flight.sim.ended is None
     beyond = [name for name, use in flight.sim.result().limits.items() if not use.kept]

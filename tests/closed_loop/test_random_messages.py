@@ -24,7 +24,7 @@ def flown(seed: int, seconds: float) -> None:
 @pytest.mark.requirement("REQ-SAFE-6", "REQ-SAFE-7")
 @pytest.mark.parametrize("seed", [1, 2])
 def test_seconds_of_random_messages_end_no_flight(seed: int) -> None:
-    flown(seed, 20.0)
+    flown(seed, 12.0)
 
 
 @pytest.mark.long

@@ -281,7 +281,7 @@ def test_only_what_the_ground_has_and_what_is_counted_stays() -> None:
     flight = Flight(parse_scenario(SCENARIO, "restart", "mocap"))
     flight.run(1.0)
     take_off(flight)
-    flight.run(5.0)
+    flight.run(2.0)
     counted = replace(
         flight.state,
         tuning=(("a.gain", 2.0),),

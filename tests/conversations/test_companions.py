@@ -100,6 +100,7 @@ def test_mavros_starts_whatever_its_identity(vehicle: Connected, who: tuple[int,
     assert (counts["echoes_dropped"], counts["for_others"]) == (0, 0)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("name", "value"), [("COM_OBL_RC_ACT", 4), ("NAV_DLL_ACT", 0), ("COM_RCL_EXCEPT", 4)]
 )
@@ -126,6 +127,7 @@ def test_mavsdk_finds_an_integer_where_px4_has_one(
     ))  # fmt: skip
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     ("name", "value"),
     [("COM_RCL_EXCEPT", 7), ("COM_OBL_RC_ACT", 4), ("COM_OF_LOSS_T", 2.0), ("COM_RC_IN_MODE", 1)],

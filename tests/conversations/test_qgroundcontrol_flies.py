@@ -73,6 +73,7 @@ def speaks(vehicle: Connected, version: int) -> Connected:
     return vehicle
 
 
+@pytest.mark.drawn(2)
 @clients
 @versions
 def test_it_connects_without_a_text_and_is_answered_in_its_version(
@@ -208,6 +209,7 @@ def test_a_refused_parameter_comes_back_at_once_with_the_reason(
     assert value.param_value == 0.75
 
 
+@pytest.mark.drawn(2)
 @clients
 @versions
 def test_the_log_page_lists_downloads_and_erases(

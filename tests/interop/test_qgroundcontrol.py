@@ -194,7 +194,7 @@ def test_everything_was_answered_in_time(station: Station) -> None:
     assert slowest[0][1] < PATIENCE_S
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("tool", "options", "shows"),
     [

@@ -34,6 +34,7 @@ def hover(env: PandionEnv) -> np.ndarray:
     return np.array([*lift, *drive], dtype=np.float32)
 
 
+@pytest.mark.drawn(5)
 @each
 @each_vehicle
 def test_gymnasiums_own_checker_finds_nothing(name: str, vehicle: str) -> None:

@@ -172,6 +172,7 @@ def test_a_flight_that_is_over_is_not_stepped() -> None:
         pandion.Autopilot(simulator)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("vehicle", ["hexa-3r", "octo-4r"])
 def test_any_vehicle_is_stepped_by_hand_as_it_flies(vehicle: str) -> None:
     simulator = pandion.Simulator("walls", seed=9, duration_s=BRIEF_S, vehicle=vehicle)

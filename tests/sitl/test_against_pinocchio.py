@@ -94,6 +94,7 @@ def worst_difference(
     return worst
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("joints", range(1, 7))
 def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> None:
     random = np.random.default_rng(joints)
@@ -105,6 +106,7 @@ def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> N
     assert worst <= TOLERANCE
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("name", vehicle_names())
 def test_so_they_do_for_the_urdf_of_every_vehicle_that_comes_with_pandion(name: str) -> None:
     vehicle, random = load_vehicle(name), np.random.default_rng(0)

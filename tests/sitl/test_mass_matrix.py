@@ -13,6 +13,7 @@ from sitl.plant.vector import V3
 from tests.sitl.vehicles import random_vehicle
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("joints", range(1, 7))
 def test_each_column_is_the_wrench_that_one_unit_acceleration_needs(joints: int) -> None:
     random = np.random.default_rng(joints)

@@ -57,7 +57,7 @@ def test_the_plant_takes_off_hovers_moves_its_arm_and_lands(suite: str, rate_hz:
 
 
 def test_two_flights_with_the_same_answers_are_the_same() -> None:
-    first, second = (fly("ground", flight_plan, seconds=4.0) for _ in range(2))
+    first, second = (fly("ground", flight_plan, seconds=2.0) for _ in range(2))
     assert np.array_equal(first.places, second.places)
 
 
@@ -71,6 +71,7 @@ def test_sensors_have_the_noise_of_the_suite_and_their_own_rates() -> None:
         assert sum(one & bits == bits for one in updated) == pytest.approx(4 * 50, abs=3)
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("skipped", [0, 8, 14])
 def test_steps_go_on_in_real_time_until_px4_answers(skipped: int) -> None:
     flight = fly("ground", lambda _: Wish(), seconds=0.5, skipped=skipped)

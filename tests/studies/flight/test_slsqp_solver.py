@@ -240,7 +240,7 @@ def test_what_cannot_be_kept_is_infeasible() -> None:
     assert not answer.usable
 
 
-@pytest.mark.drawn(3)
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("controller", VARIANTS)
 def test_plans_come_back_through_the_planner(controller: str, case: str) -> None:

@@ -185,6 +185,7 @@ def judged(tmp_path: Path, only_today: int, only_found: int, confidence: float =
     return tune(task(tmp_path, lenient), campaign, 1).judged
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize(("more", "fewer"), [(4, 0), (5, 0), (6, 0), (8, 2), (9, 2), (10, 2)])
 def test_fewer_violations_are_better_only_beyond_doubt(
     tmp_path: Path, more: int, fewer: int

@@ -60,6 +60,7 @@ def fall(name: str, excess: Array, value: float) -> float:
     return 2.0 * (most + found)
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.parametrize(
     ("name", "quantity"),
     [("shape", SHAPE), ("scale", SCALE), ("depth", depth(RARE)), ("beyond", beyond(FAR))],

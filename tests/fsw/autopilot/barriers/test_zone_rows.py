@@ -156,6 +156,7 @@ def middle_of(part: Part, on: tuple[Array, Rotation]) -> by_coal.Solid:
     return by_coal.ball_at(begin, 0.0)
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("kind", ["half-space", "ball", "box", "cylinder", "vertical cylinder"])
 def test_margins_of_the_full_body_are_coals_distances(kind: str) -> None:
     margins = Margins(FULL, AIRFRAME.bodies, (TUNING, TUNING), PERIOD)

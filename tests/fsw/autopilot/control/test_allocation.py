@@ -171,6 +171,7 @@ def any_airframe(random: np.random.Generator, rotors: int, tilt: float) -> Airfr
     return airframe_of(replace(load_vehicle("paper"), rotors=ring(random, rotors, tilt)))
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.parametrize("failed", [False, True], ids=["sound", "one fails"])
 @pytest.mark.parametrize("rotors", range(4, 9))
 def test_of_any_layout_yaw_goes_first_then_thrust_and_roll_and_pitch_are_kept(
@@ -234,6 +235,7 @@ def nearest(
     return float(found.x[which]) if found.success else None
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("rotors", range(4, 9))
 def test_of_any_layout_roll_and_pitch_that_are_too_much_are_cut_by_no_more_than_they_must(
     rotors: int,

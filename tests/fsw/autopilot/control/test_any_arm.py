@@ -176,6 +176,7 @@ def test_a_joint_without_a_limit_is_its_own_coordinate() -> None:
     assert within_limits(arm, (2.0, 50.0), 0.1) == (0.9, 50.0)
 
 
+@pytest.mark.drawn(5)
 @pytest.mark.parametrize("seed", range(20))
 def test_references_keep_every_limit_in_angle_and_rate(seed: int) -> None:
     random, arm = np.random.default_rng(seed), arm_coordinates(THREE)

@@ -99,6 +99,7 @@ def random_state(dice: random.Random) -> tuple[PredictionState, Array]:
     return x, np.array([math.cos(around[3]), math.sin(around[3]), 0.0])
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.requirement("REQ-PLAN-5")
 @pytest.mark.parametrize("seed", range(8))
 def test_whoever_keeps_lambda_stops_before_the_wall(seed: int) -> None:

@@ -32,6 +32,7 @@ def cheapest(a: Array, b: Array, price: Array, input_weight: float) -> Array:
     return np.asarray(gain[0])
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("tuning", TUNINGS)
 @pytest.mark.parametrize("lag", [0.04, 0.1])
 def test_the_horizontal_gains_are_the_cheapest(tuning: TrackingTuning, lag: float) -> None:

@@ -170,6 +170,7 @@ def test_a_steady_torque_that_nothing_told_of_is_taken_off_within_two_tenths_of_
     assert off[round(0.3 / DT) :].max() < 5e-3
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-ACT-8")
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize("far", [(2.0, -2.0), (0.2, 3.0), (2.0, 2.0)])

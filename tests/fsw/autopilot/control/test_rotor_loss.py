@@ -37,6 +37,7 @@ def program(airframe: Airframe, without: int, m: Multibody) -> tuple[np.ndarray,
     return effect, level, [(0.0, one) for one in most]
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("rotors", [4, 5, 6, 8])
 def test_what_is_left_to_tilt_with_is_the_optimum_of_a_linear_program(rotors: int) -> None:
     random = np.random.default_rng(rotors)

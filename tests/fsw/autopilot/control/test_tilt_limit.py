@@ -35,6 +35,7 @@ def flown(wanted: list[Vec3], lag: float, seconds: float = 1.5) -> tuple[float, 
     return float(largest[0]), float(largest[1]), float(largest[2])
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.requirement("REQ-ACT-8")
 @pytest.mark.parametrize("direction", np.linspace(0.0, 2.0 * math.pi, 8, endpoint=False))
 @pytest.mark.parametrize("hard", [6.0, 17.0])

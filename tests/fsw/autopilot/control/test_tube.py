@@ -121,6 +121,7 @@ HANGING = 0.3
 QUICK = replace(TUNING, observer_bandwidth=60.0, wind_limit=0.2)
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("name", vehicle_names())
 def test_a_vehicle_follows_its_plan_as_closely_as_its_rotors_allow(name: str) -> None:
     config = flight_config(vehicle=load_vehicle(name))
@@ -430,6 +431,7 @@ def test_noise_of_the_gyro_moves_the_base_by_what_its_spectrum_says() -> None:
     assert moved.std() == pytest.approx(tubes.jerk, rel=0.25)
 
 
+@pytest.mark.drawn(5)
 @pytest.mark.requirement("REQ-SAFE-2")
 @pytest.mark.parametrize("push", [0.3, 0.5, 0.8])
 @pytest.mark.parametrize("held", [3.0, 9.0, 30.0])

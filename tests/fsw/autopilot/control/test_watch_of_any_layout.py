@@ -55,6 +55,7 @@ def watched(airframe: Airframe, share: Any, seconds: float) -> Tick:
     return r
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("rotors", [4, 5, 6, 8])
 def test_a_weak_rotor_is_found_and_no_other_one(rotors: int) -> None:
     airframe = ring(rotors)
@@ -67,6 +68,7 @@ def test_of_a_vehicle_that_is_heavier_than_believed_no_rotor_is_found() -> None:
     assert watched(ring(6), np.full(6, 0.8), 1.7).watch.failed == NO_ROTOR
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("rotors", [4, 6, 8])
 def test_rotors_that_are_all_slow_are_no_failed_one_whatever_lifts_meanwhile(rotors: int) -> None:
     """hexa-3r landed for a sound rotor: pushes along z came when it turned."""

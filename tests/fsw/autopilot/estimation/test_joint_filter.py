@@ -73,6 +73,7 @@ class Arm:
                 self.off = max(self.off, abs(w1 - rate(now)), abs(w2 + rate(now)))
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     ("age", "error", "off"), [(0.0, 2e-3, 0.2), (0.014, 5e-3, 0.3), (0.04, 0.02, 0.8)]
 )
@@ -118,7 +119,7 @@ def test_garbage_is_not_believed_and_the_torques_carry_on() -> None:
     assert arm.error < 0.15, "of friction that is not modelled, in half a second"
 
 
-@pytest.mark.drawn(4)
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("by", [(0.2, 0.0), (0.0, -1.3), (0.3, 0.3), (1.0, -2.0)])
 @pytest.mark.parametrize("until", [1.52, 1.8, 3.0])
 def test_a_zero_that_has_moved_is_named_and_the_joint_is_followed_on(
@@ -133,6 +134,7 @@ def test_a_zero_that_has_moved_is_named_and_the_joint_is_followed_on(
     np.testing.assert_allclose(arm.x.encoder_zero[:2], by if until > 2.0 else (0.0, 0.0), atol=0.02)
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("sigma", [0.05, 0.1, 0.3, 1.3])
 def test_noise_of_a_tenth_of_a_second_makes_no_joint_run_away(sigma: float) -> None:
     random = np.random.default_rng(5)
@@ -220,6 +222,7 @@ def test_noise_of_an_encoder_is_no_motion_and_it_is_known_how_large_it_is(sigma:
     assert Arm().x.encoder_scale == 1.0
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("joints", [1, 4, 6])
 def test_each_of_any_number_of_joints_is_followed(joints: int) -> None:
     x, worst = empty_filter(joints), 0.0

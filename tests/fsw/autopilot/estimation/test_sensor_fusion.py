@@ -323,6 +323,7 @@ FAULTS: list[tuple[str, Change, SensorFault]] = [
 ]
 
 
+@pytest.mark.drawn(4)
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(("name", "change", "fault"), FAULTS, ids=[fault[0] for fault in FAULTS])
 def test_a_bad_pose_leaves_the_estimate_within_3_sigma(
@@ -548,6 +549,7 @@ def test_what_has_been_refused_for_long_is_not_used_for_one_pose_within_a_wide_g
     assert estimate.p_WB == pytest.approx(flown.truth.p[flown.truth.at(now)], abs=0.02)
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("suite", [MOCAP, RTK], ids=["mocap", "rtk"])
@@ -685,6 +687,7 @@ def test_garbage_is_never_taken_for_a_frame_that_has_moved() -> None:
     assert flown.worst < 4.0
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("half", ["force", "rate"])
 @pytest.mark.parametrize("how", ["stuck", "garbage", "wrong"])
 def test_half_an_inertial_unit_that_fails_leaves_the_place_to_the_pose(half: str, how: str) -> None:

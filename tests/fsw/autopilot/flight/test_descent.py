@@ -61,6 +61,7 @@ def test_it_brakes_across_and_sinks_at_the_speed_of_landing_and_faster_in_a_hurr
     assert vz == pytest.approx(times * LIMITS.land_speed, abs=1e-3)
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize(
     ("height", "sigma", "speed"),
     [

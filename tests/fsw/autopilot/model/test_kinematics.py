@@ -58,6 +58,7 @@ def at_a_moment(referee: Referee, estimate: StateEstimate, t: float) -> list[Any
     )
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("joints", range(1, 7))
 def test_places_and_velocities_are_pinocchios_whatever_the_axes(joints: int) -> None:
     random = np.random.default_rng(joints)
@@ -85,6 +86,7 @@ def test_places_and_velocities_are_pinocchios_whatever_the_axes(joints: int) -> 
             assert v == velocity(frame, joints, bodies.tip)
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("joints", range(1, 7))
 def test_a_predicted_end_effector_is_pinocchios_and_moves_as_it_does(joints: int) -> None:
     random = np.random.default_rng(joints)
@@ -120,6 +122,7 @@ def test_first_joint_turns_the_hanging_arm_forward() -> None:
     assert v_WE[2] < 0.0  # and up
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.parametrize("joints", range(1, 7))
 def test_centre_of_gravity_is_the_mass_weighted_mean_of_the_links(joints: int) -> None:
     random = np.random.default_rng(joints)

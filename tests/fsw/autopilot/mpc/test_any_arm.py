@@ -120,6 +120,7 @@ def test_joints_that_nothing_asks_for_come_home(name: str) -> None:
     np.testing.assert_allclose(tip, (x, y, z - 1.2), atol=5e-3)
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("name", VEHICLES)
 def test_no_part_of_it_comes_closer_to_a_wall_than_its_barrier_lets_it(name: str) -> None:
     airframe, model, _ = of(name)
@@ -146,6 +147,7 @@ def targets_of(target: Vec3) -> TargetPoints:
     )
 
 
+@pytest.mark.drawn(5)
 @pytest.mark.parametrize("name", [*VEHICLES, *"123456"])
 def test_no_row_is_left_out_that_inputs_within_their_limits_could_make_bind(name: str) -> None:
     """Against all rows; near and far, moving, with inputs at their corners."""

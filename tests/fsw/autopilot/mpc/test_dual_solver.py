@@ -87,7 +87,7 @@ def soft_cost(program: QpData, x: Array) -> float:
     return cost(program, np.concatenate((inputs, program.least_slacks(inputs))))
 
 
-@pytest.mark.drawn(4)
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("horizon", [1, 5, pytest.param(20, marks=pytest.mark.long)])
 @pytest.mark.parametrize("off", [0.05, 5.0], ids=["near", "far"])
 @pytest.mark.parametrize("safe_set", [SafeSet(), WALLS, SPHERE], ids=["open", "walls", "sphere"])
@@ -175,6 +175,7 @@ def test_every_solver_finds_the_optimum_of_the_program_as_filled_last(
         )
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
 def test_the_guess_says_where_to_look_and_not_what_is_found(safe_set: SafeSet) -> None:
     random = np.random.default_rng(8)

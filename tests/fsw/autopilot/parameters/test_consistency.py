@@ -40,6 +40,7 @@ def test_the_default_configuration_is_consistent(safe_set: SafeSet) -> None:
     assert refusals(analyse(config, safe_set, loop_tube(config))) == ()
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.parametrize("name", vehicle_names())
 def test_a_vehicle_that_its_own_arm_turns_is_refused_by_its_friction_and_its_pushes(
     name: str,

@@ -200,6 +200,7 @@ def last(memories: Iterator[FusionMemory]) -> FusionMemory:
     return memory
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("rate", [(0.8, 0.0, 0.0), (0.0, -2.0, 0.0), (0.0, 0.0, 1.5)])
 def test_of_a_pose_whose_attitude_is_wrong_the_place_is_used(rate: Vec3) -> None:
@@ -236,6 +237,7 @@ def test_of_a_pose_whose_attitude_repeats_itself_the_place_is_used() -> None:
     assert health.fault is SensorFault.STUCK
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize(
     ("turn", "is_believed"),

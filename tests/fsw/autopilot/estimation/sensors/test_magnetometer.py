@@ -158,6 +158,7 @@ def _shifted(sample: Sample, by: Array) -> Sample:
     return replace(sample, field=(a, b, c))
 
 
+@pytest.mark.drawn(2)
 @pytest.mark.requirement("REQ-EST-4")
 @pytest.mark.parametrize("seed", range(4))
 def test_garbage_that_is_within_the_gate_now_and_then_turns_nothing(seed: int) -> None:

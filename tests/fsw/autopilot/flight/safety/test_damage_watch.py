@@ -102,6 +102,7 @@ def weak(rotor: int, share: float) -> Given:
 NAMES = ("rotor 1 (rear)", "rotor 2 (left)", "rotor 3 (front)", "rotor 4 (right)")
 
 
+@pytest.mark.drawn(6)
 @pytest.mark.parametrize("rotor", range(4))
 @pytest.mark.parametrize(("share", "within_s"), [(0.7, 0.35), (0.5, 0.25), (0.3, 0.2)])
 def test_the_weak_rotor_is_named_with_what_it_gives(
@@ -204,6 +205,7 @@ def test_beside_a_weak_rotor_pushes_and_another_weak_one_lose_nothing(share: flo
     assert not any(one.report.lost or one.report.disobeys for one in motion.history)
 
 
+@pytest.mark.drawn(3)
 @pytest.mark.requirement("REQ-ACT-1")
 @pytest.mark.parametrize("rotor", range(4))
 @pytest.mark.parametrize("left", [0.8, 0.6, 0.45])
@@ -256,6 +258,7 @@ def test_two_rotors_that_change_together_are_no_single_one() -> None:
     assert not turned.run(FAULT_S + 0.5).rotor
 
 
+@pytest.mark.drawn(6)
 @pytest.mark.parametrize("lag", [0.04, 0.06, 0.08])
 @pytest.mark.parametrize("rotor", range(4))
 @pytest.mark.parametrize("swing", [3.0, 8.0])
