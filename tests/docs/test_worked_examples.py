@@ -144,24 +144,47 @@ def test_there_is_an_example_of_each() -> None:
 
 
 @pytest.mark.parametrize(("title", "diff"), DIFFS, ids=[title for title, _ in DIFFS])
-def test_the_example_applies_and_does_what_it_says(title: str, diff: str, tmp_path: Path) -> None:
+def test_an_example_is_small_and_applies_alone(title: str, diff: str) -> None:
     files = set(re.findall(r"^\+\+\+ b/(.+)$", diff, re.MULTILINE))
     assert 1 <= len(files) <= MAX_FILES.get(title, 3)
+    apply(diff, ROOT, "--check")
+
+
+def test_all_examples_applied_together_do_what_they_say(tmp_path: Path) -> None:
+    copy_sources(tmp_path)
+    for _, diff in DIFFS:
+        apply(diff, tmp_path)
+    check("\n".join(f"exec({text!r}, {{}})" for text in CHECKS.values()), tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("title", "diff"), DIFFS, ids=[title for title, _ in DIFFS])
+def test_an_example_alone_does_what_it_says(title: str, diff: str, tmp_path: Path) -> None:
+    copy_sources(tmp_path)
+    apply(diff, tmp_path)
+    check(CHECKS[title], tmp_path)
+
+
+def copy_sources(to: Path) -> None:
+    """With what Python has compiled of them, which is valid by the files' dates; no kernels."""
     for folder in ("docs/pages", "fsw", "messages", "sitl", "tests/fsw", "tests/sitl"):
-        # With what Python has compiled of it, which is valid by the files' dates; no kernels.
-        ignored = shutil.ignore_patterns("numba-*")
-        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignored)
+        shutil.copytree(ROOT / folder, to / folder, ignore=shutil.ignore_patterns("numba-*"))
+
+
+def apply(diff: str, folder: Path, *options: str) -> None:
     applied = subprocess.run(
-        ["git", "apply", "--recount", "-"], input=diff, text=True, cwd=tmp_path, capture_output=True
-    )
+        ["git", "apply", "--recount", *options, "-"],
+        input=diff, text=True, cwd=folder, capture_output=True,
+    )  # fmt: skip
     assert applied.returncode == 0, applied.stderr
+
+
+def check(code: str, folder: Path) -> None:
+    """Run a script on a copy of the sources."""
     # Plain Python: a copy of the kernels would be compiled anew, which takes a minute.
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(folder)}
     checked = subprocess.run(
-        [sys.executable, "-c", CHECKS[title]],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
+        [sys.executable, "-c", code],
+        cwd=folder, env=environment, capture_output=True, text=True,
+    )  # fmt: skip
     assert checked.returncode == 0, checked.stderr
