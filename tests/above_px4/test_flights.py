@@ -207,7 +207,7 @@ def test_both_conventions_of_velocities_fly_with_the_yaw_turned(child_frame: int
     there = GoTo(Place((north + 0.8, east)))
     flight.commands.append(Command(there, CommandRequest(192, (0.0,) * 7, 255, 190)))
     worst = 0.0
-    for _ in range(round(4.0 / 0.004)):
+    for _ in range(round(2.8 / 0.004)):
         flight.exchange()
         estimate, truth = flight.state.estimate, flight.sim.truth()
         assert estimate is not None

@@ -66,8 +66,8 @@ def test_whatever_is_wrong_with_it_is_told_and_nothing_is_touched(suite: str, se
 @pytest.mark.parametrize(
     ("mode", "suite", "faults"),
     [
-        ("hold", "gnss", [Fault("mag", "wrong", start_s=1.0, size=0.15)]),
         ("land", "gnss", [Fault("mag", "drifting", start_s=0.5, size=1.8)]),
+        ("hold", "gnss", [Fault("mag", "wrong", start_s=1.0, size=0.15)]),
         ("hold", "rtk", [Fault("accel", "drifting", start_s=0.3, size=1.2)]),
         ("trajectory", "rtk", [Fault("joint", "off", instance=1, start_s=3.0, duration_s=0.3)]),
     ],

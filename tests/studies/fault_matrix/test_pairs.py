@@ -144,10 +144,11 @@ def test_two_faults_are_flown_and_each_begins_at_its_time() -> None:
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("seed", "number"),
-    # A replay took in what had been left out, and two samples of one time could not be sorted.
-    [(611, 331), (611, 386), (611, 65), (611, 216)]
+    # The first one is the shortest flight, for `make test`. In those of 611 a replay took in what
+    # had been left out, and two samples of one time could not be sorted.
+    [(211, 65), (611, 331), (611, 386), (611, 65), (611, 216)]
     + [(91, 3), (91, 9), (91, 14), (91, 64), (91, 100), (91, 120), (91, 126)]
-    + [(137, 15), (211, 65), (307, 36), (307, 86), (611, 73), (611, 139), (611, 191)]
+    + [(137, 15), (307, 36), (307, 86), (611, 73), (611, 139), (611, 191)]
     + [(503, k) for k in (32, 178, 365, 560, 611, 655)]
     + [(823, k) for k in (118, 301, 351, 392, 444)],
 )
