@@ -92,8 +92,10 @@ tests-of-studies: fsw-kernels sitl-kernels
 tests-of-the-rest: fsw-kernels sitl-kernels
 	$(call check,the rest,$(PYTEST) -m "not long" $(addprefix --ignore=, \
 		$(OF_CLOCKS) $(OF_CLIENTS) $(OF_PROCESSES) $(OF_STUDIES)))
-fsw-kernels sitl-kernels: %-kernels:
-	@$(BIN)/python -m studies.flight.kernels $*
+fsw-kernels:
+	@$(BIN)/python -m studies.flight.kernels fsw px4
+sitl-kernels:
+	@$(BIN)/python -m studies.flight.kernels sitl
 
 test-long: setup ## the tests that make test leaves out for its four minutes, and properties with more examples
 	$(PYTEST) -m long
