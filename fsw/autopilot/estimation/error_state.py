@@ -47,7 +47,7 @@ ON_TRIAL = 8
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
 FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
-WITNESS: Final = 28  # integrals: see faults/redundancy.py
+WITNESS: Final = 29  # integrals: see faults/redundancy.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(

@@ -84,8 +84,9 @@ _KINDS: Final = tuple(0 if one & P else 1 if one & N else 2 if one & B else -1 f
 # Integrals of ``FILTER.witness`` over the time since the vehicle flies, by column: the turn that
 # the gyro says (quaternion, and sum of rates [rad, FRD]), velocity and place that the accelerometer
 # makes [SI, NED] and that the rotors make, rate and turn that the rotors make [SI, FRD], and what
-# is felt beside the rotors [m/s, FRD].
+# is felt beside the rotors [m/s, FRD], the turn in each axis [rad], and the time itself [s].
 SAID, FELT, FELT2, MADE, MADE2, SPUN, SPUN2, BESIDE, TURN = 0, 4, 7, 10, 13, 16, 19, 22, 25
+LASTS: Final = 28
 WINDOWS: Final = (0.1, 0.5, 1.0, 2.0)  # s
 EVERY: Final = 0.02  # s, between looks
 _LONG: Final = 3.0  # s, over which means of half a second are compared
@@ -209,7 +210,11 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
     felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
     own = rotate_back(R, pushed)
     made = rotate(R, (own[0], own[1], own[2] - model[3]))
+    # Biases are as the filter finds them until residuals are looked at, and means from then on: of
+    # a mean that begins with nothing known, half would be missing for long.
+    W[LASTS] += dt
     share = dt / _BASELINE
+    known = dt / min(max(W[LASTS] - _SETTLING, dt), _BASELINE)
     for i in range(3):
         down = GRAVITY if i == 2 else 0.0
         W[FELT + i] += dt * (felt[i] + down)
@@ -222,8 +227,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
         W[BESIDE + i] += dt * beside
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):
-            b[i] += share * (x.accel_bias[i] - b[i])
-            b[3 + i] += share * (x.gyro_bias[i] - b[3 + i])
+            b[i] += known * (x.accel_bias[i] - b[i])
+            b[3 + i] += known * (x.gyro_bias[i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
 
 
