@@ -20,7 +20,7 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.commands.bounds import bounded_update, target_problem
+from fsw.autopilot.flight.commands.bounds import bounded_update
 from fsw.autopilot.flight.descent import Descent
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
@@ -51,6 +51,7 @@ from fsw.autopilot.flight.safety.uncertain_clearance import (
 from fsw.autopilot.flight.safety.zone_room import ZoneRoom
 from fsw.autopilot.flight.setpoints.pressed_reference import pressed_reference
 from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
+from fsw.autopilot.flight.setpoints.target_check import TargetCheck
 from fsw.autopilot.flight.snapshot import Shown
 from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, SafetyMemory
 from fsw.autopilot.geometry.rotation import wrap_angle
@@ -130,6 +131,7 @@ class Autopilot:
             NO_ZONES,
         )
         self._safe_sets = SafeSetCheck(config)
+        self._targets = TargetCheck(config, self._safe_sets.loop_tube)
         self._commander = Commander(config)
         self._horizon = ReferenceHorizon(config)
         self._plans = PlanExchange(config)
@@ -447,26 +449,25 @@ class Autopilot:
         """Store targets, safe set and mission, as far as they are within bounds."""
         now_us, mission = inputs.sensors.t_us, state.mission
         update, against = bounded_update(inputs.mission)
-        problems = [(target_problem(target, now_us), target) for target in inputs.targets]
-        believed = tuple([target for problem, target in problems if problem is None])
-        against += [f"target refused: {problem}" for problem, _ in problems if problem is not None]
-        against += inputs.refused
-        texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)]
-        stream = merge(mission.stream, believed, now_us)
-        refused_count = mission.refused_count + len(against)
-        vehicle, target = state.vehicle, state.reference
+        vehicle, target, news = state.vehicle, state.reference, list[StatusText]()
         if target is None and vehicle.flies and state.estimate is not None:
             mode = self._commander.mode(state)
             target = self._horizon.target(mode, state, state.estimate, now_us)
         mission = self._safe_sets.update(
-            replace(mission, stream=stream, refused_count=refused_count),
+            mission,
             inputs if update is inputs.mission else replace(inputs, mission=update),
             state.estimate,
-            texts,
+            news,
             flies=vehicle.flies,
             armed=vehicle.armed,
             target=target,
         )
+        believed, refused = self._targets.believed(inputs.targets, mission.safe_set, now_us)
+        against += (*refused, *inputs.refused)
+        texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)] + news
+        stream = merge(mission.stream, believed, now_us)
+        refused_count = mission.refused_count + len(against)
+        mission = replace(mission, stream=stream, refused_count=refused_count)
         if mission.refused_count != state.mission.refused_count:
             counters = replace(state.safety.counters, refusals=mission.refused_count)
             state = replace(state, safety=replace(state.safety, counters=counters))

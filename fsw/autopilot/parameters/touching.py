@@ -17,6 +17,7 @@ Source: docs/equations.md T8.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,7 @@ class Grip(NamedTuple):
     outwards: float  # m, the same away from it
 
 
+@lru_cache(maxsize=16)  # it takes 60 ms, and in flight is known from the analysis of the zone
 def grip(airframe: Airframe, tuning: PressTuning, normal: Vec3, disturbance: float) -> Grip:
     """The grip of the home posture, level, along a ``normal`` [1, B] out of the surface.
 

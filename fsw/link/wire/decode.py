@@ -45,7 +45,7 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 MAX_ZONES: Final = 64  # in a set
 _KEEP_IN: Final = 1  # PANDION_SHAPE_FLAGS
 _TOUCH: Final = 2
-_FORCE_AT: Final = 16  # among the numbers of an END_EFFECTOR_TARGET
+FORCE_AT: Final = 16  # among the numbers of an END_EFFECTOR_TARGET
 _TOUCH_AT: Final = 27  # of an OBSTACLE_SHAPE
 
 
@@ -165,7 +165,7 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
     acceleration = _ZERO if mask & _ACCELERATION_IGNORED else cast(Vec3, values[7:10])
     yaw = 0.0 if mask & _YAW_IGNORED else values[10]
     target = EndEffectorTarget(
-        int(values[0]), position, velocity, acceleration, yaw, values[_FORCE_AT]
+        int(values[0]), position, velocity, acceleration, yaw, values[FORCE_AT]
     )
     problem = reference_problem(target)
     if problem is not None:

@@ -19,7 +19,7 @@ from fsw.autopilot.signals import (
     Vec3,
     Vec4,
 )
-from fsw.link.wire.decode import Numbers, RefusedError
+from fsw.link.wire.decode import FORCE_AT, Numbers, RefusedError
 from fsw.link.wire.mission_items import GLOBAL_FRAMES, HOME_FRAMES, Locate
 from messages.joint_arrays import JOINTS_MAX, SETPOINT_AT, SETPOINT_COUNT_AT, joined
 
@@ -52,11 +52,13 @@ def body_setpoint(values: Numbers) -> MotionSetpoint:
 
 
 def end_effector_setpoint(values: Numbers) -> MotionSetpoint:
-    """Read an END_EFFECTOR_TARGET without a time.
+    """Read an END_EFFECTOR_TARGET without a time, and so without a force.
 
     Raises:
         RefusedError: It is of no use.
     """
+    if values[FORCE_AT] != 0.0:
+        raise RefusedError("a force needs a time: stream targets ahead")
     return _local(values, of_end_effector=True)
 
 
