@@ -28,7 +28,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.pid import PidGains, pid_step
-from fsw.autopilot.control.press import PressTuning, press, pressed_by, presses
+from fsw.autopilot.control.press import PressTuning, left_to_press, press, pressed_by, presses
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
@@ -156,6 +156,7 @@ def joint_torques(
         for i in range(n):
             off += r.pressing.along[i] * (k.reference[i] - q[i])
             rate_off += r.pressing.along[i] * (k.reference_rate[i] - qd[i])
+        off, rate_off = left_to_press(r.pressing) * off, left_to_press(r.pressing) * rate_off
     for i in range(n):
         error = k.reference[i] - q[i] - r.pressing.share[i] * off
         rate_error = k.reference_rate[i] - qd[i] - r.pressing.share[i] * rate_off
@@ -187,6 +188,8 @@ def _press_with(r: Tick, airframe: Airframe, into: float, qdd: Floats) -> None:
     along = 0.0
     for i in range(n):
         along += p.along[i] * qdd[i]
+    left = left_to_press(p)
+    into, along = left * into, left * along
     for i in range(n):
         qdd[i] -= p.share[i] * along
     for i in range(n):
@@ -194,9 +197,9 @@ def _press_with(r: Tick, airframe: Airframe, into: float, qdd: Floats) -> None:
         for j in range(n):
             p.work[i] += m.qq[JOINTS * i + j] * qdd[j]
     # What moves the tool aside must not press: where friction holds it, the surface takes it all.
-    aside = pressed_by(p, p.work, n) if p.contact > 0 else 0.0
+    aside = left * pressed_by(p, p.work, n) if p.contact > 0 else 0.0
     for i in range(n):
-        besides = p.external[i] - p.along[i] * p.pressed
+        besides = p.external[i] - p.along[i] * left * p.pressed
         p.work[i] -= clamp_magnitude(besides, _DISTURBANCE * airframe.joint_torque_max[i])
         p.work[i] -= p.along[i] * (p.commanded + aside)
         for j in range(n):

@@ -238,6 +238,16 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
 
 
 @compilable
+def left_to_press(k: Pressing) -> float:
+    """Share [1] in which the tool's motion along the normal is a matter of force, and not of place.
+
+    In contact an arm that is nearly straight follows its reference again: its levers along the
+    normal vanish, and what is made of them is as large as it is wrong.
+    """
+    return k.stroke if k.contact > 0 else 1.0
+
+
+@compilable
 def pressed_by(k: Pressing, torque: Floats, joints: int) -> float:
     """Force [N] along the normal that a ``torque`` (j,) [N m] makes where the tool cannot move."""
     felt = whole = 0.0

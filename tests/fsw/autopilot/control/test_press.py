@@ -9,9 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from fsw.autopilot.control.joints import observe_contact
+from fsw.autopilot.control.gains import LoopGains
+from fsw.autopilot.control.joints import joint_torques, observe_contact
 from fsw.autopilot.control.press import PressTuning, look_for_surface, press, weigh_tool
 from fsw.autopilot.model.airframe import Airframe, airframe_of
+from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.multibody import move_bodies
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.zones import moving_zones
@@ -28,6 +30,7 @@ TUNING = PressTuning()
 DT = 0.002
 G = np.array([0.0, 0.0, 9.81])
 TOUCH = Touch(10.0, 1e3, 1e4)
+AHEAD: Vec3 = (-1.0, 0.0, 0.0)
 
 
 class Arm:
@@ -207,3 +210,22 @@ def test_of_a_vehicle_turned_aside_the_whole_normal_force_is_known() -> None:
     r.pressing.contact = 1
     weigh_tool(r, airframe, TUNING)
     np.testing.assert_allclose(r.pressing.force, 5.0 * normal, atol=0.2)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_in_contact_an_arm_that_is_nearly_straight_follows_its_reference_again() -> None:
+    """Its levers along the normal vanish: what they made swung it straight in 1 of 8 probes."""
+    airframe = airframe_of(load_vehicle("probe-2r"))
+    r = at_surface(airframe, estimate(np.array([1.5, 0.1]), np.zeros(2), np.zeros(3)), AHEAD)
+    weigh_tool(r, airframe, TUNING)
+    k, torques = r.pressing, []
+    r.joints.reference[0], r.joints.reference[1] = 1.4, 0.4
+    k.contact, k.distance, k.pressed, r.u.force = 1, 0.0, 4.0, 5.0
+    for near in (1, 0):
+        k.near = near
+        joint_torques(
+            *(r, airframe, arm_coordinates(airframe), LoopGains().joint, TUNING, vec3(G)),
+            *((0.0, 0.0, 0.0), DT),
+        )
+        torques.append(r.wanted.joint_torque[:2].copy())
+    np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)
