@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.scenario import Circle, Hold, Lissajous, Points, Polynomial, Trajectory
+from sitl.scenario import Points, Trajectory
 from sitl.scenario_file import read_points
 from sitl.scenario_validation import MAX_POINTS, check_trajectory
 from sitl.trajectory import reference as reference_of
@@ -25,7 +25,7 @@ from studies.flight.own_parts import OwnPartError, numbers
 Array: TypeAlias = NDArray[np.float64]
 AnyReference: TypeAlias = Callable[[float], Any] | Array | Path | str | Trajectory
 
-_KINDS: Final = (Lissajous, Hold, Points, Circle, Polynomial)
+_KINDS: Final[tuple[type[Trajectory], ...]] = get_args(Trajectory)
 _APART_S: Final = 0.05  # samples of a callable; the vehicle is sent one each 0.1 s
 _OFF_M: Final = 0.001  # by which the spline may miss a callable between two samples
 

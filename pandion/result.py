@@ -134,7 +134,7 @@ def _asked_row(error: float | None, asked: float | None) -> Rows:
     """The force's error against what was asked for, where anything was."""
     if error is None or asked is None:
         return []
-    return [("force error / asked, RMS", f"{error:.2f} / {asked:.2f} N")]
+    return [("force error, RMS", f"{error:.2f} N of {asked:.2f} N")]
 
 
 def _shown(margins: dict[str, float]) -> dict[str, float]:

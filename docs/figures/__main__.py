@@ -17,6 +17,7 @@ import matplotlib as mpl
 
 from docs.figures.animation import draw_animation
 from docs.figures.browser import NoBrowser
+from docs.figures.contact import draw_contact
 from docs.figures.dash import draw_dash, fly_four, shown
 from docs.figures.dash_animation import draw_dash_animation
 from docs.figures.diagrams import draw_architecture, draw_timing
@@ -72,6 +73,7 @@ def draw_all(flights: Path) -> None:
         draw_dash_animation(dash, four, IMAGES / "dash.webp")
         for flown, name in PICTURED.items():
             draw_flight(fly(*flown, flights), IMAGES / name)
+        draw_contact(fly("probe", "mocap", flights), IMAGES / "probe.svg")
     pictured, watched = (fly(*flown, flights) for flown in (next(iter(PICTURED)), SHOWN))
     try:
         draw_view(watched, IMAGES / "view.png")

@@ -489,6 +489,9 @@ class MissionAction(Enum):
     LOOK_AT = "look at"  # from now on: a place, or nothing
     CIRCLE = "circle"  # some turns about a position, then stay for hold_s
     JUMP = "jump"  # to another step, some times
+    PUSH = "push"  # on the surface at a position, with force for press_s
+    GRIP = "grip"  # close the gripper and hold what is in it
+    RELEASE = "release"
     SKIP = "skip"  # it is for a payload that this vehicle does not have
 
 
@@ -509,6 +512,8 @@ class MissionStep:
     target: int = 0  # of a jump: the step to go on with
     repeats: int = 0  # of a jump: how often it is taken; negative: without end
     here: bool = False  # position gives the height alone: north and east stay as they are
+    force: float = 0.0  # N, of a push, along the normal of the surface
+    press_s: float = 0.0  # with all of that force
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,13 @@ import pytest
 
 from fsw.autopilot.flight.failsafe.conditions import Action
 from fsw.autopilot.parameters.flight_config import flight_config
-from fsw.autopilot.signals import Mode
+from fsw.autopilot.signals import MissionAction, MissionState, MissionStep, MissionUpdate, Mode
 from fsw.frozen import replace
 from sitl.scenario import Disturbance, Payload, ScenarioWall, Uniform, Wind, vehicle_of
 from tests.closed_loop.harness import ARM, Flight, command, hover
 
 DO_GRIPPER, GRAB, RELEASE, HOLD = 211, 1.0, 0.0, 2.0
+MISSION_START = 300
 SHAKEN, PUSHED_DOWN, LIFTED = Uniform(0.8, 0.1), Wind((0.8, 0.0, 0.8)), Wind((-0.8, 0.0, -0.8))
 WALL = ScenarioWall("wall", (-1.0, 0.0, 0.0), -0.7, 0.1)
 
@@ -59,6 +60,24 @@ def test_what_is_gripped_is_weighed_and_dropped_beside_a_wall(
     assert [result for _, result in flight.results] == [0, 0, 0, 0]
     assert flight.mode is Mode.HOLD, flight.texts
     assert flight.snapshot.safety.breaches == 0
+
+
+def test_a_mission_takes_a_payload_up_and_lets_go_of_it() -> None:
+    flight = gripping("probe-2r", 0.2)
+    steps = (
+        MissionStep(MissionAction.GRIP),
+        MissionStep(MissionAction.DELAY, hold_s=2.0),
+        MissionStep(MissionAction.RELEASE),
+        MissionStep(MissionAction.DELAY),
+    )
+    flight.upload = MissionUpdate(steps=steps, current=0)
+    flight.step()
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    flight.run(1.5)
+    assert flight.sim.payload.held_kg == 0.2
+    flight.run(1.5)
+    assert flight.sim.payload.held_kg == 0.0
+    assert flight.snapshot.mission.state is MissionState.COMPLETE
 
 
 def test_a_gripper_that_holds_nothing_weighs_next_to_nothing() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import (
     EndEffectorTarget,
     MissionAction,
@@ -20,7 +21,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.fence_items import CIRCLE_INCLUSION, POLYGON_INCLUSION, read_fence
 from fsw.link.wire.mission_items import MissionItem
-from sitl.scenario import Pilot
+from sitl.scenario import Pilot, vehicle_of
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import (
     ARM,
@@ -121,6 +122,36 @@ def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() ->
     texts = "; ".join(flight.texts)
     assert "mission step 0 not reached" in texts
     assert "mission step 1 not reached" in texts
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_a_mission_presses_where_it_may_and_says_where_it_may_not() -> None:
+    """Places are meant on the surface: the tip finds it, in front of them or behind."""
+    scenario = replace(load_scenario("probe"), pilot=Pilot("none"))
+    config = flight_config(body="full", vehicle=vehicle_of(scenario))
+    flight = Flight(scenario, seed=2, config=config)
+    flight.step(command(ARM, 1.0))
+    steps = (
+        MissionStep(A.PUSH, (1.1, 0.1, -1.25), force=4.0, press_s=1.0),
+        MissionStep(A.PUSH, (0.2, 0.0, -1.2), force=4.0, press_s=1.0),  # far from the wall
+        MissionStep(A.PUSH, (1.0, 0.0, -1.2), force=9.9, press_s=1.0),  # more than is promised
+    )
+    reported(flight, steps)
+    flight.step(command(MISSION_START, 0.0, 0.0))
+    forces = []
+    while flight.mode is Mode.MISSION:
+        flight.step()
+        forces.append(-flight.sim.tip_force[0])
+    assert flight.mode is Mode.HOLD
+    assert flight.snapshot.mission.state is MissionState.COMPLETE
+    (use,) = flight.sim.touch.uses().values()
+    assert use.force_max_n < use.force_bound_n
+    pressed = [force for force in forces if force > 3.0]
+    assert 0.8 < 0.002 * len(pressed) < 3.5
+    assert abs(sum(pressed) / len(pressed) - 4.0) < 0.6
+    texts = "; ".join(flight.texts)
+    assert "mission step 1 not flown: the surface that may be touched is 0.78 m away" in texts
+    assert "mission step 2 not flown: 9.9 N are asked for; at most" in texts
 
 
 def test_a_fence_takes_the_place_of_the_walls_that_nobody_announced() -> None:

@@ -53,6 +53,15 @@ def test_a_picture_prints_the_recorded_numbers_of_its_flight(
     assert f"minimum margin {numbers['min_margin_mm']:.1f} mm" in title
 
 
+def test_the_picture_of_a_flight_that_touches_is_of_one_within_its_bound() -> None:
+    title = next(text for text in words(IMAGES / "probe.svg") if "--seed" in text)
+    found = re.fullmatch(
+        r"pandion fly probe --sensors mocap --seed 0: at most ([\d.]+) N of 10 N", title
+    )
+    assert found
+    assert 5.0 < float(found[1]) < 10.0
+
+
 def test_the_table_of_the_readme_has_the_recorded_numbers() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     name, length = r"`([\w-]+)`", r"([\d.]+) mm"

@@ -17,7 +17,7 @@ import pandion
 from pandion.references import trajectory
 from sitl.compiled import compiled
 from sitl.mission_clock import MissionClock
-from sitl.scenario import Circle, Lissajous, Points, Polynomial, Trajectory
+from sitl.scenario import Circle, Lissajous, Points, Polynomial, Push, Trajectory
 from sitl.scenario_file import parse_scenario, scenario_digest
 from sitl.scenario_text import scenario_text
 from sitl.trajectory import curve_row, place_on_curve, reference
@@ -131,6 +131,15 @@ def test_a_lissajous_as_a_callable_is_the_scenarios_flight() -> None:
     # The sphere of the workspace rides on the reference: compiled judge and clock agree on it.
     assert ours.min_margin == pytest.approx(same.min_margin, abs=1e-4)
     assert ours.tracking_rms == pytest.approx(same.tracking_rms, abs=1e-4)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_a_push_is_a_reference_too() -> None:
+    push = Push((-1.0, 0.0, 0.0), ((0.975, 0.0, -1.2),), (4.0,), (1.0,), away_m=0.1, approach_s=2.0)
+    result = pandion.fly("probe", reference=push, duration_s=7.0, log=False)
+    (use,) = result.truth.touches.values()
+    assert 3.5 < use.force_max_n < 6.0
+    assert use.contact_s > 1.0
 
 
 def test_yaw_is_taken_from_the_fourth_number() -> None:

@@ -16,7 +16,7 @@ from fsw.autopilot.signals import FlightSnapshot, MissionAction, MissionStep, Sa
 from fsw.link.wire.mission_items import SKIPPED, MissionItem, command_name
 
 _NAMED: Final = 4  # of a kind; the others are counted
-_PLACES: Final = (MissionAction.GO, MissionAction.CIRCLE, MissionAction.LAND)
+_PLACES: Final = (MissionAction.GO, MissionAction.CIRCLE, MissionAction.LAND, MissionAction.PUSH)
 
 
 def mission_remarks(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from fsw.autopilot.flight.commands.bounds import (
+    MAX_FORCE,
     MAX_REPEATS,
     MAX_SPEED,
     MAX_STAY,
@@ -37,7 +38,9 @@ DO_CHANGE_SPEED: Final = 178
 DO_SET_ROI_LOCATION: Final = 195
 DO_SET_ROI_NONE: Final = 197
 DO_SET_ROI: Final = 201
+DO_GRIPPER: Final = 211
 NAV_RALLY_POINT: Final = 5100
+WAYPOINT_USER_1: Final = 31000  # presses on a surface
 
 # What leaves the way as it is, and why it is skipped.
 _NO_CAMERA: Final = "this vehicle has no camera"
@@ -54,7 +57,6 @@ _MISSING: Final[dict[int, str]] = {
     187: "the joints follow from where the end-effector is to be",
     207: "the fence is always in force",
     208: "this vehicle has no parachute",
-    211: "the gripper is moved by commands alone",
     42600: "this vehicle has no winch",
 }
 
@@ -189,6 +191,25 @@ def _loiter(item: MissionItem, locate: Locate, hold: float) -> MissionStep:
     return replace(_go(item, place, hold, USUAL_ACCEPTANCE), here=here)
 
 
+def _push(item: MissionItem, locate: Locate) -> MissionStep:
+    """Parameter 1 is the force, 2 for how long, 4 the heading; NaN: towards the surface."""
+    force, press_s = item.params[:2]
+    if not 0.0 < force <= MAX_FORCE:
+        raise _bad(1, f"a force of {force:g} N is outside 0 to {MAX_FORCE:g} N")
+    if not 0.0 <= press_s <= LONGEST_STAY:
+        raise _bad(2, f"pressing for {press_s:g} s is outside 0 to {LONGEST_STAY:g} s")
+    step = _go(item, _place(item, locate, "a push needs a place"), 0.0, USUAL_ACCEPTANCE)
+    return replace(step, action=MissionAction.PUSH, force=force, press_s=press_s)
+
+
+def _grip(item: MissionItem, _: Locate) -> MissionStep:
+    """Parameter 2 is what the gripper does: 0 releases, 1 grabs."""
+    actions = {0.0: MissionAction.RELEASE, 1.0: MissionAction.GRIP}
+    if item.params[1] not in actions:
+        raise _bad(2, f"{item.params[1]:g} is neither 0, release, nor 1, grab")
+    return MissionStep(actions[item.params[1]], stop_after=not item.autocontinue)
+
+
 def _jump(item: MissionItem, _: Locate) -> MissionStep:
     """Parameter 1 is the item to go on with, 2 how often; -1: without end."""
     target, repeats = item.params[:2]
@@ -287,6 +308,8 @@ _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
     DO_SET_ROI_LOCATION: _look_at,
     DO_SET_ROI_NONE: lambda *_: MissionStep(MissionAction.LOOK_AT),
     DO_SET_ROI: _look,
+    DO_GRIPPER: _grip,
+    WAYPOINT_USER_1: _push,
 }
 
 

@@ -37,7 +37,14 @@ CIRCLE_RADII: Final = (0.5, 100.0)  # m
 MAX_TURNS: Final = 100.0
 MAX_REPEATS: Final = 1000  # of a jump
 MOVES_NOTHING: Final = frozenset(
-    {MissionAction.SPEED, MissionAction.LOOK_AT, MissionAction.JUMP, MissionAction.SKIP}
+    {
+        MissionAction.SPEED,
+        MissionAction.LOOK_AT,
+        MissionAction.JUMP,
+        MissionAction.SKIP,
+        MissionAction.GRIP,
+        MissionAction.RELEASE,
+    }
 )
 _AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
 _AXES: Final = ("north", "east", "down")
@@ -208,6 +215,9 @@ def step_problem(step: MissionStep) -> str | None:
     stays = step.hold_s == math.inf and step.action is MissionAction.GO
     if not (stays or 0.0 <= step.hold_s <= MAX_STAY):
         return f"a stay of {step.hold_s:g} s is outside 0 to {MAX_STAY:g} s"
+    if not (0.0 <= step.force <= MAX_FORCE and 0.0 <= step.press_s <= MAX_STAY):
+        most = f"{MAX_FORCE:g} N, {MAX_STAY:g} s"
+        return f"a push of {step.force:g} N for {step.press_s:g} s is outside 0 to {most}"
     if step.action is MissionAction.CIRCLE:
         return circle_problem(step.radius, step.turns)
     if step.action is MissionAction.JUMP and not -1 <= step.repeats <= MAX_REPEATS:

@@ -1,8 +1,8 @@
 """A mission in flight: which step, which segment, and what follows; pure.
 
 Each step that names a place is one segment from rest to rest (``trajectory_segment.py``), a stay
-there, and the next step. A circle begins with the straight one to its nearest point. A step is
-reached where the end-effector really is within its acceptance.
+there, and the next step. A circle begins with the straight one to its nearest point, a push with
+the one to its stand-off. A step is reached where the end-effector really is within its acceptance.
 A place that the vehicle cannot get to, beyond a wall say, is given up after a while, with a text
 and without being called reached.
 """
@@ -10,20 +10,26 @@ and without being called reached.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Final
 
 from fsw.autopilot.flight.commands.bounds import MOVES_NOTHING
 from fsw.autopilot.flight.mission.trajectory_segment import (
     TOO_NEAR_TO_LOOK,
     CircleSegment,
     MotionLimits,
+    PushSegment,
     Segment,
     braking_segment,
     circle_from,
+    push_from,
     segment_to,
 )
+from fsw.autopilot.flight.setpoints.press_check import Meeting
 from fsw.autopilot.flight.setpoints.reference_governor import project_to_safe_set
+from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.signals import (
     MAX_MISSION_SPEED,
     EndEffectorTarget,
@@ -38,7 +44,12 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 
+STAND_OFF = 0.1  # m from a surface that is to be pressed on, before and after
+_SIDEWAYS = 0.3  # of a normal, that is horizontal, from which on the nose turns to the surface
 ARRIVAL_TIMEOUT_US = 5_000_000  # at the end of a segment, for the end-effector to arrive
+
+
+_GRIPPER: Final = {MissionAction.GRIP: 1.0, MissionAction.RELEASE: -1.0}
 
 
 class Stage(Enum):
@@ -69,6 +80,11 @@ class MissionFlight:
     progress: MissionProgress = field(default_factory=MissionProgress)
 
 
+def nothing_there(place: Vec3, _force: float) -> Meeting:
+    """Where there is nothing to press on, at ``place`` [m, NED], with ``_force`` [N]."""
+    return Meeting(place, (0.0, 0.0, 0.0), "there is no surface that may be touched")
+
+
 @dataclass(frozen=True, slots=True)
 class MissionContext:
     """The vehicle's state as a mission needs it."""
@@ -79,6 +95,8 @@ class MissionContext:
     home_z: float  # m, NED, of home
     safe_set: SafeSet = field(default_factory=SafeSet)
     look_at: Vec3 | None = None  # m, where the nose is to point
+    # Where the tool meets the surface at a place [m, NED], to press with a force [N].
+    meet: Callable[[Vec3, float], Meeting] = nothing_there
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +109,7 @@ class MissionEvent:
     unmet: bool = False  # the text is a warning
     looks: bool = False  # the nose points elsewhere from now on
     look_at: Vec3 | None = None  # m, there; None: along the flight
+    gripper: float | None = None  # 1 closes, -1 opens
 
 
 NOTHING = MissionEvent()
@@ -206,30 +225,44 @@ def _begin(
 ) -> tuple[MissionFlight, MissionEvent]:
     number = flight.progress.current
     step = flight.steps[number]
-    if step.action is MissionAction.SPEED:
-        following, event = _next(_reached(replace(flight, speed=step.speed)))
-        if step.speed is not None and step.speed > MAX_MISSION_SPEED:
-            text = (
-                f"mission step {number}: {step.speed:g} m/s is flown as {MAX_MISSION_SPEED:g} m/s"
-            )
-            event = replace(event, text="; ".join(filter(None, (text, event.text))))
-        return following, event
-    if step.action is MissionAction.LOOK_AT:
-        following, event = _next(_reached(flight))
-        return following, replace(event, looks=True, look_at=step.position)
-    if step.action is MissionAction.SKIP:
-        return _next(_reached(flight))
     if step.action is MissionAction.JUMP:
         return _jump(flight, step)
+    if step.action in MOVES_NOTHING:
+        return _set(flight, number, step)
     limits = _paced(flight, limits)
-    place = _destination(step, at, context)
+    place, towards = _destination(step, at, context), step.yaw
+    if step.action is MissionAction.PUSH:
+        met = context.meet(place, step.force)
+        if met.against:
+            return _given_up(flight, f"mission step {number} not flown: {met.against}")
+        place = add_scaled(met.place, met.normal, STAND_OFF)
+        if towards is None and math.hypot(*met.normal[:2]) > _SIDEWAYS:
+            towards = math.atan2(-met.normal[1], -met.normal[0])
     end = project_to_safe_set(place, context.safe_set, context.now_us)
-    segment = segment_to(at, end, _heading(step, end, context.look_at), limits)
+    yaw = _heading(towards, end, None if step.force else context.look_at)
+    segment = segment_to(at, end, yaw, limits)
     text = f"mission step {number}: {step.action.value}"
     moving = replace(
         flight, stage=Stage.MOVE, segment=segment, place=place, since_us=context.now_us
     )
     return moving, MissionEvent(text=text)
+
+
+def _set(
+    flight: MissionFlight, number: int, step: MissionStep
+) -> tuple[MissionFlight, MissionEvent]:
+    """Do a step that moves nothing, and begin the next one."""
+    if step.action is MissionAction.SPEED:
+        flight = replace(flight, speed=step.speed)
+    following, event = _next(_reached(flight))
+    if step.action is MissionAction.LOOK_AT:
+        event = replace(event, looks=True, look_at=step.position)
+    if step.action in _GRIPPER:
+        event = replace(event, gripper=_GRIPPER[step.action])
+    if step.speed is not None and step.speed > MAX_MISSION_SPEED:
+        text = f"mission step {number}: {step.speed:g} m/s is flown as {MAX_MISSION_SPEED:g} m/s"
+        event = replace(event, text="; ".join(filter(None, (text, event.text))))
+    return following, event
 
 
 def _paced(flight: MissionFlight, limits: MotionLimits) -> MotionLimits:
@@ -253,10 +286,10 @@ def _jump(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, Miss
     return following, replace(event, text="; ".join(filter(None, (text, event.text))))
 
 
-def _heading(step: MissionStep, end: Vec3, look_at: Vec3 | None) -> float | None:
+def _heading(yaw: float | None, end: Vec3, look_at: Vec3 | None) -> float | None:
     """The heading at the end of a segment [rad]: towards the place that is looked at, if any."""
     if look_at is None or math.dist(look_at[:2], end[:2]) < TOO_NEAR_TO_LOOK:
-        return step.yaw
+        return yaw
     return math.atan2(look_at[1] - end[1], look_at[0] - end[0])
 
 
@@ -288,12 +321,32 @@ def _arrive(
     if off <= step.acceptance:
         if step.action is MissionAction.CIRCLE and not isinstance(flight.segment, CircleSegment):
             return _circle(flight, step, context, limits), NOTHING
+        if step.action is MissionAction.PUSH and not isinstance(flight.segment, PushSegment):
+            return _push(flight, step, context, limits)
         return replace(flight, stage=Stage.STAY, since_us=context.now_us), NOTHING
     if context.now_us - flight.since_us < ARRIVAL_TIMEOUT_US:
         return flight, NOTHING
-    following, event = _next(flight)
     text = f"mission step {flight.progress.current} not reached: {off:.2f} m away"
+    return _given_up(flight, text)
+
+
+def _given_up(flight: MissionFlight, text: str) -> tuple[MissionFlight, MissionEvent]:
+    """Go on with the next step, and say why the current one was not done."""
+    following, event = _next(flight)
     return following, replace(event, text=text, unmet=True)
+
+
+def _push(
+    flight: MissionFlight, step: MissionStep, context: MissionContext, limits: MotionLimits
+) -> tuple[MissionFlight, MissionEvent]:
+    """From the stand-off to the surface, where it is by now, a force on it, and back."""
+    assert flight.segment is not None
+    at = flight.segment.at(context.now_us)
+    met = context.meet(at.p_WE, step.force)
+    if met.against:
+        return _given_up(flight, f"mission step {flight.progress.current} not flown: {met.against}")
+    push = push_from(at, met.place, step.force, step.press_s, _paced(flight, limits))
+    return replace(flight, stage=Stage.MOVE, segment=push, since_us=context.now_us), NOTHING
 
 
 def _circle(

@@ -1,4 +1,4 @@
-r"""A segment of a mission, straight or along a circle, from rest or a speed to rest.
+r"""A segment of a mission, straight, along a circle or to a surface, from rest or a speed to rest.
 
 The share s of the way rises with a rate that follows a cubic smooth step up, stays, and
 follows one down again:
@@ -21,6 +21,7 @@ from fsw.autopilot.signals import EndEffectorTarget, Vec3
 _PEAK = 1.5  # largest slope of S
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 TOO_NEAR_TO_LOOK = 0.3  # m
+_RAMP_S, _RISE = 1.0, 5.0  # s at least, N/s on average, in which a force rises and falls
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,30 @@ class CircleSegment:
         )
 
 
-Segment = TrajectorySegment | CircleSegment
+@dataclass(frozen=True, slots=True)
+class PushSegment:
+    """To a surface, a force on it that rises, stays and falls, and back."""
+
+    into: TrajectorySegment  # ends where the tool touches
+    back: TrajectorySegment
+    force: float  # N, along the normal of the surface
+    ramp: float  # s, from no force to all of it, and back
+
+    @property
+    def end_us(self) -> int:
+        """When the segment is flown."""
+        return self.back.end_us
+
+    def at(self, t_us: int) -> EndEffectorTarget:
+        """The reference at an instant, at rest before and after."""
+        if t_us >= self.back.start_us:
+            return self.back.at(t_us)
+        begun, left = t_us - self.into.end_us, self.back.start_us - t_us
+        x = min(max(1e-6 * min(begun, left) / self.ramp, 0.0), 1.0)
+        return replace(self.into.at(t_us), force=self.force * x * x * (3.0 - 2.0 * x))
+
+
+Segment = TrajectorySegment | CircleSegment | PushSegment
 
 
 def circle_from(
@@ -151,6 +175,20 @@ def circle_from(
         angle=math.copysign(2.0 * math.pi * turns, radius),
         look_at=look_at,
     )
+
+
+def push_from(
+    start: EndEffectorTarget, place: Vec3, force: float, press_s: float, limits: MotionLimits
+) -> PushSegment:
+    """From ``start``, taken at rest, to ``place`` [m, NED], where it presses, and back.
+
+    The ``force`` [N] stays for ``press_s`` [s] between its rise and its fall.
+    """
+    ramp = max(_RAMP_S, force / _RISE)
+    into = segment_to(start, place, None, limits)
+    over_us = into.end_us + math.ceil(1e6 * (2.0 * ramp + press_s))
+    back = segment_to(into.at(into.end_us), start.p_WE, None, limits)
+    return PushSegment(into, replace(back, start_us=over_us), force, ramp)
 
 
 def segment_to(

@@ -6,7 +6,7 @@ import math
 
 from fsw.autopilot.flight.mission import sequencer as sequencer
 from fsw.autopilot.flight.mission.sequencer import MissionContext, Stage
-from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits
+from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits, PushSegment
 from fsw.autopilot.flight.modes.base import (
     CONTINUE,
     CommandContext,
@@ -15,10 +15,12 @@ from fsw.autopilot.flight.modes.base import (
     ModeResult,
     Px4Mode,
 )
+from fsw.autopilot.flight.setpoints.press_check import PressCheck
 from fsw.autopilot.flight.setpoints.reference_governor import project
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     EndEffectorTarget,
@@ -41,6 +43,10 @@ class Mission(FlightMode):
     before_arming = True
     lifts_off = True
     external_reference = True
+
+    def __init__(self, config: FlightConfig) -> None:
+        super().__init__(config)
+        self._press = PressCheck(config, loop_tube(config))
 
     def refusal(self, context: CommandContext) -> str | None:
         """Needs a mission that can start or continue."""
@@ -80,12 +86,15 @@ class Mission(FlightMode):
             home_z=home_z,
             safe_set=state.kept.safe_set,
             look_at=vehicle.look_at,
+            meet=lambda p, force: self._press.meet(p, force, state.kept.source, estimate.t_us),
         )
         flown, event = sequencer.advance(flight, context, motion_limits(config))
         if flown is flight:
             return state, CONTINUE
         if event.looks:
             state = replace(state, vehicle=replace(vehicle, look_at=event.look_at))
+        if event.gripper is not None:
+            state = replace(state, vehicle=replace(state.vehicle, gripper=event.gripper))
         severity = Severity.WARNING if event.unmet else Severity.INFO
         texts = (StatusText(severity, event.text),) if event.text else ()
         state = replace(state, mission=replace(state.mission, flight=flown))
@@ -96,7 +105,8 @@ class Mission(FlightMode):
         segment = state.mission.flight.segment
         if segment is None:
             return super().reference(state, t_us)
-        return project(segment.at(t_us), state.kept.safe_set)
+        touches = isinstance(segment, PushSegment)
+        return project(segment.at(t_us), state.kept.safe_set, touches=touches)
 
 
 def motion_limits(config: FlightConfig) -> MotionLimits:

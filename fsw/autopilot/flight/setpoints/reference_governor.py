@@ -183,12 +183,15 @@ def _fastest(at: Surface, alpha: float, slope: float) -> float:
     return max(safe_approach_speed(max(at.distance, 0.0), alpha, slope), _ALWAYS)
 
 
-def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int) -> Vec3:
-    """``p`` [m, NED], or a point near it that keeps the clearance of every zone at a time."""
+def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int, *, touches: bool = False) -> Vec3:
+    """``p`` [m, NED], or a point near it that keeps the clearance of every zone at a time.
+
+    Of a tool that ``touches`` what may be touched, of every other zone.
+    """
     for _ in range(_PROJECTIONS):
         moved = p
-        for zone in range(len(safe_set.zones)):
-            at = surface(safe_set, zone, p, t_us)
+        for zone, of in enumerate(safe_set.zones):
+            at = None if touches and of.touch else surface(safe_set, zone, p, t_us)
             if at is not None and -at.distance > _TOLERANCE:
                 p = add_scaled(p, at.normal, -at.distance)
         if p is moved:
@@ -196,9 +199,14 @@ def project_to_safe_set(p: Vec3, safe_set: SafeSet, t_us: int) -> Vec3:
     return p
 
 
-def project(target: EndEffectorTarget, safe_set: SafeSet) -> EndEffectorTarget:
-    """The target, or at rest at the boundary where it is beyond a wall or near an obstacle."""
-    p = project_to_safe_set(target.p_WE, safe_set, target.t_us)
+def project(
+    target: EndEffectorTarget, safe_set: SafeSet, *, touches: bool = False
+) -> EndEffectorTarget:
+    """The target, or at rest at the boundary where it is beyond a wall or near an obstacle.
+
+    A tool that ``touches`` goes up to what may be touched.
+    """
+    p = project_to_safe_set(target.p_WE, safe_set, target.t_us, touches=touches)
     if p is target.p_WE:
         return target
     rest = (0.0, 0.0, 0.0)

@@ -325,9 +325,9 @@ def test_a_leg_through_a_column_and_a_circle_over_a_wall_leave_the_fence() -> No
     ("items", "result", "why"),
     [
         (
-            [{"command": 211, "frame": 2, "params": (1.0, 0.0, NAN, NAN)}],
+            [{"command": 208, "frame": 2, "params": (2.0, 0.0, NAN, NAN)}],
             UNSUPPORTED,
-            "by commands alone",
+            "no parachute",
         ),
         ([{"command": 177, "frame": 2, "params": (9.0, 1.0, 0.0, 0.0)}], INVALID, "item 9 of 0"),
         ([{"command": 177, "frame": 2, "params": (0.0, -1.0, 0.0, 0.0)}], INVALID, "without end"),

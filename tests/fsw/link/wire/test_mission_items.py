@@ -173,9 +173,23 @@ def test_an_item_of_a_camera_is_skipped_whatever_it_says(command: int) -> None:
     assert skipped == MissionStep(MissionAction.SKIP)
 
 
+def test_a_push_has_a_force_and_a_time_and_a_gripper_grabs_or_releases() -> None:
+    read = step(item(items.WAYPOINT_USER_1, params=(5.0, 3.0, 0.0, NAN)))
+    assert read.action is MissionAction.PUSH
+    assert (read.position, read.force, read.press_s) == ((1.0, -2.0, -1.5), 5.0, 3.0)
+    assert (read.hold_s, read.yaw) == (0.0, None)
+    for number, wrong in ((1, (0.0, 3.0)), (1, (201.0, 3.0)), (1, (NAN, 3.0)), (2, (5.0, -1.0)),
+                          (2, (5.0, NAN))):  # fmt: skip
+        push = item(items.WAYPOINT_USER_1, params=(*wrong, 0.0, NAN))
+        assert refused(push).result == items.INVALID_PARAM1 + number - 1
+    for wish, action in ((0.0, MissionAction.RELEASE), (1.0, MissionAction.GRIP)):
+        assert step(item(items.DO_GRIPPER, MISSION, (1.0, wish, NAN, NAN))).action is action
+    assert refused(item(items.DO_GRIPPER, MISSION, (1.0, 2.0, NAN, NAN))).result == 7
+
+
 def test_an_item_that_a_mission_relies_on_is_refused_by_its_name() -> None:
-    wrong = refused(item(211, MISSION, (1.0, 0.0, NAN, NAN)))
-    assert (wrong.result, wrong.reason) == (3, "DO_GRIPPER: the gripper is moved by commands alone")
+    wrong = refused(item(208, MISSION, (2.0, 0.0, NAN, NAN)))
+    assert (wrong.result, wrong.reason) == (3, "DO_PARACHUTE: this vehicle has no parachute")
     wrong = refused(item(82, MISSION, (0.0, 0.0, NAN, NAN)))
     assert wrong.reason.startswith("NAV_SPLINE_WAYPOINT: it is not one of")
     wrong = refused(item(9999, MISSION, (0.0, 0.0, NAN, NAN)))

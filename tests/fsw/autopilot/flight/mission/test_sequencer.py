@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from fsw.autopilot.flight.commands.bounds import mission_problem
 from fsw.autopilot.flight.mission.sequencer import (
+    STAND_OFF,
     MissionContext,
     MissionFlight,
     Stage,
@@ -21,11 +22,13 @@ from fsw.autopilot.flight.mission.sequencer import (
     jumped,
     loaded,
     nearest,
+    nothing_there,
     paused,
     refusal,
     touched_down,
 )
 from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits
+from fsw.autopilot.flight.setpoints.press_check import Meeting
 from fsw.autopilot.flight.setpoints.reference_governor import project, project_to_safe_set
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
@@ -66,6 +69,7 @@ class Flown:
     reached: list[int] = field(default_factory=list)
     next_mode: Mode | None = None
     look_at: Vec3 | None = None
+    meet: Callable[[Vec3, float], Meeting] = lambda p, _: Meeting(p, (0.6, 0.0, -0.8))
 
     def fly(self, seconds: float = math.inf) -> Flown:
         end_us = self.t_us + min(seconds, 2e4) * 1e6
@@ -81,6 +85,7 @@ class Flown:
                 self.home_z,
                 self.safe_set,
                 self.look_at,
+                self.meet,
             )
             count = self.flight.progress.reached_count
             self.flight, event = advance(self.flight, where, PACE)
@@ -107,6 +112,13 @@ random_step = st.one_of(
         st.booleans(),
         st.none() | st.floats(-4.0, 4.0),
         st.floats(0.0, 3.0),
+    ),
+    st.builds(
+        MissionStep,
+        st.just(A.PUSH),
+        st.tuples(coordinate, coordinate, st.floats(-3.0, -0.5)),
+        force=st.floats(0.1, 20.0),
+        press_s=st.floats(0.0, 3.0),
     ),
     st.builds(MissionStep, st.just(A.DELAY), hold_s=st.floats(0.0, 3.0)),
     st.builds(MissionStep, st.just(A.SPEED), speed=st.none() | st.floats(0.05, 0.3)),
@@ -143,6 +155,8 @@ def test_without_a_jump_the_acceleration_is_continuous_too(steps: list[MissionSt
     bend = 6.0 * PACE.acceleration / 0.5  # a ramp that short is a segment of a few millimetres
     last = START
     for at in flown.points:
+        assert abs(at.force - last.force) <= 7.5 * STEP_US * 1e-6 + 1e-9
+        assert at.force == 0.0 or at.v_WE == (0.0, 0.0, 0.0)
         assert math.dist(at.a_WE, last.a_WE) <= bend * STEP_US * 1e-6 + 1e-9
         last = at
 
@@ -154,6 +168,35 @@ def test_steps_come_in_order_and_each_is_stayed_at() -> None:
     assert 2.0 <= len(there) * STEP_US * 1e-6 <= 2.3
     assert flown.points[-1].p_WE == (1.0, 1.0, -1.5)
     assert flown.texts[-1] == "mission complete"
+
+
+def test_a_push_stands_off_faces_the_surface_presses_as_long_as_asked_and_comes_back() -> None:
+    push = MissionStep(A.PUSH, (1.0, 0.5, -1.2), force=6.0, press_s=2.0)
+    flown = start(push, go(0.5, 0.0, -1.0))
+    flown.meet = lambda p, _: Meeting((0.97, *p[1:]), (-1.0, 0.0, 0.0))
+    flown.fly()
+    assert flown.reached == [0, 1]
+    pressing = [at for at in flown.points if at.force == 6.0]
+    assert len(pressing) * STEP_US * 1e-6 == pytest.approx(2.0, abs=0.11)
+    assert {at.p_WE for at in pressing} == {(0.97, 0.5, -1.2)}
+    assert pressing[0].yaw == pytest.approx(0.0)
+    first, last = (next(k for k, at in enumerate(way) if at.force > 0.0)
+                   for way in (flown.points, flown.points[::-1]))  # fmt: skip
+    stand_off = (0.97 - STAND_OFF, 0.5, -1.2)
+    for way in (flown.points[:first], flown.points[-last:]):
+        assert any(math.dist(at.p_WE, stand_off) < 1e-9 for at in way)
+
+
+def test_a_push_where_nothing_can_be_pressed_is_told_and_passed_over() -> None:
+    push = MissionStep(A.PUSH, (1.0, 0.5, -1.2), force=6.0, press_s=2.0)
+    flown = start(push, go(0.5, 0.0, -1.0))
+    flown.meet = nothing_there
+    flown.fly()
+    assert flown.reached == [1]
+    assert flown.texts[0] == (
+        "mission step 0 not flown: there is no surface that may be touched"
+    )  # fmt: skip
+    assert all(at.force == 0.0 for at in flown.points)
 
 
 def circle(radius: float, turns: float, **more: object) -> MissionStep:
