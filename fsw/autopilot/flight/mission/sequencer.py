@@ -27,8 +27,8 @@ from fsw.autopilot.flight.mission.trajectory_segment import (
     push_from,
     segment_to,
 )
-from fsw.autopilot.flight.setpoints.press_check import Meeting
 from fsw.autopilot.flight.setpoints.reference_governor import project_to_safe_set
+from fsw.autopilot.flight.setpoints.target_check import Meeting
 from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.signals import (
     MAX_MISSION_SPEED,

@@ -15,8 +15,8 @@ from fsw.autopilot.flight.modes.base import (
     ModeResult,
     Px4Mode,
 )
-from fsw.autopilot.flight.setpoints.press_check import PressCheck
 from fsw.autopilot.flight.setpoints.reference_governor import project
+from fsw.autopilot.flight.setpoints.target_check import TargetCheck
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
@@ -46,7 +46,7 @@ class Mission(FlightMode):
 
     def __init__(self, config: FlightConfig) -> None:
         super().__init__(config)
-        self._press = PressCheck(config, loop_tube(config))
+        self._targets = TargetCheck(config, loop_tube(config))
 
     def refusal(self, context: CommandContext) -> str | None:
         """Needs a mission that can start or continue."""
@@ -86,7 +86,7 @@ class Mission(FlightMode):
             home_z=home_z,
             safe_set=state.kept.safe_set,
             look_at=vehicle.look_at,
-            meet=lambda p, force: self._press.meet(p, force, state.kept.source, estimate.t_us),
+            meet=lambda p, force: self._targets.meet(p, force, state.kept.source, estimate.t_us),
         )
         flown, event = sequencer.advance(flight, context, motion_limits(config))
         if flown is flight:

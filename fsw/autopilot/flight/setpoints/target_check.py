@@ -1,4 +1,4 @@
-"""Which targets of a stream are believed: within bounds, and not pressing too hard.
+"""Which targets are believed, of a stream or a mission: within bounds, and not pressing too hard.
 
 What may be pressed is judged as the start-up analysis has it for scenarios (``against_pressing``),
 whoever sends it. The surface is the nearest one that may be touched, and friction pulls against how
@@ -76,7 +76,7 @@ class TargetCheck:
         """
         found = _nearest(safe_set, p, t_us)
         asked = EndEffectorTarget(t_us, p, _STILL, _STILL, 0.0, force)
-        problem = self.problem(asked, safe_set)
+        problem = self._pressing_problem(asked, safe_set)
         if found is None or problem is not None:
             return Meeting(p, _STILL, problem or "there is no surface that may be touched")
         zone, at = found

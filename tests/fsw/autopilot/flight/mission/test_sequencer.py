@@ -28,8 +28,8 @@ from fsw.autopilot.flight.mission.sequencer import (
     touched_down,
 )
 from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits
-from fsw.autopilot.flight.setpoints.press_check import Meeting
 from fsw.autopilot.flight.setpoints.reference_governor import project, project_to_safe_set
+from fsw.autopilot.flight.setpoints.target_check import Meeting
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
