@@ -8,10 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.control.px4_loops import Px4Tuning, airframe_above_px4
 from fsw.autopilot.control.px4_tube import is_stable
+from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig, above_px4, flight_config
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.signals import ActuatorCommand, Arm, Mode, SensorFrame, TickOutputs
@@ -134,7 +136,7 @@ def report(found: Identified, config: FlightConfig) -> tuple[dict[str, float], l
     flown = replace(config, px4=px4, airframe=airframe_above_px4(config.airframe, px4))
     values = {one.name: one.read(flown) for one in PARAMETERS if one.name.startswith("PX4_")}
     loop = loop_tube(flown)
-    reach = base_reach(loop, flown.surroundings)
+    reach = base_reach(loop, flown.surroundings.disturbance)
     sentences = [
         f"attitude loop {px4.tilt_kp:.0f} 1/s^2, {px4.tilt_kd:.1f} 1/s, delay "
         f"{1e3 * px4.delay:.0f} ms; {found.unexplained:.0%} of the lean is left unexplained",

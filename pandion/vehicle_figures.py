@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from fsw.autopilot.control.actuator_watch import UNDONE, torques_by_friction
-from fsw.autopilot.control.tube import limits_used
+from fsw.autopilot.control.tube import base_reach, limits_used
 from fsw.autopilot.model.airframe import GRAVITY, airframe_of, wrench_of
 from fsw.autopilot.model.multibody import Bodies, bodies_of, posture
 from fsw.autopilot.parameters.carrying import payload_range
-from fsw.autopilot.parameters.consistency import base_reach, loop_tube
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import FlightConfig, of_vehicle
 from vehicles.description import Vehicle
 
@@ -72,7 +72,7 @@ def start_up(vehicle: Vehicle) -> str:
     pushed, loop = config.surroundings.disturbance, loop_tube(config)
     used = limits_used(airframe, config.tuning.tracking, loop, pushed)
     most = max(used, key=lambda name: used[name])
-    reach = base_reach(loop, config.surroundings)
+    reach = base_reach(loop, config.surroundings.disturbance)
     payload = payload_range(config, loop)
     return (
         f"the base stays within {1e3 * reach:.0f} mm of its plan under {pushed:g} m/s^2, "

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.control.px4_tube import horizontal_loop, softer
 from fsw.autopilot.control.tube import after_a_push
-from fsw.autopilot.parameters.consistency import loop_tube, stand_off
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import above_px4, flight_config
 from sitl.scenario import V3, Sequence
 

@@ -97,6 +97,14 @@ class BarrierTuning:
         )
 
 
+def stand_off(tuning: BarrierTuning) -> float:
+    """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
+    knee = tuning.alpha / tuning.slope**2
+    if tuning.lambda_ <= tuning.slope * knee:
+        return tuning.lambda_ / tuning.slope
+    return tuning.lambda_**2 / (2.0 * tuning.alpha) + 0.5 * knee
+
+
 @compilable
 def safe_approach_speed(distance: float, alpha: float, slope: float) -> float:
     """Largest safe approach speed S [m/s] at a ``distance`` [m] to the boundary, negative outside.

@@ -61,6 +61,7 @@ def _tube(px4: Px4Tuning, hanging: float, hold_s: float, dt: float) -> Tube:
         base_wind=0.0,
         wind=0.0,
         wind_beyond=0.0,
+        known=_sum(base),
         height=_sum(climbs[:, 0]),
         end_effector_wind=0.0,
         base_expected=RARE * random_steps(base, per_hold),

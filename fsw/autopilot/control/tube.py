@@ -21,6 +21,15 @@ All of this is true only while no limit on the way from the error to the rotors 
 same sum over the response of what meets a limit is the most that it can be asked for, so
 ``limits_used`` tells exactly up to which disturbance of one axis the loop is linear.
 
+A force on the tool is known while it acts, and thrust cancels it, but a rotor lag and a tilt too
+late. Whenever it comes and goes, up to f, it moves the base no further than
+
+.. math:: \frac{f}{2 m} \int |g(t) + g_w(t)|\,dt + \frac{e}{m} \int |g(t)|\,dt ,
+
+:math:`g_w` being the response to a memory of wind, which cancels as what is known does, and e what
+is not known of the force (``of_contact``). The half: what is cancelled leaves nothing behind, so as
+much of the response is positive as is negative.
+
 Pushed on all axes at once, the thrust that holds the height also accelerates sideways, as far as
 the vehicle leans, and turning while it leans takes from the lift. ``all_axes`` counts both as more
 disturbance, and ``all_axes_up_to`` says up to which disturbance the rotors give what that asks.
@@ -78,6 +87,7 @@ class Tube:
     base_wind: float  # m, what the memory of wind can add to it, at its limit
     wind: float  # m per m/s^2 of that memory
     wind_beyond: float  # m of ``base_wind`` by which clearances grow while the memory is in force
+    known: float  # m per m/s^2 of a force on the tool, as it comes and goes
     height: float  # m, worst case, vertically
     end_effector_wind: float  # m, of what is covered
     base_expected: float  # m, 3.7 sigma under random steps
@@ -125,6 +135,7 @@ def tube(
         base_wind=tuning.wind_limit * _sum(base_wind),
         wind=_sum(base_wind),
         wind_beyond=(tuning.wind_limit - covered) * _sum(base_wind),
+        known=0.5 * _sum(base + base_wind),
         height=_sum(climbs[:, 0]),
         end_effector_wind=covered * _sum(end_effector_wind),
         base_expected=RARE * random_steps(base, per_hold),
@@ -152,6 +163,14 @@ def base_after(
         np.abs(impulse_responses(airframe, tuning, gains, dt, wind=False)[:, 0])
     )
     return reach
+
+
+def base_reach(loop: Tube, disturbance: float) -> float:
+    """How far a ``disturbance`` [m/s^2] pushes the base off its plan [m], an axis.
+
+    Without what clearances grow by while the memory of wind is in force.
+    """
+    return loop.base * disturbance + loop.base_wind - loop.wind_beyond
 
 
 @dataclass(frozen=True, slots=True)
@@ -407,3 +426,11 @@ def beyond_covered(loop: Tube | TubeAround, memory: Vec2) -> Vec2:
         loop.wind * max(abs(x) - WIND_COVERED, 0.0),
         loop.wind * max(abs(y) - WIND_COVERED, 0.0),
     )
+
+
+def of_contact(loop: Tube, force: float, unsure: float, mass: float) -> float:
+    """What a ``force`` [N] on the tool, as it comes and goes, can add to the tube [m].
+
+    It is ``unsure`` [N] how large it is. The ``mass`` [kg] is the whole vehicle's.
+    """
+    return (loop.known * force + loop.base * unsure) / mass

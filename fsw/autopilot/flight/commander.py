@@ -5,7 +5,9 @@ Every function takes a state and returns one; almost every tick it is the same o
 
 from __future__ import annotations
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.control.cascade import at_rest, in_hover
+from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.arming_health import arming_health
 from fsw.autopilot.flight.commands.dedup import answered_before, remember, still_true
@@ -37,7 +39,7 @@ from fsw.autopilot.flight.setpoints.reference_horizon import ReferenceHorizon
 from fsw.autopilot.flight.state import FlightState, SetpointMemory, VehicleMemory
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.parameters.carrying import payload_range
-from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.contradictions import contradictions
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
@@ -67,7 +69,7 @@ class Commander:
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
         loop = loop_tube(config)
-        self._tube_radius = base_reach(loop, config.surroundings)
+        self._tube_radius = base_reach(loop, config.surroundings.disturbance)
         self._heaviest = payload_range(config, loop).most
         self._body = body_of(config.planner.body, config.airframe)
         self._generator = SetpointGenerator(config)

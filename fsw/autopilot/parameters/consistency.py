@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fsw.autopilot.barriers.safe_approach import LOUD, BarrierTuning
+from fsw.autopilot.barriers.safe_approach import LOUD, BarrierTuning, stand_off
 from fsw.autopilot.control.gains import tracking_gains
 from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
 from fsw.autopilot.control.px4_tube import is_stable, px4_tube
@@ -25,6 +25,7 @@ from fsw.autopilot.control.tube import (
     all_axes,
     all_axes_up_to,
     base_after,
+    base_reach,
     estimate_tube,
     limits_used,
     tube,
@@ -204,7 +205,7 @@ def _estimate(
 ) -> Finding:
     reach, room = estimate_reach(config, accuracy), stand_off(tuning)
     sigmas = config.limits.clearance_sigmas or _SIGMAS
-    pushed = base_reach(loop, config.surroundings)
+    pushed = base_reach(loop, config.surroundings.disturbance)
     # The sphere that follows the target has no room to spare: it is hardly made smaller.
     grows = config.limits.clearance_sigmas > 0.0 and not inside
     needed = pushed + reach.loop + (0.0 if grows else reach.clearance)
@@ -227,22 +228,6 @@ def _estimate(
         f"{remedy} is enough",
         refuses=False,
     )
-
-
-def base_reach(loop: Tube, surroundings: DisturbanceModel) -> float:
-    """How far a disturbance within the assumed one pushes the base off its plan [m], an axis.
-
-    Without what clearances grow by while the memory of wind is in force.
-    """
-    return loop.base * surroundings.disturbance + loop.base_wind - loop.wind_beyond
-
-
-def stand_off(tuning: BarrierTuning) -> float:
-    """Distance to the boundary at which a plan at rest meets h = lambda [m]."""
-    knee = tuning.alpha / tuning.slope**2
-    if tuning.lambda_ <= tuning.slope * knee:
-        return tuning.lambda_ / tuning.slope
-    return tuning.lambda_**2 / (2.0 * tuning.alpha) + 0.5 * knee
 
 
 def sampled_robustness(tuning: BarrierTuning, disturbance: float, period: float) -> float:
@@ -324,7 +309,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
 
 
 def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: DisturbanceModel) -> Finding:
-    reach, room = base_reach(loop, surroundings), stand_off(tuning)
+    reach, room = base_reach(loop, surroundings.disturbance), stand_off(tuning)
     return _finding(
         "tube",
         room >= reach,

@@ -9,7 +9,9 @@ the surface's normal is nearer to:
 * the thrust that presses must be left by the tilt after the worst disturbance;
 * what the force on the tool, friction included, turns the base by must be left by each rotor after
   the worst disturbance, and by what rotors may spend on yaw;
-* the arm must take up what the base is pushed off its plan, both ways.
+* what the disturbance and the force, as it comes and goes, push the base off its plan must be no
+  more than the plan keeps from the boundary, for all other parts, and than the arm takes up, both
+  ways.
 
 Source: docs/equations.md T8.
 """
@@ -22,9 +24,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.control.allocation import AXES, PITCH, ROLL, THRUST, YAW
 from fsw.autopilot.control.press import PressTuning
-from fsw.autopilot.control.tube import Tube, limits_used
+from fsw.autopilot.control.tube import Tube, base_reach, limits_used, of_contact
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
 from fsw.autopilot.model.multibody import place_of_tip, posture
@@ -72,7 +75,7 @@ def grip(airframe: Airframe, tuning: PressTuning, normal: Vec3, disturbance: flo
     vq = m.vq.reshape(JOINTS, 3)[:n]
     torque = np.array(airframe.joint_friction[:n]) + disturbance * np.linalg.norm(vq, axis=1)
     torque += tuning.wrong * GRAVITY * np.abs(vq[:, 2])
-    inwards, outwards = (_room(airframe, home, sign * along) for sign in (1.0, -1.0))
+    inwards, outwards = (_stroke(airframe, home, sign * along) for sign in (1.0, -1.0))
     return Grip(float(np.abs(share) @ torque), 1.0 / eased, inwards, outwards)
 
 
@@ -91,7 +94,7 @@ def _levers(airframe: Airframe, q: tuple[float, ...]) -> Array:
     return found
 
 
-def _room(airframe: Airframe, home: tuple[float, ...], way: Array) -> float:
+def _stroke(airframe: Airframe, home: tuple[float, ...], way: Array) -> float:
     """How far [m] the tool can be moved one ``way`` (3,) [1, B] from home, and straight."""
     arm, q = arm_coordinates(airframe), np.array(home)
     begin = _tip(airframe, home)
@@ -125,7 +128,7 @@ def against_touching(config: FlightConfig, zone: Zone, loop: Tube) -> str:
         _against_force(found, touch, tuning)
         or _against_stiffness(found, touch, tuning)
         or _against_thrust(config, loop)
-        or _against_room(found, disturbance * (loop.height if _is_level(zone) else loop.base))
+        or _against_loss(config, zone, loop, found)
     )
 
 
@@ -195,7 +198,26 @@ def max_force(config: FlightConfig, zone: Zone, loop: Tube) -> float:
         return 0.0
     found = grip(config.airframe, tuning, _normal_in_body(zone), config.surroundings.disturbance)
     bounded = touch.force_max - found.unsure - tuning.damping
-    return max(min(bounded, config.airframe.mass * _left(config, loop)), 0.0)
+    leaning = config.airframe.mass * _left(config, loop)
+    return max(min(bounded, leaning, _covered(config, zone, loop, found)), 0.0)
+
+
+def _pushed(config: FlightConfig, zone: Zone, loop: Tube) -> float:
+    """How far the worst disturbance pushes the base off its plan along the normal [m]."""
+    disturbance = config.surroundings.disturbance
+    return disturbance * loop.height if _is_level(zone) else base_reach(loop, disturbance)
+
+
+def _room(config: FlightConfig, found: Grip) -> float:
+    """How far [m] the base may be off its plan along the normal while the tool presses."""
+    return min(stand_off(config.planner.walls), found.inwards, found.outwards)
+
+
+def _covered(config: FlightConfig, zone: Zone, loop: Tube, found: Grip) -> float:
+    """The largest force [N] that may come and go beside the worst disturbance."""
+    left, mass = _room(config, found) - _pushed(config, zone, loop), config.airframe.mass
+    unknown, each = of_contact(loop, 0.0, found.unsure, mass), of_contact(loop, 1.0, 0.0, mass)
+    return (left - unknown) / each
 
 
 def _left(config: FlightConfig, loop: Tube) -> float:
@@ -232,13 +254,15 @@ def _against_thrust(config: FlightConfig, loop: Tube) -> str:
     return f"beside the worst disturbance the tilt leaves {max(force, 0.0):.1f} N to press with"
 
 
-def _against_room(found: Grip, reach: float) -> str:
-    room = min(found.inwards, found.outwards)
-    if room >= reach:
+def _against_loss(config: FlightConfig, zone: Zone, loop: Tube, found: Grip) -> str:
+    if _covered(config, zone, loop, found) >= _LEAST:
         return ""
+    mass = config.airframe.mass
+    reach = _pushed(config, zone, loop) + of_contact(loop, _LEAST, found.unsure, mass)
     return (
-        f"the base can be pushed {1e3 * reach:.0f} mm off its plan, and the arm takes up "
-        f"{1e3 * room:.0f} mm along its normal in the home posture"
+        f"the base can be pushed {1e3 * reach:.0f} mm off its plan where {_LEAST:g} N are lost; "
+        f"the arm takes up {1e3 * min(found.inwards, found.outwards):.0f} mm along its normal in "
+        f"the home posture, and the plan keeps {1e3 * stand_off(config.planner.walls):.0f} mm"
     )
 
 

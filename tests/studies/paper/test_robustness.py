@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.control.tube import beyond_covered
+from fsw.autopilot.barriers.safe_approach import stand_off
+from fsw.autopilot.control.tube import base_reach, beyond_covered
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
-from fsw.autopilot.parameters.consistency import base_reach, loop_tube, stand_off
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import SensorFrame
 from sitl.mission_clock import MissionClock
@@ -139,7 +140,7 @@ def test_real_air_has_every_effect() -> None:
     assert config.airframe.joint_armature == actuators.motor_inertia_kg_m2 > 0.0
     wind, loop = config.tuning.tracking.wind_limit, loop_tube(config)
     assert wind == BY_NAME["TRK_WIND_MAX"].default, "as every vehicle flies, not tuned for the row"
-    room, reach = stand_off(config.planner.walls), base_reach(loop, config.surroundings)
+    room, reach = stand_off(config.planner.walls), base_reach(loop, config.surroundings.disturbance)
     grown, _ = beyond_covered(loop, (wind, 0.0))
     assert grown == pytest.approx(loop.wind_beyond)
     assert reach < room < reach + grown, "what the plan has no room for, clearances grow by"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.flight.descent import is_hurried
 from fsw.autopilot.flight.modes.base import FlightMode, ModeResult, Px4Mode, touch_down
 from fsw.autopilot.flight.safety.retreat import retreat_place
@@ -9,7 +10,6 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.mpc.reference import still_at
-from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import EndEffectorTarget, Mode, MotionSetpoint, StateEstimate
 from fsw.frozen import replace

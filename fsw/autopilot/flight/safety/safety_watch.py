@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 
-from fsw.autopilot.control.tube import Tube, TubeAround
+from fsw.autopilot.control.tube import Tube, TubeAround, base_reach
 from fsw.autopilot.flight.land_detector import height_above_ground
 from fsw.autopilot.flight.state import FlightState, SafetyMemory
-from fsw.autopilot.parameters.consistency import base_reach
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import ConstraintReport, PredictionState, StateEstimate
 from fsw.frozen import replace
@@ -35,7 +34,7 @@ class SafetyWatch:
     def __init__(self, config: FlightConfig, loop: Tube) -> None:
         self._config = config
         follows_state = config.follows_plan
-        reach = base_reach(loop, config.surroundings) + NOISE_ROOM
+        reach = base_reach(loop, config.surroundings.disturbance) + NOISE_ROOM
         # The other loop follows no state: only an upset takes it off its plan.
         self.radius = max(reach, _MIN_TUBE) if follows_state else config.upset_distance
         self._back = _BACK * self.radius

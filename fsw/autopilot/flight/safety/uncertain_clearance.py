@@ -24,13 +24,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.barriers.safe_approach import BarrierTuning, stand_off
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
 from fsw.autopilot.model.body import Body
 from fsw.autopilot.model.kinematics import frame_of, position
 from fsw.autopilot.model.multibody import Bodies
-from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.kind import ShapeKind
 from fsw.autopilot.shapes.zones import all_planes

@@ -19,13 +19,12 @@ import math
 import operator
 from typing import Final
 
-from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.barriers.safe_approach import BarrierTuning, stand_off
 from fsw.autopilot.control.safety_filter import ROOM
 from fsw.autopilot.flight.safety.safe_set_change import held
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.geometry.vectors import clamp, dot
 from fsw.autopilot.model.body import Body, hull_reach
-from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.parameters.flight_config import FlightConfig, lowest_height
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.zones import surface

@@ -27,6 +27,7 @@ from fsw.autopilot.control.tube import (
     estimate_tube,
     impulse_responses,
     limits_used,
+    of_contact,
     tube,
 )
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY, Airframe
@@ -59,19 +60,28 @@ def _tube() -> Tube:
     return tube(AIRFRAME, TUNING, _gains(), hanging=0.225, hold_s=0.1, dt=DT)
 
 
-def _position_under(disturbance: np.ndarray, tuning: TrackingTuning = TUNING) -> np.ndarray:
-    """One axis of the loop as it is flown, its law called tick by tick."""
+def _position_under(
+    disturbance: np.ndarray,
+    tuning: TrackingTuning = TUNING,
+    pressed: np.ndarray | None = None,
+) -> np.ndarray:
+    """One axis of the loop as it is flown, its law called tick by tick.
+
+    Beside a ``disturbance`` (ticks,) [m/s^2] what the tool is ``pressed`` by, which is known.
+    """
     law = TrackingLaw(AIRFRAME.attitude_lag, tuning, _gains())
     decay = np.exp(-DT / AIRFRAME.rotor_lag)
     p = v = a = j = s = 0.0
     believed = observed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     positions = []
-    for d in disturbance:
+    presses = np.zeros(len(disturbance)) if pressed is None else pressed
+    for d, known in zip(disturbance, presses, strict=True):
         believed = observe(believed, (v, 0.0, 0.0), (a, 0.0, 0.0), tuning, DT)
-        d_hat, lasting = believed.d[0], believed.disturbance_bias[0]
-        w = snap_command(law, AxisState(p, believed.v[0], a, j, s), d_hat, lasting, REST, 0.0)
+        d_hat, lasting = believed.d[0], believed.disturbance_bias[0] + known
+        state = AxisState(p, believed.v[0], a, j, s)
+        w = snap_command(law, state, d_hat, lasting, REST, 0.0, known)
         s = w + (s - w) * decay
-        p, v, a, j = p + DT * v, v + DT * (a + d), a + DT * j, j + DT * s
+        p, v, a, j = p + DT * v, v + DT * (a + d + known), a + DT * j, j + DT * s
         positions.append(p)
     return np.array(positions)
 
@@ -429,6 +439,27 @@ def test_noise_of_the_gyro_moves_the_base_by_what_its_spectrum_says() -> None:
     noise = np.random.default_rng(4).standard_normal(4000)
     moved = _position_misled(3, noise)[500:]
     assert moved.std() == pytest.approx(tubes.jerk, rel=0.25)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+@pytest.mark.parametrize("worst", [False, True])
+def test_a_force_that_comes_and_goes_moves_the_base_no_further_than_is_said(worst: bool) -> None:
+    """A contact that is lost, and the force that always comes and goes the worst way."""
+    forgetful, mass, force = replace(TUNING, wind_limit=0.0), 3.0, 6.0
+    pressed = np.full(3000, force / mass)
+    pressed[1500:] = 0.0
+    if worst:
+        both = (
+            impulse_responses(AIRFRAME, TUNING, _gains(), DT, wind=wind)[:1500, 0]
+            for wind in (False, True)
+        )
+        pressed[1500:] = force / mass * (sum(both)[::-1] > 0.0)
+    moved = np.abs(_position_under(np.zeros(3000), forgetful, pressed)[1500:]).max()
+    said = of_contact(_tube(), force, 0.0, mass)
+    assert moved < 1.03 * said
+    assert moved > 0.9 * said
+    # What is not known of it pushes as any disturbance does.
+    assert of_contact(_tube(), 0.0, force, mass) == pytest.approx(force / mass * _tube().base)
 
 
 @pytest.mark.drawn(5)

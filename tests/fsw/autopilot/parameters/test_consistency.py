@@ -6,16 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from fsw.autopilot.barriers.safe_approach import BarrierTuning, safe_approach_speed
+from fsw.autopilot.barriers.safe_approach import BarrierTuning, safe_approach_speed, stand_off
+from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.parameters.consistency import (
     Finding,
     analyse,
-    base_reach,
     loop_tube,
     refusals,
     return_room,
     sampled_robustness,
-    stand_off,
 )
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.shapes.ball import point
@@ -216,7 +215,7 @@ def test_the_room_at_the_return_grows_with_what_is_kept_up_to_that_of_the_tube()
     loop = loop_tube(config)
     rooms = [return_room(config, loop, least) for least in (0.1, 0.2, 0.3, 0.35)]
     assert rooms == sorted(rooms)
-    whole = stand_off(config.planner.walls) - base_reach(loop, config.surroundings)
+    whole = stand_off(config.planner.walls) - base_reach(loop, config.surroundings.disturbance)
     assert rooms[-1] == pytest.approx(whole, abs=1e-4)
 
 

@@ -8,7 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.control.press import PressTuning
+from fsw.autopilot.control.tube import base_reach, of_contact
 from fsw.autopilot.parameters.consistency import analyse, loop_tube, refusals
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.parameters.touching import (
@@ -17,6 +19,7 @@ from fsw.autopilot.parameters.touching import (
     against_touching,
     balanced_force,
     grip,
+    max_force,
 )
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import SafeSet, Touch, Zone
@@ -106,7 +109,7 @@ def test_sliding_sideways_is_bounded_by_what_rotors_spend_on_yaw() -> None:
     turned = Pressed((0.0, -1.0, 0.0), 3.0, (0.5, 0.0, 0.0))
     assert balanced_force(PROBE, zone, loop, turned) == pytest.approx(most)
     hard = against_pressing(PROBE, zone, loop, up._replace(force=9.5))
-    assert hard.startswith("9.5 N are asked for; at most 8.")
+    assert hard.startswith("9.5 N are asked for; at most 5.1 N")
 
 
 def test_weak_rotors_leave_less_to_press_with() -> None:
@@ -117,3 +120,22 @@ def test_weak_rotors_leave_less_to_press_with() -> None:
     before = balanced_force(PROBE, zone, loop, up)
     config = replace(PROBE, airframe=replace(airframe, rotor_thrust_max=weak))
     assert balanced_force(config, zone, loop, up) < 0.1 * before
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_no_force_is_promised_whose_loss_pushes_the_base_out_of_what_the_plan_keeps() -> None:
+    loop, zone = loop_tube(PROBE), touched(force_max=100.0)
+    unsure = grip(PROBE.airframe, PressTuning(), AHEAD, 0.8).unsure
+    most, walls = max_force(PROBE, zone, loop), PROBE.planner.walls
+    assert 5.0 < most < 6.0  # probe asks for 5 N
+    reach = base_reach(loop, 0.8) + of_contact(loop, most, unsure, PROBE.airframe.mass)
+    assert reach == pytest.approx(stand_off(walls))
+    less = replace(walls, lambda_=0.9 * walls.lambda_)
+    nearer = replace(PROBE, planner=replace(PROBE.planner, walls=less))
+    assert max_force(nearer, zone, loop) < most - 1.0
+    nearest = replace(walls, lambda_=0.6 * walls.lambda_)
+    nearest_of_all = replace(PROBE, planner=replace(PROBE.planner, walls=nearest))
+    against = against_touching(nearest_of_all, zone, loop)
+    assert against.startswith("the base can be pushed 59 mm off its plan where 0.5 N are lost"), (
+        against
+    )

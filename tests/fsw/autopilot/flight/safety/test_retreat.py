@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.box import box
 from fsw.autopilot.shapes.half_space import wall

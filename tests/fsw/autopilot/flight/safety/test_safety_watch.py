@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.safety.safety_watch import NOISE_ROOM, SafetyWatch
 from fsw.autopilot.flight.state import SafetyMemory
-from fsw.autopilot.parameters.consistency import base_reach, loop_tube
+from fsw.autopilot.parameters.consistency import loop_tube
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import ConstraintReport, SafetyCounters, StateEstimate, Vec3
 from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, vehicle_at
@@ -41,7 +42,7 @@ def margins(memory: SafetyMemory, least: float, t_s: float = 1.0) -> SafetyMemor
 
 @pytest.mark.requirement("REQ-SAFE-3")
 def test_the_tube_is_the_one_that_the_analysis_prints_and_room_for_noise() -> None:
-    assert pytest.approx(base_reach(TUBE, CONFIG.surroundings) + NOISE_ROOM) == R
+    assert pytest.approx(base_reach(TUBE, CONFIG.surroundings.disturbance) + NOISE_ROOM) == R
     # Closer to a wall than the plan may come, replanning would be of no use.
     assert 0.05 < R < 0.086
     still = replace(CONFIG, surroundings=replace(CONFIG.surroundings, disturbance=0.0))

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.barriers.safe_approach import BarrierTuning, stand_off
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.flight.safety.uncertain_clearance import (
     SHORTFALL,
@@ -24,7 +24,6 @@ from fsw.autopilot.geometry.rotation import yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.parts import ON_BASE
-from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.box import box
 from fsw.autopilot.shapes.half_space import wall

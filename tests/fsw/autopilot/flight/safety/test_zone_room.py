@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.safety.zone_room import ZoneRoom, is_deep
-from fsw.autopilot.parameters.consistency import stand_off
 from fsw.autopilot.parameters.flight_config import lowest_height
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import half_space, wall
