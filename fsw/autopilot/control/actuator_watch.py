@@ -465,13 +465,15 @@ def felt_inside(r: Tick, airframe: Airframe) -> JointVector:
     """How much of what undoes each joint's torque is felt nearer to the base (j,) [1].
 
     By mean squares, of what turns the base beside the model where drives act on it as they are
-    asked, and as the arm is seen to move; or of what undoes the torque of a joint between.
+    asked, and as the arm is seen to move; or of what undoes the torque of a joint between. The
+    first is a share of what turns the base: a gyro that is off shows more there than any joint.
     """
     s = r.watch
     turned2 = airframe.rotor_lever**2 * float(s.products[0] + s.products[1])
     unseen, inside, felt = float(s.odd2) - turned2, 0.0, []
     for u in s.undone2[: airframe.bodies.joints].tolist():
-        felt.append(max(unseen / max(u, ODD * ODD), inside / max(u, UNDONE * UNDONE)))
+        by_base = unseen / max(u, ODD * ODD, turned2)
+        felt.append(max(by_base, inside / max(u, UNDONE * UNDONE)))
         inside = max(inside, u)
     return tuple(felt)
 
