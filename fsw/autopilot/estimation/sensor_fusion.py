@@ -365,7 +365,11 @@ class SensorFusion:
     def _fuse_first(self, memory: FusionMemory, now: float) -> FusionMemory:
         """Fuse the first of the waiting samples, whose time the filter has."""
         one = memory.waiting[0]
-        sample = one.sample
+        sample, sensor = one.sample, self._sensors[type(one.sample)]
+        if sensor.source is Source.COMPASS and memory.verdict.suspects & Source.COMPASS:
+            # A heading that may be wrong is not needed, and turns what else is measured. It may be
+            # so since it has come.
+            return memory._replace(waiting=memory.waiting[1:])
         announced, drifts = False, False
         if isinstance(sample, PoseSample):
             memory = self._with_delay_known(memory)
@@ -375,7 +379,6 @@ class SensorFusion:
                 memory = self._with_frame(memory, sample, announced)
         refused = self._long_refused(memory, now) if isinstance(sample, PoseSample) else ()
         kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
-        sensor = self._sensors[type(sample)]
         ratio = sensor.fuse(memory, sample, one.half)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
         if not (announced or any(refused)) and max(ratio) <= 1.0:  # as nearly always
@@ -540,15 +543,12 @@ def _as_judged(
 
     Of a pose whose attitude repeats itself, or is named, the place is used alone.
     """
-    if not (verdict.wrong or verdict.suspects):
+    if not verdict.wrong:
         return health, True, half
     wrong = verdict.wrong & source
     if wrong:
         health = health.with_fault(SensorFault.DISAGREES, now)
-    # A heading that may be wrong is not needed, and turns what else is measured.
-    if wrong & ~Source.ATTITUDE or verdict.suspects & source & Source.COMPASS:
-        return health, False, half
-    return health, True, half or bool(wrong)
+    return health, not wrong & ~Source.ATTITUDE, half or bool(wrong)
 
 
 def _tilts(

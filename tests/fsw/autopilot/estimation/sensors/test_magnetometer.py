@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
+from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.sensors.gnss import velocity_rows
@@ -180,3 +181,16 @@ def test_garbage_that_is_within_the_gate_now_and_then_turns_nothing(seed: int) -
     behind = 0.2  # s, as far as the filter stays behind satellites
     assert begins - 0.1 < max(one for one in fused if one < ends) < begins + behind + 0.1
     assert ends + 0.5 - 0.02 < min(one for one in fused if one > ends) < ends + 0.5 + behind
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_reading_that_waits_is_not_used_once_its_sensor_is_a_suspect() -> None:
+    """With the gyro's bias unknown, what a field that had leapt said before it was doubted was let
+    pass: it turned the estimate by 29 deg."""
+    fusion_, memory, last = SensorFusion(RTK.tuning, 2), at_start(2), START + 1.0
+    for now, samples in run(RTK, 0, 1.5):
+        doubted = Source.COMPASS if now > last else NOBODY
+        memory = memory._replace(verdict=memory.verdict._replace(suspects=doubted))
+        memory, _ = fusion_.step(memory, samples, now)
+    assert memory.of(Sensor.MAGNETOMETER).fused[0] <= last < memory.of(Sensor.GNSS).fused[0]
+    assert memory.of(Sensor.MAGNETOMETER).came > now - 0.1, "it is heard"
