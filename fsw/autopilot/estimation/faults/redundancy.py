@@ -763,8 +763,10 @@ def judged(
     ``damaged`` vehicle it is known that the rotors' model is off.
     """
     of = _sources(holds_attitude, verdict.wrong)
-    # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's.
-    known = range(AA if holds_attitude or verdict.wrong & Q else COUNT)
+    # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's;
+    # one that was taken for unknown in this trial is whatever the suspects made of it.
+    found = holds_attitude or verdict.wrong & Q or any(verdict.unknown)
+    known = range(AA if found else COUNT)
     used = [k for k in known if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)

@@ -353,6 +353,19 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
 
 
 @pytest.mark.requirement("REQ-EST-13")
+def test_a_bias_that_was_taken_for_unknown_is_no_evidence() -> None:
+    """A field that was stuck found one of 0.14 rad/s, and the gyro was named for that."""
+    ratios = [0.0] * redundancy.COUNT
+    ratios[redundancy.GB], ratios[redundancy.GG] = 1.5, 2.0
+    verdict = Verdict(since=0.5, fired=0.98, unknown=(0.0, 0.2))
+    for look_ in range(10):
+        now = 1.0 + EVERY * look_
+        verdict = judged(verdict, tuple(ratios), now, holds_attitude=False)
+    assert verdict.suspects == Source.GYRO | Source.COMPASS
+    assert not verdict.wrong
+
+
+@pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize(("gains", "source"), [(1.0, Source.ATTITUDE), (4.0, Source.POSE)])
 def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a_tilt_explains(
     gains: float, source: Source
