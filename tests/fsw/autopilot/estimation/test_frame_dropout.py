@@ -97,8 +97,8 @@ def test_without_a_pose_the_inertial_unit_carries_on() -> None:
     assert math.dist(estimate.p_WB, frame(519).p_WB) < 0.002, "a push is felt"
     assert estimate.yaw == pytest.approx(0.4 * TICK * 519, abs=1e-3)
     position, velocity, attitude = dropout.sigmas(frame(519).t_us)
-    assert 0.05 < position < 0.2
-    assert 0.1 < velocity < 0.3
+    assert 0.01 < position < 0.03
+    assert 0.02 < velocity < 0.05
     assert attitude < 0.02
 
 
