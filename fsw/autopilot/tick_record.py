@@ -131,7 +131,8 @@ class Pressing(Record):
     stroke: float  # share of a force that the arm gives, less where it is nearly straight
     speed: float  # m/s, of the tool into the surface
     mean_speed: float  # m/s, the same of late
-    asked: float  # N, by the plan
+    balanced: float  # N along the normal, at most, whose moment about yaw rotors balance
+    asked: float  # N, by the plan, as far as all bounds allow
     ramped: float  # N, of that
     commanded: float  # N, what the joints give
     lost_for: float  # s, that it has been asked to press on a surface that it no longer meets

@@ -81,11 +81,12 @@ def allocated(
     thrust: float,
     yaw_limit: float,
     health: ActuatorHealth = HEALTHY,
+    known: float = 0.0,
 ) -> tuple[float, ...]:
     """Thrust [N] of each rotor for a torque [N m] and a thrust [N]."""
     r = new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints)
     note_health(r.health, health)
-    allocate(r, airframe, torque, thrust, yaw_limit)
+    allocate(r, airframe, torque, thrust, yaw_limit, known)
     return tuple(r.wanted.rotor_thrust[: airframe.rotors].tolist())
 
 

@@ -30,19 +30,22 @@ _HALVINGS: Final = 40
 
 
 @compilable
-def allocate(r: Tick, airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float) -> None:
+def allocate(
+    r: Tick, airframe: Airframe, torque: Vec3, thrust: float, yaw_limit: float, known: float = 0.0
+) -> None:
     """Thrust of each rotor, within what it can give. Reads health; writes wanted, mixer.
 
     Body ``torque`` [N m, FRD] about its origin and total ``thrust`` [N] along -z; no rotor spends
-    more than ``yaw_limit`` [N] on yaw. A rotor that is weak has less room; one that does not obey
-    has none, and the others do without it what they can.
+    more than ``yaw_limit`` [N] on yaw beside what balances a ``known`` part of it [N m], that of a
+    surface. A rotor that is weak has less room; one that does not obey has none, and the others do
+    without it what they can.
     """
     m, n = r.mixer, int(airframe.rotors)
     roll, pitch, lift, yaw = _left_to_others(r, airframe, torque, thrust)
     most = 0.0
     for i in range(n):
         most = max(most, abs(m.share[AXES * i + YAW]))
-    yaw = clamp_magnitude(yaw, yaw_limit / max(most, _NONE))
+    yaw = clamp_magnitude(yaw - known, yaw_limit / max(most, _NONE)) + known
     low, high = _yaw_room(m, n, roll, pitch, lift)
     if not low <= high:
         roll *= _share_that_fits(m, n, roll, 0.0)

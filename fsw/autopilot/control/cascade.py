@@ -43,7 +43,7 @@ from fsw.autopilot.control.tracking import (
 )
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround, beyond_covered
 from fsw.autopilot.geometry.rotation import rotate_back, wrap_angle
-from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, subtract, three
+from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, cross, subtract, three
 from fsw.autopilot.model.actuator_health import (
     HEALTHY,
     SOUND,
@@ -256,7 +256,8 @@ def close_loops(
     lifted = add(pushed, (0.0, 0.0, -thrust))
     load = subtract(load_on_base(r.bodies, airframe.bodies, lifted, r.pressing.load), turned)
     torque = torque_to_turn(r.bodies, airframe.bodies, turn, load, knows_arm=law.follows_plan)
-    allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit)
+    known = subtract(cross(three(r.bodies.centre, 0), pushed), turned)[2]
+    allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit, known)
     send(r, airframe)
 
 

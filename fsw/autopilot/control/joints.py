@@ -151,20 +151,22 @@ def joint_torques(
     """
     k, m, n = r.joints, r.bodies, int(airframe.bodies.joints)
     q, qd, qdd = r.estimate.q_arm, r.estimate.qd_arm, m.work
-    pressing, off, rate_off = presses(r, tuning), 0.0, 0.0
+    pressing, off, rate_off, left = presses(r, tuning), 0.0, 0.0, 1.0
     if pressing:  # how far the tool is off along the normal is no error, and not to be integrated
+        left = left_to_press(r.pressing)
         for i in range(n):
-            off += r.pressing.along[i] * (k.reference[i] - q[i])
-            rate_off += r.pressing.along[i] * (k.reference_rate[i] - qd[i])
-        off, rate_off = left_to_press(r.pressing) * off, left_to_press(r.pressing) * rate_off
+            off += left * r.pressing.along[i] * (k.reference[i] - q[i])
+            rate_off += left * r.pressing.along[i] * (k.reference_rate[i] - qd[i])
     for i in range(n):
-        error = k.reference[i] - q[i] - r.pressing.share[i] * off
-        rate_error = k.reference_rate[i] - qd[i] - r.pressing.share[i] * rate_off
+        bent = (1.0 - left) * (airframe.home_posture[i] - k.reference[i])
+        error = k.reference[i] + bent - q[i] - r.pressing.share[i] * off
+        rate_error = left * k.reference_rate[i] - qd[i] - r.pressing.share[i] * rate_off
         wanted, k.integral[i] = pid_step(gains, k.integral[i], error, rate_error, dt)
-        qdd[i] = wanted + r.flown_u.qdd_arm[i]
+        qdd[i] = wanted + left * r.flown_u.qdd_arm[i]
     limit_acceleration(airframe, arm, r.arm, q, qd, qdd)
     if pressing:
         _press_with(r, airframe, press(r, airframe, tuning, field, turning, dt), qdd)
+        _stay_within(r, airframe, arm)
         for i in range(n):
             torque = joint_load(m, i, field, turning) + r.pressing.work[i]
             r.wanted.joint_torque[i] = clamp_magnitude(torque, airframe.joint_torque_max[i])
@@ -204,6 +206,25 @@ def _press_with(r: Tick, airframe: Airframe, into: float, qdd: Floats) -> None:
         p.work[i] -= p.along[i] * (p.commanded + aside)
         for j in range(n):
             p.work[i] -= m.qq[JOINTS * i + j] * p.share[j] * into
+
+
+@compilable
+def _stay_within(r: Tick, airframe: Airframe, arm: ArmCoordinates) -> None:
+    """Limit what presses, as the accelerations that it and what is observed give the joints.
+
+    A surface that is gone no longer holds the arm. Reads estimate, bodies; writes pressing.work.
+    """
+    p, m, n, allowed = r.pressing, r.bodies, int(airframe.bodies.joints), r.arm.slope
+    for i in range(n):
+        m.work[i] = p.work[i] + p.external[i]
+    factorise(m.factor, m.qq, n)
+    solve(m.factor, m.work, n)
+    for i in range(n):
+        allowed[i] = m.work[i]
+    limit_acceleration(airframe, arm, r.arm, r.estimate.q_arm, r.estimate.qd_arm, allowed)
+    for i in range(n):
+        for j in range(n):
+            p.work[i] += m.qq[JOINTS * i + j] * (allowed[j] - m.work[j])
 
 
 @compilable

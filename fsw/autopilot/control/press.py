@@ -35,6 +35,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fsw.autopilot.control.allocation import AXES, YAW
 from fsw.autopilot.geometry.rotation import rotate, rotate_back
 from fsw.autopilot.geometry.vectors import (
     add_scaled,
@@ -70,6 +71,8 @@ from fsw.autopilot.tick_record import Pressing, Tick
 from fsw.compiled import compilable
 from fsw.record import JOINTS, Floats
 from vehicles.description import V6
+
+_BALANCED = 0.5  # share of what rotors have in hover, that the moment of a force may take
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,15 +185,16 @@ def _forget(r: Tick) -> None:
 
 @compilable
 def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
-    """The force on the tool, from what the joints' observer has found.
+    """The force on the tool, from what the joints' observer has found, and what can be balanced.
 
-    Reads estimate, bodies, pressing.external; writes pressing, observed.known.
+    Reads estimate, mass, bodies, pressing.external; writes pressing, observed.known.
     """
     k, m, b, n = r.pressing, r.bodies, airframe.bodies, int(airframe.bodies.joints)
     if k.near == 0:
         return
     R, normal = r.estimate.R_WB, three(k.normal, 0)
     along, tip = rotate_back(R, normal), place_of_tip(m, b)
+    k.balanced = _balanced(r, airframe, cross(subtract(tip, three(m.centre, 0)), along)[2])
     shape, reached = _levers(r, tip, n), (0.0, 0.0, 0.0)
     for i in range(n):
         lever = lever_of(m, i, tip)
@@ -228,8 +232,9 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         force = add_scaled(force, subtract(along, times_symmetric(shape, reached)), k.pressed)
     force = rotate(R, force)
     put_three(k.force, 0, force)
-    # What the base counts on is no more than what it was asked to stand.
-    into = clamp(dot(normal, force), 0.0, k.commanded + tuning.damping) if k.contact > 0 else 0.0
+    # What the base counts on is no more than what it was asked to stand, of an arm that is nearly
+    # straight as well: what still presses there pushes it.
+    into = clamp(dot(normal, force), 0.0, k.ramped + tuning.damping) if k.contact > 0 else 0.0
     aside = add_scaled(force, normal, -dot(normal, force))
     slipping = norm(aside)
     share = min(1.0, into / slipping) if slipping > 0.0 else 0.0
@@ -241,10 +246,25 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
 def left_to_press(k: Pressing) -> float:
     """Share [1] in which the tool's motion along the normal is a matter of force, and not of place.
 
-    In contact an arm that is nearly straight follows its reference again: its levers along the
-    normal vanish, and what is made of them is as large as it is wrong.
+    Along the normal the levers of an arm that is nearly straight vanish, and what is made of them
+    is as large as it is wrong. It is bent instead: straight it would press with the whole vehicle.
     """
-    return k.stroke if k.contact > 0 else 1.0
+    return k.stroke
+
+
+@compilable
+def _balanced(r: Tick, airframe: Airframe, lever: float) -> float:
+    """The largest force [N] whose moment about yaw, by a ``lever`` [m], rotors can balance.
+
+    A tool ahead of the base is pushed back past it: turned aside, the vehicle is turned farther,
+    and yaw is the axis for which rotors have least. Reads mass.
+    """
+    hover, most = r.mass * GRAVITY / airframe.rotors, math.inf
+    for i in range(int(airframe.rotors)):
+        spent = abs(airframe.share[AXES * i + YAW] * lever)  # N a newton
+        left = min(hover, airframe.rotor_thrust_max[i] - hover)
+        most = min(most, _BALANCED * left / max(spent, _NO_SHARE))
+    return most
 
 
 @compilable
@@ -259,6 +279,7 @@ def pressed_by(k: Pressing, torque: Floats, joints: int) -> float:
 
 _AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
 _BLOCKED = 0.5  # share of the speed asked for below which something is in the way
+_NO_SHARE = 1e-9  # N a newton
 _DAMPED = 1e-4  # m^2, of levers without which a direction is left out
 
 
@@ -307,7 +328,8 @@ def press(
     """
     k, m, n = r.pressing, r.bodies, int(airframe.bodies.joints)
     normal, R = three(k.normal, 0), r.estimate.R_WB
-    k.asked = min(r.u.force, max(k.most - k.unsure - tuning.damping, 0.0))
+    bounded = max(k.most - k.unsure - tuning.damping, 0.0)
+    k.asked = min(r.u.force, bounded, k.balanced)
     firm = k.mass * tuning.bandwidth
     most = max(k.most - k.unsure, 0.0)
     fastest = min(tuning.speed, tuning.share * most / math.sqrt(max(k.stiffness, 1.0) * k.mass))

@@ -107,12 +107,13 @@ def snap_command(
     plan: AxisState,
     u: float,
     known: float = 0.0,
+    push: float = 0.0,
 ) -> float:
     """Commanded snap [m/s^4] of one horizontal axis, for the plan's acceleration ``u`` [m/s^2].
 
     ``d`` [m/s^2] is the observed disturbance, ``bias`` [m/s^2] its slow part, wind, which is
-    cancelled whole. What a surface adds that the tool presses on is ``known`` [m/s^2]: it takes
-    nothing from what the loop may ask for.
+    cancelled whole. What a surface adds that the tool presses on is ``known`` [m/s^2], and the plan
+    counts on a ``push`` [m/s^2] of it: that it comes or goes takes nothing from the jerk.
     """
     tuning, lag = law.tuning, law.lag
     k = law.gains.k
@@ -120,10 +121,13 @@ def snap_command(
     e_s = plan.s - vehicle.s
     wanted = wanted_acceleration(law, vehicle, d, bias, plan)
     a_ref = clamp_magnitude(wanted + known, tuning.acceleration_limit) - known
+    # The surface may be gone the next moment: the vehicle leans on it no farther than it may else.
+    a_ref = clamp_magnitude(a_ref, tuning.acceleration_limit)
     j_ref = plan.j + k3 / k4 * (a_ref - vehicle.a)
     # A jerk that can still be stopped before the acceleration overshoots.
     stoppable = math.sqrt(2.0 * tuning.stopping_snap * (abs(a_ref - vehicle.a) + 0.15))
-    j_ref = clamp_magnitude(j_ref, min(tuning.jerk_limit, stoppable))
+    most = tuning.jerk_limit + k3 / k4 * abs(known - push)
+    j_ref = clamp_magnitude(j_ref, min(most, stoppable))
     return lag.kp * (u - plan.a) - lag.kd * plan.j + k5 * e_s + k4 * (j_ref - vehicle.j)
 
 
@@ -267,4 +271,4 @@ def _horizontal_snap(
     vehicle, planned = _along(axis, p, v, motion, plan)
     bias = observed.disturbance_bias[axis] + (observed.known[axis] - u.push[axis])
     d, known = observed.d[axis] - u.push[axis], observed.known[axis]
-    return snap_command(law, vehicle, d, bias, planned, u.a[axis], known)
+    return snap_command(law, vehicle, d, bias, planned, u.a[axis], known, u.push[axis])

@@ -573,8 +573,7 @@ class Autopilot:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
         wind, whole = self._wind_room(state.cascade), state.kept.whole
         kept = self._clearance.keep(whole, state.mission.safe_set, estimate, pose, wind)
-        state = state if kept is state.kept else replace(state, kept=kept)
-        return self._with_room(state, estimate)
+        return self._with_room(replace(state, kept=kept), estimate)
 
     def _with_room(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """The state with zones that take no more than their room, and their speed."""
@@ -628,8 +627,7 @@ class Autopilot:
     def _battery(self, state: FlightState) -> BatteryState:
         thrust = state.cascade.commanded.rotor_thrust
         period = 1e-6 * self.config.mpc_period_us
-        levels = self._battery_levels
-        return drained(self.config.airframe, levels, state.battery, thrust, period)
+        return drained(self.config.airframe, self._battery_levels, state.battery, thrust, period)
 
     @property
     def _battery_levels(self) -> Levels:

@@ -284,3 +284,13 @@ def test_a_level_ring_hovers_without_any_of_its_rotors(rotors: int) -> None:
         np.testing.assert_allclose(w[:, 3].T @ f, roll, atol=1e-9)
         np.testing.assert_allclose(w[:, 4].T @ f, pitch, atol=1e-9)
         np.testing.assert_allclose(-w[:, 2].T @ f, hover, atol=1e-9)
+
+
+def test_what_balances_a_surface_takes_nothing_from_what_yaw_may_spend() -> None:
+    balanced = -0.12
+    for asked in (-1.0, 0.0, 1.0):
+        alone = wrench(allocated(AIRFRAME, (0.0, 0.0, asked), 33.0, YAW_LIMIT))
+        beside = wrench(
+            allocated(AIRFRAME, (0.0, 0.0, asked + balanced), 33.0, YAW_LIMIT, known=balanced)
+        )
+        assert beside[2] - alone[2] == pytest.approx(balanced)

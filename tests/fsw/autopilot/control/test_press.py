@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from fsw.autopilot.control.gains import LoopGains
-from fsw.autopilot.control.joints import joint_torques, observe_contact
+from fsw.autopilot.control.joints import accelerate_joints, joint_torques, observe_contact
 from fsw.autopilot.control.press import PressTuning, look_for_surface, press, weigh_tool
 from fsw.autopilot.model.airframe import Airframe, airframe_of
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
@@ -213,19 +213,58 @@ def test_of_a_vehicle_turned_aside_the_whole_normal_force_is_known() -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-13")
-def test_in_contact_an_arm_that_is_nearly_straight_follows_its_reference_again() -> None:
-    """Its levers along the normal vanish: what they made swung it straight in 1 of 8 probes."""
+def test_what_presses_on_nothing_drives_no_joint_beyond_its_rate() -> None:
+    """The surface is gone, and the observer has not seen it yet."""
+    vehicle = load_vehicle("probe-2r")
+    airframe, rates = airframe_of(vehicle), np.array([vehicle.joints[0].rate_max - 0.01, 0.0])
+    state = estimate(np.array(vehicle.home_posture), rates, np.zeros(3))
+    r = at_surface(airframe, state, AHEAD)
+    weigh_tool(r, airframe, TUNING)
+    k = r.pressing
+    r.joints.reference[:2] = r.estimate.q_arm[:2]
+    k.contact, k.distance, k.pressed, k.ramped, r.u.force = 1, 0.0, 8.0, 8.0, 8.0
+    level = vec3(G), (0.0, 0.0, 0.0)
+    gains = LoopGains().joint
+    joint_torques(r, airframe, arm_coordinates(airframe), gains, TUNING, *level, DT)
+    r.sent.joint_torque[:] = r.wanted.joint_torque
+    accelerate_joints(r, airframe.bodies, *level)
+    assert r.bodies.work[0] < 1.0  # rad/s^2; 49 without
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+@pytest.mark.parametrize("contact", [0, 1])
+def test_an_arm_that_is_nearly_straight_is_bent(contact: int) -> None:
+    """As if its reference were the home posture: what its vanishing levers made swung it."""
     airframe = airframe_of(load_vehicle("probe-2r"))
     r = at_surface(airframe, estimate(np.array([1.5, 0.1]), np.zeros(2), np.zeros(3)), AHEAD)
     weigh_tool(r, airframe, TUNING)
     k, torques = r.pressing, []
-    r.joints.reference[0], r.joints.reference[1] = 1.4, 0.4
-    k.contact, k.distance, k.pressed, r.u.force = 1, 0.0, 4.0, 5.0
-    for near in (1, 0):
+    k.contact, k.distance, k.pressed, r.u.force = contact, 0.0, 4.0, 5.0
+    for near, reference in ((1, (1.4, 0.4)), (0, airframe.home)):
         k.near = near
+        r.joints.reference[:2] = reference
         joint_torques(
             *(r, airframe, arm_coordinates(airframe), LoopGains().joint, TUNING, vec3(G)),
             *((0.0, 0.0, 0.0), DT),
         )
         torques.append(r.wanted.joint_torque[:2].copy())
     np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+@pytest.mark.parametrize("degrees", [0.0, 4.0, 15.0])
+def test_no_harder_is_pressed_than_rotors_keep_a_vehicle_from_turning_aside(degrees: float) -> None:
+    """By statics: half of what rotors carry, as torque about yaw, balances the force."""
+    vehicle, aside = load_vehicle("probe-2r"), math.radians(degrees)
+    normal = np.array([-math.cos(aside), -math.sin(aside), 0.0])
+    home = np.array(vehicle.home_posture)
+    r, airframe = pressed_upon(vehicle, home, normal, vec3(normal))
+    r.u.force, r.pressing.distance = 8.0, 0.0
+    for _ in range(2000):
+        press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
+    ahead = Arm(vehicle, home).tip(home)[0]  # of the origin; the centre of mass is 4 mm behind it
+    carried = airframe.mass * 9.81 / len(vehicle.rotors)
+    torque = 0.5 * carried * sum(rotor.torque_per_thrust for rotor in vehicle.rotors)
+    most = min(8.0, torque / max((ahead + 0.004) * math.sin(aside), 1e-9))
+    assert r.pressing.asked == pytest.approx(most, rel=0.01)
+    assert r.pressing.commanded == pytest.approx(most, abs=TUNING.damping)

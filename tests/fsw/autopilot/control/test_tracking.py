@@ -192,6 +192,30 @@ def test_a_vehicle_at_the_acceleration_limit_is_not_asked_for_more(e_p: float) -
     )
 
 
+def test_that_a_force_is_lost_takes_nothing_from_the_jerk_that_may_be_asked_for() -> None:
+    law = replace(LAW, tuning=replace(TUNING, stopping_snap=1e6))
+    leaning = AxisState(-1.0, 0.0, -3.0, 0.0, 0.0)
+
+    def asked(push: float) -> float:
+        return snap_command(law, leaning, 0.0, 0.0, REST, 0.0, 0.0, push)
+
+    k3, k4 = LAW.gains.k[2], LAW.gains.k[3]
+    assert asked(0.0) == pytest.approx(k4 * TUNING.jerk_limit)
+    for push in (-0.5, 0.5):
+        assert asked(push) == pytest.approx(k4 * TUNING.jerk_limit + k3 * 0.5)
+
+
+@pytest.mark.parametrize("known", [-1.5, 0.0, 1.5])
+@pytest.mark.parametrize("e_p", [-1.0, 1.0])
+def test_what_a_surface_carries_lets_the_vehicle_lean_no_farther(known: float, e_p: float) -> None:
+    """At the largest lean that is allowed without it, no more is asked for."""
+    law = replace(LAW, tuning=replace(TUNING, position_error_limit=10.0))
+    most = TUNING.acceleration_limit
+    leaning = AxisState(-10.0 * e_p, 0.0, e_p * most, 0.0, 0.0)
+    asked = snap_command(law, leaning, 0.0, known, REST, 0.0, known, known)
+    assert asked * e_p <= 1e-9
+
+
 def test_beyond_the_position_limit_more_error_asks_for_nothing_more() -> None:
     def at(error: float) -> float:
         return snap_command(LAW, AxisState(-error, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, REST, 0.0)
