@@ -8,6 +8,7 @@ from typing import Final
 
 from command_line.output import print_error
 from command_line.parser import COULD_NOT_START, unknown_name
+from fsw.runtime.process import pin_numerics_to_one_thread
 
 _INTERRUPTED: Final = 1  # exit code
 
@@ -46,6 +47,7 @@ def main(argv: list[str] | None = None) -> int:
         print_error("python -m benchmarks", sentence)
         return COULD_NOT_START
     try:
+        pin_numerics_to_one_thread()  # before NumPy loads, whose idle threads spin
         return int(import_module(f"benchmarks.{name}").main(options))
     except KeyboardInterrupt:
         print_error(f"python -m benchmarks {name}", "interrupted")

@@ -42,9 +42,7 @@ class MpcOptions:
 def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
     options = read(MpcOptions, _PROGRAM, "Time the planner's optimiser against others.", argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     try:
         return _run(options)
     except OSError as error:

@@ -34,7 +34,7 @@ def _swap_sitl() -> None:
     general = decode.read_reply
 
     def datagram(self: Any, readings: Any, messages: Any) -> bytes:
-        spoken: bytes = self._spoken(messages)
+        spoken: bytes = self.spoken(messages) if messages else b""
         return spoken + step(sender, readings)
 
     def read_reply(received: bytes, vehicle: Any) -> Any:
@@ -87,11 +87,11 @@ def _swap_fsw() -> None:
         odometry = (o.time_usec, o.x, o.y, o.z, *o.q, o.vx, o.vy, o.vz)
         arm = (a.time_usec, *a.position, *a.velocity)
         hil = (h.time_usec, h.xacc, h.yacc, h.zacc, h.xgyro, h.ygyro, h.zgyro)
-        return self._new(odometry, arm, hil)
+        return self._new(messages[-1].get_seq(), odometry, arm, hil)
 
     def controls_of(self: Any, stamp_us: int, outputs: Any) -> bytes:
         t_us, flags, *used = hil_actuator_controls(self._airframe, stamp_us, outputs.actuators)
-        *rest, mode = end_of_controls(len(used), armed=outputs.armed)
+        *rest, mode = end_of_controls(len(used), armed=outputs.armed, gripper=outputs.gripper)
         message = sender.hil_actuator_controls_encode(t_us, [*used, *rest], mode, flags)
         return _packed(sender, message)
 

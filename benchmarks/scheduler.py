@@ -83,9 +83,7 @@ def main(argv: list[str]) -> int:
     """Measure and report; returns the exit code."""
     what = "Time the scheduler of campaigns with empty flights, and flights by one and all workers."
     options = read(SchedulerOptions, "python -m benchmarks scheduler", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     found = {"version": version(), "cores": os.cpu_count(), **_empty(options), **_real(options)}
     write_text(options.json, json_text(found, 1) + "\n")
     print("\n".join(_lines(found)), file=console_beside(options.json))

@@ -15,6 +15,7 @@ put_first()
 
 from command_line.output import EXTRAS, print_anything, print_error, without  # noqa: E402
 from command_line.parser import COULD_NOT_START, unknown_name  # noqa: E402
+from fsw.runtime.process import pin_numerics_to_one_thread  # noqa: E402
 
 # Module, and what the verb does, by what it is for.
 GROUPS: Final[dict[str, dict[str, tuple[str, str]]]] = {
@@ -153,6 +154,8 @@ def _run(words: list[str]) -> int:
         print_error("pandion", unknown_name(what, name, known))
         return COULD_NOT_START
     module = VERBS[name][0]
+    # Before NumPy loads, whose idle threads spin: a flight would find the processors busy.
+    pin_numerics_to_one_thread()
     entry = import_module(module).main
     # The two processes have programs of their own, which call themselves by another name.
     return int(

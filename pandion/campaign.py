@@ -58,9 +58,7 @@ def main(argv: list[str]) -> int:
     """Fly; returns the exit code."""
     what = "Fly many flights from one file, and write down what became of them."
     options = read(CampaignOptions, "pandion campaign", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     from studies.campaign.keys import CampaignError
     from studies.campaign.plan import EXAMPLE, load_plan
     from studies.campaign.ports import SchedulerGoneError

@@ -67,9 +67,7 @@ def main(argv: list[str]) -> int:
     """Certify, or verify; returns the exit code, 1 if a requirement is not met."""
     what = "State what a campaign shows: exact bounds, margins, what was varied and what was not."
     options = read(CertifyOptions, "pandion certify", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     from studies.campaign.keys import CampaignError
     from studies.campaign.ports import SchedulerGoneError
     from studies.campaign.store import read as read_campaign

@@ -39,9 +39,7 @@ def main(argv: list[str]) -> int:
     """Compare; returns the exit code, 1 if the second campaign is shown to be worse."""
     what = "Compare two campaigns: what differs between the plans, margins and violations."
     options = read(CompareOptions, "pandion compare", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     from studies.campaign.keys import CampaignError
     from studies.campaign.store import read_rows
     from studies.statistics.comparison import changes, differences

@@ -38,9 +38,7 @@ def main(argv: list[str]) -> int:
     """Search, or fly again; returns the exit code."""
     what = "Search for the disturbance that pushes the base furthest off its plan."
     options = read(FalsifyOptions, "pandion falsify", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     if options.over is not None:
         from pandion.falsify_over import main as search_over
 

@@ -79,9 +79,7 @@ def main(argv: list[str]) -> int:
     """Fly and compare; returns the exit code."""
     what = "Let something fail in flight and compare with what must happen."
     options = read(FaultsOptions, "pandion faults", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     from studies.campaign.ports import SchedulerGoneError
     from studies.fault_matrix.expectations import EXPECTATIONS, ExpectationError, expectations
 

@@ -116,9 +116,7 @@ def main(argv: list[str]) -> int:
     """Run one study; returns the exit code."""
     what = "Reproduce a table or a figure of the paper."
     options = read(ReproduceOptions, "pandion reproduce", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     from studies.campaign.keys import CampaignError
     from studies.campaign.ports import SchedulerGoneError
     from studies.drawing import NoMatplotlibError

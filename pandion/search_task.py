@@ -47,9 +47,7 @@ def run_task(
     what they import may load NumPy.
     """
     options = read(SearchTaskOptions, f"pandion {verb}", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     if options.example:
         print(example().read_text(encoding="utf-8"), end="")
         return _PRINTED

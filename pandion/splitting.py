@@ -53,9 +53,7 @@ def main(argv: list[str]) -> int:
     """Estimate; returns the exit code."""
     what = "Estimate how rare a small margin is, by splitting the way to it into levels."
     options = read(SplittingOptions, "pandion splitting", what, argv)
-    from fsw.runtime.process import pin_numerics_to_one_thread
 
-    pin_numerics_to_one_thread()  # before NumPy loads
     return exit_code("splitting", lambda: _estimate(options))
 
 

@@ -102,3 +102,9 @@ def test_a_suite_is_compared_with_exact_states(
 def test_too_slow_is_an_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lockstep, "_measure_one", lambda *_: _flown(24.9))
     assert lockstep.main(["--rounds", "1"]) == 1
+
+
+@pytest.mark.long
+def test_the_peer_flies(capsys: pytest.CaptureFixture[str]) -> None:
+    assert lockstep.main(["--duration", "1", "--rounds", "1"]) in (lockstep.DONE, lockstep.SLOW)
+    assert "round 1, pymavlink: " in capsys.readouterr().out

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 from argparse import ArgumentTypeError
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -25,6 +27,7 @@ from fsw.arguments import FswOptions
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.signals import Origin
 from fsw.link.link_choice import LinkChoice
+from pandion import __main__ as pandion_main
 from pandion.certify import CertifyOptions
 from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions
@@ -248,3 +251,17 @@ def test_of_many_names_none_is_listed_where_none_is_like_it() -> None:
     assert unknown_name("parameter", "PID007", many).endswith("did you mean PID_007?")
     assert len(unknown_name("parameter", "nothing", many)) < 100
     assert unknown_name("verb", "nothing", ["fly", "view"]).endswith("known: fly, view")
+
+
+def test_numerics_have_one_thread_before_a_verb_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """NumPy's own would spin when ``pandion fly`` looks for processors that are idle."""
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    threads = []
+
+    def load(_: str) -> SimpleNamespace:
+        threads.append(os.environ["OPENBLAS_NUM_THREADS"])
+        return SimpleNamespace(main=lambda _: 0)
+
+    monkeypatch.setattr("pandion.__main__.import_module", load)
+    assert pandion_main.main(["fly"]) == 0
+    assert threads == ["1"]
