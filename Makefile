@@ -97,7 +97,7 @@ fsw-kernels:
 sitl-kernels:
 	@$(BIN)/python -m studies.flight.kernels sitl
 
-test-long: setup ## the tests that make test leaves out for its four minutes, and properties with more examples
+test-long: setup ## the tests that make test leaves out to be short, and properties with more examples
 	$(PYTEST) -m long
 	PROPERTIES=thorough $(PYTEST) -m hypothesis
 

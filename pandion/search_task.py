@@ -43,8 +43,7 @@ def run_task(
 ) -> int:
     """Read the options of a ``verb`` and ``run`` its task, or print its ``example``.
 
-    Returns the exit code. Both are called after numerics have been pinned to one thread, so that
-    what they import may load NumPy.
+    Returns the exit code. Both import what they need when they are called.
     """
     options = read(SearchTaskOptions, f"pandion {verb}", what, argv)
 

@@ -11,9 +11,10 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from pyulog import ULog
 
+from docs.figures.flight import BASE, END_EFFECTOR, FORBIDDEN, REFERENCE, seconds
 from docs.figures.save import save
 
-TRUE, ASKED, OBSERVED, BOUND = "#bc4c00", "#1a7f37", "#0969da", "#cf222e"
+TRUE, ASKED, OBSERVED, BOUND = END_EFFECTOR, REFERENCE, BASE, FORBIDDEN
 _BIN: Final = 20  # ticks, of which the largest true force is drawn
 _BEFORE_S, _SHOWN_S = 1.0, 8.0  # of the nearer view, about the first touch
 
@@ -27,7 +28,7 @@ def draw_contact(directory: Path, target: Path) -> None:
     log = ULog(str(directory / "flight.ulg"))
     true, observed = log.get_dataset("sim_contact").data, log.get_dataset("tool_contact").data
     bins = len(true["normal"]) // _BIN * _BIN
-    t = _seconds(log, true)[:bins:_BIN]
+    t = seconds(log, true)[:bins:_BIN]
     force = true["normal"][:bins].reshape(-1, _BIN).max(axis=1)
     asked = true["asked"][:bins:_BIN]
     figure, (whole, near) = plt.subplots(
@@ -48,7 +49,7 @@ def draw_contact(directory: Path, target: Path) -> None:
         axes.grid(axis="y", color="#d0d7de", lw=0.5)
         axes.set_xlabel("time [s]")
     whole.set_ylabel("normal force [N]")
-    _draw_observed(near, _seconds(log, observed), observed)
+    _draw_observed(near, seconds(log, observed), observed)
     near.set_ylim(0.0, 1.1 * touch["force_bound_n"])
     near.legend(loc="upper right", bbox_to_anchor=(1.0, 0.92), frameon=False, fontsize=8.0)
     whole.set_title("red: the bound", fontsize=9.0)
@@ -63,7 +64,3 @@ def _draw_observed(axes: Axes, t: Numbers, data: dict[str, Numbers]) -> None:
     low, high = pressed - unsure, pressed + unsure
     axes.fill_between(t, low, high, color=OBSERVED, alpha=0.15, lw=0.0)
     axes.plot(t, pressed, color=OBSERVED, lw=0.9, label="observed, and how sure")
-
-
-def _seconds(log: ULog, data: dict[str, Numbers]) -> Numbers:
-    return 1e-6 * (data["timestamp"].astype(float) - log.start_timestamp)

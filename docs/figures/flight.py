@@ -95,13 +95,19 @@ def draw_obstacles(axes: Axes, scenario: Scenario) -> None:
 def draw_margin(axes: Axes, log: ULog) -> None:
     """The smallest margin as the flight software saw it, once a planning cycle."""
     data = log.get_dataset("barrier_margin").data
-    seconds = 1e-6 * (data["timestamp"].astype(float) - log.start_timestamp)
+    t = seconds(log, data)
     margin = np.minimum(1e3 * data["minimum"], TOP_MM)
-    axes.plot(seconds, margin, color=BASE, lw=0.9)
+    axes.plot(t, margin, color=BASE, lw=0.9)
     axes.axhline(0.0, color=FORBIDDEN, lw=1.0)
     axes.set_ylim(-10.0, TOP_MM)
-    axes.set_xlim(0.0, float(seconds[-1]))
+    axes.set_xlim(0.0, float(t[-1]))
     axes.grid(axis="y", color="#d0d7de", lw=0.5)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("smallest margin [mm]")
     axes.set_title("distance of base, joint 2 or end-effector beyond the clearance", fontsize=9.0)
+
+
+def seconds(log: ULog, data: dict[str, Any]) -> np.ndarray[Any, Any]:
+    """Times (n,) [s] of a topic's rows since the log began."""
+    times: np.ndarray[Any, Any] = 1e-6 * (data["timestamp"].astype(float) - log.start_timestamp)
+    return times

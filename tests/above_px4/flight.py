@@ -8,7 +8,7 @@ from typing import Any
 from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.parameters.flight_config import FlightConfig, above_px4, flight_config
-from fsw.autopilot.signals import EndEffectorTarget, Mode, Setpoint, TickOutputs
+from fsw.autopilot.signals import EndEffectorTarget, MissionUpdate, Mode, Setpoint, TickOutputs
 from fsw.link.inbox import Inbox
 from fsw.link.px4.arm import Joints, servo_ranges
 from fsw.link.px4.link import Px4Link
@@ -119,6 +119,7 @@ class AbovePx4:
         self.answer = Px4Answer(0, *Controls.off(self.sim.vehicle)[:3])
         self.outputs: TickOutputs | None = None
         self.commands: list[Any] = []
+        self.upload: MissionUpdate | None = None
         self.next_target_us = START_US
         self.streams = True  # of targets
         self.stopped = False  # our process, whose clocks go on
@@ -164,10 +165,12 @@ class AbovePx4:
         taken = self.planner.take(frame.t_us)
         inputs = self.inbox.take_inputs(frame, taken, None, None)
         commands, self.commands = tuple(self.commands), []
+        upload, self.upload = self.upload, None
         fresh = announced(self.scenario) if self.outputs is None else ()
         inputs = replace(
             inputs,
             commands=(*inputs.commands, *commands),
+            mission=upload,
             targets=self._targets(frame.t_us),
             announced=(*inputs.announced, *fresh),
         )

@@ -12,13 +12,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsw.autopilot.signals import Command, CommandRequest, GoTo, Mode, Place
+from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4
+from fsw.autopilot.signals import (
+    Command,
+    CommandRequest,
+    GoTo,
+    MissionAction,
+    MissionStep,
+    MissionUpdate,
+    Mode,
+    Place,
+)
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario
 from tests.above_px4.flight import TRAJECTORY, AbovePx4
 from tests.above_px4.worst_push import BOUND, KEPT, worst_push
 from tests.closed_loop.harness import command, hover
 from tests.px4_companion_stand_in import HOLD, OFFBOARD, POSITION, SET_MODE, Gains
+
+MISSION_START = 300
 
 
 def still(yaw_deg: float = 0.0) -> Scenario:
@@ -70,6 +82,16 @@ def test_our_operator_asks_px4_for_offboard_and_gives_it_back() -> None:
     assert flight.px4.mode == HOLD
     assert "given back to PX4, which is asked to hold" in flight.texts
     assert flight.mode is Mode.DISARMED
+
+
+def test_a_mission_that_moves_the_gripper_is_told_that_it_is_px4s() -> None:
+    flight = handed_over(AbovePx4(still()))
+    flight.upload = MissionUpdate(steps=(MissionStep(MissionAction.GRIP),), current=0)
+    flight.run(0.1)
+    flight.commands.append(command(MISSION_START, 0.0, 0.0))
+    flight.run(0.5)
+    assert GRIPPER_OF_PX4 in flight.texts
+    assert flight.state.vehicle.gripper == 0.0
 
 
 def test_a_px4_that_refuses_offboard_is_not_pressed() -> None:

@@ -31,7 +31,17 @@ def flown(one: Scenario, seed: int = 0) -> FlightResult:
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(("vehicle", "suite"), list(product(OTHERS, (None, "mocap"))))
 def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | None) -> None:
-    truth = flown(scenario("walls", vehicle, 13.0, suite)).truth
+    keeps_its_limits(vehicle, suite, 13.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("vehicle", "suite"), list(product(OTHERS, (None, "mocap"))))
+def test_it_flies_between_walls_for_longer(vehicle: str, suite: str | None) -> None:
+    keeps_its_limits(vehicle, suite, 25.0)
+
+
+def keeps_its_limits(vehicle: str, suite: str | None, seconds: float) -> None:
+    truth = flown(scenario("walls", vehicle, seconds, suite)).truth
     assert truth.completed, truth.end_reason
     assert truth.min_margin_m is not None
     assert truth.min_margin_m > 0.01

@@ -16,7 +16,14 @@ from tests.closed_loop.harness import Flight
 
 @pytest.mark.requirement("REQ-SAFE-1", "REQ-ACT-8")
 @pytest.mark.parametrize(
-    ("name", "seconds"), [("walls", 13.0), ("workspace", 10.0), ("branches", 13.0)]
+    ("name", "seconds"),
+    [
+        ("walls", 13.0),
+        ("workspace", 10.0),
+        ("branches", 13.0),
+        pytest.param("walls", 20.0, marks=pytest.mark.long),
+        pytest.param("workspace", 15.0, marks=pytest.mark.long),
+    ],
 )
 def test_every_margin_stays_positive_and_every_limit_is_kept_between_samples_too(
     name: str, seconds: float

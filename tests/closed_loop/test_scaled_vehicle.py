@@ -20,7 +20,7 @@ from vehicles.description import V3, V6, Vehicle
 from vehicles.vehicle_file import load_vehicle, vehicle_text
 
 SCALE = 1.5
-SECONDS = 5.0
+SECONDS = 8.0
 
 
 def larger(vehicle: Vehicle) -> Vehicle:

@@ -28,7 +28,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.pid import PidGains, pid_step
-from fsw.autopilot.control.press import PressTuning, left_to_press, press, pressed_by, presses
+from fsw.autopilot.control.press import PressTuning, press, pressed_by, presses
 from fsw.autopilot.geometry.vectors import clamp, clamp_magnitude
 from fsw.autopilot.model.actuator_health import SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
@@ -153,7 +153,9 @@ def joint_torques(
     q, qd, qdd = r.estimate.q_arm, r.estimate.qd_arm, m.work
     pressing, off, rate_off, left = presses(r, tuning), 0.0, 0.0, 1.0
     if pressing:  # how far the tool is off along the normal is no error, and not to be integrated
-        left = left_to_press(r.pressing)
+        # Levers along the normal vanish as an arm gets straight, and what is made of them is as
+        # large as it is wrong. It is bent instead: straight it would press with the whole vehicle.
+        left = r.pressing.stroke
         for i in range(n):
             off += left * r.pressing.along[i] * (k.reference[i] - q[i])
             rate_off += left * r.pressing.along[i] * (k.reference_rate[i] - qd[i])
@@ -186,11 +188,10 @@ def _press_with(r: Tick, airframe: Airframe, into: float, qdd: Floats) -> None:
     Along the normal the tool accelerates ``into`` [m/s^2] the surface in place of that. What is
     observed there is not made up for: it is what is wanted. Reads bodies; writes pressing.work.
     """
-    p, m, n = r.pressing, r.bodies, int(airframe.bodies.joints)
+    p, m, n, left = r.pressing, r.bodies, int(airframe.bodies.joints), r.pressing.stroke
     along = 0.0
     for i in range(n):
         along += p.along[i] * qdd[i]
-    left = left_to_press(p)
     into, along = left * into, left * along
     for i in range(n):
         qdd[i] -= p.share[i] * along

@@ -243,16 +243,6 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
 
 
 @compilable
-def left_to_press(k: Pressing) -> float:
-    """Share [1] in which the tool's motion along the normal is a matter of force, and not of place.
-
-    Along the normal the levers of an arm that is nearly straight vanish, and what is made of them
-    is as large as it is wrong. It is bent instead: straight it would press with the whole vehicle.
-    """
-    return k.stroke
-
-
-@compilable
 def _balanced(r: Tick, airframe: Airframe, lever: float) -> float:
     """The largest force [N] whose moment about yaw, by a ``lever`` [m], rotors can balance.
 

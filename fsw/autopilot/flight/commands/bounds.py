@@ -46,6 +46,7 @@ MOVES_NOTHING: Final = frozenset(
         MissionAction.RELEASE,
     }
 )
+GRIPPER_OF_PX4: Final = "gripper not moved: above PX4 it is PX4's; ask PX4 for it"
 _AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
 _AXES: Final = ("north", "east", "down")
 _WHAT: Final = ("position", "velocity", "acceleration")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.autopilot.flight.commands import arming
-from fsw.autopilot.flight.commands.bounds import motion_refusal, place_problem
+from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4, motion_refusal, place_problem
 from fsw.autopilot.flight.commands.dedup import COURSE
 from fsw.autopilot.flight.modes.base import CommandContext, FlightMode
 from fsw.autopilot.flight.restart import RESTARTED
@@ -328,7 +328,7 @@ def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes
 
 def _grip(action: Grip, context: CommandContext, modes: Modes) -> Decision:
     if context.above_px4:
-        return Decision(DENIED, "gripper not moved: above PX4 it is PX4's; ask PX4 for it")
+        return Decision(DENIED, GRIPPER_OF_PX4)
     return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
 
 

@@ -47,8 +47,6 @@ from fsw.autopilot.signals import (
 STAND_OFF = 0.1  # m from a surface that is to be pressed on, before and after
 _SIDEWAYS = 0.3  # of a normal, that is horizontal, from which on the nose turns to the surface
 ARRIVAL_TIMEOUT_US = 5_000_000  # at the end of a segment, for the end-effector to arrive
-
-
 _GRIPPER: Final = {MissionAction.GRIP: 1.0, MissionAction.RELEASE: -1.0}
 
 
@@ -230,17 +228,16 @@ def _begin(
     if step.action in MOVES_NOTHING:
         return _set(flight, number, step)
     limits = _paced(flight, limits)
-    place, towards = _destination(step, at, context), step.yaw
+    place, towards, look_at = _destination(step, at, context), step.yaw, context.look_at
     if step.action is MissionAction.PUSH:
         met = context.meet(place, step.force)
         if met.against:
             return _given_up(flight, f"mission step {number} not flown: {met.against}")
-        place = add_scaled(met.place, met.normal, STAND_OFF)
+        place, look_at = add_scaled(met.place, met.normal, STAND_OFF), None
         if towards is None and math.hypot(*met.normal[:2]) > _SIDEWAYS:
             towards = math.atan2(-met.normal[1], -met.normal[0])
     end = project_to_safe_set(place, context.safe_set, context.now_us)
-    yaw = _heading(towards, end, None if step.force else context.look_at)
-    segment = segment_to(at, end, yaw, limits)
+    segment = segment_to(at, end, _heading(towards, end, look_at), limits)
     text = f"mission step {number}: {step.action.value}"
     moving = replace(
         flight, stage=Stage.MOVE, segment=segment, place=place, since_us=context.now_us
@@ -259,10 +256,16 @@ def _set(
         event = replace(event, looks=True, look_at=step.position)
     if step.action in _GRIPPER:
         event = replace(event, gripper=_GRIPPER[step.action])
+        return following, _said(f"mission step {number}: {step.action.value}", event)
     if step.speed is not None and step.speed > MAX_MISSION_SPEED:
         text = f"mission step {number}: {step.speed:g} m/s is flown as {MAX_MISSION_SPEED:g} m/s"
-        event = replace(event, text="; ".join(filter(None, (text, event.text))))
+        return following, _said(text, event)
     return following, event
+
+
+def _said(text: str, event: MissionEvent) -> MissionEvent:
+    """An event before whose text another one is said."""
+    return replace(event, text="; ".join(filter(None, (text, event.text))))
 
 
 def _paced(flight: MissionFlight, limits: MotionLimits) -> MotionLimits:
@@ -283,7 +286,7 @@ def _jump(flight: MissionFlight, step: MissionStep) -> tuple[MissionFlight, Miss
     following, event = _next(_reached(flight, over=False), step.target)
     count = f"{taken + 1} of {step.repeats}" if step.repeats > 0 else "without end"
     text = f"mission step {number}: jump to step {step.target}, {count}"
-    return following, replace(event, text="; ".join(filter(None, (text, event.text))))
+    return following, _said(text, event)
 
 
 def _heading(yaw: float | None, end: Vec3, look_at: Vec3 | None) -> float | None:

@@ -136,9 +136,9 @@ class PushSegment:
         """The reference at an instant, at rest before and after."""
         if t_us >= self.back.start_us:
             return self.back.at(t_us)
-        begun, left = t_us - self.into.end_us, self.back.start_us - t_us
-        x = min(max(1e-6 * min(begun, left) / self.ramp, 0.0), 1.0)
-        return replace(self.into.at(t_us), force=self.force * x * x * (3.0 - 2.0 * x))
+        pressed = 1e-6 * min(t_us - self.into.end_us, self.back.start_us - t_us)
+        _, share, _ = _rise(min(max(pressed, 0.0), self.ramp), self.ramp)
+        return replace(self.into.at(t_us), force=self.force * share)
 
 
 Segment = TrajectorySegment | CircleSegment | PushSegment

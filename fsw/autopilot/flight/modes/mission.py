@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4
 from fsw.autopilot.flight.mission import sequencer as sequencer
 from fsw.autopilot.flight.mission.sequencer import MissionContext, Stage
 from fsw.autopilot.flight.mission.trajectory_segment import MotionLimits, PushSegment
@@ -93,7 +94,9 @@ class Mission(FlightMode):
             return state, CONTINUE
         if event.looks:
             state = replace(state, vehicle=replace(vehicle, look_at=event.look_at))
-        if event.gripper is not None:
+        if event.gripper is not None and config.inner == "px4":
+            event = replace(event, text=GRIPPER_OF_PX4, unmet=True)
+        elif event.gripper is not None:
             state = replace(state, vehicle=replace(state.vehicle, gripper=event.gripper))
         severity = Severity.WARNING if event.unmet else Severity.INFO
         texts = (StatusText(severity, event.text),) if event.text else ()

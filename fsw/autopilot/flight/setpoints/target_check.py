@@ -61,10 +61,16 @@ class TargetCheck:
         if found is None:
             return f"{target.force:.1f} N are asked for where nothing may be touched"
         zone, at = found
-        normal = at.nx, at.ny, at.nz
-        v = subtract(target.v_WE, zone.velocity)
+        return self._pressed_problem(zone, (at.nx, at.ny, at.nz), target.force, target.v_WE)
+
+    def _pressed_problem(self, zone: Zone, normal: Vec3, force: float, v: Vec3) -> str | None:
+        """Why a ``force`` [N] cannot be pressed with on a ``zone``; None: it can.
+
+        Along the ``normal`` [1, NED], by a tool that moves at ``v`` [m/s, NED].
+        """
+        v = subtract(v, zone.velocity)
         slide = add_scaled(v, normal, -dot(normal, v))
-        asked = Pressed(normal, target.force, slide if norm(slide) > _RESTS else _STILL)
+        asked = Pressed(normal, force, slide if norm(slide) > _RESTS else _STILL)
         # Where it is by now is of no matter, nor how it moves.
         still = replace(zone, velocity=_STILL, t_us=0)
         return self._against(still, asked) or None
@@ -75,16 +81,14 @@ class TargetCheck:
         ``force`` [N] is what it is to press with.
         """
         found = _nearest(safe_set, p, t_us)
-        asked = EndEffectorTarget(t_us, p, _STILL, _STILL, 0.0, force)
-        problem = self._pressing_problem(asked, safe_set)
-        if found is None or problem is not None:
-            return Meeting(p, _STILL, problem or "there is no surface that may be touched")
+        if found is None:
+            return Meeting(p, _STILL, "there is no surface that may be touched")
         zone, at = found
-        off = at.distance + zone.clearance - self._tool_radius
+        normal, off = (at.nx, at.ny, at.nz), at.distance + zone.clearance - self._tool_radius
         if abs(off) > FARTHEST:
             return Meeting(p, _STILL, f"the surface that may be touched is {off:.2f} m away")
-        normal = at.nx, at.ny, at.nz
-        return Meeting(add_scaled(p, normal, -off), normal)
+        against = self._pressed_problem(zone, normal, force, _STILL)
+        return Meeting(add_scaled(p, normal, -off), normal, against or "")
 
 
 class Meeting(NamedTuple):

@@ -34,7 +34,7 @@ from fsw.autopilot.tick_record import FILTER_ACTED, GATE_NEEDED, Tick
 from tests.fsw.random_states import as_state, prediction_vector, random_estimate, vec3
 from tests.fsw.records import with_given
 
-STATES = 120
+STATES = 300
 TUBE = TubeAround(1.5, 0.2, 0.01)
 TUNINGS = [LoopGains(), replace(LoopGains(), compensate=False)]
 

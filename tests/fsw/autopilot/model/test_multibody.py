@@ -63,18 +63,22 @@ def vehicles() -> list[Vehicle]:
     ]
 
 
-def test_it_equals_pinocchio_for_any_vehicle_in_any_motion() -> None:
-    """440 states, 200 of them of those that come with Pandion; as Python."""
+@pytest.mark.parametrize(
+    ("ours", "others"), [(40, 8), pytest.param(250, 35, marks=pytest.mark.long)]
+)
+def test_it_equals_pinocchio_for_any_vehicle_in_any_motion(ours: int, others: int) -> None:
+    """440 states, 200 of them of those that come with Pandion, and 2,300; as Python."""
     random = np.random.default_rng(7)
     for vehicle in vehicles():
         referee, b = Referee(vehicle), bodies_of(vehicle)
         m = Multibody()
-        for _ in range(40 if vehicle.name in vehicle_names() else 8):
+        for _ in range(ours if vehicle.name in vehicle_names() else others):
             check_motion(referee, m, b, random)
             check_tip(referee, m, b)
 
 
-def test_it_equals_pinocchio_with_a_payload_at_the_end_effector() -> None:
+@pytest.mark.parametrize("states", [6, pytest.param(20, marks=pytest.mark.long)])
+def test_it_equals_pinocchio_with_a_payload_at_the_end_effector(states: int) -> None:
     random, load = np.random.default_rng(8), 0.4
     for vehicle in vehicles():
         referee, b = Referee(vehicle), bodies_of(vehicle)
@@ -83,7 +87,7 @@ def test_it_equals_pinocchio_with_a_payload_at_the_end_effector() -> None:
         referee.model.appendBodyToJoint(at_tip.parentJoint, point, at_tip.placement)
         m = Multibody()
         m.carried = load
-        for _ in range(6):
+        for _ in range(states):
             check_motion(referee, m, b, random)
 
 
