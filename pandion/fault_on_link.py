@@ -26,6 +26,7 @@ from studies.fault_matrix.flights import (
     SITUATIONS,
     FaultFlight,
     Said,
+    Situation,
     beside_the_wall_text,
     contact_of,
 )
@@ -33,7 +34,11 @@ from studies.fault_matrix.matrix import Cell
 from studies.flight.job import sources
 
 _WAIT_S: Final = 600.0
-_PACKAGED: Final = {"trajectory": "walls-calm", "workspace": "workspace-calm"}
+_PACKAGED: Final = {
+    "trajectory": "walls-calm",
+    "workspace": "workspace-calm",
+    "press": "probe",
+}
 
 
 class _Watch(Display):
@@ -72,7 +77,7 @@ def _fly(cell: Cell, folder: Path) -> FaultFlight:
     try:
         flown = Supervisor(watch, folder).run(
             as_words(_sitl(scenario, cell, situation.ends_s, folder)),
-            lambda port: as_words(_fsw(port, station.port, situation.body, folder)),
+            lambda port: as_words(_fsw(port, station.port, situation, cell.expected.suite, folder)),
         )
     except ProcessFailed as error:
         return cell.broken(str(error))
@@ -109,11 +114,12 @@ def _sitl(scenario: Path, cell: Cell, ends_s: float, out: Path) -> SitlOptions:
     )
 
 
-def _fsw(port: int, station: int, body: str, out: Path) -> FswOptions:
+def _fsw(port: int, station: int, situation: Situation, suite: str, out: Path) -> FswOptions:
     return FswOptions(
         sim=f"udp:127.0.0.1:{port}",
         links=LinkChoice(gcs=f"udp:127.0.0.1:{station}", api=NO_LINK),
-        control=ControlChoice(body=body),
+        control=ControlChoice(body=situation.body),
+        vehicle=situation.scenario(suite).vehicle,
         out=out,
         wait_s=_WAIT_S,
     )
@@ -152,7 +158,16 @@ def _seen(
         contact=contact,
         ended=reason if contact or failure else "",
         least_m=result.get("min_margin_m"),
+        force_share=_force_share(result),
         problem=problem,
+    )
+
+
+def _force_share(result: dict[str, Any]) -> float:
+    """The largest force on the tool over what its surface allows."""
+    uses = result.get("touches", {}).values()
+    return max(
+        (float(use["force_max_n"]) / float(use["force_bound_n"]) for use in uses), default=0.0
     )
 
 

@@ -122,15 +122,20 @@ class Pressing(Record):
     surface_speed: float  # m/s, of the surface along the normal
     most: float  # N
     stiffness: float  # N/m, at most
+    dissipation: float  # s/m
+    friction: float
     momentum: PerJoint  # N m s, as the observer believes
     external: PerJoint  # N m, on each joint from outside of the model
     force: Three  # N, NED, on the tool, observed
     pressed: float  # N, of that along the normal
     unsure: float  # N, by which that may be wrong
     mass: float  # kg, of the tool along the normal
+    held_mass: float  # kg, the same of one that friction holds on the surface
     stroke: float  # share of a force that the arm gives, less where it is nearly straight
     speed: float  # m/s, of the tool into the surface
     mean_speed: float  # m/s, the same of late
+    coming: float  # m/s, the most of it in the last ticks
+    blow: float  # N, at most, with which the tool has met the surface
     balanced: float  # N along the normal, at most, whose moment about yaw rotors balance
     asked: float  # N, by the plan, as far as all bounds allow
     ramped: float  # N, of that
@@ -202,6 +207,9 @@ class Watched(Record):
     undoing: PerJoint
     rate2: PerJoint  # rad^2/s^2
     behind2: PerJoint  # rad^2, mean square of the distance from the reference
+    unseen: PerJoint  # rad, by which it must have moved unseen to hold a tool in contact
+    yielding2: PerJoint  # rad^2/s^2, mean square of the rate that it had to have, seen or not
+    stands_for: PerJoint  # s, that it has not had any of that
     joint_for: PerJoint  # s, for how long it has been suspected
     joint: PerJoint  # SOUND, STUCK or LIMP
     stood_at: PerJoint  # rad, where it was found stuck
@@ -360,6 +368,11 @@ class Tick(Record):
         return _JOINTS.unpack_from(self.memory, _UNDONE_AT)[: self.joint_count]
 
     @property
+    def unseen(self) -> JointVector:
+        """By how much joints must have moved unseen to hold a tool in contact (j,) [rad]."""
+        return _JOINTS.unpack_from(self.memory, _UNSEEN_AT)[: self.joint_count]
+
+    @property
     def joint_acceleration(self) -> JointVector:
         """What was found for the joints (j,) [rad/s^2] by ``accelerate_joints``."""
         return _JOINTS.unpack_from(self.memory, _WORK_AT)[: self.joint_count]
@@ -450,6 +463,7 @@ _COUNTS_AT: Final = Tick.place("rotor_count")
 _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")
 _UNDONE_AT: Final = Tick.place("watch", "undone")
+_UNSEEN_AT: Final = Tick.place("watch", "unseen")
 _CONTACT_AT: Final = Tick.place("pressing", "contact")
 _ASKED_AT: Final = Tick.place("pressing", "asked")
 _GRIPPED_AT: Final = Tick.place("payload", "gripped")

@@ -27,9 +27,19 @@ _KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
 _MAX_BYTES: Final = 1 << 20
 _SHOWN: Final = 60  # characters of a wrong value
 _MAX_MM: Final = 1e6  # of a margin
+_MAX_FORCE: Final = 100.0  # over what a surface allows
 _MAX_S: Final = 86400.0  # of a time
 _NUMBERS: Final = ("duration_s", "share", "size", "axis", "delay_ms", "rate_hz", "jump_s")
-_EXPECTED: Final = ("told_within_s", "names", "then", "last", "contact", "margin_mm", "why")
+_EXPECTED: Final = (
+    "told_within_s",
+    "names",
+    "then",
+    "last",
+    "contact",
+    "margin_mm",
+    "force",
+    "why",
+)
 _KNOWN: Final = (
     "name",
     "units",
@@ -57,6 +67,7 @@ class Expectation:
     names: str = ""  # what a text must name, a regular expression
     contact: Contact = "none"  # that cannot be helped
     margin_mm: float = 0.0  # least margin to the safe set; where contact is allowed it is not asked
+    force: float = 1.0  # at most, on the tool, over what its surface allows
     why: str = ""
     last: tuple[str, ...] = ()  # of which the last action must be one; empty: any of ``then``
 
@@ -243,7 +254,7 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
         )
     if contact != "none" and not keys.get("why"):
         raise ExpectationError(f'contact = "{contact}" needs a reason: why')
-    margin_mm, within_s = _margin_mm(keys), _told_within_s(keys)
+    margin_mm, force, within_s = _margin_mm(keys), _force(keys), _told_within_s(keys)
     names = keys["names"]
     if not isinstance(names, str):
         raise ExpectationError(f"names = {_shown(names)}: must be a regular expression")
@@ -256,7 +267,7 @@ def _expectation(keys: dict[str, Any]) -> Expectation:
         re.compile(names)
     except re.error as error:
         raise ExpectationError(f"names = {names!r} is no regular expression: {error}") from None
-    return Expectation(then, within_s, names, contact, margin_mm, why, last)
+    return Expectation(then, within_s, names, contact, margin_mm, force, why, last)
 
 
 def _margin_mm(keys: dict[str, Any]) -> float:
@@ -269,6 +280,17 @@ def _margin_mm(keys: dict[str, Any]) -> float:
     if margin < 0.0 and not keys.get("why"):
         raise ExpectationError(f"margin_mm = {margin:g} needs a reason: why")
     return float(margin)
+
+
+def _force(keys: dict[str, Any]) -> float:
+    force = keys.get("force", 1.0)
+    if not _is_number(force) or not 1.0 <= force <= _MAX_FORCE:
+        raise ExpectationError(
+            f"force = {_shown(force)}: must be a share of the largest, from 1 to {_MAX_FORCE:g}"
+        )
+    if force > 1.0 and not keys.get("why"):
+        raise ExpectationError(f"force = {force:g} needs a reason: why")
+    return float(force)
 
 
 def _told_within_s(keys: dict[str, Any]) -> float | None:
@@ -323,6 +345,8 @@ def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[st
         found.append(f"{', then '.join(actions)}; must end with {' or '.join(expected.last)}")
     if seen.contact and expected.contact not in ("any", seen.contact):
         found.append(seen.ended)
+    if not seen.force_share <= expected.force:  # NaN is more
+        found.append(f"{seen.force_share:.0%} of the force; must be {expected.force:.0%} at most")
     min_mm = math.inf if seen.least_m is None else 1e3 * seen.least_m
     if expected.contact == "none" and not min_mm >= expected.margin_mm:  # NaN is less
         found.append(f"margin {min_mm:.1f} mm; must be {expected.margin_mm:g} mm")

@@ -36,7 +36,7 @@ from fsw.autopilot.signals import (
 )
 from sitl.faults.keys import SENSORS, Fault
 from sitl.result import EndKind
-from sitl.scenario import Scenario
+from sitl.scenario import Scenario, vehicle_of
 from sitl.scenario_file import PERFECT, load_scenario, parse_scenario
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner
@@ -159,6 +159,15 @@ SITUATIONS: Final[dict[str, Situation]] = {
         frozenset((Mode.TRAJECTORY,)),
         body="points",
     ),
+    # Touching a wall with 5 N, a second after it has met it; then it goes to the next place.
+    "press": Situation(
+        Mode.TRAJECTORY,
+        _packaged("probe"),
+        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
+        5.0,
+        17.0,
+        frozenset((Mode.TRAJECTORY,)),
+    ),
     "offboard": _in_the_air(
         Mode.OFFBOARD,
         (0.5, _to(Mode.OFFBOARD)),
@@ -194,7 +203,7 @@ SITUATIONS: Final[dict[str, Situation]] = {
         then=_LANDED,
     ),
 }
-"""By the name of the mode; both safe sets of the paper are flown in Trajectory."""
+"""By the name of the mode; both safe sets of the paper and a push are flown in Trajectory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,6 +225,7 @@ class FaultFlight:
     ended: str = ""  # why before its time; empty if it was flown to its end
     least_m: float | None = None  # margin to the safe set, of any part, in the whole flight
     away_m: float | None = None  # from the start at the end
+    force_share: float = 0.0  # the largest force on the tool over what its surface allows
     problem: str = ""  # the flight was none: refused, or not in the mode when the fault began
     error: bool = False  # it could not be flown at all
     took_s: float = field(default=0.0, compare=False)  # by the wall's clock
@@ -346,7 +356,7 @@ def fly(
     scenario = situation.scenario(suite)
     scenario = replace(scenario, faults=situation.placed(faults))
     simulation = Simulation(scenario, seed)
-    config = flight_config(body=situation.body)
+    config = flight_config(body=situation.body, vehicle=vehicle_of(scenario))
     limits = replace(config.limits, station_timeout_us=_STATION_TIMEOUT_US)
     config = replace(config, limits=limits)
     planner: PlanService = _Planner(config, simulation)
@@ -410,5 +420,6 @@ def _judged(simulation: Simulation, seen: Observer, away_m: float) -> FaultFligh
         ended="" if end is None else end.sentence,
         least_m=simulation.result().min_margin_m,
         away_m=round(away_m, 3) if math.isfinite(away_m) else None,
+        force_share=round(simulation.touch.force_share(), 3),
         problem=seen.problem,
     )

@@ -87,6 +87,7 @@ class Judged:
             "ended": flight.ended,
             "min_margin_m": flight.least_m,
             "away_m": flight.away_m,
+            "force_share": flight.force_share,
             "known_limits": list(self.known),
             "as_expected": not self.differs,
             "differs": list(self.differs),

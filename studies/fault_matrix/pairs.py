@@ -169,7 +169,8 @@ def findings(flight: FaultFlight) -> tuple[str, ...]:
     if flight.away_m is None or flight.away_m > _FURTHEST_M:
         found.append("lost")
     breach = flight.least_m is not None and not flight.least_m >= 0.0  # NaN is one
-    if (found or breach) and flight.warning is None:
+    hard = not flight.force_share <= 1.0
+    if (found or breach or hard) and flight.warning is None:
         found.append("silent")
     return tuple(found)
 

@@ -446,15 +446,11 @@ def _fly_whole(
     """Fly the worst finds again with the whole stack; improve the worst of each kind there."""
     whole = evaluations
     hard = hunt.hard(math.ceil(0.2 * evaluations))
-    # Each with what is not claimed, in turn.
+    # Each with what is not claimed, in turn; the next time round each with another.
     free = hunt.hard(math.ceil(0.1 * evaluations), free=True)
-    count = round(0.3 * evaluations) if free else 0
-    past = [
-        replace(one, disturbance=replace(one.disturbance, met=met))
-        for _, one, met in zip(
-            range(count), itertools.cycle(free), itertools.cycle(unclaimed(scenario))
-        )
-    ]
+    count, kinds = round(0.3 * evaluations) if free else 0, unclaimed(scenario)
+    turns = (divmod(k, len(free)) for k in range(count))
+    past = [_with(free[one], kinds[(turn + one) % len(kinds)]) for turn, one in turns]
     evaluations -= len(hard) + len(past)
     steps = hunt.steps(math.ceil(0.25 * evaluations))
     telling = [one for one in hunt.telling(math.ceil(0.5 * evaluations)) if one.kind != STEP]
@@ -500,6 +496,11 @@ def _fly_whole(
         hardest=max(flown, key=lambda one: one.flown.force_share) if hard else None,
         beyond=tuple(beyond),
     )
+
+
+def _with(found: Found, met: Met) -> Found:
+    """A find to be flown again with what is met."""
+    return replace(found, disturbance=replace(found.disturbance, met=met))
 
 
 def _improve_whole(

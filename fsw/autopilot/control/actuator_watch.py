@@ -17,7 +17,8 @@ like a single one: how rotors twice as slow would turn the vehicle is computed a
 that much explains what does, none has failed, whatever pushes along z meanwhile.
 
 A joint has failed when torque is observed that undoes what is asked of its drive, and the base does
-not feel it either.
+not feel it either. A surface that holds the tool undoes torques as well; there a joint has failed
+that does not move while the base carries the arm about.
 
 Source: A. De Luca, R. Mattone, Actuator failure detection and isolation using generalized momenta,
 ICRA 2003, for the joints; docs/decisions/0033-actuators-that-fail.md.
@@ -44,7 +45,7 @@ from fsw.autopilot.model.multibody import (
     posture,
 )
 from fsw.autopilot.model.rotors import lag_rotor, load_of_tip, rotor_wrench
-from fsw.autopilot.signals import JointVector, Vec3
+from fsw.autopilot.signals import JointVector, Vec2, Vec3
 from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
 from fsw.record import ROTORS, Floats, padded
@@ -92,6 +93,12 @@ PLAIN_SHARE: Final = 0.7
 JOINT_TIME: Final = 0.1  # s
 STANDING: Final = 0.2  # rad/s, root mean square of the rate of a joint that stands
 MOVED: Final = 0.05  # rad; a joint that has moved so far is not stuck
+# In contact: the rate, root mean square, that would hold the tool, and the share of it below which
+# a joint stands.
+MOVING: Final = 0.1  # rad/s
+RIGID: Final = 0.1
+RIGID_TIME: Final = 0.3  # s
+_SHORT: Final = 0.01  # m; shorter levers move no tool
 
 # What is known of parts that have failed, which lasts while nothing can be observed.
 _OF_FAILED: Final = (
@@ -186,8 +193,8 @@ def watch(
         for i in range(rotors):
             s.thrust[i] = s.slow[i] = sent.rotor_thrust[i]
     _observe_base(r, law, decay, dt, sent)
-    # At a surface, or with something in the gripper, it is not known what the joints are to do.
-    if angles_known and r.pressing.near == 0 and r.payload.gripped == 0.0:
+    # With something in the gripper it is not known what the joints are to do.
+    if angles_known and r.payload.gripped == 0.0:
         _observe_arm(r, airframe.bodies, dt, sent.joint_torque)
         s.arm_seen += dt
     else:
@@ -199,8 +206,11 @@ def watch(
     settled = s.running > SETTLING
     _judge_rotors(r, law, dt, settled)
     found = s.failed >= 0
+    # What a surface does to the tool can look like a drive that gives nothing.
+    tells = settled and s.arm_seen > SETTLING and r.pressing.near == 0
     for k in range(joints):
-        _judge_joint(s, k, law.torques[k], dt, settled and s.arm_seen > SETTLING, x.q_arm[k])
+        _judge_joint(s, k, law.torques[k], dt, tells, x.q_arm[k])
+        _judge_yielding(s, k, dt, x.q_arm[k])
         found = found or s.joint[k] != SOUND
     return bool(found)
 
@@ -224,13 +234,15 @@ def _observe_base(r: Tick, law: WatchLaw, decay: float, dt: float, sent: Sent) -
     force, turn = rotor_wrench(airframe, r.mixer.mean)
     pushed, turned = load_of_tip(r, airframe.bodies, sent.joint_torque)
     load = load_on_base(r.bodies, airframe.bodies, add(force, pushed), r.pressing.load)
-    modelled = subtract(add(turn, turned), load)
+    modelled = free = subtract(add(turn, turned), load)
+    if r.pressing.near > 0:  # drives are judged by what turns the base where nothing is touched
+        free = subtract(turn, load_on_base(r.bodies, airframe.bodies, force, sent.joint_torque))
     grown = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
     for i in range(2):
         gained = J[3 * i] * grown[0] + J[3 * i + 1] * grown[1] + J[3 * i + 2] * grown[2]
         if s.running == 0.0:
             gained = dt * modelled[i]
-        s.torque[i] += OBSERVER * (gained - dt * (modelled[i] + s.torque[i]))
+        s.torque[i] += OBSERVER * (gained - dt * (free[i] + s.torque[i]))
         s.turned[i] += observer * (gained - dt * (modelled[i] + s.turned[i]))
     share, total = min(observer * dt, 1.0), -force[2]
     lift = airframe.mass * r.estimate.specific_force - (1.0 + s.lasting) * total
@@ -369,6 +381,8 @@ def _judge_rotors(r: Tick, law: WatchLaw, dt: float, settled: bool) -> None:
 def _a_drive_does_this(r: Tick, airframe: Airframe, pattern: Vec3) -> bool:
     """Whether a drive that is dead, or its friction, turns the base about this pattern's axis."""
     s, m = r.watch, r.bodies
+    if r.pressing.near > 0:  # what undoes a torque there is the surface
+        return False
     for k in range(int(airframe.bodies.joints)):
         x, y = m.reaction[3 * k], m.reaction[3 * k + 1]
         same = abs(x * pattern[0] + y * pattern[1])
@@ -446,6 +460,9 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
         s.asked2[k] += forget * (s.asked[k] * s.asked[k] - s.asked2[k])
         s.undoing[k] += forget * (s.undone[k] * s.asked[k] - s.undoing[k])
         s.rate2[k] += forget * (x.qd_arm[k] * x.qd_arm[k] - s.rate2[k])
+        yielding, unseen = _yielding(r, k, joints)
+        s.unseen[k] += dt * unseen
+        s.yielding2[k] += forget * (yielding * yielding - s.yielding2[k])
         behind = r.joints.reference[k] - x.q_arm[k]
         s.behind2[k] += forget * (behind * behind - s.behind2[k])
     # What a drive does not give to the arm it does not take from the base. A contact, and a gyro
@@ -461,6 +478,23 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
     s.odd2 += forget * (odd2 - s.odd2)
 
 
+@compilable
+def _yielding(r: Tick, joint: int, joints: int) -> Vec2:
+    """Rates [rad/s] of a joint that hold a tool in contact: in all, and beside what is seen.
+
+    Both are 0 without contact.
+    """
+    k, whole = r.pressing, 0.0
+    if k.contact == 0:
+        return 0.0, 0.0
+    carried = moved = -k.speed
+    for i in range(joints):
+        carried -= k.along[i] * r.estimate.qd_arm[i]
+        whole += k.along[i] * k.along[i]
+    share = k.along[joint] / max(whole, _SHORT * _SHORT)
+    return share * carried, share * moved
+
+
 def felt_inside(r: Tick, airframe: Airframe) -> JointVector:
     """How much of what undoes each joint's torque is felt nearer to the base (j,) [1].
 
@@ -469,6 +503,8 @@ def felt_inside(r: Tick, airframe: Airframe) -> JointVector:
     first is a share of what turns the base: a gyro that is off shows more there than any joint.
     """
     s = r.watch
+    if r.pressing.near > 0:  # what a surface does is felt as well
+        return (0.0,) * int(airframe.bodies.joints)
     turned2 = airframe.rotor_lever**2 * float(s.products[0] + s.products[1])
     unseen, inside, felt = float(s.odd2) - turned2, 0.0, []
     for u in s.undone2[: airframe.bodies.joints].tolist():
@@ -485,7 +521,7 @@ def _forget_arm(s: Watched) -> None:
     for k in range(s.undone.size):
         s.undone[k], s.asked[k], s.joint_for[k] = 0.0, 0.0, 0.0
         s.undone2[k], s.asked2[k], s.undoing[k] = 0.0, 0.0, 0.0
-        s.rate2[k], s.behind2[k] = 0.0, 0.0
+        s.rate2[k], s.behind2[k], s.yielding2[k], s.stands_for[k] = 0.0, 0.0, 0.0, 0.0
 
 
 @compilable
@@ -505,3 +541,13 @@ def _judge_joint(
     if s.joint_for[k] > JOINT_TIME:
         s.joint[k] = STUCK if s.rate2[k] < STANDING * STANDING else LIMP
         s.stood_at[k] = angle
+
+
+@compilable
+def _judge_yielding(s: Watched, k: int, dt: float, angle: float) -> None:
+    """Find a joint that stands where the base carries the arm about and the tool is held."""
+    yields2 = s.yielding2[k]
+    stands = yields2 > MOVING * MOVING and s.rate2[k] < RIGID * RIGID * yields2
+    s.stands_for[k] = s.stands_for[k] + dt if stands else 0.0
+    if s.joint[k] == SOUND and s.stands_for[k] > RIGID_TIME:
+        s.joint[k], s.stood_at[k] = STUCK, angle

@@ -59,7 +59,9 @@ from fsw.autopilot.model.multibody import (
 )
 from fsw.autopilot.shapes.zones import (
     CLEARANCE,
+    DAMPS,
     FORCE_MAX,
+    ROUGH,
     STIFF,
     Array,
     moved_by,
@@ -97,6 +99,7 @@ class PressTuning:
     slipping: float = 0.5  # s, over which the mean of a slip is taken
     remember: float = 0.1  # s, in which the mean speed of a tool in contact follows
     damping: float = 1.0  # N, at most, against speeds beside the mean
+    noticed: float = 10.0  # m/s^2; what is slowed down more than this has struck something
     disturbance: float = 0.8  # m/s^2, d_m
     wrong: float = 0.03  # mu, share by which masses may be wrong
     heaviest: float = 1.0  # kg; an arm that is nearly straight is not believed to be heavier
@@ -135,16 +138,16 @@ def look_for_surface(
             put_three(k.normal, 0, n)
             k.surface_speed = dot(n, velocity_of(zones, zone, estimate.t_us))
             k.most, k.stiffness = zones[zone, FORCE_MAX], zones[zone, STIFF]
+            k.dissipation, k.friction = zones[zone, DAMPS], zones[zone, ROUGH]
     if found:
         k.distance = nearest
         if k.contact > 0:  # it is where it is felt
-            k.moved = clamp(k.moved + nearest, -tuning.farthest, tuning.farthest)
-            k.distance = 0.0
+            k.moved, k.distance = k.moved + nearest, 0.0
         if k.near == 0:
             k.near = 1
             for i in range(int(bodies.joints)):
                 k.momentum[i], k.external[i] = r.bodies.momentum[i], r.joints.disturbance[i]
-    elif k.near > 0:
+    if k.near > 0 and (not found or abs(k.moved) > tuning.farthest):
         _forget(r)
     _watch_contact(r, bodies, tuning, dt)
 
@@ -152,6 +155,7 @@ def look_for_surface(
 @compilable
 def _watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> None:
     k = r.pressing
+    k.coming = max(k.speed, k.coming - tuning.noticed * dt)
     if not r.u.force > 0.0:
         if k.met > 0:
             k.met, k.lost_for = 0, 0.0
@@ -175,7 +179,7 @@ def _watch_contact(r: Tick, bodies: Bodies, tuning: PressTuning, dt: float) -> N
 def _forget(r: Tick) -> None:
     k = r.pressing
     k.near = k.contact = 0
-    k.pressed = k.unsure = k.mass = k.speed = k.mean_speed = 0.0
+    k.pressed = k.unsure = k.mass = k.speed = k.mean_speed = k.coming = k.blow = 0.0
     k.asked = k.ramped = k.commanded = 0.0
     for i in range(3):
         k.force[i] = r.observed.known[i] = 0.0
@@ -203,9 +207,9 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
         reached = add_scaled(reached, lever, k.along[i])
     factorise(m.factor, m.qq, n)
     solve(m.factor, k.work, n)
-    eased = whole = turned = 0.0
+    whole, turned, eased = 0.0, 0.0, (0.0, 0.0, 0.0)
     for i in range(n):
-        eased += k.along[i] * k.work[i]
+        eased = add_scaled(eased, lever_of(m, i, tip), k.work[i])
         whole += k.share[i] * k.along[i]
         turned += k.share[i] * k.share[i]
     v = rotate(R, velocity_of_tip(m, b))
@@ -215,7 +219,9 @@ def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     k.speed = k.surface_speed - speed
     # Joints feel the part of a force that they move the tool along; of what is normal to the
     # surface the rest is known. It turns a vehicle farther aside that is turned aside.
-    k.mass, k.pressed = 1.0 / max(eased, 1.0 / tuning.heaviest), pressed_by(k, k.external, n)
+    k.pressed, least, freed = pressed_by(k, k.external, n), 1.0 / tuning.heaviest, dot(along, eased)
+    held = k.friction * norm(add_scaled(eased, along, -freed))
+    k.mass, k.held_mass = 1.0 / max(freed, least), 1.0 / max(freed - held, least)
     # Rates of s give the tool unit speed along n: an arm that is nearly straight has to turn fast.
     # A part of n that no joint moves the tool along, as with a vehicle turned aside, is no matter.
     reach = whole / math.sqrt(turned) if turned > 0.0 else 0.0
@@ -269,6 +275,7 @@ def pressed_by(k: Pressing, torque: Floats, joints: int) -> float:
 
 _AHEAD = 0.5  # share of the normal, at least, that joints move the tool along
 _BLOCKED = 0.5  # share of the speed asked for below which something is in the way
+_DAMPS = 0.1  # of Hunt and Crossley's dissipation times speed, in the largest force
 _NO_SHARE = 1e-9  # N a newton
 _DAMPED = 1e-4  # m^2, of levers without which a direction is left out
 
@@ -296,6 +303,13 @@ def _force_on_tool(r: Tick, shape: V6, tip: Vec3, n: int) -> Vec3:
     for i in range(n):
         total = add_scaled(total, lever_of(m, i, tip), r.pressing.external[i])
     return times_symmetric(shape, total)
+
+
+@compilable
+def _blow(k: Pressing) -> float:
+    """The most [N] that the hardest surface gives a tool that has come so fast."""
+    damped = 1.0 + _DAMPS * k.dissipation * k.coming
+    return damped * k.coming * math.sqrt(k.stiffness * k.held_mass)
 
 
 @compilable
@@ -327,9 +341,9 @@ def press(
     blocked = k.distance < tuning.band and k.asked > 0.0 and k.speed < _BLOCKED * fastest
     if k.contact > 0:
         if k.pressed < tuning.lost:
-            k.contact = 0
+            k.contact, k.blow = 0, 0.0
     elif k.pressed > k.unsure + (tuning.felt if blocked else tuning.struck):
-        k.contact, k.mean_speed = 1, 0.0
+        k.contact, k.mean_speed, k.blow = 1, 0.0, _blow(k)
     wanted = k.asked if k.contact > 0 or blocked else 0.0
     fall = tuning.fall if k.contact > 0 else tuning.drop
     k.ramped = clamp(wanted, k.ramped - fall * dt, k.ramped + tuning.rise * dt)

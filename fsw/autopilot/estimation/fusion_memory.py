@@ -30,6 +30,7 @@ _REPEATS: Final = 6  # of encoders; a resting arm's 12 bits are the same for lon
 _HELD: Final = 0.1
 # Of that; 0.7 and more of joints that move unseen, less than 0 of ones that fail.
 _FELT: Final = 0.5
+_UNSEEN: Final = 0.02  # rad, by which a joint must have moved that holds a tool on its surface
 _REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 
@@ -56,10 +57,11 @@ class EncoderWatch(NamedTuple):
     """Whether the joints' encoders still follow the joints."""
 
     angles: JointVector = ()  # rad, the last reading
-    # Of each: readings in a row that were the same, infinite of one that is stuck, and what undid
-    # its joint's torque when they began [N m].
+    # Of each: readings in a row that were the same, infinite of one that is stuck, what undid its
+    # joint's torque when they began [N m], and by how much it must have moved unseen [rad].
     repeats: tuple[float, ...] = ()
     first: JointVector = ()
+    unseen: JointVector = ()
 
     @property
     def repeating(self) -> bool:
@@ -75,6 +77,7 @@ class EncoderWatch(NamedTuple):
         self,
         angles: JointVector,
         undone: JointVector,
+        unseen: JointVector,
         felt: Callable[[], JointVector],
         *,
         judged: bool,
@@ -85,17 +88,19 @@ class EncoderWatch(NamedTuple):
         and what carries the joint feels that it moves. ``undone`` (j,) [N m] is what the watch over
         the joints finds to act against each torque, and ``felt`` says how much of that is felt
         nearer to the base (j,) [1] (``actuator_watch.felt_inside``). A joint that fails is not
-        felt, a load that is not known acts from the start. On the ground, and where a joint is
-        known to have failed, they are not ``judged``.
+        felt, a load that is not known acts from the start. At a surface it is stuck where its joint
+        must have moved ``unseen`` (j,) [rad], or the tool would not be where it is. On the ground,
+        and where a joint is known to have failed, they are not ``judged``.
         """
-        repeats, first = [0.0] * len(angles), list(undone)
+        repeats, first, began = [0.0] * len(angles), list(undone), list(unseen)
         for k in range(len(angles) if judged and len(self.angles) == len(angles) else 0):
             if angles[k] == self.angles[k]:
                 repeats[k], first[k] = self.repeats[k] + 1.0, self.first[k]
-                held = repeats[k] >= _REPEATS and abs(undone[k] - first[k]) > _HELD
-                if held and felt()[k] > _FELT:
+                began[k] = self.unseen[k]
+                held = abs(undone[k] - first[k]) > _HELD and felt()[k] > _FELT
+                if repeats[k] >= _REPEATS and (held or abs(unseen[k] - began[k]) > _UNSEEN):
                     repeats[k] = math.inf
-        return EncoderWatch(angles, tuple(repeats), tuple(first))
+        return EncoderWatch(angles, tuple(repeats), tuple(first), tuple(began))
 
 
 TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4, Vec3]

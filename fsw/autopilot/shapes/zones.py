@@ -21,11 +21,12 @@ _INDEX = {kind.name: k for k, kind in enumerate(KINDS)}
 
 
 # Columns of a zone's row; one array, because compiled code counts the references to each.
-KIND, KEEP_IN, CLEARANCE, PLANES, FLAT, FOLLOWS, FORCE_MAX, STIFF, FIRST = range(9)
+KIND, KEEP_IN, CLEARANCE, PLANES, FLAT, FOLLOWS = range(6)
+FORCE_MAX, STIFF, DAMPS, ROUGH, FIRST = range(6, 11)
 """Which of KINDS; whether to keep in; clearance [m]; how many planes each place has; whether they
 are the same everywhere; whether it rides on the target and keeps the base alone; the force [N] with
-which the tool may press on it, 0: none, and the largest stiffness [N/m] it then meets; its
-numbers."""
+which the tool may press on it, 0: none, and the largest stiffness [N/m], the dissipation [s/m] and
+the friction that it then meets; its numbers."""
 _MOVE = FIRST + NUMBERS  # behind them its velocity, where it is at a time, that time
 _ACCELERATION = _MOVE + 7  # m/s^2, of a target: within 0.1 s its turning moves it by millimetres
 ADDED = _ACCELERATION + 3  # m, in its clearance for an uncertain estimate
@@ -46,6 +47,7 @@ def zone_arrays(safe_set: SafeSet) -> Array:
         row[FIRST : FIRST + kind.size] = zone.shape.numbers
         if zone.touch is not None:
             row[FORCE_MAX], row[STIFF] = zone.touch.force_max, zone.touch.stiffness_high
+            row[DAMPS], row[ROUGH] = zone.touch.dissipation, zone.touch.friction
     return rows
 
 

@@ -335,7 +335,7 @@ def _without_stuck(
         if type(one) is JointSample:
             r, judged = state.cascade, state.vehicle.flies and not state.damage.joint
             felt = partial(felt_inside, r, airframe)
-            watch = watch.after(one.angles, r.undone, felt, judged=judged)
+            watch = watch.after(one.angles, r.undone, r.unseen, felt, judged=judged)
             if watch.stuck and not before.stuck:
                 memory = _at_rest(memory, law, one)
     if watch.stuck:

@@ -113,7 +113,7 @@ def lacks_room(context: FailsafeContext) -> bool:
 def presses_too_hard(context: FailsafeContext) -> bool:
     """In flight, the tool may be pressed upon by more than its surface allows."""
     k = context.state.cascade.pressing
-    return bool(k.near and k.pressed + k.unsure > k.most) and _flies(context)
+    return bool(k.near and max(k.pressed, k.blow) + k.unsure > k.most) and _flies(context)
 
 
 def has_lost_contact(context: FailsafeContext) -> bool:

@@ -107,7 +107,7 @@ def by_mm(length: float) -> str:
 def force(context: FailsafeContext) -> str:
     """How hard the tool is pressed upon, and what is allowed."""
     pressing = context.state.cascade.pressing
-    found, unsure = pressing.pressed, pressing.unsure
+    found, unsure = max(pressing.pressed, pressing.blow), pressing.unsure
     return f": {found:.1f} N, or {unsure:.1f} N more, of {pressing.most:.1f} N"
 
 

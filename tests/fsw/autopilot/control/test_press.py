@@ -268,3 +268,57 @@ def test_no_harder_is_pressed_than_rotors_keep_a_vehicle_from_turning_aside(degr
     most = min(8.0, torque / max((ahead + 0.004) * math.sin(aside), 1e-9))
     assert r.pressing.asked == pytest.approx(most, rel=0.01)
     assert r.pressing.commanded == pytest.approx(most, abs=TUNING.damping)
+
+
+def peak_of(arm: Arm, speed: float, touch: Touch, dt: float = 2e-5) -> float:
+    """The largest normal force of a tool that meets a wall ahead, by Hunt and Crossley, rough."""
+    J = arm.jacobian()[[0, 2]]
+    arm.qd = np.linalg.lstsq(J, np.array([speed, 0.0]), rcond=None)[0]
+    arm.referee.place(arm.q, np.zeros(arm.n), np.zeros(3))
+    mobility = J @ np.linalg.solve(arm.referee.mass[6:, 6:], J.T)
+    (v, side), depth, most = J @ arm.qd, 0.0, 0.0
+    while depth >= 0.0 and v > -speed:
+        force = touch.stiffness_high * depth * max(1.0 + touch.dissipation * v, 0.0)
+        pull = -touch.friction * force * math.tanh(side / 1e-3)
+        v, side = np.array([v, side]) + dt * mobility @ np.array([-force, pull])
+        depth, most = depth + dt * v, max(most, force)
+    return most
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+def test_a_tool_that_comes_too_fast_knows_how_hard_it_may_have_struck() -> None:
+    """Never less than the blow was, of any posture and speed; and not many times as much."""
+    vehicle, random, over = load_vehicle("probe-2r"), np.random.default_rng(8), []
+    airframe = airframe_of(vehicle)
+    for _ in range(60):
+        q = np.array(vehicle.home_posture) + random.uniform(-0.4, 0.4, 2)
+        touch = TOUCH._replace(
+            dissipation=random.uniform(0.0, 4.0), friction=random.uniform(0.0, 0.6)
+        )
+        speed, arm = random.uniform(0.05, 1.0), Arm(vehicle, q)
+        peak = peak_of(arm, speed, touch)
+        r = at_surface(airframe, estimate(q, np.zeros(2), np.zeros(3)), AHEAD)
+        k = r.pressing
+        k.friction, k.dissipation = touch.friction, touch.dissipation
+        k.coming, k.distance = speed, 0.1
+        k.external[:2] = arm.jacobian().T @ (6.0 * np.array(AHEAD))  # it is felt by now
+        weigh_tool(r, airframe, TUNING)
+        press(r, airframe, TUNING, vec3(G), (0.0, 0.0, 0.0), DT)
+        assert k.contact == 1
+        assert k.blow >= 0.99 * peak
+        over.append(k.blow / peak)
+    assert np.median(over) < 2.0
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+def test_a_surface_is_not_believed_to_be_anywhere() -> None:
+    """Contact farther off than a surface may be is none: something else moves the joints."""
+    airframe = airframe_of(load_vehicle("probe-2r"))
+    home = np.array(airframe.home)
+    for far, near in ((0.25, 1), (0.35, 0)):
+        r = at_surface(airframe, estimate(home, np.zeros(2), np.zeros(3)), AHEAD)
+        r.pressing.contact, offset = 1, -9.0 + r.pressing.distance - far
+        beyond = SafeSet((replace(wall(AHEAD, offset, 0.0), touch=TOUCH),))
+        zones, wide = moving_zones(beyond, None), replace(TUNING, near=20.0)
+        look_for_surface(r, airframe.bodies, wide, 0.0, zones, DT)
+        assert r.pressing.near == near

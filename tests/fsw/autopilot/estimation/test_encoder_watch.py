@@ -9,6 +9,7 @@ from fsw.autopilot.signals import JointVector
 
 STANDS, MOVES = (0.7, -0.2), (0.7015, -0.2)  # rad
 LOAD, HELD = 0.3, 0.25  # N m
+RESTS = (0.0, 0.0)  # rad, that each joint has moved unseen while a surface held the tool
 FELT, UNFELT = (1.0, 1.0), (-1.0, 0.0)  # of it, nearer to the base
 
 
@@ -18,7 +19,7 @@ def watched(
     """A watch after equal readings, while torques [N m] go nowhere."""
     watch = EncoderWatch()
     for one in undone:
-        watch = watch.after(STANDS, one, lambda: felt, judged=judged)
+        watch = watch.after(STANDS, one, RESTS, lambda: felt, judged=judged)
     return watch
 
 
@@ -41,16 +42,16 @@ def test_an_encoder_is_stuck_where_its_joint_is_felt_to_move(
 ) -> None:
     watch = watched(undone, felt)
     assert watch.stuck
-    assert watch.after(STANDS, (0.0, 0.0), lambda: UNFELT, judged=True).stuck, (
+    assert watch.after(STANDS, (0.0, 0.0), RESTS, lambda: UNFELT, judged=True).stuck, (
         "until it speaks again"
     )
     speaks = tuple(angle + 0.0015 for angle in STANDS)
-    assert not watch.after(speaks, (HELD, HELD), lambda: FELT, judged=True).stuck
+    assert not watch.after(speaks, (HELD, HELD), RESTS, lambda: FELT, judged=True).stuck
 
 
 def test_one_that_is_stuck_stays_so_while_another_one_moves() -> None:
     watch = watched(rising(0.0, HELD), (-1.0, 0.7))
-    assert watch.after(MOVES, (0.0, 0.0), lambda: UNFELT, judged=True).stuck
+    assert watch.after(MOVES, (0.0, 0.0), RESTS, lambda: UNFELT, judged=True).stuck
 
 
 @pytest.mark.parametrize(
@@ -84,3 +85,19 @@ def test_encoders_are_not_judged_on_the_ground_or_beside_a_failed_joint() -> Non
 
 def test_readings_that_repeat_themselves_for_a_moment_are_a_resting_arm() -> None:
     assert not watched([(0.0, 0.0), (HELD, HELD), (HELD, HELD)]).stuck
+
+
+@pytest.mark.parametrize(
+    ("unseen", "stuck"),
+    [((0.03, 0.0), True), ((0.0, -0.03), True), ((0.015, -0.015), False)],
+    ids=["the first", "the second", "as little as friction and noise"],
+)
+def test_an_encoder_is_stuck_whose_joint_must_have_moved_while_a_surface_held_the_tool(
+    unseen: JointVector, stuck: bool
+) -> None:
+    """Whatever the base feels: what a surface does it feels as well."""
+    watch = EncoderWatch()
+    for k in range(11):
+        so_far = tuple(k / 10 * one for one in unseen)
+        watch = watch.after(STANDS, RESTS, so_far, lambda: UNFELT, judged=True)
+    assert watch.stuck is stuck

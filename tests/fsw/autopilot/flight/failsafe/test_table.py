@@ -205,6 +205,10 @@ def test_nothing_wrong_is_no_condition() -> None:
             replace(FINE, pressing={"near": 1, "pressed": 4.8, "unsure": 0.3, "most": 5.0}),
             Condition.FORCE_HIGH,
         ),
+        (
+            replace(FINE, pressing={"near": 1, "blow": 4.8, "unsure": 0.3, "most": 5.0}),
+            Condition.FORCE_HIGH,
+        ),
         (replace(FINE, pressing={"near": 1, "lost_for": 1.1}), Condition.CONTACT_LOST),
         (replace(FINE, pressing={"near": 1, "moved": -0.07}), Condition.SURFACE_MOVED),
         (replace(FINE, pressing={"contact": 1, "slip": (0.3, 0.1, 0.0)}), Condition.TOOL_SLIPS),

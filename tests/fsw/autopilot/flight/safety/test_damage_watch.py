@@ -318,6 +318,31 @@ def test_a_joint_that_fails_and_stands_still_may_be_one_that_is_not_seen(
     assert ("joint encoders stuck" in damage.joint) is repeat
 
 
+@pytest.mark.parametrize("stands", [(0,), (1,), (0, 1), ()], ids=str)
+@pytest.mark.parametrize("contact", [1, 0])
+def test_a_joint_that_does_not_yield_to_a_surface_stands(
+    stands: tuple[int, ...], contact: int
+) -> None:
+    """The base is swung to and fro, and joints hold the tool, but for those that stand."""
+    motion, along = Motion(lambda _t, _i: 1.0), np.array([0.3, 0.2])
+    motion.run(1.5)
+    loops, watch = motion.loops, motion.loops.watch
+    for k in range(500):
+        t, carried = 2.5 + k * DT, 0.3 * math.sin(9.0 * k * DT)
+        qd = -along * carried / float(along @ along)
+        qd[list(stands)] = 0.0
+        now = estimate(t, (0.0, 0.0, 0.0), 9.81)._replace(qd_arm=(float(qd[0]), float(qd[1])))
+        loops = changed(loops, watch=watch)
+        after = changed(loops, known=now)
+        at = after.pressing
+        at.near, at.contact, at.speed = 1, contact, -carried - float(along @ qd)
+        at.along[:2] = along
+        motion.damage = WATCHER.see(motion.damage, loops, after, 1)
+        watch = after.watch
+    found = {k for k in range(2) if watch.joint[k] == STUCK}
+    assert found == (set(stands) if contact else set())
+
+
 def test_allocation_is_left_alone_where_that_is_asked_for() -> None:
     ignoring = DamageWatch(AIRFRAME, DT, reallocates=False)
     damage = Motion(weak(1, 0.6), ignoring).run(FAULT_S + 0.6)
