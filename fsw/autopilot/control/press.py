@@ -187,6 +187,14 @@ def _forget(r: Tick) -> None:
         k.momentum[i] = k.external[i] = 0.0
 
 
+def off_surface(k: Pressing, p: Vec3, by: float) -> Vec3:
+    """A place ``p`` [m, NED] ``by`` [m] off the surface that the tool is at, or as it is.
+
+    What follows a push begins there, and a landing stays off the surface.
+    """
+    return add_scaled(p, three(k.normal, 0), by) if k.near > 0 else p
+
+
 @compilable
 def weigh_tool(r: Tick, airframe: Airframe, tuning: PressTuning) -> None:
     """The force on the tool, from what the joints' observer has found, and what can be balanced.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from fsw.autopilot.barriers.safe_approach import stand_off
 from fsw.autopilot.control.cascade import at_rest, in_hover
+from fsw.autopilot.control.press import off_surface
 from fsw.autopilot.control.tube import base_reach
 from fsw.autopilot.flight.commands import arming
 from fsw.autopilot.flight.commands.arming_health import arming_health
@@ -60,7 +61,7 @@ from fsw.frozen import replace
 
 _DISARMED = Mode.DISARMED  # ten times as fast as Mode.X
 _RESTARTS = "command refused: the flight software restarts; send it again"
-_AWAY = 0.3  # m, farther from a surface that is not as announced
+_AWAY = 0.3  # m off a surface that it has touched, or that is not as announced
 
 
 class Commander:
@@ -411,9 +412,8 @@ class Commander:
         follower = self._modes.get(mode, self._no_mode)
         here = self._horizon.here(estimate, estimate.t_us)
         last = self._horizon.target(self.mode(state), state, estimate, estimate.t_us)
-        handover = Handover(last, completed)
         origin = last if completed or follower.continues_reference else here
-        state = follower.activate(mission_left(state, mode), estimate, handover)
+        state = follower.activate(mission_left(state, mode), estimate, Handover(last, completed))
         if follower.lifts_off and vehicle.landed:
             state = _lift_off(state, estimate)
         state = in_the_air(state, estimate)
@@ -422,7 +422,7 @@ class Commander:
             mode=mode,
             # What follows from a mode that was completed is what its command led to.
             answered=state.vehicle.answered if completed else (),
-            mode_origin=origin.p_WE,
+            mode_origin=off_surface(state.cascade.pressing, origin.p_WE, _AWAY),
             mode_yaw=origin.yaw,
             mode_begin_us=estimate.t_us,
             is_up=False,

@@ -559,3 +559,17 @@ def test_a_takeoff_chosen_before_arming_is_dropped_with_a_warning() -> None:
     state, texts = completed(chosen, STANDING._replace(t_us=NOW_US + wait_us))
     assert state.vehicle.intended_mode is Mode.HOLD
     assert texts == ["takeoff cancelled: not armed within 10 s"]
+
+
+@pytest.mark.requirement("REQ-SAFE-14")
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.LAND])
+def test_what_follows_a_push_begins_off_its_surface(mode: Mode) -> None:
+    """A landing would else drag the tool down the wall, beside which a failed rotor swings it."""
+    begun = []
+    for near in (0, 1):
+        state = with_record(flying(Mode.OFFBOARD))
+        state.cascade.pressing.near, state.cascade.pressing.normal[:] = near, (-0.8, 0.6, 0.0)
+        state, _ = carried_out(state, SwitchMode(mode))
+        begun.append(state.vehicle.mode_origin)
+    moved = [one - other for one, other in zip(begun[1], begun[0], strict=True)]
+    assert moved == pytest.approx([-0.24, 0.18, 0.0])
