@@ -446,11 +446,8 @@ def _fly_whole(
     """Fly the worst finds again with the whole stack; improve the worst of each kind there."""
     whole = evaluations
     hard = hunt.hard(math.ceil(0.2 * evaluations))
-    # Each with what is not claimed, in turn; the next time round each with another.
     free = hunt.hard(math.ceil(0.1 * evaluations), free=True)
-    count, kinds = round(0.3 * evaluations) if free else 0, unclaimed(scenario)
-    turns = (divmod(k, len(free)) for k in range(count))
-    past = [_with(free[one], kinds[(turn + one) % len(kinds)]) for turn, one in turns]
+    past = each_with(free, unclaimed(scenario), round(0.3 * evaluations))
     evaluations -= len(hard) + len(past)
     steps = hunt.steps(math.ceil(0.25 * evaluations))
     telling = [one for one in hunt.telling(math.ceil(0.5 * evaluations)) if one.kind != STEP]
@@ -498,9 +495,11 @@ def _fly_whole(
     )
 
 
-def _with(found: Found, met: Met) -> Found:
-    """A find to be flown again with what is met."""
-    return replace(found, disturbance=replace(found.disturbance, met=met))
+def each_with(finds: list[Found], kinds: tuple[Met, ...], count: int) -> list[Found]:
+    """``count`` finds to be flown again, each time round each with another of what is met."""
+    turns = (divmod(k, len(finds)) for k in range(count if finds else 0))
+    pairs = [(finds[one], kinds[(turn + one) % len(kinds)]) for turn, one in turns]
+    return [replace(it, disturbance=replace(it.disturbance, met=met)) for it, met in pairs]
 
 
 def _improve_whole(

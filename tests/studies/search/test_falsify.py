@@ -19,6 +19,7 @@ from studies.search.falsify import (
     Search,
     as_scenario,
     bounds,
+    each_with,
     replay,
     search,
     search_and_fly,
@@ -279,6 +280,18 @@ def test_a_surface_is_as_stiff_and_as_rough_as_the_search_says() -> None:
     assert twice is not None
     assert twice.stiffness_n_m == 4000.0
     assert not any("as stiff" in met.name and met in WITHIN for met in unclaimed(scenario))
+
+
+def test_what_is_not_claimed_is_met_from_everywhere_before_anything_is_flown_twice() -> None:
+    """As many finds as kinds would else meet the same, each time round."""
+    found = _hardest().worst_force
+    assert found is not None
+    kinds = unclaimed(_pressing())
+    for count in (3, len(kinds), 12):
+        finds = [replace(found, margin_m=float(k)) for k in range(count)]
+        flown = each_with(finds, kinds, 30)
+        assert len({(one.margin_m, str(one.disturbance.met)) for one in flown}) == 30
+    assert each_with([], kinds, 30) == []
 
 
 def test_a_process_flies_both_bodies_alike() -> None:
