@@ -360,7 +360,8 @@ def press(
     if k.contact > 0 and force > 0.0:
         k.mean_speed += min(dt / tuning.remember, 1.0) * (k.speed - k.mean_speed)
         damped = clamp(firm * (k.mean_speed - k.speed), -tuning.damping, tuning.damping)
-        force = clamp(force + damped, 0.0, most)
+        rebound = firm * max(k.speed - fastest, 0.0)  # it has come off, and comes back too fast
+        force = clamp(force + damped - rebound, 0.0, most)
     else:
         toward, lead = fastest, 0.0
         if not k.asked * k.stroke > 0.0:

@@ -322,3 +322,23 @@ def test_a_surface_is_not_believed_to_be_anywhere() -> None:
         zones, wide = moving_zones(beyond, None), replace(TUNING, near=20.0)
         look_for_surface(r, airframe.bodies, wide, 0.0, zones, DT)
         assert r.pressing.near == near
+
+
+@pytest.mark.requirement("REQ-SAFE-13")
+def test_a_tool_that_comes_back_too_fast_is_not_pressed_on() -> None:
+    """It has come off for an instant, and the observer of the force is too slow to see it."""
+    vehicle = load_vehicle("probe-2r")
+    r, airframe = pressed_upon(
+        vehicle, np.array(vehicle.home_posture), 5.0 * np.array(AHEAD), AHEAD
+    )
+    k, level = r.pressing, (vec3(G), (0.0, 0.0, 0.0), DT)
+    r.u.force, k.distance = 5.0, 0.0
+    for _ in range(1000):
+        press(r, airframe, TUNING, *level)
+    assert k.commanded > 4.0
+    k.speed = k.mean_speed = 0.04
+    press(r, airframe, TUNING, *level)
+    assert k.commanded > 4.0, "it follows a surface that yields"
+    k.speed = k.mean_speed = 0.4
+    press(r, airframe, TUNING, *level)
+    assert k.commanded < 1.0
