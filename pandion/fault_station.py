@@ -46,7 +46,7 @@ class Station(threading.Thread):
         """Ask for a mode of the matrix one second after the vehicle's first heartbeat."""
         super().__init__(daemon=True)
         self.noted: list[Noted] = []
-        self._wanted = mode
+        self._wanted, self._commands = mode, _COMMANDS[mode]
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._socket.settimeout(0.02)
@@ -120,7 +120,7 @@ class Station(threading.Thread):
         if since_s < _ASKS_AT_S or self._asked >= 2:
             return
         self._asked += 1
-        for number, params in _COMMANDS[self._wanted]:
+        for number, params in self._commands:
             self._send(self._link.command_int_encode(1, 1, _LOCAL_NED, number, 0, 0, *params))
         if self._wanted == "mission" and self._asked == 1:
             self._send(self._link.mission_count_encode(1, 1, len(_MISSION), 0))
@@ -153,6 +153,7 @@ _COMMANDS: Final[dict[str, list[tuple[int, tuple[Any, ...]]]]] = {
     "hold": [_mode(4, 3)],
     "trajectory": [],
     "workspace": [],
+    "press": [],
     "offboard": [_mode(6)],
     "mission": [(_START, (0.0, 0.0, 0.0, 0.0, 0, 0, 0.0))],
     "orbit": [(_ORBIT, (0.6, 0.4, _NAN, _NAN, -6000, 0, -_HEIGHT))],

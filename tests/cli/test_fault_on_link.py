@@ -14,6 +14,7 @@ from pandion import fault_on_link
 from pandion.fault_on_link import LinkCell
 from pandion.fault_station import Station
 from studies.fault_matrix.expectations import expectations
+from studies.fault_matrix.flights import SITUATIONS
 from tests.waiting import becomes
 
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
@@ -28,6 +29,14 @@ def test_a_cell_that_breaks_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatc
     row = LinkCell("hold", expectations()["disk-full"], 0).row()
     assert row.error
     assert row.problem == "ValueError: no such port"
+
+
+@pytest.mark.parametrize("mode", SITUATIONS)
+def test_a_station_knows_how_to_ask_for_each_mode(mode: str) -> None:
+    """Its thread would else end, and the cell be taken for a silent vehicle."""
+    station = Station(mode)
+    station.start()
+    station.close()
 
 
 def test_a_vehicle_that_has_landed_is_disarmed_and_in_no_mode_of_its_own() -> None:
