@@ -34,11 +34,6 @@ from studies.fault_matrix.matrix import Cell
 from studies.flight.job import sources
 
 _WAIT_S: Final = 600.0
-_PACKAGED: Final = {
-    "trajectory": "walls-calm",
-    "workspace": "workspace-calm",
-    "press": "probe",
-}
 
 
 class _Watch(Display):
@@ -71,7 +66,7 @@ class LinkCell(Cell):
 def _fly(cell: Cell, folder: Path) -> FaultFlight:
     situation, (fault,) = SITUATIONS[cell.mode], cell.expected.faults
     scenario = folder / "cell.toml"
-    scenario.write_text(_scenario(cell.mode, fault, situation.fault_s), encoding="utf-8")
+    scenario.write_text(_scenario(cell.mode, situation, fault), encoding="utf-8")
     station, watch = Station(cell.mode), _Watch()
     station.start()
     try:
@@ -88,15 +83,15 @@ def _fly(cell: Cell, folder: Path) -> FaultFlight:
     return _seen(cell.mode, flown, station.noted, watch.begun_s, time.monotonic())
 
 
-def _scenario(mode: str, fault: Fault, start_s: float) -> str:
-    if mode in _PACKAGED:
-        text = (PACKAGED / f"{_PACKAGED[mode]}.toml").read_text(encoding="utf-8")
+def _scenario(mode: str, situation: Situation, fault: Fault) -> str:
+    if situation.packaged:
+        text = (PACKAGED / f"{situation.packaged}.toml").read_text(encoding="utf-8")
     else:
         text = beside_the_wall_text(
             "ground" if mode == "takeoff" else "airborne",
             "none" if mode == "takeoff" else "trajectory",
         )
-    keys = asdict(fault) | {"start_s": start_s}
+    keys = asdict(fault) | {"start_s": situation.fault_s}
     lines = [f"{k} = {v!r}" if isinstance(v, float) else f'{k} = "{v}"' for k, v in keys.items()]
     return "\n".join([text, "[[faults]]", *lines, ""])
 

@@ -91,6 +91,7 @@ class Situation:
     upload: MissionUpdate | None = None
     motion: MotionSetpoint | None = None  # streamed
     body: str = "full"
+    packaged: str = ""  # the scenario that comes with Pandion; none: beside a wall
 
     def placed(self, faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
         """Faults whose times count from that of the situation, in times of the simulation."""
@@ -104,10 +105,6 @@ def beside_the_wall_text(kind: str, plan: str) -> str:
 
 def _beside_the_wall(kind: str) -> Callable[[str], Scenario]:
     return lambda suite: parse_scenario(beside_the_wall_text(kind, "none"), "wall", suite)
-
-
-def _packaged(name: str) -> Callable[[str], Scenario]:
-    return lambda suite: load_scenario(name, suite)
 
 
 _AIR, _GROUND = _beside_the_wall("airborne"), _beside_the_wall("ground")
@@ -138,36 +135,26 @@ def _in_the_air(
     )
 
 
+def _following(packaged: str, body: str = "full", fault_s: float = 4.0) -> Situation:
+    return Situation(
+        Mode.TRAJECTORY,
+        lambda suite: load_scenario(packaged, suite),
+        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
+        fault_s,
+        fault_s + 12.0,
+        frozenset((Mode.TRAJECTORY,)),
+        body=body,
+        packaged=packaged,
+    )
+
+
 _LANDED = (Mode.LAND, Mode.DISARMED)
 SITUATIONS: Final[dict[str, Situation]] = {
     "hold": _in_the_air(Mode.HOLD),
-    "trajectory": Situation(
-        Mode.TRAJECTORY,
-        _packaged("walls-calm"),
-        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
-        4.0,
-        16.0,
-        frozenset((Mode.TRAJECTORY,)),
-        body="points",
-    ),
-    "workspace": Situation(
-        Mode.TRAJECTORY,
-        _packaged("workspace-calm"),
-        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
-        4.0,
-        16.0,
-        frozenset((Mode.TRAJECTORY,)),
-        body="points",
-    ),
+    "trajectory": _following("walls-calm", body="points"),
+    "workspace": _following("workspace-calm", body="points"),
     # Touching a wall with 5 N, a second after it has met it; then it goes to the next place.
-    "press": Situation(
-        Mode.TRAJECTORY,
-        _packaged("probe"),
-        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
-        5.0,
-        17.0,
-        frozenset((Mode.TRAJECTORY,)),
-    ),
+    "press": _following("probe", fault_s=5.0),
     "offboard": _in_the_air(
         Mode.OFFBOARD,
         (0.5, _to(Mode.OFFBOARD)),

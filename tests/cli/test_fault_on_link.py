@@ -13,6 +13,7 @@ from messages import dialect
 from pandion import fault_on_link
 from pandion.fault_on_link import LinkCell
 from pandion.fault_station import Station
+from pandion.supervisor import Flown
 from studies.fault_matrix.expectations import expectations
 from studies.fault_matrix.flights import SITUATIONS
 from tests.waiting import becomes
@@ -37,6 +38,13 @@ def test_a_station_knows_how_to_ask_for_each_mode(mode: str) -> None:
     station = Station(mode)
     station.start()
     station.close()
+
+
+def test_the_force_on_the_tool_is_read_from_the_simulators_result() -> None:
+    uses = {"panel": {"force_max_n": 12.0, "force_bound_n": 10.0}}
+    for touches, share in ((uses, 1.2), ({}, 0.0)):
+        flown = Flown(results={"sitl": {"touches": touches}})
+        assert fault_on_link._seen("press", flown, [], 0.0, 1.0).force_share == share
 
 
 def test_a_vehicle_that_has_landed_is_disarmed_and_in_no_mode_of_its_own() -> None:

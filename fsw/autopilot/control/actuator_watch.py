@@ -45,7 +45,7 @@ from fsw.autopilot.model.multibody import (
     posture,
 )
 from fsw.autopilot.model.rotors import lag_rotor, load_of_tip, rotor_wrench
-from fsw.autopilot.signals import JointVector, Vec2, Vec3
+from fsw.autopilot.signals import JointVector, Vec3
 from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
 from fsw.record import ROTORS, Floats, padded
@@ -448,20 +448,22 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
     """What acts on the arm beside gravity, its own motion and the torques."""
     s, m, x, joints = r.watch, r.bodies, r.estimate, int(bodies.joints)
     field = 0.0, 0.0, x.specific_force
-    share, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
+    observed, forget = min(OBSERVER * dt, 1.0), min(dt / MEMORY, 1.0)
+    carried, moved, whole = _yielding(r, joints)
     for k in range(joints):
         gained, drift = m.momentum[k] - s.momentum[k], joint_drift(m, k, field)
         if s.running == 0.0 or s.arm_seen == 0.0:
             gained = dt * (torque[k] + drift)
         s.momentum[k] = m.momentum[k]
         s.undone[k] += OBSERVER * (gained - dt * (torque[k] + drift + s.undone[k]))
-        s.asked[k] += share * (torque[k] - s.asked[k])
+        s.asked[k] += observed * (torque[k] - s.asked[k])
         s.undone2[k] += forget * (s.undone[k] * s.undone[k] - s.undone2[k])
         s.asked2[k] += forget * (s.asked[k] * s.asked[k] - s.asked2[k])
         s.undoing[k] += forget * (s.undone[k] * s.asked[k] - s.undoing[k])
         s.rate2[k] += forget * (x.qd_arm[k] * x.qd_arm[k] - s.rate2[k])
-        yielding, unseen = _yielding(r, k, joints)
-        s.unseen[k] += dt * unseen
+        share = r.pressing.along[k] / whole
+        yielding = share * carried
+        s.unseen[k] += dt * (share * moved)
         s.yielding2[k] += forget * (yielding * yielding - s.yielding2[k])
         behind = r.joints.reference[k] - x.q_arm[k]
         s.behind2[k] += forget * (behind * behind - s.behind2[k])
@@ -479,20 +481,20 @@ def _observe_arm(r: Tick, bodies: Bodies, dt: float, torque: Floats) -> None:
 
 
 @compilable
-def _yielding(r: Tick, joint: int, joints: int) -> Vec2:
-    """Rates [rad/s] of a joint that hold a tool in contact: in all, and beside what is seen.
+def _yielding(r: Tick, joints: int) -> Vec3:
+    """How joints hold a tool in contact where it is.
 
-    Both are 0 without contact.
+    The speed [m/s] along the normal that they take from it, in all and beside what is seen, and the
+    square of their levers [m^2] for that. No speed without contact.
     """
     k, whole = r.pressing, 0.0
     if k.contact == 0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 1.0
     carried = moved = -k.speed
     for i in range(joints):
         carried -= k.along[i] * r.estimate.qd_arm[i]
         whole += k.along[i] * k.along[i]
-    share = k.along[joint] / max(whole, _SHORT * _SHORT)
-    return share * carried, share * moved
+    return carried, moved, max(whole, _SHORT * _SHORT)
 
 
 def felt_inside(r: Tick, airframe: Airframe) -> JointVector:

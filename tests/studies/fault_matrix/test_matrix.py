@@ -78,6 +78,9 @@ def test_contact_is_never_allowed_without_a_reason() -> None:
         (replace(FINE, least_m=-0.001), ("margin -1.0 mm; must be 0 mm",)),
         (replace(FINE, least_m=None), ()),
         (replace(FINE, least_m=float("nan")), ("margin nan mm; must be 0 mm",)),
+        (replace(FINE, force_share=1.0), ()),
+        (replace(FINE, force_share=1.2), ("120% of the force; must be 100% at most",)),
+        (replace(FINE, force_share=float("nan")), ("nan% of the force; must be 100% at most",)),
         (
             replace(FINE, texts=(replace(TOLD, after_s=float("nan")),)),
             ("told after nan s, not within 0.5 s",),
@@ -174,6 +177,8 @@ _MOTOR = '[[faults]]\nunits = ["motor"]\nkinds = ["weak"]\nthen = ["hold"]\n'
         ('[[faults]]\nthen = ["hold"]\ntold_within_s = 1', "what must be told needs names"),
         ('[[faults]]\nthen = ["hold"]\nmargin_mm = -1', "margin_mm = -1 needs a reason"),
         ('[[faults]]\nthen = ["hold"]\nmargin_mm = nan', "margin_mm = nan: must be a length"),
+        ('[[faults]]\nthen = ["hold"]\nforce = 2', "force = 2 needs a reason"),
+        ('[[faults]]\nthen = ["hold"]\nforce = 0.5', "force = 0.5: must be a share"),
         ("names = 3", "names must give a regular expression for each unit"),
         ('names.gyros = "x"', "names must give a regular expression for each unit"),
         ("names.gyro = 3", "names must give a regular expression for each unit"),

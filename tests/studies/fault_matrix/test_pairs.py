@@ -70,6 +70,8 @@ def test_draws_have_every_kind_mode_and_suite_that_can_be_flown() -> None:
         (replace(FINE, away_m=None), ("lost",)),
         (replace(FINE, least_m=-0.01), ()),
         (replace(FINE, least_m=-0.01, texts=()), ("silent",)),
+        (replace(FINE, force_share=1.2), ()),
+        (replace(FINE, force_share=1.2, texts=()), ("silent",)),
         (replace(FINE, least_m=float("nan"), texts=()), ("silent",)),
         (replace(FINE, texts=()), ()),
         (replace(FINE, problem="it took longer than 600 s", error=True), ("no flight",)),

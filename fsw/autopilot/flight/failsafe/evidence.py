@@ -110,10 +110,16 @@ def lacks_room(context: FailsafeContext) -> bool:
     return kept.shortfall > SHORTFALL and lasts and context.state.vehicle.flies
 
 
+def force_on_tool(context: FailsafeContext) -> float:
+    """The normal force [N], as it is observed or by how fast the tool met its surface."""
+    k = context.state.cascade.pressing
+    return float(max(k.pressed, k.blow))
+
+
 def presses_too_hard(context: FailsafeContext) -> bool:
     """In flight, the tool may be pressed upon by more than its surface allows."""
     k = context.state.cascade.pressing
-    return bool(k.near and max(k.pressed, k.blow) + k.unsure > k.most) and _flies(context)
+    return bool(k.near and force_on_tool(context) + k.unsure > k.most) and _flies(context)
 
 
 def has_lost_contact(context: FailsafeContext) -> bool:

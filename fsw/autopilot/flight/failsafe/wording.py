@@ -8,6 +8,7 @@ from typing import Final
 from fsw.autopilot.estimation.faults.sensor_fault import sentence
 from fsw.autopilot.flight.failsafe.evidence import (
     FailsafeContext,
+    force_on_tool,
     lost_sensors,
     plan_age_us,
     way_home_s,
@@ -107,8 +108,8 @@ def by_mm(length: float) -> str:
 def force(context: FailsafeContext) -> str:
     """How hard the tool is pressed upon, and what is allowed."""
     pressing = context.state.cascade.pressing
-    found, unsure = max(pressing.pressed, pressing.blow), pressing.unsure
-    return f": {found:.1f} N, or {unsure:.1f} N more, of {pressing.most:.1f} N"
+    found, unsure, most = force_on_tool(context), pressing.unsure, pressing.most
+    return f": {found:.1f} N, or {unsure:.1f} N more, of {most:.1f} N"
 
 
 def without_contact(context: FailsafeContext) -> str:
