@@ -10,6 +10,7 @@ import numba
 from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 
+from command_line.callee_code import give_callees_no_code
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
 from command_line.kernel_types import compile_for_types, compile_quietly, types_of
 
@@ -80,4 +81,5 @@ def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:
         numba.config.CACHE_DIR = before
     compile_for_types(dispatcher, numba.types.unliteral)
     compile_quietly(dispatcher)
+    give_callees_no_code(dispatcher)
     return cast(Callable[P, R], dispatcher)

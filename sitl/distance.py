@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from sitl.body import BALL, CAPSULE, SHAFT, Parts
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.nearest import nearest
 from sitl.plant.vector import V3, Array, add, dot, row, scale, sub
 
@@ -137,7 +137,7 @@ def along_segment(kind: int, numbers: Array, begin: V3, end: V3) -> float:
     return min(ends, at_a, at_b)
 
 
-@kernel
+@compilable
 def _into_rotor(hub: V3, axis: V3, radius: float, half: float, p: V3) -> V3:
     """The place of a rotor nearest to p."""
     away = sub(p, hub)
@@ -220,7 +220,7 @@ def _searched(kind: int, numbers: Array, hub: V3, axis: V3, radius: float, half:
     return min(at_a, at_b, bottom, top)
 
 
-@kernel
+@compilable
 def _on_disc(kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float) -> float:
     low, high = -radius, radius
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
@@ -238,7 +238,7 @@ def _on_disc(kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float)
     return min(at_a, at_b)
 
 
-@kernel
+@compilable
 def _on_chord(
     kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float, at: float
 ) -> float:
@@ -280,7 +280,7 @@ def farthest_of_rotor(
     return farthest
 
 
-@kernel
+@compilable
 def _at_rim(
     kind: int, numbers: Array, centre: V3, x: V3, y: V3, radius: float, angle: float
 ) -> float:

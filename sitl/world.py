@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sitl.body import BALL, SHAFT, TIP, Parts, as_arrays, parts_of, spoken
-from sitl.compiled import compiled, kernel
+from sitl.compiled import compilable, compiled, kernel
 from sitl.distance import part_bound, part_distance
 from sitl.nearest import nearest
 from sitl.plant.vector import V3, Array, dot, put_row, row, sub
@@ -149,7 +149,7 @@ def fill_margins(
             i += 1
 
 
-@kernel
+@compilable
 def _is_kept(table: ZoneTable, z: int, parts: Parts, b: int) -> bool:
     """Whether part ``b`` has a margin of a zone: all have, but for a tip that may touch it."""
     return not (table.touch[z] and parts.tool[b] == TIP)
@@ -161,7 +161,7 @@ def _clearance(table: ZoneTable, z: int, parts: Parts, b: int) -> float:
     return 0.0 if table.touch[z] and parts.tool[b] == SHAFT else float(table.clearance[z])
 
 
-@compiled
+@compilable
 def _origin_margin(table: ZoneTable, z: int, shift: V3, places: Array) -> float:
     p = (places[0, 0] - shift[0], places[0, 1] - shift[1], places[0, 2] - shift[2])
     d = nearest(table.kind[z], table.numbers[z], p).distance
@@ -240,7 +240,7 @@ def record_if_clear(
     return max(free, 0.0)
 
 
-@kernel
+@compilable
 def _is_clear(
     table: ZoneTable,
     parts: Parts,
@@ -274,7 +274,7 @@ def _is_clear(
     return True
 
 
-@kernel
+@compilable
 def travelled(before: Array, places: Array, axes: int, reach: float) -> float:
     """As ``travel``, from ``before`` (rows, 3) to ``places`` (rows, 3) [m, NED], kept there.
 
@@ -286,7 +286,7 @@ def travelled(before: Array, places: Array, axes: int, reach: float) -> float:
     return path
 
 
-@kernel
+@compilable
 def travel(before: Array, places: Array, axes: int, reach: float) -> float:
     """No place of any part has moved farther [m] from ``before`` to ``places``.
 
@@ -349,7 +349,7 @@ def _left(margin: float, lowest: float) -> float:
     return margin - _held_back(lowest) - _ROUNDING
 
 
-@kernel
+@compilable
 def _held_back(lowest: float) -> float:
     """The margin [m] that is a record, given the ``lowest`` [m] so far."""
     return min(max(lowest, 0.0), _FAR)

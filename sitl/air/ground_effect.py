@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.plant.vector import Array
 
 NEAREST = 0.5  # rotor radii; nearer, the theory has no answer
 
 
-@kernel
+@compilable
 def image_share(radius: float, height: float, beside: float) -> float:
     r"""Share of a rotor's induced velocity that one mirrored rotor takes away.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl.air.load import Air, drag_force, rotor_gain, wall_force
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.plant.actuators import joint_torque, stop_torque, thrust_rate
 from sitl.plant.bodies import Chain, Points, Posture, empty_posture, posture_into
 from sitl.plant.contact import Balls, Feet, Surfaces, ground_wrench, touch_into
@@ -121,13 +121,13 @@ def first_angle(plant: Plant) -> int:
     return THRUST + int(plant.rotors.number)
 
 
-@kernel
+@compilable
 def gravity_in_body(rotation: Array, g: float) -> V3:
     """Gravity g [m/s²] in B for the rotation (3, 3) [1], R_WB; in NED it points along +z."""
     return transposed_times(rotation, (0.0, 0.0, g))
 
 
-@kernel
+@compilable
 def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> None:
     """All that acts but gravity at a state (n,) [SI], whose bodies ``work`` has placed, into it."""
     load, rotation, rotors, air = work.load, work.rotation, plant.rotors, plant.air
@@ -169,7 +169,7 @@ def load_into(plant: Plant, state: Array, inputs: Inputs, work: Workspace) -> No
         touch_into(*how, state, angles, load)
 
 
-@kernel
+@compilable
 def stops_into(stops: Stops, state: Array, angles: int, joints: int, load: Array) -> None:
     """Add the torques of all end stops that are touched to load (6 + j,) [SI].
 
@@ -221,7 +221,7 @@ def placed_acceleration_into(plant: Plant, state: Array, inputs: Inputs, work: W
     solve_in_place(work.mass, load, 6 + joints)
 
 
-@kernel
+@compilable
 def hold_joint(mass: Array, load: Array, row: int, n: int) -> None:
     """Replace one row of mass (n, n) [any unit] x = load (n,) [any unit] by x[row] = 0.
 
@@ -235,7 +235,7 @@ def hold_joint(mass: Array, load: Array, row: int, n: int) -> None:
     load[row] = 0.0
 
 
-@kernel
+@compilable
 def derivative_into(
     plant: Plant, state: Array, inputs: Inputs, work: Workspace, out: Array
 ) -> None:

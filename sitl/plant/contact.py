@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.nearest import nearest
 from sitl.plant.bodies import Chain, Posture
 from sitl.plant.state import P_WB, V_WB, W_WB_B
@@ -136,13 +136,13 @@ def ground_wrench(feet: Feet, p: V3, v: V3, w: V3, rotation: Array) -> tuple[V3,
     return force, moment
 
 
-@kernel
+@compilable
 def surface_law(surfaces: Surfaces, s: int) -> Law:
     """The law of surface ``s``."""
     return Law(surfaces.stiffness[s], surfaces.dissipation[s], surfaces.friction[s], SLIP_RATE)
 
 
-@kernel
+@compilable
 def gap_of(surfaces: Surfaces, s: int, p: V3) -> tuple[float, V3]:
     """Distance [m] of a place p [m, NED] to surface ``s``, and the outward normal [1, NED]."""
     moved = scale(surfaces.clock[1], row(surfaces.velocity, s))
@@ -150,7 +150,7 @@ def gap_of(surfaces: Surfaces, s: int, p: V3) -> tuple[float, V3]:
     return at.distance, (at.nx, at.ny, at.nz)
 
 
-@kernel
+@compilable
 def is_near(surfaces: Surfaces, p: V3, room: float) -> bool:
     """Whether a place p [m, NED] is within ``room`` [m] of any surface, or is no number."""
     near = False
@@ -159,7 +159,7 @@ def is_near(surfaces: Surfaces, p: V3, room: float) -> bool:
     return near
 
 
-@kernel
+@compilable
 def steps_within(
     balls: Balls, surfaces: Surfaces, at: Posture, rotation: Array, p: V3, step: float
 ) -> int:
@@ -173,7 +173,7 @@ def steps_within(
     return int(surfaces.finer) if is_near(surfaces, tip, balls.radius[TIP] + FASTEST * step) else 1
 
 
-@kernel
+@compilable
 def touch_into(
     chain: Chain,
     balls: Balls,
@@ -231,7 +231,7 @@ def touch_into(
                 surfaces.slip[s] = np.sqrt(dot(across, across))
 
 
-@kernel
+@compilable
 def pass_stage(surfaces: Surfaces, stage: int, step: float, until: float) -> None:
     """After a stage of Runge and Kutta: let time pass ``until`` [s] that of the next.
 

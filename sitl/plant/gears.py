@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable
 from sitl.plant.state import JOINTS_MAX
 from sitl.plant.vector import Array
 
@@ -49,7 +49,7 @@ def gears(inertia: Array, gap: float) -> Gears:
     return Gears(len(inertia), gap, each, none if gap > 0.0 else each, none, none, none)
 
 
-@kernel
+@compilable
 def part_teeth(gears: Gears, torque: Array, acceleration: Array, rates: Array) -> bool:
     """Let go of every motor whose teeth would have to pull; whether there was one.
 
@@ -67,7 +67,7 @@ def part_teeth(gears: Gears, torque: Array, acceleration: Array, rates: Array) -
     return parted
 
 
-@kernel
+@compilable
 def move_free(gears: Gears, torque: Array, moved: Array, rates: Array, step: float) -> bool:
     """Move the motors within their gaps for a ``step`` [s]; whether teeth have met.
 
@@ -92,7 +92,7 @@ def move_free(gears: Gears, torque: Array, moved: Array, rates: Array, step: flo
     return met
 
 
-@kernel
+@compilable
 def servo_rates_into(gears: Gears, rates: Array) -> None:
     """Joints' ``rates`` (j,) [rad/s], replaced by those of motors that are within their gaps."""
     for i in range(gears.joints):

@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from sitl.compiled import compiled, kernel
+from sitl.compiled import compilable, compiled, kernel
 from sitl.plant.aerial_manipulator import (
     Inputs,
     Plant,
@@ -64,13 +64,13 @@ def specific_force(plant: Plant, state: Array, inputs: Inputs, work: Workspace) 
     return sub(triple(work.load, 0), gravity_in_body(work.rotation, plant.gravity))
 
 
-@kernel
+@compilable
 def state_size(plant: Plant) -> int:
     """Entries that the state vector of the vehicle has."""
     return first_angle(plant) + 2 * int(plant.chain.joints)
 
 
-@kernel
+@compilable
 def rk4_step(
     plant: Plant, state: Array, inputs: Inputs, step: float, work: Workspace, slopes: Slopes
 ) -> None:
@@ -104,7 +104,7 @@ def rk4_step(
     normalise_attitude(state)
 
 
-@kernel
+@compilable
 def normalise_attitude(state: Array) -> None:
     """Give the attitude in a state (n,) [SI] unit length."""
     length = 0.0
@@ -114,7 +114,7 @@ def normalise_attitude(state: Array) -> None:
         state[i] /= np.sqrt(length)
 
 
-@kernel
+@compilable
 def geared_step(
     plant: Plant,
     state: Array,
@@ -141,7 +141,7 @@ def geared_step(
         strike(plant, state, moved, work)
 
 
-@kernel
+@compilable
 def strike(plant: Plant, state: Array, momentum: Array, work: Workspace) -> None:
     """Let motors strike joints with a ``momentum`` (6,) [N·m·s]; state (n,) [SI]."""
     joints, rates = plant.chain.joints, first_angle(plant) + plant.chain.joints
@@ -159,7 +159,7 @@ def strike(plant: Plant, state: Array, momentum: Array, work: Workspace) -> None
         state[rates + i] += work.load[6 + i]
 
 
-@kernel
+@compilable
 def run_steps(
     plant: Plant,
     state: Array,

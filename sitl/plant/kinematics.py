@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.plant.aerial_manipulator import Plant, Workspace
 from sitl.plant.state import P_WB, V_WB, W_WB_B
 from sitl.plant.vector import V3, Array, add, cross, row, times, times_one, triple
 
 
-@kernel
+@compilable
 def places_of_bodies(plant: Plant, state: Array, work: Workspace, k: int, out: Array) -> None:
     """Rows of ``sitl.plant.places``, of a state (n,) [SI], into entry k.
 
@@ -35,7 +35,7 @@ def _put(out: Array, k: int, i: int, p: V3) -> None:
     out[k, i, 0], out[k, i, 1], out[k, i, 2] = p
 
 
-@kernel
+@compilable
 def touch_down_speed(plant: Plant, state: Array, work: Workspace) -> float:
     """Largest downward speed [m/s] of a foot below ground in a state (n,) [SI]; 0 if none is.
 

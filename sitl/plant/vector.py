@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 
 Array: TypeAlias = npt.NDArray[np.float64]
 V3: TypeAlias = tuple[float, float, float]
@@ -20,7 +20,7 @@ V8: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 # reference count, and these run some hundred times per step.
 
 
-@kernel
+@compilable
 def triple(a: Array, i: int) -> V3:
     """Entries i, i+1, i+2 of a (n,) [any unit]."""
     return (a[i], a[i + 1], a[i + 2])
@@ -40,7 +40,7 @@ def row(a: Array, i: int) -> V3:
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
-@kernel
+@compilable
 def put_row(out: Array, i: int, v: V3) -> None:
     """Store v [any unit, any frame] in row ``i`` of out (n, 3) [same unit]."""
     out[i, 0] = v[0]
@@ -54,7 +54,7 @@ def column(stack: Array, i: int, c: int) -> V3:
     return (stack[i, 0, c], stack[i, 1, c], stack[i, 2, c])
 
 
-@kernel
+@compilable
 def times_one(stack: Array, i: int, v: V3) -> V3:
     """Product of matrix ``i`` in a stack (n, 3, 3) [any unit] and v [any unit, any frame]."""
     return (
@@ -108,7 +108,7 @@ def times(m: Array, v: V3) -> V3:
     )
 
 
-@kernel
+@compilable
 def transposed_times(m: Array, v: V3) -> V3:
     """Product of the transpose of m (3, 3) [any unit] and v [any unit, any frame]."""
     return (
@@ -118,7 +118,7 @@ def transposed_times(m: Array, v: V3) -> V3:
     )
 
 
-@kernel
+@compilable
 def rotation_into(a: Array, i: int, out: Array) -> None:
     """R_WB into out (3, 3) [1] from the quaternion w, x, y, z in entries i … i+3 of a (n,) [1].
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from sitl.compiled import kernel, machine_code
+from sitl.compiled import compilable, kernel, machine_code
 from sitl.plant.packing import pack_params
 from sitl.plant.state import ROTORS_MAX
 from sitl.plant.vector import V3, V6, V8, Array, times
@@ -47,7 +47,7 @@ class _Errors(NamedTuple):
     phase: Array  # (8,) rad, where each rotor stands; moved on by the kernel
 
 
-@kernel
+@compilable
 def vibrate(errors: _Errors, thrust: V8) -> V3:
     """Turn the rotors on by one sample; the unbalance of all, as a share of one in hover, B.
 
@@ -70,7 +70,7 @@ def vibrate(errors: _Errors, thrust: V8) -> V3:
     return (x, y, z)
 
 
-@kernel
+@compilable
 def _digit(value: float, limit: float, resolution: float) -> float:
     """What the converter makes of a value [any unit]: on its grid, within its range."""
     if resolution > 0.0:

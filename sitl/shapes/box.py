@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.plant.vector import V4, Array
 from sitl.scenario import V3, WORLD_M, Range, ScenarioZone
 from sitl.shapes.kind import Nearest, ShapeKind
@@ -49,7 +49,7 @@ def _quaternion(attitude_deg: V3) -> V4:
     )
 
 
-@kernel
+@compilable
 def _column(numbers: Array, k: int) -> V3:
     """Axis ``k`` of the box in NED."""
     w, x, y, z = numbers[6], numbers[7], numbers[8], numbers[9]

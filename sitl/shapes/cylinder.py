@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from sitl.compiled import kernel
+from sitl.compiled import compilable, kernel
 from sitl.plant.vector import Array, dot, scale, sub
 from sitl.scenario import V3, WORLD_M, Range, ScenarioZone
 from sitl.shapes.kind import Nearest, ShapeKind
@@ -37,7 +37,7 @@ class Cylinder(ScenarioZone):
         return f"end_m = {list(self.end_m)}: must be at least {_SHORTEST:g} m from begin_m"
 
 
-@kernel
+@compilable
 def cylinder_nearest(middle: V3, axis: V3, half: float, radius: float, p: V3) -> Nearest:
     """A point p [m, NED] against a cylinder about ``middle`` [m, NED] along ``axis`` [1, NED].
 

@@ -7,9 +7,11 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from numba import literal_unroll
+from numba.core.registry import cpu_target
 
 import fsw.compiled
 import sitl.compiled
@@ -21,6 +23,8 @@ DOORS = {
     "sitl compiled": sitl.compiled.compiled,
     "sitl kernel": sitl.compiled.kernel,
 }
+
+LAWS = {"fsw": fsw.compiled.compilable, "sitl": sitl.compiled.compilable}
 
 
 def put(out: Any, at: int, value: float, more: bool = False) -> None:
@@ -78,3 +82,48 @@ def test_what_else_numba_warns_of_is_heard() -> None:
     compile_quietly(dispatcher)
     with pytest.warns(UserWarning, match="contiguous"):
         assert dispatcher._compiler.compile("arguments", "returned") == ("arguments", "returned")
+
+
+def negative(x: float) -> float:
+    if x < 0.0:
+        raise ValueError("negative", x)
+    return np.sqrt(x)
+
+
+@pytest.mark.parametrize("door", ["fsw", "sitl"])
+def test_what_only_kernels_call_has_no_machine_code_and_does_what_it_did(
+    door: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded: list[str] = []
+    engine = type(cpu_target.target_context.codegen()._engine)
+    add = engine.add_module
+
+    def load(self: Any, module: Any) -> Any:
+        loaded.append(module.name)
+        return add(self, module)
+
+    monkeypatch.setattr(engine, "add_module", load)
+    compiled = DOORS[f"{door} compiled"]
+    law, inner = LAWS[door](negative), compiled(add_one)
+
+    def outer(x: float) -> float:
+        return law(x) + inner(x)
+
+    kernel: Any = compiled(outer)
+    assert kernel(4.0) == 7.0
+    kernel.recompile()  # it may have been on disk
+    assert kernel(4.0) == 7.0
+    assert {"outer", "add_one"} <= {name.split(".")[-1] for name in loaded}
+    assert "negative" not in loaded
+    with pytest.raises(ValueError, match="negative") as raised:
+        kernel(-1.0)
+    assert raised.value.args == ("negative", -1.0)
+    assert inner(1.0) == 2.0
+
+
+def test_kernels_of_others_are_compiled_as_ever() -> None:
+    fsw.compiled.compiled(add_one)(1.0)
+    mine: Any = numba.njit(add_two)
+    assert mine(1.0) == 3.0
+    (overload,) = mine.overloads.values()
+    assert type(overload.library).__module__ == "numba.core.codegen"
