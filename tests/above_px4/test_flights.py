@@ -105,6 +105,7 @@ def test_a_px4_that_refuses_offboard_is_not_pressed() -> None:
     assert 1 <= sum(one[0] == SET_MODE for one in flight.px4.commands) <= 5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seconds", [11.0, pytest.param(31.0, marks=pytest.mark.long)])
 def test_walls_are_kept_in_calm_air(seconds: float) -> None:
     """Past the first wall, and all the way."""
@@ -155,6 +156,7 @@ def test_a_stream_that_is_lost_ends_offboard_and_ours() -> None:
     assert not [one for one in flight.px4.commands if one[0] == SET_MODE]
 
 
+@pytest.mark.long
 def test_a_px4_that_falls_silent_is_told_and_gets_no_more_set_points() -> None:
     flight = handed_over(AbovePx4(still()))
     flight.px4.mute = True
@@ -204,6 +206,7 @@ def test_a_planner_that_stopped_holds_and_does_not_go_on_with_its_plan(stop_s: f
     assert flight.sim.truth().p_WB == pytest.approx(place, abs=0.1)
 
 
+@pytest.mark.long
 def test_a_yaw_that_is_not_followed_is_told_and_planned_anew() -> None:
     """With PX4's own gains the paper's vehicle swings about its yaw for long."""
     slow = Gains(yaw_p=2.8, yaw_rate=0.2, yaw_rate_i=0.1)

@@ -121,6 +121,7 @@ def test_replay_finds_no_difference_and_says_so_in_json(log: Path, tmp_path: Pat
     assert f"no difference in {TICKS} ticks" in done.stderr
 
 
+@pytest.mark.long
 def test_replay_names_the_first_difference(log: Path, tmp_path: Path) -> None:
     data = bytearray(log.read_bytes())
     at = data.rindex(b"hold to trajectory")

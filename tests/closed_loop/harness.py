@@ -144,7 +144,7 @@ class Flight:
 
     @property
     def mode(self) -> Mode:
-        return Mode.DISARMED if self._outputs is None else self.snapshot.mode
+        return Mode.DISARMED if self._outputs is None else self._outputs.mode
 
     def follow(self) -> None:
         """Arm and start the scenario's trajectory, both in their first possible tick."""

@@ -91,6 +91,7 @@ def test_one_announcement_of_a_stranger_does_not_move_a_hovering_vehicle(zone: Z
     assert flight.snapshot.safe_set == SafeSet()
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-4")
 def test_far_outside_the_vehicle_holds_and_then_lands_and_says_so() -> None:
     """Armed by force 10 m behind a wall."""

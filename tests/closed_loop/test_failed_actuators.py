@@ -143,6 +143,7 @@ def test_each_joint_is_named_beside_walls(joint: int, kind: str, suite: str) -> 
     assert seen.least_m > (-0.05 if suite == "rtk" else 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-ACT-2", "REQ-ACT-4")
 def test_an_arm_without_torque_that_swings_as_it_takes_off_is_believed_and_named() -> None:
     """Its encoders were rejected, nobody was named, and it swung the vehicle into the wall."""

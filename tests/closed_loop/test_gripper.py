@@ -88,6 +88,7 @@ def test_a_gripper_that_holds_nothing_weighs_next_to_nothing() -> None:
     assert flight.state.cascade.payload.mass < 0.005
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-16")
 def test_a_payload_that_is_too_heavy_is_told_and_landed_with_until_it_is_let_go_of() -> None:
     """The range of ``probe-2r`` ends at 353 g; what is heavier by 5 % is told."""

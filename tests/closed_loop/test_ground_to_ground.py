@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 from fsw.autopilot.signals import Mode
 from tests.closed_loop.harness import ARM, LAND, TAKEOFF, Flight, command, on_the_ground
 
@@ -43,6 +45,7 @@ def test_on_the_ground_it_refuses_to_follow_and_says_why() -> None:
     assert any("ground" in text for text in flight.texts)
 
 
+@pytest.mark.long
 def test_the_second_hop_is_like_the_first() -> None:
     flight = Flight(on_the_ground())
     heights = []

@@ -78,6 +78,7 @@ def where(flight: Flight) -> Vec3:
     return flight.sim.truth().p_WE
 
 
+@pytest.mark.long
 def test_a_mission_from_the_ground_to_the_ground() -> None:
     """As QGroundControl begins it: mission mode first, then arming."""
     flight = Flight(on_the_ground())
@@ -162,6 +163,7 @@ def test_a_fence_takes_the_place_of_the_walls_that_nobody_announced() -> None:
     assert flight.state.mission.safe_set == SafeSet()
 
 
+@pytest.mark.long
 def test_the_sphere_of_case_2_can_be_a_fence() -> None:
     scenario = replace(load_scenario("workspace"), pilot=Pilot("none"))
     flight = Flight(scenario, seed=7, announces=False)

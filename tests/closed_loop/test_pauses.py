@@ -17,6 +17,7 @@ def flown(seed: int, pause_s: float, *, planner_only: bool = False) -> None:
     assert not [text for _, text in outcome.texts if "IMU" in text or "encoders" in text]
 
 
+@pytest.mark.long
 def test_half_a_second_without_the_flight_software_costs_no_contact() -> None:
     flown(1, 0.5)
 

@@ -80,6 +80,7 @@ def test_a_wall_that_comes_is_left_behind(starts_s: float) -> None:
     assert flight.sim.touch.normal() == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-13")
 def test_a_tool_that_slides_over_a_wall_keeps_the_force() -> None:
     whole = load_scenario("wipe")

@@ -70,6 +70,7 @@ def larger(vehicle: Vehicle) -> Vehicle:
     )
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-1")
 def test_margins_are_those_of_its_true_points(tmp_path: Path) -> None:
     file = tmp_path / "larger.toml"

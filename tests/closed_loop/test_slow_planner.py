@@ -126,6 +126,7 @@ def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> No
     assert flight.sim.min_margin_m > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("tilt_deg", [4.0, 12.0])
 def test_without_plans_it_brakes_with_the_tilt_that_the_plan_may_use(tilt_deg: float) -> None:

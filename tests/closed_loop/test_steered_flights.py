@@ -82,6 +82,7 @@ def test_goto_a_place_on_earth_then_home_and_down() -> None:
     assert flight.snapshot.failures == ()
 
 
+@pytest.mark.long
 def test_hold_breaks_off_the_way_to_a_place() -> None:
     flight = up()
     flight.step(as_int(GOTO, 1, -1.0, 1.0, 0.0, NAN, 20.0, 0.0, -2.0))

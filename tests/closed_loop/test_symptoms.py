@@ -47,6 +47,7 @@ def test_a_vehicle_that_neither_stands_nor_flies_is_not_armed() -> None:
     assert not flight.snapshot.armed
 
 
+@pytest.mark.long
 def test_a_target_that_is_no_number_does_not_keep_the_vehicle_from_landing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

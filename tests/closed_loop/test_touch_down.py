@@ -108,6 +108,7 @@ def test_a_landing_ends_within_a_second_of_the_ground(suite: str, mass: float) -
     assert not any("no plan" in text for text in flight.texts)
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-13")
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.TRAJECTORY])

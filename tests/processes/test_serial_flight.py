@@ -29,6 +29,7 @@ def flight(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.long
 def test_a_station_on_a_noisy_serial_line_hears_and_is_heard(tmp_path: Path) -> None:
     station = FrameWriter(255, 190)
     asked = (512.0, *(0.0,) * 6, 512, 1, 1, 0)  # a message that does not exist

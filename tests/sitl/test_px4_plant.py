@@ -56,6 +56,7 @@ def test_the_plant_takes_off_hovers_moves_its_arm_and_lands(suite: str, rate_hz:
     assert flight.places[-1, 2] == pytest.approx(-0.318, abs=0.005)  # on its legs
 
 
+@pytest.mark.long
 def test_two_flights_with_the_same_answers_are_the_same() -> None:
     first, second = (fly("ground", flight_plan, seconds=2.0) for _ in range(2))
     assert np.array_equal(first.places, second.places)

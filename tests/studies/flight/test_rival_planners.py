@@ -96,6 +96,7 @@ def cost_of(controller: str, off: float, *, centred: bool = False) -> float:
     return quadratic(cost, horizon, guess, targets)[0]
 
 
+@pytest.mark.long
 def test_the_sphere_of_sc_costs_outside_alone_and_most_at_the_end() -> None:
     assert cost_of("sc", 0.074) == 0.0
     assert cost_of("sc", 0.1) == pytest.approx(0.01 * (3.0 * (N - 1) + 40.0))

@@ -52,6 +52,7 @@ def test_no_tightening_is_enough_at_a_wall_that_is_seen_too_late() -> None:
     assert not soft.completed  # its rows gave way by more than they were tightened
 
 
+@pytest.mark.long
 def test_the_safety_filter_takes_no_turn_of_the_target_for_a_breach() -> None:
     """As `pandion fly` flies: with the filter, which the tables leave out."""
     config = replace(configuration("full"), soft=False)

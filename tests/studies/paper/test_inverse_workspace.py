@@ -70,6 +70,7 @@ def test_both_elbows_serve_the_papers_sphere_and_one_does_not() -> None:
     assert (best.up_m, best.radius_m) == pytest.approx((0.225, 0.075), abs=5e-5)
 
 
+@pytest.mark.long
 def test_mirrored_elbows_have_mirrored_spheres() -> None:
     forward, backward = (InverseWorkspace(elbows=elbows).largest() for elbows in ((1,), (-1,)))
     assert (forward.x_m, forward.up_m, forward.radius_m) == pytest.approx(

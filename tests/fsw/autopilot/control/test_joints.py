@@ -154,6 +154,7 @@ def at(q: Vec2) -> Callable[[float], tuple[Vec2, Vec2]]:
     return lambda _: (q, (0.0, 0.0))
 
 
+@pytest.mark.long
 def test_in_closed_loop_the_arm_settles_on_its_reference_whatever_friction_there_is() -> None:
     for friction in (0.0, 0.01, 0.03):
         angles, _ = followed((0.3, -0.8), at((-0.5, 1.0)), 1.5, friction)

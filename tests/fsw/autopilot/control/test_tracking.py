@@ -130,6 +130,7 @@ def test_wind_is_cancelled_whole_once_it_is_believed(sign: float) -> None:
     assert leaning == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_lasting_push_is_taken_for_wind_up_to_its_limit_and_forgotten(sign: float) -> None:

@@ -99,6 +99,7 @@ def test_a_lasting_push_stays_inside_and_uses_much_of_it() -> None:
     assert 0.6 * 0.5 * _tube().base < settled < 0.5 * _tube().base
 
 
+@pytest.mark.long
 def test_wind_within_the_limit_ends_without_an_offset() -> None:
     """And more than that with what the limit leaves."""
     limit = TUNING.wind_limit
@@ -257,6 +258,7 @@ def test_the_worst_push_attains_the_bound_through_every_limit_that_is_flown(
     assert with_wind < amplitude * bound.base + bound.base_wind
 
 
+@pytest.mark.long
 def test_a_jerk_limit_that_is_too_low_is_named_and_breaks_the_bound() -> None:
     """The limit that was flown before: 60 under the root, and an input weight of 1.2e-7."""
     before = replace(LIMITED, input_weight=1.2e-7, stopping_snap=30.0, wind_limit=0.0)

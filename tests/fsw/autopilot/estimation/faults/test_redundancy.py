@@ -171,6 +171,7 @@ def test_nobody_is_suspected_while_all_are_well(suite: str, seed: int) -> None:
     assert not suspected(flown(Wrong(), suite, 6.0, seed))
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-13")
 def test_a_gyro_whose_axes_are_off_is_well_however_long_the_vehicle_turns_on() -> None:
     """hexa-3r was held between walls: it turned on by 0.8 rad in 3 s."""
@@ -269,6 +270,7 @@ def test_a_frame_that_gains_speed_is_named() -> None:
     assert named(verdicts) == Source.POSE
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-13")
 def test_a_slow_turn_stays_undecided_for_long_and_is_over_when_it_ends() -> None:
     verdicts = flown(Wrong(turning=(0.0, 0.0, math.radians(1.0))), "pose", 6.0)
@@ -307,6 +309,7 @@ def test_a_field_that_turns_as_the_rotors_turn_nothing_is_named(turning: Vec3) -
     assert named(verdicts) == Source.COMPASS
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-13")
 @settings(deadline=None, max_examples=FEW, phases=[Phase.generate])
 @given(direction=directions, size=st.floats(0.04, 0.3), seed=st.integers(0, 99))

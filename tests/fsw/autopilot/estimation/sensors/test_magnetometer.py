@@ -121,6 +121,7 @@ def heading_sigma(suite_offset: float) -> float:
     return math.sqrt(fusion_.covariance(memory, now)[TH + 2, TH + 2])
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-2")
 def test_no_number_of_readings_takes_an_offset_away() -> None:
     # Of 0.05 rad, what accelerations of some m/s^2 do not tell of the heading.
