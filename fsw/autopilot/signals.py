@@ -83,7 +83,7 @@ class ConstraintKind(IntEnum):
     NONE = 0
     WALLS = 1
     WORKSPACE = 2
-    OBSTACLES = 3  # points; beside them there may be walls
+    OBSTACLES = 3  # any shape that is no wall; beside them there may be walls
 
 
 # ---------------------------------------------------------------- inputs of a tick
@@ -603,9 +603,9 @@ class PlanRequest:
     safe_set: SafeSet
     from_nominal: bool  # start carried over from the running plan, not measured
     tuning: Tuning = ()  # of the planner's configuration
-    # rad, joints to hold at the nodes; empty: where the arm is is the planner's choice
+    # rad, joints to hold at the nodes; empty: the planner chooses
     joint_targets: tuple[JointVector, ...] = ()
-    # m/s^2, largest horizontal disturbance observed of late; by default none is known to be absent
+    # m/s^2, largest horizontal disturbance observed of late; infinite: not known
     recent_disturbance: float = math.inf
     mode: Mode = Mode.TRAJECTORY  # in which the plan is flown
     # m/s^2, NED, in each step: what pressing adds to what thrust does; empty: nothing is pressed on
@@ -908,7 +908,7 @@ class PayloadReport(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FlightSnapshot:
-    """The vehicle as telemetry shows it after a tick; what follows from it, encoders compute."""
+    """The vehicle as telemetry shows it after a tick; messages compute what follows from it."""
 
     t_us: int
     mode: Mode

@@ -1,8 +1,8 @@
 """Which part of the flight software runs how often, and in which order: one table.
 
-The loop walks the table from top to bottom, each group's members from left to right. Releases are
-an absolute schedule on the monotonic clock; a missed release is skipped and counted, and shifts
-nothing. The planning cycle runs in a process of its own: its member here hands over the request.
+The loop walks the table from top to bottom, each group's members from left to right. In real time
+releases are an absolute schedule on the monotonic clock; a missed one is skipped and counted, and
+shifts nothing. In lockstep each step of the simulator is one. PLAN runs where a tick has asked.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class Member(enum.Enum):
     """What a group does; the loop has one method for each."""
 
     RECEIVE = "receive"  # from the simulator and the planner, and what the ground had sent
-    TICK = "tick"  # estimate, modes, control, safety gate: pure, up to the command
+    TICK = "tick"  # ``Autopilot.control``: estimate, modes, control, safety gate
     ACTUATE = "actuate"  # answer the simulator; until here the vehicle waits
-    CONCLUDE = "conclude"  # the rest of the tick, as pure: watches, reference, reports
+    CONCLUDE = "conclude"  # the rest of the tick: watches, reference, reports
     PLAN = "plan"  # hand a request to the planner
     PUBLISH = "publish"  # telemetry to the ground, and read what it sends
     LOG = "log"  # the flight log

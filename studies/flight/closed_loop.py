@@ -212,7 +212,7 @@ class CalmStretch:
         """Go on as far as nothing happens, often not at all; whether the run is not over then."""
         loop, calm, reading = self._loop, self._calm, self._reading
         simulation, before = loop.simulation, loop.state
-        r, flown = before.cascade, 0
+        r, flown = before.record, 0
         allowed = self._allowed and simulation.t_us == before.t_us + STEP_US
         for _ in range(calm.ticks(before) if allowed else 0):
             simulation.exact_state(reading)

@@ -389,7 +389,7 @@ class WatchedController:
             OwnPartError: The command cannot be flown.
         """
         state, outputs = self._autopilot.tick(state, inputs)
-        estimate = state.cascade.known
+        estimate = state.record.known
         if outputs.mode is not Mode.TRAJECTORY or estimate is None or not state.vehicle.flies:
             return state, outputs
         t_us = inputs.sensors.t_us
@@ -397,7 +397,7 @@ class WatchedController:
         command = self._checked(self._pace.call(self._law, seen, seen.t), seen.t)
         command, _ = gate(self._airframe, command, self._last, armed=True)
         zones = self._autopilot.zones_now(state)
-        if not passes(self._cascade, state.cascade, zones, command):
+        if not passes(self._cascade, state.record, zones, command):
             if t_us > self._ours_until_us:
                 text = "safety filter: own controller overridden"
                 self._recorder.texts.append((seen.t, text))
@@ -406,7 +406,7 @@ class WatchedController:
             self._recorder.overridden_s += self._tick_s
             self._last = outputs.actuators
             return state, outputs
-        self._last = state.cascade.commanded = command
+        self._last = state.record.commanded = command
         # Our plans begin where this controller has led the vehicle, not where ours would have.
         if outputs.plan_request is not None:
             state = replace(state, safety=replace(state.safety, replan=True))

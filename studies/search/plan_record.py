@@ -70,7 +70,7 @@ def record(
     def sense(simulation: Simulation, state: FlightState) -> None:
         if len(states) % EVERY == 0:
             now = np.frombuffer(simulation.state_bytes()).copy()
-            before[:] = [(now, state.cascade)]
+            before[:] = [(now, state.record)]
             touched[:] = [simulation.touch.depth() > 0.0]
 
     def see(simulation: Simulation, state: FlightState, outputs: TickOutputs) -> None:
@@ -79,8 +79,8 @@ def record(
         if len(states) % EVERY == 0:
             margin = min(simulation.truth().margins_m, default=math.inf)
             starts.append(Start(len(states), simulation.step - 1, *before[0], margin, *touched))
-        states.append(state.cascade.plan.numbers.tobytes())
-        inputs.append(state.cascade.u.numbers.tobytes())
+        states.append(state.record.plan.numbers.tobytes())
+        inputs.append(state.record.u.numbers.tobytes())
         zones.add(state)
         if len(states) % 500 == 0:
             report(simulation.time_s, scenario.duration_s)

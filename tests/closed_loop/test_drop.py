@@ -24,7 +24,7 @@ def flown(scenario: Scenario, seed: int) -> tuple[ScenarioFlight, list[float]]:
     while flight.loop.simulation.ended is None:
         flight.step()
         state: FlightState = flight.loop.state
-        believed.append(state.cascade.payload.mass)
+        believed.append(state.record.payload.mass)
     return flight, believed
 
 

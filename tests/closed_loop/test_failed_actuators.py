@@ -49,7 +49,7 @@ def test_a_weak_rotor_is_named_once_and_the_vehicle_lands_with_it() -> None:
     assert estimate is not None
     assert math.degrees(math.acos(estimate.R_WB[8])) < 5.0
     # The loops know what the rotor gives: they believe in the thrust that there is.
-    assert flight.state.cascade.rotors[1] == pytest.approx(flight.state.cascade.rotors[3], abs=0.5)
+    assert flight.state.record.rotors[1] == pytest.approx(flight.state.record.rotors[3], abs=0.5)
     sent = flight.sent[-1].rotor_thrust
     assert sent[1] / sent[3] == pytest.approx(1.0 / 0.6, rel=0.15)
 
@@ -186,5 +186,5 @@ def test_walls_with_a_healthy_vehicle_count_on_every_rotor_exactly() -> None:
     flight = Flight(load_scenario("walls"))
     flight.follow()
     flight.run(1.5)
-    assert flight.state.cascade.watch.running > 1.0
+    assert flight.state.record.watch.running > 1.0
     assert flight.state.damage.health == HEALTHY

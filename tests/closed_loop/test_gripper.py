@@ -52,9 +52,9 @@ def test_what_is_gripped_is_weighed_and_dropped_beside_a_wall(
     flight.step(command(DO_GRIPPER, 1.0, HOLD))
     flight.run(3.0)
     assert flight.sim.payload.held_kg == kg
-    assert flight.state.cascade.payload.mass == pytest.approx(kg, rel=0.05)
+    assert flight.state.record.payload.mass == pytest.approx(kg, rel=0.05)
     flight.step(command(DO_GRIPPER, 1.0, RELEASE))
-    assert flight.state.cascade.payload.mass == 0.0
+    assert flight.state.record.payload.mass == 0.0
     flight.run(2.0)
     assert flight.sim.payload.held_kg == 0.0
     assert [result for _, result in flight.results] == [0, 0, 0, 0]
@@ -85,7 +85,7 @@ def test_a_gripper_that_holds_nothing_weighs_next_to_nothing() -> None:
     flight.sim.payload.update = lambda *_: None  # type: ignore[method-assign]
     flight.step(command(DO_GRIPPER, 1.0, GRAB))
     flight.run(3.0)
-    assert flight.state.cascade.payload.mass < 0.005
+    assert flight.state.record.payload.mass < 0.005
 
 
 @pytest.mark.long

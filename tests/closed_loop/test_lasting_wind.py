@@ -22,7 +22,7 @@ def test_clearances_grow_with_the_memory_of_wind_and_shrink_with_it() -> None:
     flight.run(1.0)
     assert max(flight.state.kept.added, default=0.0) <= 0.005
     flight.run(24.0)
-    memory = flight.state.cascade.observed.disturbance_bias[0]
+    memory = flight.state.record.observed.disturbance_bias[0]
     assert memory == pytest.approx(0.45, abs=0.03), "it is taken for wind"
     (grown,) = flight.state.kept.added
     assert grown == pytest.approx(0.0823 * (memory - 0.05), abs=2.5e-3)

@@ -37,7 +37,7 @@ def test_a_payload_is_picked_carried_along_a_wall_and_put_down(
     while simulation.ended is None:
         flight.step()
         state: FlightState = flight.loop.state
-        weighed.append(state.cascade.payload.mass)
+        weighed.append(state.record.payload.mass)
     assert simulation.ended.kind is EndKind.DURATION
     use = simulation.payload.use()
     assert use is not None

@@ -42,7 +42,7 @@ def flown(scenario: Scenario, seed: int, seconds: float) -> tuple[Flight, np.nda
     flight.follow()
     while flight.sim.step * 0.002 < seconds:
         flight.step()
-        k = flight.state.cascade.pressing
+        k = flight.state.record.pressing
         force = -flight.sim.tip_force[0]
         seen.append((force, k.pressed, k.unsure, k.asked))
     return flight, np.array(seen)

@@ -56,7 +56,7 @@ def with_given(before: Tick, estimate: StateEstimate, plan: PredictionState, u: 
 
 def with_record(state: FlightState, **fields: Any) -> FlightState:
     """A state whose record has other fields, the estimate as ``known``."""
-    return replace(state, cascade=changed(state.cascade, **fields))
+    return replace(state, record=changed(state.record, **fields))
 
 
 def placed(airframe: Airframe, estimate: StateEstimate, mass: float | None = None) -> Tick:

@@ -76,8 +76,8 @@ from fsw.autopilot.tick_record import (
 from fsw.compiled import compilable, compiled, kernel, machine_code, packed
 
 Inner = Literal["tracking", "pid", "px4"]
-Model = Vec4
-"""What rotors make of it: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
+ExpectedMotion = Vec4
+"""By the rotors alone: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
 
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -154,7 +154,7 @@ def cascade_law(
 
 
 class Cascade:
-    """The inner loops of one configuration; laws are pure, memory goes in and comes out."""
+    """The inner loops of one configuration; each law writes into the record it is given."""
 
     def __init__(
         self,
@@ -191,13 +191,13 @@ class Cascade:
         now.known = estimate
         return self._motion(self.packed, now.array)
 
-    def expected(self, r: Tick) -> tuple[JointVector, Model, Vec3]:
+    def expected(self, r: Tick) -> tuple[JointVector, ExpectedMotion, Vec3]:
         """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle.
 
         And what a surface that the tool presses on makes of it besides [m/s^2, NED].
         """
-        model, known = self._expected(self.packed, r.array)
-        return r.joint_acceleration, model, known
+        model, surface = self._expected(self.packed, r.array)
+        return r.joint_acceleration, model, surface
 
     def setpoint(self, r: Tick) -> Setpoint | None:
         """What another autopilot is asked for; None: these loops command rotors."""
@@ -256,8 +256,8 @@ def close_loops(
     lifted = add(pushed, (0.0, 0.0, -thrust))
     load = subtract(load_on_base(r.bodies, airframe.bodies, lifted, r.pressing.load), turned)
     torque = torque_to_turn(r.bodies, airframe.bodies, turn, load, knows_arm=law.follows_plan)
-    known = subtract(cross(three(r.bodies.centre, 0), pushed), turned)[2]
-    allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit, known)
+    surface_yaw = subtract(cross(three(r.bodies.centre, 0), pushed), turned)[2]
+    allocate(r, airframe, torque, thrust, tuning.yaw_thrust_limit, surface_yaw)
     send(r, airframe)
 
 
@@ -291,8 +291,8 @@ def keep_off_zones(
     if law.follows_plan:
         asked = wanted_accelerations(law.tracking, r.estimate, motion, r.observed, r.plan, r.u)
     level = law.filter.level
-    known = r.observed.known  # thrust does what surfaces do not
-    asked = asked[0] + known[0], asked[1] + known[1], asked[2] + known[2]
+    surface = r.observed.known  # thrust does what surfaces do not
+    asked = asked[0] + surface[0], asked[1] + surface[1], asked[2] + surface[2]
     wanted = clamp_magnitude(asked[0], level), clamp_magnitude(asked[1], level), asked[2]
     a = add_scaled(motion.a, r.observed.d, 1.0)
     safe, changed = filter_asked(r, law, zones, probes, a, wanted)
@@ -313,7 +313,7 @@ def filter_asked(
     a: Vec3,
     asked: Vec3,
 ) -> tuple[Vec3, bool]:
-    """What the safety filter makes of an acceleration ``asked`` for [m/s^2, NED]; is it another.
+    """The filtered acceleration, and whether it is another than ``asked`` [m/s^2, NED].
 
     The base accelerates by ``a`` [m/s^2, NED] now; ``zones`` (zones, k) [SI] and ``probes``
     (probes, 12) [SI] as of ``close_loops``. Reads estimate, observed; writes margin, flags.
@@ -356,7 +356,7 @@ def turn_by_pid(r: Tick, law: CascadeLaw) -> tuple[Vec3, float]:
 
 @compilable
 def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
-    """What the joints are to do, ``seconds`` [s] later. Writes off_plan, joints.reference."""
+    """The joints' reference, ``seconds`` [s] later. Writes off_plan, arm, joints.reference."""
     airframe, tuning, plan = law.airframe, law.tuning, r.flown
     if law.follows_plan and tuning.compensate and _joints_are_sound(r, airframe):
         limits = tuning.compensation_near if r.pressing.near > 0 else tuning.compensation
@@ -373,7 +373,7 @@ def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
 
 @compilable
 def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> None:
-    """Torques for the joints' reference. Reads sent, mass, observed, health; writes wanted."""
+    """Drive joints. Reads sent, mass, observed, health; writes joints, pressing, wanted."""
     airframe = law.airframe
     # Gravity less the base's acceleration.
     pushed = rotate_back(r.estimate.R_WB, r.observed.d)
@@ -384,7 +384,7 @@ def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> N
         observe_contact(r, airframe, torque, field, law.dt)
     weigh_payload(r, airframe, field, law.dt * ticks)
     weigh_tool(r, airframe, law.tuning.press)
-    # Not what is commanded: the rotors take 40 ms to give it.
+    # Not what is commanded: the rotors take their lag to give it.
     joint_torques(
         r, airframe, law.arm, law.tuning.joint, law.tuning.press, field, motion.turning, law.dt
     )
@@ -409,7 +409,7 @@ def send(r: Tick, airframe: Airframe) -> None:
 
 @compilable
 def compare_with_plan(r: Tick, tube: TubeAround) -> None:
-    """Whether the base has left the tube around its plan. Reads estimate, plan, observed."""
+    """Flag a base that left the plan's tube. Reads estimate, plan, observed; writes flags."""
     bias = r.observed.disturbance_bias
     aside = beyond_covered(tube, (bias[0], bias[1]))
     most = tube.radius + max(aside[0], aside[1]) + tube.unsure
@@ -429,19 +429,19 @@ def _joints_are_sound(r: Tick, airframe: Airframe) -> bool:
 @compiled
 def _close_loops(
     law: NDArray[Any],
-    ticks: NDArray[Any],
-    count: int,
+    records: NDArray[Any],
+    ticks: int,
     zones: NDArray[np.float64],
     probes: NDArray[np.float64],
     tube: TubeAround,
 ) -> None:
-    close_loops(ticks[0], law[0], count, zones, probes)
-    compare_with_plan(ticks[0], tube)
+    close_loops(records[0], law[0], ticks, zones, probes)
+    compare_with_plan(records[0], tube)
 
 
 @kernel
-def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Model, Vec3]:
-    airframe, r = laws[0].airframe, ticks[0]
+def _expected(laws: NDArray[Any], records: NDArray[Any]) -> tuple[ExpectedMotion, Vec3]:
+    airframe, r = laws[0].airframe, records[0]
     for i in range(int(airframe.rotors)):
         settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
         r.mixer.mean[i] = lag_rotor(r.rotors[i], settling_at, laws[0].rotor_decay)
@@ -456,8 +456,8 @@ def _expected(laws: NDArray[Any], ticks: NDArray[Any]) -> tuple[Model, Vec3]:
 
 
 @kernel
-def _motion(laws: NDArray[Any], ticks: NDArray[Any]) -> MotionState:
-    law, r = laws[0], ticks[0]
+def _motion(laws: NDArray[Any], records: NDArray[Any]) -> MotionState:
+    law, r = laws[0], records[0]
     settle_rotors(r, law, 1)
     move_bodies(r.bodies, law.airframe.bodies, law.airframe.joint_armature, r.estimate)
     return motion_state(law.airframe, r, r.rotors, r.sent.joint_torque)

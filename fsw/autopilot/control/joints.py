@@ -83,8 +83,8 @@ def _packed(airframe: Airframe) -> NDArray[Any]:
 
 @machine_code
 @kernel
-def _place(airframes: NDArray[Any], ticks: NDArray[Any]) -> None:
-    airframe, r = airframes[0], ticks[0]
+def _place(airframes: NDArray[Any], records: NDArray[Any]) -> None:
+    airframe, r = airframes[0], records[0]
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
 
 

@@ -226,11 +226,11 @@ def _asked_along(r: Tick, axis: int, gains: Vec2) -> float:
 def _ask_px4(
     laws: NDArray[Any],
     models: NDArray[Any],
-    ticks: NDArray[Any],
-    count: int,
+    records: NDArray[Any],
+    ticks: int,
     zones: NDArray[np.float64],
     probes: NDArray[np.float64],
     tube: TubeAround,
 ) -> None:
-    ask_px4(ticks[0], laws[0], models[0], count, zones, probes)
-    compare_with_plan(ticks[0], tube)
+    ask_px4(records[0], laws[0], models[0], ticks, zones, probes)
+    compare_with_plan(records[0], tube)

@@ -60,9 +60,9 @@ def reading_of(sensors: SensorFrame) -> Floats:
 
 
 @kernel
-def _read(ticks: NDArray[Any], reading: Floats, now_us: int) -> int:
+def _read(records: NDArray[Any], reading: Floats, now_us: int) -> int:
     """Write the estimate that a ``reading`` (READINGS,) [SI] is."""
-    r = ticks[0]
+    r = records[0]
     r.has_estimate = 1
     return read_into(r.estimate, reading, now_us)
 

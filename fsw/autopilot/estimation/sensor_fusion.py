@@ -29,11 +29,11 @@ from fsw.autopilot.estimation.error_state import (
 from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, extended
+from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
 from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, Source, Verdict
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
-    EncoderWatch,
     FusionMemory,
     TickInputs,
     Trail,

@@ -1,7 +1,7 @@
 """One tick of the flight software, top to bottom: (state, inputs) -> (state, outputs).
 
 No clock, socket, thread or random number: real time, lockstep, replay and tests all call this.
-``Autopilot.tick`` reads in the order things happen.
+``control`` and ``conclude`` read in the order things happen.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class Controlled(NamedTuple):
 
 
 class Autopilot:
-    """The tick of one configuration; holds only what never changes in flight."""
+    """The tick of one configuration; holds that, and caches that change no result."""
 
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
@@ -209,7 +209,7 @@ class Autopilot:
         if state.index >= 0 and inputs.samples:
             state, inputs = self._sensed.take_missed(state, inputs)
         state, r, estimate, fusion, caught = self._estimate(state, inputs, texts)
-        began = state.cascade
+        began = state.record
         state = self._receive(state, came, texts)
         if estimate is None:
             return self._blind(state, r, inputs, texts)._replace(fusion=fusion, caught=caught)
@@ -224,11 +224,11 @@ class Autopilot:
         ticks = looped = self._elapsed_ticks(state, now_us)
         vehicle = state.vehicle
         armed = vehicle.armed
-        flown = vehicle.flies and vehicle.unloaded is None and bool(state.cascade.has_plan)
+        flown = vehicle.flies and vehicle.unloaded is None and bool(state.record.has_plan)
         if flown and now_us - state.t_us > self._max_us:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
-        if state.cascade is not began:  # loops or plan begin anew
-            r = state.cascade.copy()
+        if state.record is not began:  # loops or plan begin anew
+            r = state.record.copy()
             r.known = estimate
         plan = state.plan
         if flown:
@@ -257,7 +257,7 @@ class Autopilot:
             state, r = self._exact.estimate(state, inputs, texts)
             return state, r, r.known, None, None
         state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
-        r = state.cascade.copy()
+        r = state.record.copy()
         if estimate is not None:
             r.known = estimate
         return state, r, estimate, fusion, caught
@@ -312,7 +312,7 @@ class Autopilot:
             index=index,
             t_us=now_us,
             output_replaced=c.replaced,
-            cascade=r,
+            record=r,
             plan=plan,
             safety=self._filtered(state, safety, estimate, r.margin, flags),
             fusion=fusion,
@@ -486,9 +486,9 @@ class Autopilot:
 
     def _resumed(self, state: FlightState, estimate: StateEstimate) -> FlightState:
         """The state after a time without ticks: loops and plan go on from the measurement."""
-        motion = self._cascade.motion(state.cascade, estimate)
+        motion = self._cascade.motion(state.record, estimate)
         state = plan_resumed(self.config, state, estimate, motion)
-        return replace(state, cascade=loops_resumed(self.config, state.cascade, estimate))
+        return replace(state, record=loops_resumed(self.config, state.record, estimate))
 
     def _until_plan(self, state: FlightState) -> int:
         """Ticks from the last one to the next that asks for a plan."""
@@ -509,9 +509,9 @@ class Autopilot:
         now_us: int,
         texts: list[StatusText],
     ) -> tuple[FlightState, PlanRequest]:
-        """Request a plan that takes effect after a fixed delay, from the vehicle to ``replan``.
+        """Request a plan that takes effect after a fixed delay; to replan, from the measurement.
 
-        Appends what is to be said of its reference.
+        Appends status texts on its reference.
         """
         config = self.config
         apply_us = now_us + config.plan_delay_ticks * config.tick_period_us
@@ -520,9 +520,9 @@ class Autopilot:
         if state.limited and state.limited != limited:
             texts.append(StatusText(Severity.WARNING, f"reference limited: {state.limited}"))
         p_WE, _ = end_effector(config.airframe.bodies, estimate)
-        targets, pushes = pressed_reference(targets, state.cascade, p_WE, config.tuning.press)
+        targets, pushes = pressed_reference(targets, state.record, p_WE, config.tuning.press)
         plan, safety = state.plan, state.safety
-        measured = measured_state(estimate, self._cascade.motion(state.cascade, estimate))
+        measured = measured_state(estimate, self._cascade.motion(state.record, estimate))
         start, from_nominal = self._plans.start(plan, nominal, measured, now_us, safety.replan)
         request = PlanRequest(
             plan_id=plan.next_id,
@@ -532,7 +532,7 @@ class Autopilot:
             safe_set=state.kept.safe_set,
             from_nominal=from_nominal,
             joint_targets=joints,
-            recent_disturbance=state.cascade.observed.recent,
+            recent_disturbance=state.record.observed.recent,
             mode=state.vehicle.mode,
             pushes=pushes,
         )
@@ -571,7 +571,7 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
-        wind, whole = self._wind_room(state.cascade), state.kept.whole
+        wind, whole = self._wind_room(state.record), state.kept.whole
         kept = self._clearance.keep(whole, state.mission.safe_set, estimate, pose, wind)
         return self._with_room(replace(state, kept=kept), estimate)
 
@@ -625,7 +625,7 @@ class Autopilot:
         )
 
     def _battery(self, state: FlightState) -> BatteryState:
-        thrust = state.cascade.commanded.rotor_thrust
+        thrust = state.record.commanded.rotor_thrust
         period = 1e-6 * self.config.mpc_period_us
         return drained(self.config.airframe, self._battery_levels, state.battery, thrust, period)
 
@@ -648,13 +648,13 @@ class Autopilot:
 
         Also the record for the next tick, and whether the gate replaced the command.
         """
-        last, airframe = state.cascade, self.config.airframe
+        last, airframe = state.record, self.config.airframe
         if flown:
             tube = self._watch.tube(state)
             r.payload.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0
             self._cascade.step(r, ticks, self.zones_now(state), state.damage.health, tube)
             wanted = r.commanded
-            if armed and not r.flags & GATE_NEEDED:
+            if not r.flags & GATE_NEEDED:  # what flies is armed
                 return wanted, r, False
         elif armed:
             idle = self.config.limits.idle_thrust
@@ -690,7 +690,7 @@ class Autopilot:
             return state.damage
         return self._damage.see(
             state.damage,
-            state.cascade,
+            state.record,
             r,
             controlled.ticks,
             angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
@@ -701,7 +701,7 @@ class Autopilot:
         """The zones (zones, k) [SI] for the safety filter.
 
         Made anew where they or their target changed.
-        None where the vehicle descends because it does not know where it is.
+        No zones where the vehicle descends because it does not know where it is.
         """
         kept, target = state.kept, state.reference
         blind = state.aiding.unaided_us >= self.config.limits.aiding_loss_us

@@ -44,14 +44,14 @@ from fsw.record import Floats
 
 @kernel
 def _sense(
-    models: NDArray[Any], ticks: NDArray[Any], reading: Floats, now_us: int, upright: float
+    models: NDArray[Any], records: NDArray[Any], reading: Floats, now_us: int, upright: float
 ) -> bool:
     """Read a frame and move the plan's state on; whether the frame is believed as it is.
 
     ``reading`` (READINGS,) [SI]; ``upright`` [1] is the cosine of the tilt up to which nothing is
     to be done. Reads plan, u; writes estimate, plan.
     """
-    r = ticks[0]
+    r = records[0]
     missing = read_into(r.estimate, reading, now_us)
     move_plan(models[0], r.plan, r.u, r.joint_count)
     return bool(missing == 0 and r.estimate.R_WB[8] > upright)
@@ -88,7 +88,7 @@ class CalmTick:
 
         Of a suite also what its filter has made of inertial unit and encoders.
         """
-        frame, before = inputs.sensors, state.cascade
+        frame, before = inputs.sensors, state.record
         now_us = frame.t_us
         next_one = now_us == state.t_us + self._tick_us
         if not (next_one and self.ticks(state) and inputs.has_only_sensors):
@@ -135,7 +135,7 @@ class CalmTick:
     ) -> FlightState:
         """The state after calm ``ticks``, with the record that they have left: calm as before."""
         index, t_us = state.index + ticks, state.t_us + ticks * self._tick_us
-        self._state = replace(state, index=index, t_us=t_us, cascade=r, fusion=fusion)
+        self._state = replace(state, index=index, t_us=t_us, record=r, fusion=fusion)
         return self._state
 
     def _look_at(self, state: FlightState) -> None:
@@ -174,7 +174,7 @@ def _is_range(sample: Sample) -> bool:
 
 def _is_calm(state: FlightState, config: FlightConfig) -> bool:
     """Whether nothing goes on that a calm tick does not know of."""
-    vehicle, plan, r = state.vehicle, state.plan, state.cascade
+    vehicle, plan, r = state.vehicle, state.plan, state.record
     estimate = r.known
     return (
         vehicle.mode is Mode.TRAJECTORY

@@ -1,6 +1,6 @@
 """The commander: commands, failsafes and completed modes move the vehicle between modes.
 
-Every function takes a state and returns one; almost every tick it is the same object.
+What changes the state returns a new one; almost every tick none does.
 """
 
 from __future__ import annotations
@@ -216,8 +216,8 @@ class Commander:
         config = self._config
         room = stand_off(config.planner.walls) + self._tube_radius
         safe_set = within_room(state.kept.safe_set, estimate, self._body)
-        if safe_set.touchable:  # one that comes is left behind
-            room += _AWAY + max(state.cascade.pressing.moved, 0.0)
+        if safe_set.touchable:  # a moving surface needs more room
+            room += _AWAY + max(state.record.pressing.moved, 0.0)
         place = retreat_place(safe_set, estimate, self._body, config.airframe.bodies, room)
         home = self._config.airframe.home if safe_set.touchable else None  # the arm has given way
         return self._towards(state, PositionGoal(MotionSetpoint(False, place), home), estimate)
@@ -269,7 +269,7 @@ class Commander:
         if answered is not state.vehicle.answered:
             # Another sender's command is not done any more: it acts again if it is sent again.
             state = replace(state, vehicle=replace(state.vehicle, answered=answered))
-        state = self._remember(state, decision, estimate)
+        state = self._apply(state, decision, estimate)
         if decision.arm:
             state = self._arm(state, estimate, texts)
         elif decision.mode is not None:
@@ -298,7 +298,7 @@ class Commander:
         memory = overridden(vehicle.failsafe, vehicle.conditions)
         return replace(state, vehicle=replace(vehicle, failsafe=memory, failsafe_from=None))
 
-    def _remember(
+    def _apply(
         self, state: FlightState, decision: Decision, estimate: StateEstimate
     ) -> FlightState:
         """Apply the effects of a decision."""
@@ -386,7 +386,7 @@ class Commander:
             state,
             vehicle=vehicle,
             setpoint=SetpointMemory(),
-            cascade=begin(airframe, estimate, state.cascade),
+            record=begin(airframe, estimate, state.record),
         )
         if intended is Mode.HOLD:
             return state
@@ -422,7 +422,7 @@ class Commander:
             mode=mode,
             # What follows from a mode that was completed is what its command led to.
             answered=state.vehicle.answered if completed else (),
-            mode_origin=off_surface(state.cascade.pressing, origin.p_WE, _AWAY),
+            mode_origin=off_surface(state.record.pressing, origin.p_WE, _AWAY),
             mode_yaw=origin.yaw,
             mode_begin_us=estimate.t_us,
             is_up=False,

@@ -134,7 +134,7 @@ def is_aloft(state: FlightState, now: float, legs: float, oldest: float) -> bool
     knows its height. Where they differ and sensors are in dispute, the estimate may be what is
     wrong; else it is the rangefinder, and who else is wrong must be asked all the same.
     """
-    r, vehicle = state.cascade, state.vehicle
+    r, vehicle = state.record, state.vehicle
     if not (r.has_estimate and vehicle.flies):
         return False
     measured = _measured_height(state, now, r.upright, legs, oldest)
@@ -161,7 +161,7 @@ def _measured_height(
 
 def is_light(config: FlightConfig, state: FlightState) -> bool:
     """Whether rotors carry so little of the weight that what flies would fall."""
-    return bool(sum(state.cascade.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY)
+    return bool(sum(state.record.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY)
 
 
 def feel_ground(

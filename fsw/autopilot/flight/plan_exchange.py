@@ -175,7 +175,7 @@ class PlanExchange:
         return memory
 
     def _steer(self, plan: Plan | None, r: Tick, now_us: int) -> None:
-        """The running plan's input at its age; braking where there is none young enough."""
+        """The running plan's input, as ``plan_input`` has it."""
         u = None if plan is None else planned_input(plan, now_us)
         if u is None:
             nominal = r.nominal
@@ -231,7 +231,7 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
     """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
     last = state.plan
     plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
-    return replace(state, cascade=with_nominal(state.cascade, nominal_at_rest(estimate)), plan=plan)
+    return replace(state, record=with_nominal(state.record, nominal_at_rest(estimate)), plan=plan)
 
 
 def with_nominal(r: Tick, nominal: PredictionState) -> Tick:

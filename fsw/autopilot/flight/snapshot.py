@@ -30,7 +30,7 @@ class Shown:
 
 def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
     """The vehicle after a tick with this frame of its ``sensors``, which left this state."""
-    vehicle, plan, goal, r = state.vehicle, state.plan, state.setpoint.goal, state.cascade
+    vehicle, plan, goal, r = state.vehicle, state.plan, state.setpoint.goal, state.record
     estimate, nominal = r.known, r.nominal if vehicle.flies else None
     assert estimate is not None
     return FlightSnapshot(

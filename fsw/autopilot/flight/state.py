@@ -55,7 +55,7 @@ _DISARMED, _FAULT = Mode.DISARMED, Mode.FAULT
 
 @dataclass(frozen=True, slots=True)
 class VehicleMemory:
-    """Mode and what belongs to it; changes with commands, failsafes and completed modes."""
+    """Mode and what belongs to it."""
 
     mode: Mode = Mode.DISARMED
     landed: bool = True
@@ -132,7 +132,7 @@ class OffboardMemory:
 
 
 def is_young(last_received_us: int, now_us: int, timeout_us: int) -> bool:
-    """Whether what came at ``heard_us``, negative for never, is within the timeout."""
+    """Whether what came at ``last_received_us``, negative for never, is within the timeout."""
     return last_received_us >= 0 and now_us - last_received_us < timeout_us
 
 
@@ -274,9 +274,9 @@ COMPLETE: Final = Dropout()
 
 @dataclass(frozen=True, slots=True)
 class FlightState:
-    """Everything a tick starts from; the upper half changes every tick, the lower rarely."""
+    """Everything a tick starts from."""
 
-    cascade: Tick
+    record: Tick
     index: int = -1  # of the last tick on the absolute grid, missed ones counted
     t_us: int = 0  # of the last tick
     invalid_ticks: int = 0
@@ -309,14 +309,14 @@ class FlightState:
     @property
     def estimate(self) -> StateEstimate | None:
         """The last valid one, made anew each time."""
-        return self.cascade.known
+        return self.record.known
 
     @property
     def nominal(self) -> PredictionState | None:
         """Where the running plan wants the vehicle now, made anew each time."""
-        return self.cascade.nominal
+        return self.record.nominal
 
 
 def first_state(airframe: Airframe) -> FlightState:
     """What the first tick of a vehicle starts from."""
-    return FlightState(cascade=new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints))
+    return FlightState(record=new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints))

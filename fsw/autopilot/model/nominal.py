@@ -74,10 +74,10 @@ def rest_state(joints: int) -> PredictionState:
 
 
 @kernel
-def _move(models: NDArray[Any], ticks: NDArray[Any], count: int) -> None:
-    """Bring the plan's state ``count`` ticks on."""
-    model, r = models[0], ticks[0]
-    for _ in range(count):
+def _move(models: NDArray[Any], records: NDArray[Any], ticks: int) -> None:
+    """Bring the plan's state some ``ticks`` on."""
+    model, r = models[0], records[0]
+    for _ in range(ticks):
         move_plan(model, r.plan, r.u, r.joint_count)
 
 

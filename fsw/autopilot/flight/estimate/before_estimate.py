@@ -92,7 +92,7 @@ def nothing_known(
         t_us=t_us,
         mode=so_far.mode,
         armed=so_far.armed,
-        estimate=nowhere(t_us, state.cascade.joint_count),
+        estimate=nowhere(t_us, state.record.joint_count),
         reference=None,
         plan_state=None,
         plan_input=None,

@@ -34,7 +34,7 @@ class ExactState:
 
         Appends to ``texts``.
         """
-        sensors, last = inputs.sensors, state.cascade
+        sensors, last = inputs.sensors, state.record
         r = last.copy()
         missing = read_frame(sensors, r)
         if not (missing or inputs.stale_us or state.invalid_ticks) and state.dropout is COMPLETE:
@@ -49,7 +49,7 @@ class ExactState:
                 return state, r
             if (missing or lost) and not inputs.stale_us:
                 state, found = self._incomplete(state, before, found, missing, inputs, texts)
-                r = state.cascade.copy()
+                r = state.record.copy()
                 r.known = found
                 return state, r
         elif state.dropout is not COMPLETE and not (missing or inputs.stale_us):
@@ -78,7 +78,7 @@ class ExactState:
         texts.extend(StatusText(Severity.WARNING, text) for text in sentences)
         aiding = AIDED
         if missing:
-            r, expected = state.cascade, self._cascade.expected
+            r, expected = state.record, self._cascade.expected
             found = filled(missing, inputs.sensors, found, before, lambda: expected(r)[0])
             aiding = _aiding(dropout, found.t_us)
         if away and dropout.pose.since_us < 0:

@@ -75,4 +75,4 @@ def returned(
     """
     reset, said = on_return(found, before)
     texts += said
-    return replace(state, cascade=moved_along(state.cascade, reset))
+    return replace(state, record=moved_along(state.record, reset))

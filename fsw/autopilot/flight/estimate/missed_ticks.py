@@ -67,4 +67,4 @@ def plan_resumed(
     measured = measured_state(estimate, motion)
     settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
     state = without_plan(state, estimate)
-    return replace(state, cascade=with_nominal(state.cascade, settled))
+    return replace(state, record=with_nominal(state.record, settled))

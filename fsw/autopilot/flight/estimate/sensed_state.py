@@ -12,11 +12,11 @@ from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
+from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
 from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names, scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
 from fsw.autopilot.estimation.fusion_memory import (
-    EncoderWatch,
     FusionMemory,
     Reset,
     at_start,
@@ -128,8 +128,8 @@ class SensedState:
         before = self._memory(state, now)
         pushed: JointVector = ()
         model, surfaces = UNKNOWN, UNPUSHED
-        if state.cascade.has_estimate:
-            pushed, model, surfaces = self._cascade.expected(state.cascade)
+        if state.record.has_estimate:
+            pushed, model, surfaces = self._cascade.expected(state.record)
             # On the ground thrust does not explain how the vehicle moves.
             if not state.vehicle.flies or state.vehicle.unloaded is not None:
                 model = UNKNOWN
@@ -140,7 +140,7 @@ class SensedState:
             started, samples, now, pushed, watch, model, surfaces
         )
         caught = None
-        if estimate is None and not state.cascade.has_estimate:
+        if estimate is None and not state.record.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
             estimate = caught.estimate
         if estimate is None:
@@ -163,9 +163,9 @@ class SensedState:
             memory, found = self._fused(state, memory, one.samples, estimate)
             state, known = replace(state, fusion=memory), found or estimate
             if known is not None:
-                r = state.cascade.copy()
+                r = state.record.copy()
                 r.known = known
-                state = replace(state, cascade=r)
+                state = replace(state, record=r)
         return state, inputs
 
     def catch_up(
@@ -219,7 +219,7 @@ class SensedState:
             flies=state.vehicle.flies,
             damaged=bool(state.damage.rotor or state.damage.joint),
             # What pushes back, or was just gripped, turns the vehicle by more than is known of it.
-            touches=state.cascade.touches,
+            touches=state.record.touches,
         )
 
     def reported(
@@ -333,7 +333,7 @@ def _without_stuck(
     before = watch = memory.encoders
     for one in samples:
         if type(one) is JointSample:
-            r, judged = state.cascade, state.vehicle.flies and not state.damage.joint
+            r, judged = state.record, state.vehicle.flies and not state.damage.joint
             felt = partial(felt_inside, r, airframe)
             watch = watch.after(one.angles, r.undone, r.unseen, felt, judged=judged)
             if watch.stuck and not before.stuck:

@@ -112,30 +112,30 @@ def lacks_room(context: FailsafeContext) -> bool:
 
 def force_on_tool(context: FailsafeContext) -> float:
     """The normal force [N], as it is observed or by how fast the tool met its surface."""
-    k = context.state.cascade.pressing
+    k = context.state.record.pressing
     return float(max(k.pressed, k.blow))
 
 
 def presses_too_hard(context: FailsafeContext) -> bool:
     """In flight, the tool may be pressed upon by more than its surface allows."""
-    k = context.state.cascade.pressing
+    k = context.state.record.pressing
     return bool(k.near and force_on_tool(context) + k.unsure > k.most) and _flies(context)
 
 
 def has_lost_contact(context: FailsafeContext) -> bool:
     """In flight, the tool has missed its surface for a while."""
-    return context.state.cascade.pressing.lost_for > CONTACT_LOST_S and _flies(context)
+    return context.state.record.pressing.lost_for > CONTACT_LOST_S and _flies(context)
 
 
 def surface_has_moved(context: FailsafeContext) -> bool:
     """In flight, the tool meets its surface far from where it was announced."""
-    pressing = context.state.cascade.pressing
+    pressing = context.state.record.pressing
     return bool(pressing.near and abs(pressing.moved) > SURFACE_OFF) and _flies(context)
 
 
 def tool_slips(context: FailsafeContext) -> bool:
     """In flight, the tool moves along its surface faster than any reference leads it."""
-    pressing = context.state.cascade.pressing
+    pressing = context.state.record.pressing
     if not pressing.contact:
         return False
     return math.hypot(*pressing.slip.tolist()) > SLIP and _flies(context)
@@ -143,7 +143,7 @@ def tool_slips(context: FailsafeContext) -> bool:
 
 def payload_is_heavy(context: FailsafeContext) -> bool:
     """In flight, the gripper holds more than is safe, by more than it is weighed within."""
-    held = context.state.cascade.payload.mass
+    held = context.state.record.payload.mass
     return bool(held > WEIGHED * context.heaviest) and _flies(context)
 
 

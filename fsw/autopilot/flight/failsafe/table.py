@@ -28,7 +28,7 @@ from fsw.autopilot.signals import BatteryWarning, Severity
 
 AT_ONCE_US: Final = TICK_US
 SLOW_US: Final = PLANNING_US  # after which the other rows are looked at again
-SECOND_US: Final = 1_100_000  # the loop looks at its machine once a second
+_OF_HOST_US: Final = 1_000_000 + SLOW_US  # the loop looks at its machine once a second
 
 Evidence = Callable[[FailsafeContext], bool]
 
@@ -64,7 +64,7 @@ class Failsafe:
 
 _SLOWLY: Final = SLOW_US + AT_ONCE_US
 _TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
-# What rows have in common. Faults of the vehicle are found out once a planning period.
+# What rows have in common. Faults of the vehicle are told a planning period late at most.
 _fault = partial(Failsafe, of_vehicle=True, within_us=_SLOWLY)
 _of_contact = partial(
     Failsafe, asks=Action.RETREAT, severity=Severity.CRITICAL, slow=True, within_us=_SLOWLY
@@ -85,7 +85,7 @@ _of_battery = partial(
     within_us=_TWICE,
     component=Subject.BATTERY,
 )
-_of_host = partial(Failsafe, slow=True, within_us=SECOND_US)
+_of_host = partial(Failsafe, slow=True, within_us=_OF_HOST_US)
 
 FAILSAFES: Final = (
     _fault(

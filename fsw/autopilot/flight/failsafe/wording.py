@@ -107,24 +107,24 @@ def by_mm(length: float) -> str:
 
 def force(context: FailsafeContext) -> str:
     """How hard the tool is pressed upon, and what is allowed."""
-    pressing = context.state.cascade.pressing
+    pressing = context.state.record.pressing
     found, unsure, most = force_on_tool(context), pressing.unsure, pressing.most
     return f": {found:.1f} N, or {unsure:.1f} N more, of {most:.1f} N"
 
 
 def without_contact(context: FailsafeContext) -> str:
     """For how long the tool has missed its surface."""
-    return f" for {context.state.cascade.pressing.lost_for:.1f} s"
+    return f" for {context.state.record.pressing.lost_for:.1f} s"
 
 
 def surface_moved(context: FailsafeContext) -> str:
     """How far a surface is from where it was announced."""
-    return by_mm(abs(context.state.cascade.pressing.moved))
+    return by_mm(abs(context.state.record.pressing.moved))
 
 
 def payload(context: FailsafeContext) -> str:
     """What the gripper holds, and what it may."""
-    held = context.state.cascade.payload.mass
+    held = context.state.record.payload.mass
     return f": {1e3 * held:.0f} g of {1e3 * context.heaviest:.0f} g"
 
 

@@ -59,8 +59,8 @@ class CommandContext:
     inconsistent: str  # why the configuration cannot keep the safe set
     mission: MissionProgress
     mission_refusal: str | None  # None: it can be flown
-    setpoint_fresh: bool  # an offboard setpoint came within the last 0.5 s
-    setpoint_problem: str  # why those of the last 0.5 s are refused; empty: none was
+    setpoint_fresh: bool  # an offboard setpoint came within COM_OF_LOSS_T
+    setpoint_problem: str  # why those of that time are refused; empty: none was
     position: Vec3  # m, of the body
     yaw: float  # rad
     joints: JointVector  # rad, asked for last or as they are

@@ -61,7 +61,8 @@ class Offboard(FlightMode):
             return None
         if context.setpoint_problem:
             return f"not offboard: setpoints are refused: {context.setpoint_problem}"
-        return "not offboard: no setpoint was received in the last 0.5 s"
+        timeout = 1e-6 * self.config.limits.setpoint_timeout_us
+        return f"not offboard: no setpoint was received in the last {timeout:g} s"
 
     def waits(self, state: FlightState, now_us: int) -> str | None:
         """Dropped when setpoints stop."""
@@ -125,7 +126,7 @@ class Offboard(FlightMode):
             tilt = tilted(memory.attitude, last, tilt_limit, config.planner.period)
             airframe = config.airframe
             thrust = airframe.full_thrust * memory.attitude.thrust
-            return as_motion(tilt, thrust / state.cascade.mass), tilt
+            return as_motion(tilt, thrust / state.record.mass), tilt
         assert memory.motion is not None, "one of the two is young"
         return _moved_on(memory.motion, estimate.t_us - memory.motion_us), ahead
 

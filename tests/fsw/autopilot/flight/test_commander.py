@@ -303,7 +303,7 @@ def test_arming_on_the_ground_begins_in_hold_with_home_here_and_all_wishes_forgo
     assert vehicle.conditions == (), "what is so is reported anew, and acted upon"
     assert state.setpoint == SetpointMemory()
     assert state.plan == PlanMemory(since_us=NOW_US, next_id=7, counters=PlannerCounters(plans=5))
-    assert state.cascade.commanded.rotor_thrust == (0.0,) * 4
+    assert state.record.commanded.rotor_thrust == (0.0,) * 4
 
 
 def test_arming_in_the_air_hovers_at_once() -> None:
@@ -312,7 +312,7 @@ def test_arming_in_the_air_hovers_at_once() -> None:
     assert state.nominal is not None
     assert (state.nominal.p, state.nominal.v) == (HERE, (0.0, 0.0, 0.0))
     weight = 9.81 * CONFIG.airframe.mass
-    assert sum(state.cascade.commanded.rotor_thrust) == pytest.approx(weight, rel=0.05)
+    assert sum(state.record.commanded.rotor_thrust) == pytest.approx(weight, rel=0.05)
 
 
 def test_a_takeoff_chosen_before_arming_follows_it() -> None:
@@ -568,7 +568,7 @@ def test_what_follows_a_push_begins_off_its_surface(mode: Mode) -> None:
     begun = []
     for near in (0, 1):
         state = with_record(flying(Mode.OFFBOARD))
-        state.cascade.pressing.near, state.cascade.pressing.normal[:] = near, (-0.8, 0.6, 0.0)
+        state.record.pressing.near, state.record.pressing.normal[:] = near, (-0.8, 0.6, 0.0)
         state, _ = carried_out(state, SwitchMode(mode))
         begun.append(state.vehicle.mode_origin)
     moved = [one - other for one, other in zip(begun[1], begun[0], strict=True)]

@@ -127,11 +127,11 @@ def test_on_the_rotors_model_alone_rotors_stop_close_above_the_ground(
 ) -> None:
     """And with a gyro they carry it down to the ground."""
     state = flying(Mode.DESCEND, ranges=kept(sample))
-    carries = changed(state.cascade, rotors=(0.25 * WEIGHT,) * 4)
+    carries = changed(state.record, rotors=(0.25 * WEIGHT,) * 4)
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
     for lost in (True, False):
         aiding = Aiding(height_sigma=sigma, gyro_lost=lost)
-        found = feel_ground(CONFIG, replace(state, cascade=carries, aiding=aiding), estimate)
+        found = feel_ground(CONFIG, replace(state, record=carries, aiding=aiding), estimate)
         assert found[1] is (landed and lost)
 
 
@@ -244,7 +244,7 @@ def landed_after(
     for k in range(1, 2000):
         open_ = state.vehicle.unloaded is not None
         v = v + fall * 1e-6 * TICK_US if open_ else velocity
-        state = replace(state, cascade=changed(state.cascade, rotors=() if open_ else rotors))
+        state = replace(state, record=changed(state.record, rotors=() if open_ else rotors))
         here = vehicle_at((0.0, 0.0, GROUND_Z - height), (0.0, 0.0, v), k * TICK_US)
         state, landed = feel_ground(CONFIG, state, here)
         if landed:

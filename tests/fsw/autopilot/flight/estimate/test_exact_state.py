@@ -49,7 +49,7 @@ def seen(state: FlightState, s: SensorFrame, stale_us: int = 0) -> tuple[FlightS
     """The state after a tick of estimates, and what it said."""
     texts: list[StatusText] = []
     state, r = EXACT.estimate(state, TickInputs(s, stale_us=stale_us), texts)
-    return replace(state, cascade=r), [one.text for one in texts]
+    return replace(state, record=r), [one.text for one in texts]
 
 
 def estimate_of(state: FlightState) -> StateEstimate:

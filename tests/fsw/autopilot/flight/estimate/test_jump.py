@@ -29,7 +29,7 @@ def errors(state: FlightState, estimate: StateEstimate) -> np.ndarray:
         [
             *np.subtract(estimate.p_WB, state.nominal.p),
             wrap_angle(yaw_of(estimate.R_WB) - state.nominal.yaw),
-            *np.subtract(estimate.v_WB, state.cascade.observed.v),
+            *np.subtract(estimate.v_WB, state.record.observed.v),
         ]
     )
 
@@ -43,7 +43,7 @@ def moving(random: np.random.Generator) -> tuple[FlightState, StateEstimate]:
     )
     cascade = with_nominal(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
     cascade.observed.v[:] = random.uniform(-1.0, 1.0, 3)
-    return replace(flying(), cascade=cascade), estimate
+    return replace(flying(), record=cascade), estimate
 
 
 def turned_and_moved(

@@ -101,7 +101,7 @@ class Evidence:
             host=self.host,
             damage=self.damage,
             kept=self.kept,
-            cascade=changed(
+            record=changed(
                 Tick(),
                 pressing=changed(Pressing(), **self.pressing),
                 payload=changed(Payload(), mass=self.held),

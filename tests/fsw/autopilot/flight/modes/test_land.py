@@ -49,7 +49,7 @@ def test_a_plan_below_a_vehicle_that_flies_is_no_ground() -> None:
     x, y, z = estimate.p_WB
     nominal = nominal_at_rest(estimate)._replace(p=(x, y, z + 0.06))
     hover = with_nominal(in_hover(CONFIG.airframe, estimate), nominal)
-    state = replace(flying(Mode.LAND, moved_us=0), cascade=hover)
+    state = replace(flying(Mode.LAND, moved_us=0), record=hover)
     after, result = LAND.update(state, estimate)
     assert result.next_mode is None
     assert after.vehicle.moved_us == estimate.t_us

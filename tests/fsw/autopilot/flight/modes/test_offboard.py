@@ -278,7 +278,7 @@ def test_the_setpoint_begins_anew_only_where_it_is_of_another_point() -> None:
 
 def test_an_attitude_is_an_acceleration_by_the_mass_that_was_weighed() -> None:
     state = hearing(attitude=ATTITUDE, motion_us=NOW_US)
-    light = replace(state, cascade=changed(state.cascade, mass=2.0))
+    light = replace(state, record=changed(state.record, mass=2.0))
     goal = aimed(light).goal
     assert goal is not None
     thrust = 0.5 * 4.0 * CONFIG.airframe.weakest_thrust

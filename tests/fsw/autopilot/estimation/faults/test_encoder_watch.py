@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fsw.autopilot.estimation.fusion_memory import EncoderWatch
+from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
 from fsw.autopilot.signals import JointVector
 
 STANDS, MOVES = (0.7, -0.2), (0.7015, -0.2)  # rad
