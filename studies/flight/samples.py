@@ -18,9 +18,10 @@ from sitl.sensors.gnss import GnssMeasurement
 from sitl.sensors.imu import ImuMeasurement
 
 _NOT_STATED: Final = 0.0  # a variance that the message has no field for
-# By the name that a kind has on both sides; where nothing else is said, in the same order.
-_KINDS: Final[dict[str, Any]] = {
-    kind.__name__.removesuffix("Sample"): kind for kind in get_args(Sample)
+# By the name that a kind has on both sides, and how many fields; where nothing else is said, in the
+# same order.
+_KINDS: Final[dict[str, tuple[Any, int]]] = {
+    kind.__name__.removesuffix("Sample"): (kind, len(fields(kind))) for kind in get_args(Sample)
 }
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 
@@ -45,11 +46,11 @@ def sample(said: Measurement) -> Sample:
             )
         case PressureMeasurement():
             return PressureSample(time, standard_altitude(said.pressure_pa), _NOT_STATED)
-    kind = _KINDS.get(type(said).__name__.removesuffix("Measurement"))
+    values: Any = said
+    kind, count = _KINDS.get(type(said).__name__.removesuffix("Measurement"), (None, 0))
     if kind is None:
         raise TypeError(f"{said} is nothing that the flight software takes in")
-    values: Any = said
-    found: Sample = kind(time, *values[1 : len(fields(kind))])
+    found: Sample = kind(time, *values[1:count])
     return found
 
 
