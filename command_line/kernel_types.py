@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from typing import Any, Final
 
 # Said of a tuple of kernels, such as the table of shapes that a kernel calls (sitl/distance.py,
@@ -35,24 +37,35 @@ def compile_for_types(dispatcher: Any, without_value: Callable[[Any], Any]) -> N
     dispatcher.get_call_template = of_types
 
 
+def compile_within(dispatcher: Any, context: Callable[[], AbstractContextManager[None]]) -> None:
+    """Let numba compile a kernel within a ``context``, under its lock."""
+    compiler = getattr(dispatcher, "_compiler", None)
+    if compiler is None:  # NUMBA_DISABLE_JIT
+        return
+    compile_it = compiler.compile
+
+    def within(arguments: Any, returned: Any) -> Any:
+        with context():
+            return compile_it(arguments, returned)
+
+    compiler.compile = within
+
+
 def compile_quietly(dispatcher: Any) -> None:
     """Let numba compile a kernel without its warning of tuples of kernels, and with all others.
 
     Whoever imports a package may set up warnings anew, as pytest does for each test: a filter that
     was set by an import holds for as long as that.
     """
-    compiler = getattr(dispatcher, "_compiler", None)
-    if compiler is None:  # NUMBA_DISABLE_JIT
-        return
-    compile_it = compiler.compile
+    compile_within(dispatcher, _without_that_warning)
 
-    def quietly(arguments: Any, returned: Any) -> Any:
-        # Under numba's lock, as its own filters of warnings: these are of the whole process.
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", _TUPLE_OF_KERNELS)
-            return compile_it(arguments, returned)
 
-    compiler.compile = quietly
+@contextlib.contextmanager
+def _without_that_warning() -> Iterator[None]:
+    # Under numba's lock, as its own filters of warnings: these are of the whole process.
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", _TUPLE_OF_KERNELS)
+        yield
 
 
 _OF_ARRAYS: dict[Any, Any] = {}

@@ -13,9 +13,9 @@ from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from command_line.callee_code import give_callees_no_code
+from command_line.callee_code import callees_without_code
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types, compile_quietly, types_of
+from command_line.kernel_types import compile_for_types, compile_quietly, compile_within, types_of
 
 tell_layouts_apart(numba.types.Record)
 
@@ -68,7 +68,7 @@ def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
         numba.config.CACHE_DIR = before
     compile_for_types(dispatcher, numba.types.unliteral)
     compile_quietly(dispatcher)
-    give_callees_no_code(dispatcher)
+    compile_within(dispatcher, callees_without_code)
     _DISPATCHERS.append(dispatcher)
     return cast(Callable[P, R], dispatcher)
 

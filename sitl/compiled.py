@@ -10,9 +10,9 @@ import numba
 from llvmlite.binding import get_host_cpu_name
 from numba.extending import register_jitable
 
-from command_line.callee_code import give_callees_no_code
+from command_line.callee_code import callees_without_code
 from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types, compile_quietly, types_of
+from command_line.kernel_types import compile_for_types, compile_quietly, compile_within, types_of
 
 tell_layouts_apart(numba.types.Record)
 
@@ -60,7 +60,7 @@ def machine_code(function: Callable[P, R], *example: Any) -> Callable[P, R]:
 
 
 def compilable(function: Callable[P, R]) -> Callable[P, R]:
-    """Let compiled code take a pure function into itself; called from Python it stays Python."""
+    """Let compiled code take a function into itself; called from Python it stays Python."""
     same: Callable[P, R] = register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
     return same
 
@@ -81,5 +81,5 @@ def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:
         numba.config.CACHE_DIR = before
     compile_for_types(dispatcher, numba.types.unliteral)
     compile_quietly(dispatcher)
-    give_callees_no_code(dispatcher)
+    compile_within(dispatcher, callees_without_code)
     return cast(Callable[P, R], dispatcher)

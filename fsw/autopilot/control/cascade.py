@@ -373,7 +373,7 @@ def refer_joints(r: Tick, law: CascadeLaw, seconds: float) -> None:
 
 @compilable
 def drive_joints(r: Tick, law: CascadeLaw, motion: MotionState, ticks: int) -> None:
-    """Drive joints. Reads sent, mass, observed, health; writes joints, pressing, wanted."""
+    """Reads sent, mass, observed, health; writes joints, payload, pressing, observed, wanted."""
     airframe = law.airframe
     # Gravity less the base's acceleration.
     pushed = rotate_back(r.estimate.R_WB, r.observed.d)

@@ -41,9 +41,9 @@ def moving(random: np.random.Generator) -> tuple[FlightState, StateEstimate]:
         p_WB=tuple(random.uniform(-2.0, 2.0, 3).tolist()),
         v_WB=tuple(random.uniform(-1.0, 1.0, 3).tolist()),
     )
-    cascade = with_nominal(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
-    cascade.observed.v[:] = random.uniform(-1.0, 1.0, 3)
-    return replace(flying(), record=cascade), estimate
+    record = with_nominal(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
+    record.observed.v[:] = random.uniform(-1.0, 1.0, 3)
+    return replace(flying(), record=record), estimate
 
 
 def turned_and_moved(

@@ -176,6 +176,12 @@ def test_it_needs_setpoints() -> None:
     assert "no setpoint" in (OFFBOARD.refusal(replace(READY, setpoint_fresh=False)) or "")
 
 
+def test_a_refusal_says_how_long_it_waits_for_setpoints() -> None:
+    patient = Offboard(limits(setpoint_timeout_us=2_500_000))
+    refusal = patient.refusal(replace(READY, setpoint_fresh=False))
+    assert refusal == "not offboard: no setpoint was received in the last 2.5 s"
+
+
 @pytest.mark.parametrize(
     ("motion", "rises"),
     [
