@@ -377,7 +377,7 @@ class SensorFusion:
             drifts = sample.drifts
             if drifts:
                 memory = self._with_frame(memory, sample, announced)
-        refused = self._long_refused(memory, now) if isinstance(sample, PoseSample) else ()
+        refused = _refused_last(memory) if isinstance(sample, PoseSample) else ()
         kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
         ratio = sensor.fuse(memory, sample, one.half)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
@@ -387,21 +387,16 @@ class SensorFusion:
             return memory.after(
                 one, health.with_fused((now,) * len(ratio), ratio, shown), memory.runs
             )
-        passes = [r <= 1.0 and long for r, long in zip(ratio, refused, strict=False)]
+        passes = [r <= 1.0 and before for r, before in zip(ratio, refused, strict=False)]
         if any(passes) and not _is_small(sample, innovation):
-            # By now the gate is so wide that of garbage some is within it: a run has to say so.
+            # The gate widens meanwhile, until some of what is garbage is within it: a run has to
+            # say so.
             memory.numbers[0] = kept
             ratio = tuple([max(r, _JUST_REFUSED) for r in ratio])
         previous = kept if announced and drifts else None
         return self._judged(
             memory, one, ratio, innovation, now, announced=announced, previous=previous
         )
-
-    def _long_refused(self, memory: FusionMemory, now: float) -> tuple[bool, ...]:
-        """Whether each half of the last pose was refused, and has been for long."""
-        health, most = memory.of(Sensor.POSE), self.tuning.reset_time
-        halves = zip(health.ratio, health.fused, strict=False)
-        return tuple([1.0 < ratio < math.inf and now - used > most for ratio, used in halves])
 
     def _judged(
         self,
@@ -446,7 +441,9 @@ class SensorFusion:
         counter, memory = memory.reset_counter, memory.after(one, health, runs)
         believed = (
             run is not None
-            and run.is_believable(self.tuning.reset_time, announced=announced)
+            and run.is_believable(
+                self.tuning.reset_time, announced=announced, jumped=memory.reset.position
+            )
             and not _tilts(memory, sample, innovation, now)
         )
         if announced and run is not None and not believed:
@@ -526,6 +523,11 @@ def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFa
     if sample.time < now - ENCODERS_TOO_OLD:
         return SensorFault.TOO_OLD
     return SensorFault.RATE_TOO_LOW if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
+
+
+def _refused_last(memory: FusionMemory) -> tuple[bool, ...]:
+    """Whether each half of the last pose was refused."""
+    return tuple([1.0 < ratio < math.inf for ratio in memory.of(Sensor.POSE).ratio])
 
 
 def _is_small(sample: AidingSample, innovation: tuple[float, ...]) -> bool:

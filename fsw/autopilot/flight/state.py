@@ -240,7 +240,8 @@ class Aiding(NamedTuple):
     pose: Sensor = Sensor.POSE  # that gives positions
     pose_fault: SensorFault = SensorFault.STALE
     position_sigma: float = 0.0  # m, of the worst axis, without what lasts of a sensor's error
-    velocity_sigma: float = 0.0  # m/s, the same
+    elsewhere: float = 0.0  # m, how far away positions say it is that are refused meanwhile
+    velocity_sigma: float = 0.0  # m/s, as of the position
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error
     lost: tuple[LostSensor, ...] = ()  # others that are of no use

@@ -2,7 +2,8 @@
 
 What is refused in flight is compared by its innovation, which knows how the vehicle has moved: a
 run of refused samples goes on where value and direction nearly stay, of which noise makes no long
-one. How long a run must be until it is believed grows with how far it would move the estimate.
+one. How long a run must be until it is believed grows with how far it would move the estimate, from
+where it is or from where it was before it last jumped: what was believed wrongly is soon undone.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from fsw.autopilot.measurements import GnssSample, PoseSample
+from fsw.autopilot.signals import Vec3
 
 # By which share of itself an innovation changes besides, because an inertial unit that is wrong
 # leads the filter astray ever faster.
@@ -44,14 +46,23 @@ class Run(NamedTuple):
         """Whether so many samples say so that it is no chance."""
         return self.samples >= _NO_CHANCE
 
-    def is_believable(self, least: float, *, announced: bool = False) -> bool:
+    @property
+    def place(self) -> tuple[float, ...]:
+        """By how much [m, NED] it would move the estimate; empty: it says nothing of that."""
+        return self.innovation[:3] if self.kind in (PoseSample, GnssSample) else ()
+
+    def is_believable(
+        self, least: float, *, announced: bool = False, jumped: Vec3 = (0.0, 0.0, 0.0)
+    ) -> bool:
         """Whether it has lasted for ``least`` [s], and for as long as its size asks for.
 
-        Where the sensor has ``announced`` that it jumps, by little, two samples are enough.
+        Where the sensor has ``announced`` that it jumps, by little, two samples are enough. By
+        ``jumped`` [m, NED] the estimate was moved last: what takes that back moves it by the rest.
         """
-        place = self.innovation[:3] if self.kind in (PoseSample, GnssSample) else ()
+        place = self.place
         turn = self.innovation[3:] if self.kind is PoseSample else ()
-        sizes = [math.hypot(*place), math.hypot(*turn)]
+        undone = math.hypot(*[p + jump for p, jump in zip(place, jumped, strict=False)])
+        sizes = [min(math.hypot(*place), undone), math.hypot(*turn)]
         if announced:
             least = 0.0
             if all(size <= most for size, most in zip(sizes, _ANNOUNCED, strict=True)):

@@ -375,6 +375,7 @@ def _aiding(
         pose=aid.sensor,
         pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
         position_sigma=drifted,
+        elsewhere=_elsewhere(memory),
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11], 0.0)),
         attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
         height_sigma=math.sqrt(max(pose[11], 0.0)),
@@ -385,6 +386,13 @@ def _aiding(
         disputed_us=max(round(1e6 * disputed), 1) if suspects else 0,
         suspects=names(suspects),
     )
+
+
+def _elsewhere(memory: FusionMemory) -> float:
+    """How far [m] from the estimate a run of positions is that are refused since one was used."""
+    used = memory.now - unaided(memory, memory.now)
+    runs = [one for one in memory.runs if one.last > used and one.is_no_noise]
+    return max([math.hypot(*one.place) for one in runs], default=0.0)
 
 
 def _recently(aid: Health) -> float:

@@ -173,6 +173,12 @@ def position_is_off(context: FailsafeContext, most: float) -> bool:
     return is_unaided(context) and not context.state.aiding.position_sigma <= most
 
 
+def position_is_disputed(context: FailsafeContext) -> bool:
+    """Positions are missing; the estimate is off, or those refused say so, by COM_POS_LOW_EPH."""
+    aiding, most = context.state.aiding, context.limits.position_low
+    return position_is_off(context, most) or (is_unaided(context) and aiding.elsewhere > most)
+
+
 def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
     """Those that have been of no use for COM_SENS_LOSS_T, but for those that give the position."""
     since_us = context.estimate.t_us - context.limits.sensor_loss_us

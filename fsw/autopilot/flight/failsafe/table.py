@@ -199,7 +199,7 @@ FAILSAFES: Final = (
     ),
     _fault(
         Condition.POSITION_LOW,
-        lambda c: evidence.position_is_off(c, c.limits.position_low),
+        evidence.position_is_disputed,
         lambda c: actions.by_number(c.limits.position_low_action),
         Severity.CRITICAL,
         wording.uncertain,

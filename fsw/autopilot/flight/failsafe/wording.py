@@ -19,7 +19,8 @@ from fsw.autopilot.signals import SolverStatus
 
 def uncertain(context: FailsafeContext) -> str:
     """By how much the position is, and why it is not measured."""
-    return f" by {1e3 * context.state.aiding.position_sigma:.0f} mm{unaided(context)}"
+    aiding = context.state.aiding
+    return f" by {1e3 * max(aiding.position_sigma, aiding.elsewhere):.0f} mm{unaided(context)}"
 
 
 def unaided(context: FailsafeContext) -> str:
