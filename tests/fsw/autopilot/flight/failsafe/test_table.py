@@ -622,6 +622,20 @@ def test_in_dead_reckoning_it_holds_and_then_descends(
     assert lost_rows(adrift) == {**expected, Condition.AIDING_LOST: Action.DEAD_RECKON}
 
 
+@pytest.mark.requirement("REQ-EST-4")
+@pytest.mark.parametrize(("elsewhere", "holds"), [(0.1, False), (0.11, True), (5.0, True)])
+def test_it_holds_where_refused_positions_say_that_it_is_elsewhere(
+    elsewhere: float, holds: bool
+) -> None:
+    """It had flown on by a jump that was believed a second later, and by then it was fast."""
+    trajectory = replace(FINE, mode=Mode.TRAJECTORY)
+    disputed = replace(trajectory, aiding=UNAIDED._replace(elsewhere=elsewhere))
+    hold = {Condition.POSITION_LOW: Action.HOLD} if holds else {}
+    assert lost_rows(disputed) == {**hold, Condition.AIDING_LOST: Action.DEAD_RECKON}
+    aided = replace(trajectory, aiding=Aiding(elsewhere=elsewhere))
+    assert lost_rows(aided) == {}
+
+
 @pytest.mark.requirement("REQ-EST-4", "REQ-EST-6")
 @pytest.mark.parametrize(
     ("number", "expected"), [(1, Action.WARN), (2, Action.HOLD), (5, Action.LAND)]
