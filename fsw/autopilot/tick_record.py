@@ -2,8 +2,9 @@
 
 First come the estimate, the plan's state and its input, then the memory of the loops and of the
 watch over the actuators. Which law reads and writes what says the law; their order is that of
-``Autopilot.tick``, and of ``close_loops`` in ``fsw/autopilot/control/cascade.py``. Python objects
-are made of it where somebody asks for them.
+``Autopilot.tick``, and of ``close_loops`` in ``fsw/autopilot/control/cascade.py``. Kernels read its
+fields; its properties ``state_estimate``, ``plan_state``, ``plan_input`` and ``actuator_command``
+are the values that Python hands around, made where they are asked for.
 """
 
 from __future__ import annotations
@@ -327,14 +328,14 @@ class Tick(Record):
     payload: Payload
 
     @property
-    def commanded(self) -> ActuatorCommand:
-        """The last command."""
+    def actuator_command(self) -> ActuatorCommand:
+        """The last command, ``sent``."""
         found: Any = _COUNTED_COMMAND.unpack_from(self.memory, _COUNTS_AT)
         rotors, joints = 2 + found[0], 2 + ROTORS + found[1]
         return ActuatorCommand(found[2:rotors], found[2 + ROTORS : joints])
 
-    @commanded.setter
-    def commanded(self, command: ActuatorCommand) -> None:
+    @actuator_command.setter
+    def actuator_command(self, command: ActuatorCommand) -> None:
         thrust, torque = padded(command.rotor_thrust, ROTORS), padded(command.joint_torque, JOINTS)
         _COMMAND.pack_into(self.memory, _SENT_AT, *thrust, *torque)
 
@@ -383,21 +384,21 @@ class Tick(Record):
         return _JOINTS.unpack_from(self.memory, _REFERENCE_AT)[: self.joint_count]
 
     @property
-    def known(self) -> StateEstimate | None:
-        """The estimate; None: there has been none yet."""
+    def state_estimate(self) -> StateEstimate | None:
+        """The ``estimate``; None: there has been none yet."""
         known, _, _, joints = _HEAD.unpack_from(self.memory, _HEAD_AT)
         return estimate_in(self, 0, joints) if known else None
 
-    @known.setter
-    def known(self, x: StateEstimate) -> None:
+    @state_estimate.setter
+    def state_estimate(self, x: StateEstimate) -> None:
         self.has_estimate = 1
         t_us, p, v, R, w, yaw, q, qd, force = x
         known = _ESTIMATES[len(q)]
         known.pack_into(self.memory, 0, t_us, *p, *v, *R, *w, yaw, *q, *qd, force)
 
     @property
-    def nominal(self) -> PredictionState | None:
-        """The plan's state; None: there is none."""
+    def plan_state(self) -> PredictionState | None:
+        """The ``plan``'s state; None: there is none."""
         _, planned, _, joints = _HEAD.unpack_from(self.memory, _HEAD_AT)
         if not planned:
             return None
@@ -406,8 +407,8 @@ class Tick(Record):
         q, qd = n[15 : 15 + joints], n[15 + JOINTS : 15 + JOINTS + joints]
         return PredictionState(p, v, a, j, s, n[13], n[14], q, qd)
 
-    @nominal.setter
-    def nominal(self, x: PredictionState | None) -> None:
+    @plan_state.setter
+    def plan_state(self, x: PredictionState | None) -> None:
         self.has_plan = int(x is not None)
         if x is not None:
             p, v, a, j, s, yaw, rate, q, qd = x
@@ -415,14 +416,14 @@ class Tick(Record):
             _PLAN.pack_into(self.memory, _PLAN_AT, *p, *v, *a, *j, *s, yaw, rate, *arm)
 
     @property
-    def input(self) -> PlanInput:
-        """The plan's input."""
+    def plan_input(self) -> PlanInput:
+        """The plan's input, ``u``."""
         n: Any = _INPUT.unpack_from(self.memory, _INPUT_AT)
         push = n[4 + JOINTS : 7 + JOINTS]
         return PlanInput(n[:3], n[3], n[4 : 4 + self.joint_count], push, n[-1])
 
-    @input.setter
-    def input(self, u: PlanInput) -> None:
+    @plan_input.setter
+    def plan_input(self, u: PlanInput) -> None:
         arm = padded(u.qdd_arm, JOINTS)
         _INPUT.pack_into(self.memory, _INPUT_AT, *u.a, u.yaw_acc, *arm, *u.push, u.force)
 

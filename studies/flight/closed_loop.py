@@ -221,7 +221,7 @@ class CalmStretch:
                 break
             r, flown = after, flown + 1
             simulation.advance(
-                loop.controls(r.commanded, armed=True, gripper=before.vehicle.gripper)
+                loop.controls(r.actuator_command, armed=True, gripper=before.vehicle.gripper)
             )
             if simulation.ended is not None:
                 break

@@ -389,7 +389,7 @@ class WatchedController:
             OwnPartError: The command cannot be flown.
         """
         state, outputs = self._autopilot.tick(state, inputs)
-        estimate = state.record.known
+        estimate = state.record.state_estimate
         if outputs.mode is not Mode.TRAJECTORY or estimate is None or not state.vehicle.flies:
             return state, outputs
         t_us = inputs.sensors.t_us
@@ -406,7 +406,7 @@ class WatchedController:
             self._recorder.overridden_s += self._tick_s
             self._last = outputs.actuators
             return state, outputs
-        self._last = state.record.commanded = command
+        self._last = state.record.actuator_command = command
         # Our plans begin where this controller has led the vehicle, not where ours would have.
         if outputs.plan_request is not None:
             state = replace(state, safety=replace(state.safety, replan=True))

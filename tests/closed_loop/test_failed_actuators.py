@@ -78,9 +78,9 @@ def test_a_limp_joint_is_named_once_and_asked_for_nothing_more() -> None:
     assert text.startswith("failsafe: joint failed: joint 2 gives no torque")
     assert flight.mode is Mode.LAND
     assert flight.sent[-1].joint_torque[1] == 0.0
-    assert flight.state.nominal is not None
+    assert flight.state.plan_state is not None
     assert flight.state.estimate is not None
-    assert flight.state.nominal.q_arm[1] == flight.state.estimate.q_arm[1]
+    assert flight.state.plan_state.q_arm[1] == flight.state.estimate.q_arm[1]
 
 
 @pytest.mark.requirement("REQ-ACT-1", "REQ-ACT-3")

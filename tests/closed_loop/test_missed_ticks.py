@@ -75,9 +75,9 @@ def fly(lost: set[int], ticks: int) -> tuple[FlightState, list[PlanRequest]]:
 def test_the_plan_s_state_is_where_it_would_be_without_the_loss(lost: set[int]) -> None:
     whole, _ = fly(set(), 140)
     holed, _ = fly(lost, 140)
-    assert whole.nominal is not None
-    assert whole.nominal == holed.nominal
-    assert math.dist(whole.nominal.p, (0.0, 0.0, -2.0)) > 1e-3, "it moves"
+    assert whole.plan_state is not None
+    assert whole.plan_state == holed.plan_state
+    assert math.dist(whole.plan_state.p, (0.0, 0.0, -2.0)) > 1e-3, "it moves"
 
 
 @pytest.mark.parametrize("lost", [{49, 50, 51}, {100}])
@@ -85,9 +85,9 @@ def test_a_loss_of_the_planning_tick_costs_a_hundredth_of_a_millimetre(lost: set
     """The next plan is another one; without the missed steps the state would be 40 um off."""
     whole, _ = fly(set(), 140)
     holed, _ = fly(lost, 140)
-    assert whole.nominal is not None
-    assert holed.nominal is not None
-    assert 0.0 < math.dist(whole.nominal.p, holed.nominal.p) < 2e-5
+    assert whole.plan_state is not None
+    assert holed.plan_state is not None
+    assert 0.0 < math.dist(whole.plan_state.p, holed.plan_state.p) < 2e-5
 
 
 def test_a_lost_planning_tick_is_planned_on_the_next_and_the_grid_stays() -> None:
@@ -103,7 +103,7 @@ def test_without_loss_every_step_is_one_step_of_the_model() -> None:
     plan = state.plan.running
     assert plan is not None
     assert len(asked) == 1
-    assert state.nominal == model.advance(plan.start, plan.inputs[0], 3)
+    assert state.plan_state == model.advance(plan.start, plan.inputs[0], 3)
 
 
 def test_no_rotor_or_joint_is_blamed_for_what_stopped_while_no_tick_was_there() -> None:

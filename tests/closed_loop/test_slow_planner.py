@@ -143,8 +143,8 @@ def test_without_plans_it_brakes_with_the_tilt_that_the_plan_may_use(tilt_deg: f
     for _ in range(40):
         flight.run(0.2)
         if Condition.PLAN_STALE.value in flight.snapshot.failures:
-            assert flight.state.nominal is not None
-            asked = max(asked, -flight.state.nominal.a[0])
+            assert flight.state.plan_state is not None
+            asked = max(asked, -flight.state.plan_state.a[0])
     most = GRAVITY * math.tan(math.radians(tilt_deg))
     assert 0.7 * most < asked < 1.02 * most
     assert math.dist(flight.sim.truth().v_WB, (0.0, 0.0, 0.0)) < 0.05

@@ -80,9 +80,9 @@ def test_one_tick_of_nonsense_does_not_leave_the_vehicle_in_open_loop() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))
     flight.run(0.5)
-    nominal = flight.state.nominal
+    nominal = flight.state.plan_state
     assert nominal is not None
-    flight.state = with_record(flight.state, nominal=nominal._replace(q_arm=(math.nan, 0.0)))
+    flight.state = with_record(flight.state, plan_state=nominal._replace(q_arm=(math.nan, 0.0)))
     flight.step()
     assert flight.state.output_replaced
     flight.run(0.5)

@@ -50,19 +50,19 @@ def changed(record: Kind, **fields: Any) -> Kind:
 def with_given(before: Tick, estimate: StateEstimate, plan: PredictionState, u: PlanInput) -> Tick:
     """The record of a tick that is given these, before the loops are closed."""
     r = before.copy()
-    r.known, r.nominal, r.input = estimate, plan, u
+    r.state_estimate, r.plan_state, r.plan_input = estimate, plan, u
     return r
 
 
 def with_record(state: FlightState, **fields: Any) -> FlightState:
-    """A state whose record has other fields, the estimate as ``known``."""
+    """A state whose record has other fields or ``state_estimate``."""
     return replace(state, record=changed(state.record, **fields))
 
 
 def placed(airframe: Airframe, estimate: StateEstimate, mass: float | None = None) -> Tick:
     """A record whose bodies are those of an estimate."""
     r = new_tick(airframe.mass if mass is None else mass, airframe.rotors, airframe.bodies.joints)
-    r.known = estimate
+    r.state_estimate = estimate
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, estimate)
     return r
 

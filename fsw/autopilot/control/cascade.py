@@ -89,7 +89,7 @@ def at_rest(airframe: Airframe, estimate: StateEstimate, before: Tick | None = N
     if before is not None:
         r.take_given(before)
         r.watch = before.watch
-    r.known = estimate
+    r.state_estimate = estimate
     r.observed.v[:] = estimate.v_WB
     rest_joints(r.joints, airframe, estimate)
     return r
@@ -188,7 +188,7 @@ class Cascade:
     def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
         now = r.copy()
-        now.known = estimate
+        now.state_estimate = estimate
         return self._motion(self.packed, now.array)
 
     def expected(self, r: Tick) -> tuple[JointVector, ExpectedMotion, Vec3]:

@@ -61,7 +61,7 @@ def rest_joints(k: Joints, airframe: Airframe, estimate: StateEstimate) -> None:
     """Let joint loops begin."""
     k.numbers[:] = 0.0
     still = Tick()
-    still.known = estimate
+    still.state_estimate = estimate
     _place(_packed(airframe), still.array)
     k.reference[:], k.momentum[:] = still.estimate.q_arm, still.bodies.momentum
 

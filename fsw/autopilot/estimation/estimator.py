@@ -44,7 +44,7 @@ def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
     """The vehicle's state, or None where a reading is no number, out of range or no attitude."""
     r = Tick()
     r.joint_count = len(sensors.q_arm)
-    return None if read_frame(sensors, r) else r.known
+    return None if read_frame(sensors, r) else r.state_estimate
 
 
 def read_frame(sensors: SensorFrame, r: Tick) -> int:

@@ -197,7 +197,7 @@ class Autopilot:
         calm = self.calm.fly(state, inputs)
         if calm is not None:
             r, fusion, estimate = calm
-            outputs = self._commanded(state, r, r.commanded, flown=True)
+            outputs = self._commanded(state, r, r.actuator_command, flown=True)
             return Controlled(
                 outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
             )
@@ -229,12 +229,12 @@ class Autopilot:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
         if state.record is not began:  # loops or plan begin anew
             r = state.record.copy()
-            r.known = estimate
+            r.state_estimate = estimate
         plan = state.plan
         if flown:
             plan = self._follow(state, r, estimate, inputs.plan, looped)
         else:
-            r.input = rest_input(r.joint_count)
+            r.plan_input = rest_input(r.joint_count)
         sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
         outputs = self._commanded(state, r, sent, flown=flown)
         outputs = replace(outputs, acks=tuple(acks), texts=tuple(texts))
@@ -255,11 +255,11 @@ class Autopilot:
         """The record of this tick, with its estimate or the last one, and the estimator's part."""
         if not inputs.samples and state.fusion is None:
             state, r = self._exact.estimate(state, inputs, texts)
-            return state, r, r.known, None, None
+            return state, r, r.state_estimate, None, None
         state, fusion, estimate, caught = self._sensed.estimate(state, inputs)
         r = state.record.copy()
         if estimate is not None:
-            r.known = estimate
+            r.state_estimate = estimate
         return state, r, estimate, fusion, caught
 
     def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:
@@ -275,7 +275,7 @@ class Autopilot:
             safety = self._watch.off_plan(
                 safety,
                 estimate,
-                r.nominal if flown else None,
+                r.plan_state if flown else None,
                 state.accuracy.reach,
                 max(self._wind_room(r)),
             )
@@ -286,7 +286,7 @@ class Autopilot:
             if reset is not None:
                 r = moved_along(r, reset)
             if found is not None and found is not estimate:
-                r.known = found
+                r.state_estimate = found
             estimate = found
         if c.calm and texts is outputs.texts and reset is None:
             damage = state.damage if fusion is None else self._see_damage(state, r, c)
@@ -303,7 +303,7 @@ class Autopilot:
         index = state.index + c.ticks
         request = None
         if index // per_plan != state.index // per_plan:
-            nominal = r.nominal if flown else None
+            nominal = r.plan_state if flown else None
             state = replace(state, plan=plan, safety=safety, fusion=fusion)
             state, request, news = self._each_period(state, estimate, nominal, now_us)
             plan, safety, texts = state.plan, state.safety, (*texts, *news)
@@ -389,11 +389,13 @@ class Autopilot:
         Reads plan; writes plan, u.
         """
         plan = self._plans.follow(state.plan, r, answer, estimate.t_us, ticks)
-        before = state.nominal if state.vehicle.mode is _DESCEND else None
+        before = state.plan_state if state.vehicle.mode is _DESCEND else None
         if before is not None:
             goal = state.setpoint.goal
             place = None if goal is None else goal.motion.p
-            r.nominal, r.input = self._descent.step(before, estimate, state.aiding, ticks, place)
+            r.plan_state, r.plan_input = self._descent.step(
+                before, estimate, state.aiding, ticks, place
+            )
         if state.damage.joint:
             freeze_arm(r, estimate, state.damage.report.joints)
         return plan
@@ -625,7 +627,7 @@ class Autopilot:
         )
 
     def _battery(self, state: FlightState) -> BatteryState:
-        thrust = state.record.commanded.rotor_thrust
+        thrust = state.record.actuator_command.rotor_thrust
         period = 1e-6 * self.config.mpc_period_us
         return drained(self.config.airframe, self._battery_levels, state.battery, thrust, period)
 
@@ -653,7 +655,7 @@ class Autopilot:
             tube = self._watch.tube(state)
             r.payload.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0
             self._cascade.step(r, ticks, self.zones_now(state), state.damage.health, tube)
-            wanted = r.commanded
+            wanted = r.actuator_command
             if not r.flags & GATE_NEEDED:  # what flies is armed
                 return wanted, r, False
         elif armed:
@@ -662,13 +664,13 @@ class Autopilot:
             r = at_rest(airframe, estimate, r)
         else:
             wanted = stopped(airframe)
-        sent, replaced = gate(airframe, wanted, last.commanded, armed)
+        sent, replaced = gate(airframe, wanted, last.actuator_command, armed)
         if replaced:
             # The NaN is in the loops' new memory as well: discard that.
             found, r = r, last.copy()
             r.take_given(found)
             r.flags, r.margin = found.flags, found.margin
-        r.commanded = sent
+        r.actuator_command = sent
         return sent, r, replaced
 
     def _let_down(self, estimate: StateEstimate) -> JointVector:

@@ -105,7 +105,7 @@ class CalmTick:
         if news or estimate is None or not estimate.R_WB[8] > self._watch.upright:
             return None
         r = before.copy()
-        r.known = estimate
+        r.state_estimate = estimate
         self._model.move(r, 1)
         self._close_loops(r)
         return None if r.flags else (r, fusion, estimate)
@@ -175,7 +175,7 @@ def _is_range(sample: Sample) -> bool:
 def _is_calm(state: FlightState, config: FlightConfig) -> bool:
     """Whether nothing goes on that a calm tick does not know of."""
     vehicle, plan, r = state.vehicle, state.plan, state.record
-    estimate = r.known
+    estimate = r.state_estimate
     return (
         vehicle.mode is Mode.TRAJECTORY
         and vehicle.flies

@@ -165,7 +165,7 @@ class PlanExchange:
         memory, new_plan = take_answer(memory, answer, now_us)
         if new_plan is not None:
             late = max(now_us - new_plan.t_us, 0) // tick_us
-            r.nominal, r.input = new_plan.start, new_plan.inputs[0]
+            r.plan_state, r.plan_input = new_plan.start, new_plan.inputs[0]
             self.model.move(r, late)
         elif now_us > memory.since_us:
             for ago in range(ticks, 0, -1):
@@ -178,10 +178,10 @@ class PlanExchange:
         """The running plan's input, as ``plan_input`` has it."""
         u = None if plan is None else planned_input(plan, now_us)
         if u is None:
-            nominal = r.nominal
+            nominal = r.plan_state
             assert nominal is not None
             u = self._brake(nominal)
-        r.input = u
+        r.plan_input = u
 
     def start(
         self,
@@ -237,5 +237,5 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
 def with_nominal(r: Tick, nominal: PredictionState) -> Tick:
     """A record with another state of the plan."""
     r = r.copy()
-    r.nominal = nominal
+    r.plan_state = nominal
     return r

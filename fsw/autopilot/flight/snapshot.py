@@ -31,7 +31,7 @@ class Shown:
 def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
     """The vehicle after a tick with this frame of its ``sensors``, which left this state."""
     vehicle, plan, goal, r = state.vehicle, state.plan, state.setpoint.goal, state.record
-    estimate, nominal = r.known, r.nominal if vehicle.flies else None
+    estimate, nominal = r.state_estimate, r.plan_state if vehicle.flies else None
     assert estimate is not None
     return FlightSnapshot(
         t_us=estimate.t_us,
@@ -40,8 +40,8 @@ def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
         estimate=estimate,
         reference=state.reference,
         plan_state=nominal,
-        plan_input=None if nominal is None else r.input,
-        actuators=r.commanded,
+        plan_input=None if nominal is None else r.plan_input,
+        actuators=r.actuator_command,
         plan=plan.running,
         plan_status=plan.status,
         counters=plan.counters,

@@ -310,12 +310,12 @@ class FlightState:
     @property
     def estimate(self) -> StateEstimate | None:
         """The last valid one, made anew each time."""
-        return self.record.known
+        return self.record.state_estimate
 
     @property
-    def nominal(self) -> PredictionState | None:
+    def plan_state(self) -> PredictionState | None:
         """Where the running plan wants the vehicle now, made anew each time."""
-        return self.record.nominal
+        return self.record.plan_state
 
 
 def first_state(airframe: Airframe) -> FlightState:

@@ -55,9 +55,9 @@ class NominalModel:
         """The state some ticks later under one input."""
         r = Tick()
         r.joint_count = len(x.q_arm)
-        r.nominal, r.input = x, u
+        r.plan_state, r.plan_input = x, u
         self.move(r, ticks)
-        moved = r.nominal
+        moved = r.plan_state
         assert moved is not None
         return moved
 

@@ -39,28 +39,28 @@ class ExactState:
         missing = read_frame(sensors, r)
         if not (missing or inputs.stale_us or state.invalid_ticks) and state.dropout is COMPLETE:
             return state, r
-        before, found = last.known, r.known
+        before, found = last.state_estimate, r.state_estimate
         assert found is not None
         if before is not None and state.vehicle.flies:
             lost = state.dropout is not COMPLETE and state.dropout.lost
             if lost and inputs.stale_us:
                 found = moved_on(before, 1e-6 * (sensors.t_us - before.t_us))
-                r.known = found._replace(t_us=sensors.t_us)
+                r.state_estimate = found._replace(t_us=sensors.t_us)
                 return state, r
             if (missing or lost) and not inputs.stale_us:
                 state, found = self._incomplete(state, before, found, missing, inputs, texts)
                 r = state.record.copy()
-                r.known = found
+                r.state_estimate = found
                 return state, r
         elif state.dropout is not COMPLETE and not (missing or inputs.stale_us):
             state = replace(state, dropout=COMPLETE, aiding=AIDED)
         if missing:
             r = last.copy()
             if before is not None:  # telemetry goes by its time, and goes on
-                r.known = before._replace(t_us=sensors.t_us)
+                r.state_estimate = before._replace(t_us=sensors.t_us)
             return replace(state, invalid_ticks=state.invalid_ticks + 1), r
         if inputs.stale_us:
-            r.known = moved_on(found, 1e-6 * inputs.stale_us)
+            r.state_estimate = moved_on(found, 1e-6 * inputs.stale_us)
         return (replace(state, invalid_ticks=0) if state.invalid_ticks else state), r
 
     def _incomplete(

@@ -44,10 +44,10 @@ def told(reset: Reset) -> str:
 
 def moved_along(r: Tick, reset: Reset) -> Tick:
     """The record with the plan's state and the observer's velocity moved along."""
-    r, nominal = r.copy(), r.nominal
+    r, nominal = r.copy(), r.plan_state
     if nominal is not None:
         yaw = yaw_of(matrix_from_quaternion(reset.turn))
-        r.nominal = nominal._replace(
+        r.plan_state = nominal._replace(
             p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
         )
     r.observed.v += reset.velocity

@@ -164,7 +164,7 @@ class SensedState:
             state, known = replace(state, fusion=memory), found or estimate
             if known is not None:
                 r = state.record.copy()
-                r.known = known
+                r.state_estimate = known
                 state = replace(state, record=r)
         return state, inputs
 

@@ -131,7 +131,7 @@ class ReferenceHorizon:
 
     def _is_off_plan(self, state: FlightState, estimate: StateEstimate) -> bool:
         """Whether the fast loop is off the plan: then the reference does not advance."""
-        nominal = state.nominal
+        nominal = state.plan_state
         if nominal is None:
             return False
         (x, y, z), (px, py, pz) = estimate.p_WB, nominal.p

@@ -80,7 +80,7 @@ def one_step(
     inner: Inner = "tracking",
 ) -> ActuatorCommand:
     cascade = Cascade(AIRFRAME, TUNING, inner, DT)
-    return after_step(cascade, in_hover(AIRFRAME, estimate), estimate, plan, u).commanded
+    return after_step(cascade, in_hover(AIRFRAME, estimate), estimate, plan, u).actuator_command
 
 
 def turned(yaw: float, w: Vec3 = STILL) -> StateEstimate:
@@ -118,7 +118,7 @@ def test_body_torque_is_eulers_equation() -> None:
     estimate = estimate_of(Rotation.from_euler("ZYX", [0.3, 0.05, -0.04]), w)
     cascade = Cascade(LIGHT, TUNING, "pid", DT)
     before = in_hover(LIGHT, estimate)
-    command = after_step(cascade, before, estimate, plan_at(0.3), NO_INPUT).commanded
+    command = after_step(cascade, before, estimate, plan_at(0.3), NO_INPUT).actuator_command
     reference = attitude_reference(STILL, 0.3)
     wanted, _ = attitude_pid(TUNING.attitude, STILL, estimate, reference, DT)
     inertia, spin = np.array(AIRFRAME.bodies.base_inertia[:3]), np.array(w)
@@ -157,7 +157,9 @@ def test_the_rotor_model_lags_behind_what_was_sent() -> None:
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = in_hover(AIRFRAME, estimate)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
-    after = after_step(cascade, changed(memory, commanded=sent), estimate, plan_at(), NO_INPUT)
+    after = after_step(
+        cascade, changed(memory, actuator_command=sent), estimate, plan_at(), NO_INPUT
+    )
     share = 1.0 - math.exp(-DT / AIRFRAME.rotor_lag)
     hover = 3.5 * 9.81 / 4.0
     assert after.rotors[:4] == pytest.approx([hover + share * (10.0 - hover)] * 4)
@@ -168,9 +170,9 @@ def test_a_vehicle_taken_over_carries_its_weight_and_one_at_rest_nothing() -> No
     hovering, standing = in_hover(AIRFRAME, moving), at_rest(AIRFRAME, moving)
     assert sum(hovering.rotors) == pytest.approx(AIRFRAME.mass * 9.81)
     each = hovering.rotors.item(0)
-    assert hovering.commanded == ActuatorCommand((each,) * 4, (0.0, 0.0))
+    assert hovering.actuator_command == ActuatorCommand((each,) * 4, (0.0, 0.0))
     assert hovering.rotors.tolist() == [*(each,) * 4, *(0.0,) * 4]
-    assert standing.commanded == stopped(AIRFRAME)
+    assert standing.actuator_command == stopped(AIRFRAME)
     assert not standing.rotors.any()
     for memory in (hovering, standing):
         assert memory.mass == AIRFRAME.mass
@@ -190,7 +192,7 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
     estimate = turned(0.0)._replace(v_WB=(0.05, -0.04, 0.03))
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     sent = ActuatorCommand((10.0, 10.0, 10.0, 10.0), (0.0, 0.0))
-    memory = changed(in_hover(AIRFRAME, turned(0.0)), commanded=sent)
+    memory = changed(in_hover(AIRFRAME, turned(0.0)), actuator_command=sent)
     after = after_step(cascade, memory, estimate, plan_at(), NO_INPUT, ticks)
     hover = 3.5 * 9.81 / 4.0
     left = math.exp(-ticks * DT / AIRFRAME.rotor_lag)
@@ -217,10 +219,10 @@ def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
         lower = field * m2 * c2 * math.sin(sum(q_arm))
         upper = field * (m1 * c1 + m2 * l1) * math.sin(q_arm[0])
         sent = ActuatorCommand(each, (upper + lower, lower))
-        memory = changed(in_hover(AIRFRAME, estimate), rotors=each, commanded=sent)
+        memory = changed(in_hover(AIRFRAME, estimate), rotors=each, actuator_command=sent)
         # The accelerometer agrees that the mass is what it was.
         seen = estimate._replace(specific_force=thrust / 3.5)
-        command = after_step(cascade, memory, seen, plan_at(q_arm=q_arm), NO_INPUT).commanded
+        command = after_step(cascade, memory, seen, plan_at(q_arm=q_arm), NO_INPUT).actuator_command
         # The observers see a vehicle at rest that should be rising, and believe a little of it.
         np.testing.assert_allclose(command.joint_torque, (upper + lower, lower), rtol=0.05)
 
@@ -230,7 +232,7 @@ def test_the_motion_is_that_of_the_rotors_one_tick_on_and_of_the_first_joints_to
     cascade = Cascade(AIRFRAME, TUNING, "tracking", DT)
     memory = changed(in_hover(AIRFRAME, estimate), mass=3.6)
     sent = ActuatorCommand((8.0, 9.0, 10.0, 11.0), (0.3, -0.7))
-    got = cascade.motion(changed(memory, commanded=sent), estimate)
+    got = cascade.motion(changed(memory, actuator_command=sent), estimate)
     left = math.exp(-DT / AIRFRAME.rotor_lag)
     f = [
         target + left * (now - target)
@@ -261,7 +263,7 @@ def test_spinning_about_two_axes_the_third_torque_is_eulers() -> None:
     cascade = Cascade(unlike, free, "pid", DT)
     command = after_step(
         cascade, in_hover(unlike, estimate), estimate, plan_at(), NO_INPUT
-    ).commanded
+    ).actuator_command
     inertia, spin = np.array(bodies.base_inertia[:3]), np.array(w)
     expected = np.cross(spin, inertia * spin) + [0.0, command.joint_torque[0], 0.0]
     np.testing.assert_allclose(torque_of(command), expected, atol=1e-7)

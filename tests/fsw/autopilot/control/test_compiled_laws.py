@@ -56,7 +56,7 @@ def four(random: np.random.Generator, high: float) -> Vec4:
 def memory(random: np.random.Generator) -> Tick:
     r = in_hover(AIRFRAME, random_estimate(random))
     torque = (float(random.uniform(-2.0, 2.0)), float(random.uniform(-2.0, 2.0)))
-    r.commanded = ActuatorCommand(four(random, AIRFRAME.weakest_thrust), torque)
+    r.actuator_command = ActuatorCommand(four(random, AIRFRAME.weakest_thrust), torque)
     r.rotors[:4] = random.uniform(0.0, AIRFRAME.weakest_thrust, 4)
     r.mass, r.height = float(random.uniform(2.5, 4.5)), float(random.uniform(-0.2, 0.2))
     r.observed.v[:], r.observed.d[:] = random.uniform(-1.0, 1.0, (2, 3))
@@ -112,7 +112,7 @@ def test_a_number_that_is_none_comes_out_as_none_and_is_left_to_the_gate() -> No
     plan = as_state(prediction_vector(random))._replace(q_arm=(math.nan, 0.0))
     after = with_given(memory(random), random_estimate(random), plan, plan_input(random))
     cascade.step(after)
-    assert not math.isfinite(sum(after.commanded.joint_torque))
+    assert not math.isfinite(sum(after.actuator_command.joint_torque))
     assert after.flags & GATE_NEEDED
 
 
@@ -124,12 +124,12 @@ def test_the_plans_state_moves_on_as_in_python(lag: AttitudeLag) -> None:
         x, u = as_state(prediction_vector(random)), plan_input(random)
         plain = Tick()
         plain.joint_count = 2
-        plain.nominal, plain.input = x, u
+        plain.plan_state, plain.plan_input = x, u
         for _ in range(ticks):
             move_plan(nominal.model, plain.plan, plain.u, 2)
         np.testing.assert_allclose(
             list(numbers(nominal.advance(x, u, ticks))),
-            list(numbers(plain.nominal)),
+            list(numbers(plain.plan_state)),
             rtol=0,
             atol=1e-9,
         )
@@ -158,7 +158,9 @@ def test_the_watch_over_actuators_is_the_one_of_python() -> None:
     plain, found = ours.copy(), 0
     for k in range(STATES):
         sent = ours.copy()
-        ours.known = plain.known = random_estimate(random)._replace(specific_force=9.81)
+        ours.state_estimate = plain.state_estimate = random_estimate(random)._replace(
+            specific_force=9.81
+        )
         ours.joints.reference[:2] = plain.joints.reference[:2] = random.uniform(-1.0, 1.0, 2)
         # Settled, and now and then one rotor is under suspicion for long.
         for r in (ours, plain):

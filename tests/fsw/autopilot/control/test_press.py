@@ -79,7 +79,7 @@ def stiffnesses(arm: Arm) -> np.ndarray:
 def at_surface(airframe: Airframe, seen: StateEstimate, normal: Vec3) -> Tick:
     """A record whose tool is just in front of a surface with a ``normal``."""
     r = new_tick(airframe.mass, airframe.rotors, airframe.bodies.joints)
-    r.known = seen
+    r.state_estimate = seen
     move_bodies(r.bodies, airframe.bodies, 0.0, seen)
     zones = moving_zones(SafeSet((replace(wall(normal, -9.0, 0.0), touch=TOUCH),)), None)
     r.pressing.near = 0
@@ -102,8 +102,8 @@ def pressed_upon(
         sent = np.zeros(JOINTS)
         sent[: arm.n] = arm.torque
         arm.move(swing, force, stiff)
-        r.known = estimate(arm.q, arm.qd, np.zeros(3))
-        move_bodies(r.bodies, airframe.bodies, 0.0, r.known)
+        r.state_estimate = estimate(arm.q, arm.qd, np.zeros(3))
+        move_bodies(r.bodies, airframe.bodies, 0.0, r.state_estimate)
         observe_contact(r, airframe, sent, vec3(G - swing), DT)
         weigh_tool(r, airframe, TUNING)
     return r, airframe

@@ -71,7 +71,7 @@ def test_a_part_that_is_no_number_is_named_and_the_others_stay(name: str) -> Non
     nothing: Any = (math.nan,) * len(getattr(GOOD, name))
     r = new_tick(3.5, 4, 2)
     assert read_frame(replace(GOOD, **{name: nothing}), r) == PARTS[name]
-    state = r.known
+    state = r.state_estimate
     assert state is not None
     if name != "gyro_B":
         assert state.w_WB_B == GOOD.gyro_B

@@ -48,7 +48,7 @@ def flown(
     for k in range(1, ticks):
         s = spoil(k, frame(k))
         r = new_tick(3.5, 4, 2)
-        missing, read = read_frame(s, r), r.known
+        missing, read = read_frame(s, r), r.state_estimate
         assert read is not None
         dropout, sentences = dropout.after(missing, s.t_us)
         said += [(k, one) for one in sentences]

@@ -264,7 +264,7 @@ def test_outside_a_wall_and_the_fence_both_are_told_with_their_own_sizes(again_u
     assert seen is not None
     kept = InflatedSafeSet().of(mission.safe_set)
     state = replace(
-        with_record(flying(), nominal=nominal_at_rest(seen)), mission=mission, kept=kept
+        with_record(flying(), plan_state=nominal_at_rest(seen)), mission=mission, kept=kept
     )
     texts: list[str] = []
     for t_us in (1_000_000, 1_000_000 + again_us):

@@ -249,7 +249,7 @@ def test_a_mode_that_is_complete_is_what_its_command_led_to() -> None:
     state = asked(flying(), SwitchMode(Mode.LAND), 1, sender=255)
     answered = state.vehicle.answered
     on_the_ground = replace(state, vehicle=replace(state.vehicle, landed=True))
-    on_the_ground = with_record(on_the_ground, nominal=None)
+    on_the_ground = with_record(on_the_ground, plan_state=None)
     estimate = STANDING
     while on_the_ground.vehicle.mode is Mode.LAND:
         estimate = estimate._replace(t_us=estimate.t_us + 100_000)
@@ -303,16 +303,16 @@ def test_arming_on_the_ground_begins_in_hold_with_home_here_and_all_wishes_forgo
     assert vehicle.conditions == (), "what is so is reported anew, and acted upon"
     assert state.setpoint == SetpointMemory()
     assert state.plan == PlanMemory(since_us=NOW_US, next_id=7, counters=PlannerCounters(plans=5))
-    assert state.record.commanded.rotor_thrust == (0.0,) * 4
+    assert state.record.actuator_command.rotor_thrust == (0.0,) * 4
 
 
 def test_arming_in_the_air_hovers_at_once() -> None:
     state = after(replace(DISARMED, vehicle=replace(DISARMED.vehicle, landed=False)), Arm())
     assert state.vehicle.flies
-    assert state.nominal is not None
-    assert (state.nominal.p, state.nominal.v) == (HERE, (0.0, 0.0, 0.0))
+    assert state.plan_state is not None
+    assert (state.plan_state.p, state.plan_state.v) == (HERE, (0.0, 0.0, 0.0))
     weight = 9.81 * CONFIG.airframe.mass
-    assert sum(state.record.commanded.rotor_thrust) == pytest.approx(weight, rel=0.05)
+    assert sum(state.record.actuator_command.rotor_thrust) == pytest.approx(weight, rel=0.05)
 
 
 def test_a_takeoff_chosen_before_arming_follows_it() -> None:
@@ -540,8 +540,8 @@ def test_a_mode_that_lifts_off_flies_with_a_plan_that_begins_where_the_vehicle_s
     idling = replace(DISARMED, vehicle=replace(DISARMED.vehicle, mode=Mode.HOLD))
     state = after(idling, TakeOff(Place()), estimate=STANDING)
     assert state.vehicle.flies
-    assert state.nominal is not None
-    assert state.nominal.p == STANDING.p_WB
+    assert state.plan_state is not None
+    assert state.plan_state.p == STANDING.p_WB
     assert state.plan.since_us == NOW_US
     flying_on = replace(flying(), plan=PlanMemory(since_us=5))
     assert after(flying_on, SwitchMode(Mode.LAND)).plan.since_us == 5

@@ -155,7 +155,7 @@ def test_legs_that_may_touch_the_ground_are_not_aloft(
     estimate = vehicle_at((0.0, 0.0, GROUND_Z - height), t_us=2_000_000)
     state = flying(ranges=kept(sample))
     state = replace(state, aiding=Aiding(height_sigma=sigma, disputed_us=disputed_us))
-    state = with_record(state, known=estimate)
+    state = with_record(state, state_estimate=estimate)
     legs = CONFIG.airframe.leg_length
     assert is_aloft(state, 2.0, legs, oldest=0.5) is aloft
     assert not is_aloft(with_record(state, has_estimate=0), 2.0, legs, oldest=0.5)
@@ -179,7 +179,7 @@ def test_a_rangefinder_that_is_known_to_be_wrong_does_not_say_how_high_it_is(
     stuck = fault is SensorFault.STUCK
     assert may_be_low(CONFIG, state, low) is stuck
     legs = CONFIG.airframe.leg_length
-    assert is_aloft(with_record(state, known=low), 2.0, legs, oldest=0.5) is not stuck
+    assert is_aloft(with_record(state, state_estimate=low), 2.0, legs, oldest=0.5) is not stuck
 
 
 @pytest.mark.requirement("REQ-EST-13")
@@ -293,6 +293,6 @@ def test_a_vehicle_that_falls_flies_on_with_a_plan_from_where_it_is() -> None:
     assert not landed
     assert after.vehicle.unloaded is None
     assert after.vehicle.moved_us == estimate.t_us
-    assert after.nominal is not None
-    assert after.nominal.p == estimate.p_WB
+    assert after.plan_state is not None
+    assert after.plan_state.p == estimate.p_WB
     assert after.plan.running is None

@@ -98,7 +98,7 @@ def test_a_plan_on_time_starts_where_it_says() -> None:
     exchange = PlanExchange(flight_config(body="points"))
     r = with_nominal(new_tick(3.5, 4, 2), moving())
     exchange.follow(WAITING, r, plan(), START_US, 1)
-    assert r.nominal == new.start
+    assert r.plan_state == new.start
 
 
 @pytest.mark.requirement("REQ-PLAN-1")
@@ -113,8 +113,8 @@ def test_a_late_plan_is_missed_once_and_starts_where_it_would_be_by_now() -> Non
     r = with_nominal(new_tick(3.5, 4, 2), moving())
     memory = PlanExchange(flight_config(body="points")).follow(memory, r, new, now_us, 1)
     assert (memory.counters.missed_deadlines, memory.counters.plans) == (1, 1)
-    assert r.nominal == MODEL.advance(new.start, new.inputs[0], 3)
-    assert r.input == new.inputs[0]
+    assert r.plan_state == MODEL.advance(new.start, new.inputs[0], 3)
+    assert r.plan_input == new.inputs[0]
 
 
 def test_before_its_time_nothing_is_missed() -> None:

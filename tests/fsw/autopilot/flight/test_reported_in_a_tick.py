@@ -49,10 +49,14 @@ def hovering(**changes: Any) -> FlightState:
         "plan": PlanMemory(since_us=BEGIN_US),
         **changes,
     }
-    nominal = given.pop("nominal", nominal_at_rest(seen))
+    nominal = given.pop("plan_state", nominal_at_rest(seen))
     kept = InflatedSafeSet().of(given["mission"].safe_set)
     return replace(
-        with_record(flying(), nominal=nominal), index=0, t_us=BEGIN_US - 2_000, kept=kept, **given
+        with_record(flying(), plan_state=nominal),
+        index=0,
+        t_us=BEGIN_US - 2_000,
+        kept=kept,
+        **given,
     )
 
 
@@ -167,7 +171,7 @@ def test_off_the_tube_is_reported_and_the_next_plan_starts_from_the_measurement(
     seen = estimate_state(IN_THE_AIR)
     assert seen is not None
     x, y, z = seen.p_WB
-    state = hovering(nominal=nominal_at_rest(seen)._replace(p=(x - off, y, z)))
+    state = hovering(plan_state=nominal_at_rest(seen)._replace(p=(x - off, y, z)))
     told_us, request = math.inf, None
     for t_us in range(BEGIN_US, BEGIN_US + 110_000, 2_000):
         state, outputs = tick(state, t_us, sensors=replace(IN_THE_AIR, t_us=t_us))

@@ -82,7 +82,7 @@ def test_a_vehicle_that_was_switched_on_stands_disarmed_and_has_heard_and_done_n
     )
     assert vehicle.gcs_heard_us < 0
     assert (state.index, state.invalid_ticks, state.output_replaced) == (-1, 0, False)
-    assert (state.record.commanded, state.mission.safe_set) == (stopped(AIRFRAME), SafeSet())
+    assert (state.record.actuator_command, state.mission.safe_set) == (stopped(AIRFRAME), SafeSet())
     assert (plan.next_id, plan.status, plan.refused) == (0, SolverStatus.UNKNOWN, False)
     assert plan.awaited_id < 0
     assert plan.counters == PlannerCounters(plans=0, missed_deadlines=0, fallbacks=0)

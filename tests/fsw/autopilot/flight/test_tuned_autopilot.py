@@ -78,7 +78,7 @@ def test_the_same_state_is_flown_alike_by_a_loop_that_never_saw_its_tuning() -> 
 def test_the_planner_is_asked_with_its_part_of_the_tuning() -> None:
     loop, requests = TunedAutopilot(CONFIG), []
     state = replace(walled(), index=0)
-    state = with_record(state, nominal=nominal_at_rest(vehicle_at(HERE)))
+    state = with_record(state, plan_state=nominal_at_rest(vehicle_at(HERE)))
     for tuning in (None, SLOW, None):
         for _ in range(5):
             state, outputs = tick(loop, state, tuning)

@@ -42,7 +42,7 @@ def frame(k: int, **changes: Any) -> SensorFrame:
 def hovering() -> FlightState:
     seen = estimate_state(frame(0))
     assert seen is not None
-    return with_record(flying(), known=seen, nominal=nominal_at_rest(seen))
+    return with_record(flying(), state_estimate=seen, plan_state=nominal_at_rest(seen))
 
 
 def seen(state: FlightState, s: SensorFrame, stale_us: int = 0) -> tuple[FlightState, list[str]]:
@@ -78,8 +78,8 @@ def test_a_pose_that_is_missing_is_carried_on_and_the_plan_moves_along_when_it_i
     state, texts = seen(state, frame(102, p_WB=FAR))
     assert estimate_of(state).p_WB == FAR
     assert texts == ["estimate moved by 400 mm, 0.000 rad: the plan moves along"]
-    assert state.nominal is not None
-    assert state.nominal.p[1] == pytest.approx(0.4, abs=1e-3)
+    assert state.plan_state is not None
+    assert state.plan_state.p[1] == pytest.approx(0.4, abs=1e-3)
     assert state.aiding == AIDED
 
 

@@ -24,11 +24,11 @@ SEEN = 1e-9
 
 def errors(state: FlightState, estimate: StateEstimate) -> np.ndarray:
     """Position [m] and yaw [rad] from the plan, velocity [m/s] from the observer: (7,)."""
-    assert state.nominal is not None
+    assert state.plan_state is not None
     return np.array(
         [
-            *np.subtract(estimate.p_WB, state.nominal.p),
-            wrap_angle(yaw_of(estimate.R_WB) - state.nominal.yaw),
+            *np.subtract(estimate.p_WB, state.plan_state.p),
+            wrap_angle(yaw_of(estimate.R_WB) - state.plan_state.yaw),
             *np.subtract(estimate.v_WB, state.record.observed.v),
         ]
     )

@@ -395,7 +395,7 @@ def test_landing_or_disarming_ends_a_failsafe() -> None:
     watched = Watched(AT_ONCE).until(11.0)
     assert watched.state.vehicle.failsafe.action is Action.RETURN
     vehicle = replace(watched.state.vehicle, mode=Mode.LAND, landed=True)
-    state = with_record(replace(watched.state, vehicle=vehicle), nominal=None)
+    state = with_record(replace(watched.state, vehicle=vehicle), plan_state=None)
     estimate = vehicle_at((0.0, 0.0, -CONFIG.airframe.leg_length), t_us=watched.now_us)
     for _ in range(2):
         state = watched.commander.check_mode_completion(state, estimate, [])

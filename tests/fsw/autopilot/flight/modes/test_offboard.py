@@ -128,7 +128,7 @@ def test_a_position_from_the_vehicle_or_above_home_is_a_place_from_its_arrival_o
     facing_east = vehicle_at((1.0, 2.0, -3.0))._replace(yaw=0.5 * math.pi)
     state = flying(Mode.OFFBOARD)
     vehicle = replace(state.vehicle, home=Home((5.0, 5.0, -0.25), 0.0))
-    state = with_record(replace(state, vehicle=vehicle), known=facing_east)
+    state = with_record(replace(state, vehicle=vehicle), state_estimate=facing_east)
 
     def place(motion: MotionSetpoint, at: FlightState = state) -> Vec3 | None:
         kept = accepted(OffboardMemory(), reported(motion=motion), vehicle=at).motion

@@ -74,7 +74,7 @@ class Motion:
             share = min(t / self.takeoff_s, 1.0) if self.takeoff_s else 1.0
             each = tuple(share * self.asked(t, i) for i in range(4))
             commanded = ActuatorCommand(each, HANGING)
-            loops = changed(self.loops, commanded=commanded, watch=watch)
+            loops = changed(self.loops, actuator_command=commanded, watch=watch)
             for i in range(4):
                 thrust[i] += DT / self.lag * (self.given(t, i) * each[i] - thrust[i])
             rear, left, front, right = thrust
@@ -83,7 +83,7 @@ class Motion:
             wy += DT * 0.3 * (front - rear) / 0.3
             felt = (9.81 if share < 1.0 else sum(thrust) / mass) + push(t)
             now = estimate(1.0 + t, (wx, wy, 0.0), felt)
-            after = changed(loops, known=now)
+            after = changed(loops, state_estimate=now)
             if doubted(t):
                 pause(after.watch)
             else:
@@ -333,7 +333,7 @@ def test_a_joint_that_does_not_yield_to_a_surface_stands(
         qd[list(stands)] = 0.0
         now = estimate(t, (0.0, 0.0, 0.0), 9.81)._replace(qd_arm=(float(qd[0]), float(qd[1])))
         loops = changed(loops, watch=watch)
-        after = changed(loops, known=now)
+        after = changed(loops, state_estimate=now)
         at = after.pressing
         at.near, at.contact, at.speed = 1, contact, -carried - float(along @ qd)
         at.along[:2] = along

@@ -47,7 +47,7 @@ def under_way(
     goal = goal or PositionGoal(MotionSetpoint(False, FAR))
     nominal = nominal_at_rest(estimate)._replace(p=plan_p)
     state = replace(flying(), setpoint=SetpointMemory(reference, goal))
-    return with_record(state, nominal=nominal)
+    return with_record(state, plan_state=nominal)
 
 
 def speed_after(state: FlightState, estimate: StateEstimate) -> float:
@@ -79,7 +79,7 @@ def test_a_vehicle_that_is_off_its_plan_is_asked_for_nothing_new(
 
 def test_without_a_plan_nothing_is_off_it() -> None:
     estimate = vehicle_at(HERE)
-    state = with_record(under_way(estimate, HERE), nominal=None)
+    state = with_record(under_way(estimate, HERE), plan_state=None)
     assert speed_after(state, estimate) > SPEED
 
 
@@ -95,7 +95,7 @@ def test_near_the_ground_the_plan_may_be_lower_than_the_vehicle(
     start = replace(reference, p=p, v=(0.1, 0.0, 0.0))
     state = replace(lower, setpoint=replace(lower.setpoint, reference=start))
     assert (speed_after(state, estimate) > 0.1) is on_plan
-    aside = with_record(state, nominal=nominal_at_rest(estimate)._replace(p=(0.06, 0.0, p[2])))
+    aside = with_record(state, plan_state=nominal_at_rest(estimate)._replace(p=(0.06, 0.0, p[2])))
     assert speed_after(aside, estimate) < 0.1
 
 
