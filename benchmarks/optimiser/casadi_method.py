@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.optimiser.instances import INPUTS, STATES, Instance
 from benchmarks.optimiser.solved import Solved, timed
-from fsw.autopilot.barriers.cbf_row import cbf_lower_bound
+from fsw.autopilot.barriers.barrier_function import cbf_lower_bound
 from fsw.autopilot.barriers.safe_approach import safe_approach_speed
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.body import body_of

@@ -26,7 +26,7 @@ import math
 
 import numpy as np
 
-from fsw.autopilot.barriers.cbf_row import barrier_value, cbf_lower_bound
+from fsw.autopilot.barriers.barrier_function import barrier_value, cbf_lower_bound
 from fsw.autopilot.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope

@@ -36,7 +36,7 @@ from fsw.autopilot.flight.plan_exchange import (
     measured_state,
     nominal_at_rest,
     requested,
-    with_nominal,
+    with_plan_state,
 )
 from fsw.autopilot.flight.restart import restarted
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
@@ -169,7 +169,7 @@ class Autopilot:
         rest = (0.0,) * self.config.airframe.bodies.joints
         estimate = estimate_state(replace(_STILL, q_arm=rest, qd_arm=rest))
         assert estimate is not None
-        r = with_nominal(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
+        r = with_plan_state(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
         self._plans.model.move(r, 1)
         self._cascade.step(r)
         self._safe_sets.warm_up(estimate)

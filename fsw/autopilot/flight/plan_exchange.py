@@ -231,10 +231,12 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
     """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
     last = state.plan
     plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
-    return replace(state, record=with_nominal(state.record, nominal_at_rest(estimate)), plan=plan)
+    return replace(
+        state, record=with_plan_state(state.record, nominal_at_rest(estimate)), plan=plan
+    )
 
 
-def with_nominal(r: Tick, nominal: PredictionState) -> Tick:
+def with_plan_state(r: Tick, nominal: PredictionState) -> Tick:
     """A record with another state of the plan."""
     r = r.copy()
     r.plan_state = nominal

@@ -14,7 +14,7 @@ from fsw.autopilot.flight.mission.sequencer import MissionFlight
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
-from fsw.autopilot.flight.setpoints.offboard import Tilt
+from fsw.autopilot.flight.setpoints.offboard_setpoint import Tilt
 from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.autopilot.model.airframe import Airframe

@@ -10,7 +10,7 @@ import math
 from typing import Final, cast
 
 from fsw.autopilot.flight.commands.bounds import motion_refusal
-from fsw.autopilot.flight.setpoints.offboard import attitude_refusal
+from fsw.autopilot.flight.setpoints.offboard_setpoint import attitude_refusal
 from fsw.autopilot.signals import (
     AttitudeSetpoint,
     JointSetpoint,

@@ -13,7 +13,7 @@ from fsw.autopilot.flight.commands.dedup import COURSE
 from fsw.autopilot.flight.modes.base import CommandContext, FlightMode
 from fsw.autopilot.flight.restart import RESTARTED
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
-from fsw.autopilot.flight.setpoints.offboard import joints_refusal
+from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.body import hull_reach

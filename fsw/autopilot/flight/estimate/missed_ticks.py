@@ -16,7 +16,7 @@ from fsw.autopilot.estimation.imu import IMU_TOO_OLD
 from fsw.autopilot.flight.plan_exchange import (
     measured_state,
     with_arm_in_bounds,
-    with_nominal,
+    with_plan_state,
     without_plan,
 )
 from fsw.autopilot.flight.state import FlightState
@@ -67,4 +67,4 @@ def plan_resumed(
     measured = measured_state(estimate, motion)
     settled = with_arm_in_bounds(measured, config.airframe, config.planner.limits)
     state = without_plan(state, estimate)
-    return replace(state, record=with_nominal(state.record, settled))
+    return replace(state, record=with_plan_state(state.record, settled))

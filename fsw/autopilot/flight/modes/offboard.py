@@ -14,7 +14,7 @@ from fsw.autopilot.flight.modes.base import (
     Px4Mode,
 )
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
-from fsw.autopilot.flight.setpoints.offboard import (
+from fsw.autopilot.flight.setpoints.offboard_setpoint import (
     Tilt,
     as_motion,
     attitude_refusal,

@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 
 from fsw.autopilot.barriers.safe_approach import safe_approach_speed
-from fsw.autopilot.flight.setpoints.offboard import finite_or_zero, turn_level
+from fsw.autopilot.flight.setpoints.offboard_setpoint import finite_or_zero, turn_level
 from fsw.autopilot.flight.setpoints.orbit_path import looking_at, on_orbit
 from fsw.autopilot.flight.setpoints.reference_governor import SETTLE_RATE, ReferenceGovernor
 from fsw.autopilot.geometry.rotation import wrap_angle

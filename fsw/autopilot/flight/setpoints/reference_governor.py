@@ -24,7 +24,7 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning, safe_approach_speed
-from fsw.autopilot.flight.setpoints.offboard import finite_or_zero
+from fsw.autopilot.flight.setpoints.offboard_setpoint import finite_or_zero
 from fsw.autopilot.geometry.vectors import add_scaled, dot, limit_norm, norm, subtract
 from fsw.autopilot.model.body import Body, body_of, hull_reach
 from fsw.autopilot.parameters.flight_config import FlightConfig, lowest_height

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from fsw.autopilot.barriers.cbf_row import cbf_lower_bound
+from fsw.autopilot.barriers.barrier_function import cbf_lower_bound
 from fsw.autopilot.barriers.safe_approach import (
     LOUD,
     BarrierTuning,

@@ -20,7 +20,7 @@ from fsw.autopilot.flight.plan_exchange import (
     plan_input,
     take_answer,
     with_arm_in_bounds,
-    with_nominal,
+    with_plan_state,
 )
 from fsw.autopilot.flight.state import PlanMemory
 from fsw.autopilot.model.airframe import AIRFRAME
@@ -96,7 +96,7 @@ def test_a_plan_on_time_starts_where_it_says() -> None:
     assert (memory.running, memory.since_us, memory.awaited_id) == (new, START_US, -1)
     assert (memory.counters.plans, memory.counters.missed_deadlines) == (1, 0)
     exchange = PlanExchange(flight_config(body="points"))
-    r = with_nominal(new_tick(3.5, 4, 2), moving())
+    r = with_plan_state(new_tick(3.5, 4, 2), moving())
     exchange.follow(WAITING, r, plan(), START_US, 1)
     assert r.plan_state == new.start
 
@@ -110,7 +110,7 @@ def test_a_late_plan_is_missed_once_and_starts_where_it_would_be_by_now() -> Non
         assert memory.counters.missed_deadlines == 1
     now_us = START_US + 3 * TICK_US
     new = plan()
-    r = with_nominal(new_tick(3.5, 4, 2), moving())
+    r = with_plan_state(new_tick(3.5, 4, 2), moving())
     memory = PlanExchange(flight_config(body="points")).follow(memory, r, new, now_us, 1)
     assert (memory.counters.missed_deadlines, memory.counters.plans) == (1, 1)
     assert r.plan_state == MODEL.advance(new.start, new.inputs[0], 3)

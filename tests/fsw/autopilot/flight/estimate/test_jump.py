@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.control.cascade import in_hover
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.flight.estimate.jump import returned
-from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_nominal
+from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_plan_state
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.geometry.rotation import wrap_angle, yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
@@ -41,7 +41,7 @@ def moving(random: np.random.Generator) -> tuple[FlightState, StateEstimate]:
         p_WB=tuple(random.uniform(-2.0, 2.0, 3).tolist()),
         v_WB=tuple(random.uniform(-1.0, 1.0, 3).tolist()),
     )
-    record = with_nominal(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
+    record = with_plan_state(in_hover(AIRFRAME, estimate), nominal_at_rest(estimate))
     record.observed.v[:] = random.uniform(-1.0, 1.0, 3)
     return replace(flying(), record=record), estimate
 

@@ -8,7 +8,7 @@ import pytest
 
 from fsw.autopilot.control.cascade import in_hover
 from fsw.autopilot.flight.modes.land import Land
-from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_nominal
+from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_plan_state
 from fsw.autopilot.signals import Mode, StateEstimate
 from tests.fsw.autopilot.flight.in_flight import GROUND_Z, flying, limits, vehicle_at
 
@@ -48,7 +48,7 @@ def test_a_plan_below_a_vehicle_that_flies_is_no_ground() -> None:
     estimate = at(0.0)
     x, y, z = estimate.p_WB
     nominal = nominal_at_rest(estimate)._replace(p=(x, y, z + 0.06))
-    hover = with_nominal(in_hover(CONFIG.airframe, estimate), nominal)
+    hover = with_plan_state(in_hover(CONFIG.airframe, estimate), nominal)
     state = replace(flying(Mode.LAND, moved_us=0), record=hover)
     after, result = LAND.update(state, estimate)
     assert result.next_mode is None

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.flight.setpoints.offboard import (
+from fsw.autopilot.flight.setpoints.offboard_setpoint import (
     Tilt,
     as_motion,
     attitude_refusal,
