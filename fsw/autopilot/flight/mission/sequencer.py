@@ -44,7 +44,7 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 
-STAND_OFF = 0.1  # m from a surface that is to be pressed on, before and after
+APPROACH_DISTANCE = 0.1  # m from a surface that is to be pressed on, before and after
 _SIDEWAYS = 0.3  # of a normal, that is horizontal, from which on the nose turns to the surface
 ARRIVAL_TIMEOUT_US = 5_000_000  # at the end of a segment, for the end-effector to arrive
 _GRIPPER: Final = {MissionAction.GRIP: 1.0, MissionAction.RELEASE: -1.0}
@@ -233,7 +233,7 @@ def _begin(
         met = context.meet(place, step.force)
         if met.against:
             return _given_up(flight, f"mission step {number} not flown: {met.against}")
-        place, look_at = add_scaled(met.place, met.normal, STAND_OFF), None
+        place, look_at = add_scaled(met.place, met.normal, APPROACH_DISTANCE), None
         if towards is None and math.hypot(*met.normal[:2]) > _SIDEWAYS:
             towards = math.atan2(-met.normal[1], -met.normal[0])
     end = project_to_safe_set(place, context.safe_set, context.now_us)

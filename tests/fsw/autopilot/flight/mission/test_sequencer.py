@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fsw.autopilot.flight.commands.bounds import mission_problem
 from fsw.autopilot.flight.mission.sequencer import (
-    STAND_OFF,
+    APPROACH_DISTANCE,
     MissionContext,
     MissionFlight,
     Stage,
@@ -182,7 +182,7 @@ def test_a_push_stands_off_faces_the_surface_presses_as_long_as_asked_and_comes_
     assert pressing[0].yaw == pytest.approx(0.0)
     first, last = (next(k for k, at in enumerate(way) if at.force > 0.0)
                    for way in (flown.points, flown.points[::-1]))  # fmt: skip
-    stand_off = (0.97 - STAND_OFF, 0.5, -1.2)
+    stand_off = (0.97 - APPROACH_DISTANCE, 0.5, -1.2)
     for way in (flown.points[:first], flown.points[-last:]):
         assert any(math.dist(at.p_WE, stand_off) < 1e-9 for at in way)
 
