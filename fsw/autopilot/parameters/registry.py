@@ -399,7 +399,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
         ("COM_AID_LOSS_T", "limits.aiding_loss_us", "s", 0.01, 10.0,
          "Time without a usable position after which its loss is reported", _IN_MICROSECONDS),
         ("COM_POS_LOW_EPH", "limits.position_low", "m", 0.02, 10.0,
-         "Dead reckoning: standard deviation of the position that is acted upon"),
+         "Dead reckoning: how far off the position may be that is acted upon"),
         ("COM_POS_LOW_ACT", "limits.position_low_action", "", 1.0, 5.0,
          "Dead reckoning: action above COM_POS_LOW_EPH"),
         ("COM_POS_FS_EPH", "limits.position_lost", "m", 0.05, 100.0,
