@@ -393,9 +393,8 @@ class Autopilot:
         if before is not None:
             goal = state.setpoint.goal
             place = None if goal is None else goal.motion.p
-            r.plan_state, r.plan_input = self._descent.step(
-                before, estimate, state.aiding, ticks, place
-            )
+            moved = self._descent.step(before, estimate, state.aiding, ticks, place)
+            r.plan_state, r.plan_input = moved
         if state.damage.joint:
             freeze_arm(r, estimate, state.damage.report.joints)
         return plan

@@ -95,8 +95,10 @@ def _each(value: Callable[[int], float]) -> Vec3:
     return value(0), value(1), value(2)
 
 
-def planned_input(plan: Plan, now_us: int) -> PlanInput | None:
-    """A plan's input at its age; None where it is not young enough."""
+def planned_input(plan: Plan | None, now_us: int) -> PlanInput | None:
+    """A plan's input at its age; None where it is not young enough, or there is none."""
+    if plan is None:
+        return None
     step = (now_us - plan.t_us) // plan.period_us
     young = 0 <= step < PLAN_STALE_PERIODS and step < len(plan.inputs)
     return plan.inputs[step] if young else None
@@ -104,8 +106,7 @@ def planned_input(plan: Plan, now_us: int) -> PlanInput | None:
 
 def plan_input(plan: Plan | None, nominal: PredictionState, now_us: int, brake: Brake) -> PlanInput:
     """The running plan's input at its age; braking where there is none young enough."""
-    planned = None if plan is None else planned_input(plan, now_us)
-    return brake(nominal) if planned is None else planned
+    return planned_input(plan, now_us) or brake(nominal)
 
 
 def take_answer(
@@ -176,8 +177,7 @@ class PlanExchange:
 
     def _steer(self, plan: Plan | None, r: Tick, now_us: int) -> None:
         """The running plan's input, as ``plan_input`` has it."""
-        u = None if plan is None else planned_input(plan, now_us)
-        if u is None:
+        if (u := planned_input(plan, now_us)) is None:
             nominal = r.plan_state
             assert nominal is not None
             u = self._brake(nominal)
@@ -231,9 +231,8 @@ def without_plan(state: FlightState, estimate: StateEstimate) -> FlightState:
     """No plan runs yet, its state is the vehicle's, and the count of requests goes on."""
     last = state.plan
     plan = PlanMemory(since_us=estimate.t_us, next_id=last.next_id, counters=last.counters)
-    return replace(
-        state, record=with_plan_state(state.record, nominal_at_rest(estimate)), plan=plan
-    )
+    record = with_plan_state(state.record, nominal_at_rest(estimate))
+    return replace(state, record=record, plan=plan)
 
 
 def with_plan_state(r: Tick, nominal: PredictionState) -> Tick:

@@ -399,10 +399,7 @@ FAILSAFES: Final = (
         slow=True,
         delayed=True,
         within_us=_TWICE,
-        parameters=(
-            *("RTL_TIME_FACTOR", "RTL_TIME_MARGIN", "COM_FLTT_LOW_ACT"),
-            "COM_FAIL_ACT_T",
-        ),
+        parameters=("RTL_TIME_FACTOR", "RTL_TIME_MARGIN", "COM_FLTT_LOW_ACT", "COM_FAIL_ACT_T"),
     ),
     _of_battery(
         Condition.BATTERY_LOW,
