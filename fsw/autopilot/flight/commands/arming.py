@@ -63,7 +63,7 @@ def _attitude(context: CommandContext) -> str:
 def _standing(context: CommandContext) -> str:
     if not context.standing_unclear:
         return ""
-    return "neither at rest on the ground nor clearly in the air; check the height"
+    return "neither at rest on the ground nor clearly in the air; wait, or check the height"
 
 
 def _battery(context: CommandContext) -> str:
