@@ -55,7 +55,7 @@ from fsw.autopilot.estimation.kernels import (
     Asked,
 )
 from fsw.autopilot.estimation.sensors import SENSORS
-from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of
+from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of, chi_square
 from fsw.autopilot.estimation.sensors.pose import Pose, is_attitude_stuck
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
@@ -388,7 +388,7 @@ class SensorFusion:
                 one, health.with_fused((now,) * len(ratio), ratio, shown), memory.runs
             )
         passes = [r <= 1.0 and before for r, before in zip(ratio, refused, strict=False)]
-        if any(passes) and not _is_small(sample, innovation):
+        if any(passes) and not self._is_expected(memory, sample, innovation, passes, now):
             # The gate widens meanwhile, until some of what is garbage is within it: a run has to
             # say so.
             memory.numbers[0] = kept
@@ -397,6 +397,29 @@ class SensorFusion:
         return self._judged(
             memory, one, ratio, innovation, now, announced=announced, previous=previous
         )
+
+    def _is_expected(
+        self,
+        memory: FusionMemory,
+        sample: AidingSample,
+        innovation: tuple[float, ...],
+        passes: Sequence[bool],
+        now: float,
+    ) -> bool:
+        """Whether a pose whose last one was refused is used without a run that says the same.
+
+        One is that is off by little, or by no more than noise makes it in what ``passes`` the gate
+        of a filter that doubts; unless none has been used for so long that noise is not known.
+        """
+        if _is_small(sample, innovation):
+            return True
+        used = memory.of(Sensor.POSE).fused
+        if not isinstance(sample, PoseSample) or now - min(used) > self.tuning.reset_time:
+            return False
+        sigmas = self._pose.deviations(memory, self._pose.stated(sample))
+        most = math.sqrt(chi_square(self.tuning.pose.gate, 3))
+        parts = zip(passes, (innovation[:3], innovation[3:]), sigmas, strict=True)
+        return all(math.hypot(*off) <= most * sigma for said, off, sigma in parts if said)
 
     def _judged(
         self,
@@ -431,7 +454,8 @@ class SensorFusion:
             little = _is_small(sample, innovation)
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)
-            if little and not announced and run.is_no_noise and isinstance(sample, PoseSample):
+            parts = [1.0 < r < math.inf for r in ratio]
+            if little and not announced and run.is_no_noise(parts):
                 fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN, max(ratio) < math.inf)
                 ratio = sensor.fuse(memory, sample, one.half)
         fused = health.fused or (now,) * len(ratio)

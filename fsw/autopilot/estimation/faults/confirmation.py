@@ -9,7 +9,7 @@ where it is or from where it was before it last jumped: what was believed wrongl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from fsw.autopilot.measurements import GnssSample, PoseSample
@@ -18,6 +18,9 @@ from fsw.autopilot.signals import Vec3
 # By which share of itself an innovation changes besides, because an inertial unit that is wrong
 # leads the filter astray ever faster.
 _GROWS: Final = 0.5
+# By which share of itself it may change from one sample to the next and be no noise: of noise that
+# nobody has stated, two steps in a row are as short as that once in 30,000 times.
+_STAYS: Final = 0.5
 _NO_CHANCE: Final = 3
 _APART: Final = 0.25  # s; readings farther apart do not confirm each other
 _SELDOM_APART: Final = 1.25  # s; the same of a sensor whose readings come farther apart than that
@@ -35,6 +38,8 @@ class Run(NamedTuple):
     last: float  # s
     innovation: tuple[float, ...]  # of the last one [SI]
     samples: int = 1
+    # Of the last two times: how far each part's innovation was from the one before [SI].
+    steps: tuple[tuple[float, ...], ...] = ()
 
     @property
     def is_confirmed(self) -> bool:
@@ -42,9 +47,16 @@ class Run(NamedTuple):
         return self.samples > 1
 
     @property
-    def is_no_noise(self) -> bool:
-        """Whether so many samples say so that it is no chance."""
+    def is_no_chance(self) -> bool:
+        """Whether so many samples say so."""
         return self.samples >= _NO_CHANCE
+
+    def is_no_noise(self, refused: Sequence[bool]) -> bool:
+        """Whether what each ``refused`` part says stays nearly the same, as no noise does."""
+        parts = zip(refused, (self.innovation[:3], self.innovation[3:]), *self.steps, strict=False)
+        return self.is_no_chance and all(
+            max(steps) < _STAYS * math.hypot(*part) for one, part, *steps in parts if one
+        )
 
     @property
     def place(self) -> tuple[float, ...]:
@@ -88,7 +100,9 @@ def extended(
         if one.kind is not new.kind or apart > (_SELDOM_APART if seldom else _APART):
             continue
         a, b = one.innovation, new.innovation
-        parts = zip((a[:3], a[3:]), (b[:3], b[3:]), rooms(apart), strict=False)
-        if all(math.dist(p, q) <= room + _GROWS * math.hypot(*p) for p, q, room in parts):
-            return new._replace(since=one.since, samples=one.samples + 1)
+        step = math.dist(a[:3], b[:3]), math.dist(a[3:], b[3:])
+        parts = zip(step, (a[:3], a[3:]), rooms(apart), strict=False)
+        if all(off <= room + _GROWS * math.hypot(*before) for off, before, room in parts):
+            steps = (*one.steps[-1:], step)
+            return new._replace(since=one.since, samples=one.samples + 1, steps=steps)
     return new

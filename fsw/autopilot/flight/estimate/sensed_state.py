@@ -391,7 +391,7 @@ def _aiding(
 def _elsewhere(memory: FusionMemory) -> float:
     """How far [m] from the estimate a run of positions is that are refused since one was used."""
     used = memory.now - unaided(memory, memory.now)
-    runs = [one for one in memory.runs if one.last > used and one.is_no_noise]
+    runs = [one for one in memory.runs if one.last > used and one.is_no_chance]
     return max([math.hypot(*one.place) for one in runs], default=0.0)
 
 
