@@ -28,7 +28,7 @@ from fsw.autopilot.estimation.error_state import (
 )
 from fsw.autopilot.estimation.faults import redundancy
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
-from fsw.autopilot.estimation.faults.confirmation import Run, extended
+from fsw.autopilot.estimation.faults.confirmation import Run, ended, extended
 from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
 from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, Source, Verdict
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
@@ -385,7 +385,9 @@ class SensorFusion:
             health = memory.of(sensor.sensor)
             shown = innovation if len(ratio) > 1 else innovation[:1]
             return memory.after(
-                one, health.with_fused((now,) * len(ratio), ratio, shown), memory.runs
+                one,
+                health.with_fused((now,) * len(ratio), ratio, shown),
+                ended(memory.runs, sample),
             )
         passes = [r <= 1.0 and before for r, before in zip(ratio, refused, strict=False)]
         if any(passes) and not self._is_expected(memory, sample, innovation, passes, now):
@@ -445,7 +447,7 @@ class SensorFusion:
         if refused and sensor.starts_anywhere and not health.fused:
             refused, memory = False, sensor.take(memory, sample, one.time, ratio)
             ratio = (1.0,) * len(ratio)
-        runs, run = memory.runs, None
+        runs, run = memory.runs if refused else ended(memory.runs, sample), None
         used = [at for at, r in zip(health.fused, ratio, strict=False) if r < math.inf]
         long_refused = bool(used) and now - min(used) > self.tuning.reset_time
         if refused:

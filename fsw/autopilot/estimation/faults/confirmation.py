@@ -2,8 +2,9 @@
 
 What is refused in flight is compared by its innovation, which knows how the vehicle has moved: a
 run of refused samples goes on where value and direction nearly stay, of which noise makes no long
-one. How long a run must be until it is believed grows with how far it would move the estimate, from
-where it is or from where it was before it last jumped: what was believed wrongly is soon undone.
+one, and until a pose is used. How long a run must be until it is believed grows with how far it
+would move the estimate, from where it is or from where it was before it last jumped: what was
+believed wrongly is soon undone.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from fsw.autopilot.signals import Vec3
 # leads the filter astray ever faster.
 _GROWS: Final = 0.5
 # By which share of itself it may change from one sample to the next and be no noise: of noise that
-# nobody has stated, two steps in a row are as short as that once in 30,000 times.
+# nobody has stated, two steps in a row are as short as that once in 700 times.
 _STAYS: Final = 0.5
 _NO_CHANCE: Final = 3
 _APART: Final = 0.25  # s; readings farther apart do not confirm each other
@@ -81,6 +82,16 @@ class Run(NamedTuple):
                 sizes = [0.0, 0.0]
         takes = [size / speed for size, speed in zip(sizes, _BELIEVED, strict=True)]
         return self.is_confirmed and self.last - self.since >= max(least, *takes)
+
+
+def ended(runs: tuple[Run, ...], sample: object) -> tuple[Run, ...]:
+    """The runs after a ``sample`` was used: a pose speaks against the one of poses.
+
+    Within the gate of a heading or of a height garbage is now and then.
+    """
+    if not runs or not isinstance(sample, PoseSample):
+        return runs
+    return tuple([one for one in runs if one.kind is not PoseSample])
 
 
 def extended(
