@@ -558,6 +558,27 @@ def test_noise_of_attitudes_that_begins_at_once_makes_no_bias(sigma: float) -> N
 
 
 @pytest.mark.requirement("REQ-EST-1")
+@pytest.mark.parametrize(("suite", "sigma"), [(MOCAP, 0.01), (VIO, 0.02)])
+def test_noise_of_places_that_begins_at_once_makes_no_velocity(suite: Suite, sigma: float) -> None:
+    """It was up to 17 m/s off, by a bias of the accelerometer."""
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+
+        def noisy(now: float, sample: Sample, random: np.random.Generator = random) -> Sample:
+            if not isinstance(sample, PoseSample) or sample.time < START + 1.0:
+                return sample
+            off = random.normal(0.0, sigma, 3)
+            return replace(sample, position=tuple((np.array(sample.position) + off).tolist()))
+
+        flown, fusion, memory = run(suite, 8, 2.0), SensorFusion(suite.tuning, 2), at_start(2)
+        for now, samples in flown:
+            memory, estimate = fusion.step(memory, [noisy(now, one) for one in samples], now)
+            if estimate is not None and now > START + 1.0:
+                off = np.linalg.norm(errors(estimate, flown, now)[3:6])
+                assert off < 0.3, (seed, now - START)
+
+
+@pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("lasted", [0.1, 0.8])
 def test_after_a_refused_pose_none_far_off_is_used_within_a_wide_gate(lasted: float) -> None:
     """At the end of a climb one pose of garbage tilted the estimate by 46 deg; a run is used.
