@@ -49,7 +49,7 @@ class Run(NamedTuple):
 
     @property
     def is_no_chance(self) -> bool:
-        """Whether so many samples say so."""
+        """Whether more samples agree than do by chance."""
         return self.samples >= _NO_CHANCE
 
     def is_no_noise(self, refused: Sequence[bool]) -> bool:

@@ -175,8 +175,9 @@ def position_is_off(context: FailsafeContext, most: float) -> bool:
 
 def position_is_disputed(context: FailsafeContext) -> bool:
     """Positions are missing; the estimate is off, or those refused say so, by COM_POS_LOW_EPH."""
-    aiding, most = context.state.aiding, context.limits.position_low
-    return position_is_off(context, most) or (is_unaided(context) and aiding.elsewhere > most)
+    aiding = context.state.aiding
+    off = max(aiding.position_sigma, aiding.elsewhere)
+    return is_unaided(context) and not off <= context.limits.position_low
 
 
 def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:

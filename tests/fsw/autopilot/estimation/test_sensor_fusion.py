@@ -611,6 +611,54 @@ def test_after_a_refused_pose_none_far_off_is_used_within_a_wide_gate(lasted: fl
     assert estimate.p_WB == pytest.approx(flown.truth.p[flown.truth.at(now)], abs=0.02)
 
 
+@pytest.mark.requirement("REQ-EST-1")
+def test_what_scatters_for_long_is_not_taken_for_noise() -> None:
+    """An attitude that is off by as much as that noise would be is one of garbage, too."""
+    flown, fusion, memory = run(MOCAP, 8, 2.5), SensorFusion(MOCAP.tuning, 2), at_start(2)
+    random, off = np.random.default_rng(3), 0.0
+    for now, samples in flown:
+        since = now - START - 1.0
+        tried = 0.8 < since < 0.85
+        if since > 0.82:  # poses are 15 ms late
+            M = memory.numbers[0]["covariance"]
+            M[[6, 7, 8], [6, 7, 8]] = 1.0
+        heard: list[Sample] = []
+        for one in samples:
+            if isinstance(one, PoseSample) and 0.0 < since < 0.85:
+                angle = 0.15 if tried else random.uniform(0.5, 3.0)
+                turn = (math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0)
+                q = multiply(np.array([one.attitude]), np.array([turn]))[0]
+                one = replace(one, attitude=tuple(q.tolist()))
+            heard.append(one)
+        memory, estimate = fusion.step(memory, heard, now)
+        if estimate is not None and 0.5 < since < 0.9:
+            off = max(off, float(np.linalg.norm(errors(estimate, flown, now)[6:])))
+    assert off < 0.03
+
+
+def test_of_noise_that_is_known_most_poses_are_used() -> None:
+    """Noise that passes the gate needs no run, though the pose before it was refused."""
+    random, used = np.random.default_rng(0), []
+
+    def noisy(sample: Sample) -> Sample:
+        if not isinstance(sample, PoseSample) or sample.time < START + 1.0:
+            return sample
+        turn = (1.0, *(0.5 * random.normal(0.0, 0.1, 3)))
+        q = multiply(np.array([sample.attitude]), np.array([turn]))[0]
+        return replace(sample, attitude=tuple((q / np.linalg.norm(q)).tolist()))
+
+    flown, fusion, memory = run(MOCAP, 8, 2.5), SensorFusion(MOCAP.tuning, 2), at_start(2)
+    last: tuple[float, ...] = ()
+    for now, samples in flown:
+        memory, _ = fusion.step(memory, [noisy(one) for one in samples], now)
+        ratio = memory.of(Sensor.POSE).ratio
+        if now > START + 1.5 and ratio != last:
+            used.append(ratio[1] <= 1.0)
+            last = ratio
+    assert len(used) > 80
+    assert np.mean(used) > 0.6
+
+
 @pytest.mark.drawn(3)
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -161,3 +161,22 @@ def test_poses_that_scatter_more_than_they_state_are_told(noise: float) -> None:
         told += [one.text for one in outputs.texts]
     assert ("pose noisier than stated" in told) is (noise > 0.0)
     assert told.count("pose noisier than stated") <= 1
+
+
+@pytest.mark.requirement("REQ-EST-4")
+def test_how_far_away_refused_poses_say_it_is_is_known_until_one_is_used() -> None:
+    state, farthest, last = first_state(AIRFRAME), 0.0, math.nan
+    for now, samples in run(MOCAP, 1, 2.0):
+        moved = 6.0 < now < 6.5
+        told = tuple(
+            replace(one, position=(one.position[0], one.position[1] + 3.0, one.position[2]))
+            if moved and isinstance(one, PoseSample)
+            else one
+            for one in samples
+        )
+        state, _ = tick(state, round(1e6 * now), samples=told)
+        last = state.aiding.elsewhere
+        assert last == 0.0 or moved or now < 6.7
+        farthest = max(farthest, last)
+    assert farthest == pytest.approx(3.0, abs=0.1)
+    assert last == 0.0

@@ -660,6 +660,10 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
             "failsafe: sensor lost: IMU stuck, for 0.06 s, holding",
         ),
         (
+            Aiding(400_000, Sensor.POSE, SensorFault.JUMP, elsewhere=1.05),
+            "failsafe: position uncertain by 1050 mm: pose jump rejected, for 0.40 s, holding",
+        ),
+        (
             Aiding(400_000, Sensor.POSE, SensorFault.NOT_FINITE, attitude_sigma=0.8),
             "attitude unknown: pose not finite, for 0.40 s: terminate",
         ),
