@@ -12,7 +12,7 @@ T = TypeVar("T")
 _PAUSE_S = 0.002
 
 
-def becomes(condition: Callable[[], object], patience_s: float = 10.0) -> bool:
+def becomes(condition: Callable[[], object], patience_s: float = 30.0) -> bool:
     """Whether something comes true in time; asked at least once, and once more at the end."""
     until = time.monotonic() + patience_s
     while not condition():
@@ -22,7 +22,7 @@ def becomes(condition: Callable[[], object], patience_s: float = 10.0) -> bool:
     return True
 
 
-def wait_for(condition: Callable[[], T], what: str = "", patience_s: float = 10.0) -> T:
+def wait_for(condition: Callable[[], T], what: str = "", patience_s: float = 30.0) -> T:
     """The first value of a condition that is true."""
     until = time.monotonic() + patience_s
     while not (value := condition()):

@@ -94,6 +94,7 @@ def test_a_mission_that_moves_the_gripper_is_told_that_it_is_px4s() -> None:
     assert flight.state.vehicle.gripper == 0.0
 
 
+@pytest.mark.long
 def test_a_px4_that_refuses_offboard_is_not_pressed() -> None:
     flight = AbovePx4(still())
     flight.px4.accepts_offboard = False
@@ -174,6 +175,7 @@ def test_a_px4_that_falls_silent_is_told_and_gets_no_more_set_points() -> None:
     assert flight.mode is Mode.HOLD
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_worst_push_stays_inside_the_bound_that_is_printed(axis: int) -> None:
@@ -189,7 +191,7 @@ def test_the_worst_push_stays_inside_the_bound_that_is_printed(axis: int) -> Non
     assert not [text for text in flight.texts if "off the plan" in text]
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("stop_s", [0.7, 1.1, 3.0])
 def test_a_planner_that_stopped_holds_and_does_not_go_on_with_its_plan(stop_s: float) -> None:
     flight = handed_over(AbovePx4(still()))
@@ -222,6 +224,7 @@ def test_a_yaw_that_is_not_followed_is_told_and_planned_anew() -> None:
     assert " deg: replanning" in told[0]
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("child_frame", [1, 12])
 def test_both_conventions_of_velocities_fly_with_the_yaw_turned(child_frame: int) -> None:
     flight = AbovePx4(still(yaw_deg=90.0), child_frame=child_frame)

@@ -59,6 +59,7 @@ def test_a_lag_that_is_known_is_found(kp: float, kd: float, delay: float) -> Non
     assert found.delay == pytest.approx(delay, abs=0.005)
 
 
+@pytest.mark.long
 def test_what_is_no_such_loop_is_refused() -> None:
     seen = [one._replace(lean=(0.3, -0.2)) for one in pushed(Px4Tuning())]
     rng = np.random.default_rng(2)
@@ -86,6 +87,7 @@ class Identified(AbovePx4):
         self.over = self.identifier.step(frame, self.link) or self.over
 
 
+@pytest.mark.long
 def test_the_stand_ins_loops_are_identified_in_flight() -> None:
     flight = Identified(still())
     flight.run(0.5)

@@ -46,6 +46,7 @@ def test_the_example_can_be_flown(capsys: pytest.CaptureFixture[str]) -> None:
     assert tomllib.loads(capsys.readouterr().out)["flights"] == 200
 
 
+@pytest.mark.long
 def test_the_directory_holds_everything(campaign: tuple[Path, Path]) -> None:
     _, out = campaign
     result = read(out)

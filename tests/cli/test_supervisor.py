@@ -58,6 +58,7 @@ def test_a_process_that_has_to_be_killed_is_a_failure(reported: list[str], tmp_p
     assert time.monotonic() - begin_s < 3.0
 
 
+@pytest.mark.long
 def test_a_half_that_is_slow_to_end_before_the_flight_is_given_the_time(tmp_path: Path) -> None:
     """What refused the flight is the reason, and all of it."""
     supervisor = Supervisor(Display(io.StringIO()), tmp_path, runner="tests.cli.fake_processes")
@@ -96,6 +97,7 @@ def test_a_warning_of_the_vehicle_is_a_line_between_those_of_the_progress(tmp_pa
     assert "flying    0.5 s  ×2.0  margin 100 mm" in lines
 
 
+@pytest.mark.long
 def test_kernels_that_are_compiled_are_counted_until_the_flight_begins(tmp_path: Path) -> None:
     folder, stream = tmp_path / "numba-0", io.StringIO()
     folder.mkdir()

@@ -105,6 +105,7 @@ def test_far_outside_the_vehicle_holds_and_then_lands_and_says_so() -> None:
     assert flight.mode is Mode.DISARMED
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-4")
 def test_a_zone_that_runs_over_the_vehicle_drives_it_no_faster_than_setpoints() -> None:
     """Upright, a wall comes from behind at the largest speed; then one from above."""
@@ -184,6 +185,7 @@ def test_a_ceiling_announced_lower_and_lower_holds_the_vehicle_above_the_ground(
     assert -flight.sim.truth().p_WB[2] == pytest.approx(lowest_height(flight.config), abs=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-4")
 def test_a_landing_that_a_wall_runs_over_ends_upright() -> None:
     """It slid along the ground at 1.5 m/s, and tipped over."""

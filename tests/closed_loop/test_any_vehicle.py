@@ -28,7 +28,7 @@ def flown(one: Scenario, seed: int = 0) -> FlightResult:
     return simulate(one, seed, flight_config(body=one.body, vehicle=vehicle_of(one)))
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("vehicle", "suite"), list(product(OTHERS, (None, "mocap"))))
 def test_it_flies_between_walls_within_its_limits(vehicle: str, suite: str | None) -> None:
     keeps_its_limits(vehicle, suite, 13.0)
@@ -50,6 +50,7 @@ def keeps_its_limits(vehicle: str, suite: str | None, seconds: float) -> None:
     assert [key for key, use in truth.limits.items() if not use.kept] == []
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-13")
 def test_what_pushes_make_of_a_heavy_arm_is_no_gyro_s_fault() -> None:
     """The flight held after 2.5 s: pushes had turned it by 1.6 rad/s in two seconds."""

@@ -106,6 +106,7 @@ def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
     assert flight.calm >= min_calm * flight.loop.simulation.step
 
 
+@pytest.mark.long
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     ("suite", "push", "min_calm"),

@@ -61,6 +61,7 @@ def test_a_vehicle_without_a_position_descends_where_it_is() -> None:
     assert any("position unknown" in text and "descending" in text for text in flight.texts)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-5", "REQ-SAFE-11")
 def test_a_vehicle_without_satellites_draws_back_from_the_wall_while_it_descends() -> None:
     """Early, so that it must do so in Descend: a hold does by itself."""

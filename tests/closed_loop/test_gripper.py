@@ -32,7 +32,7 @@ def gripping(vehicle: str, kg: float = 0.1, disturbance: Disturbance = SHAKEN) -
     return flight
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-15")
 @pytest.mark.parametrize(
     ("vehicle", "kg", "disturbance"),
@@ -108,6 +108,7 @@ def test_a_payload_that_is_too_heavy_is_told_and_landed_with_until_it_is_let_go_
     assert flight.snapshot.safety.breaches == 0
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-16")
 @pytest.mark.parametrize("disturbance", [SHAKEN, PUSHED_DOWN])

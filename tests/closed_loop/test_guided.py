@@ -119,6 +119,7 @@ def uploaded(*items: MissionItem) -> MissionUpdate:
     return MissionUpdate(steps=tuple(steps), current=0)  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_a_mission_that_is_started_disarmed_arms_and_flies() -> None:
     flight = standing(Flight(on_the_ground()))
     flight.upload = uploaded(item(22, 0.0, 0.0, 0.0, NAN, z=-1.2))
@@ -212,6 +213,7 @@ def test_a_mission_looks_at_a_place_until_it_is_told_not_to() -> None:
     assert yaws[-1] == pytest.approx(0.0, abs=0.1), "the heading that the last item asks for"
 
 
+@pytest.mark.long
 def test_the_speed_of_a_goto_can_be_changed() -> None:
     def distance(speed: float) -> float:
         flight = hovering()
@@ -253,6 +255,7 @@ def test_a_return_waits_at_its_descent_height_before_it_lands() -> None:
     assert flight.mode is Mode.LAND
 
 
+@pytest.mark.long
 def test_a_return_that_is_not_to_land_holds_over_home() -> None:
     flight = standing(Flight(on_the_ground(), config=limits(return_wait=-1.0)))
     flight.step(command(TAKEOFF))

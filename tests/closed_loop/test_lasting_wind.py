@@ -13,6 +13,7 @@ from tests.closed_loop.harness import ARM, BESIDE_A_WALL, Flight, command
 PUSH = 0.5  # m/s^2, north, where the wall is
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-2")
 def test_clearances_grow_with_the_memory_of_wind_and_shrink_with_it() -> None:
     calm = parse_scenario(BESIDE_A_WALL.replace('"ground"', '"airborne"'), "wall", "perfect")

@@ -25,7 +25,7 @@ CASES = [
 WITHIN_S = 12.0
 
 
-@pytest.mark.drawn(3)
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-ACT-1", "REQ-ACT-3")
 @pytest.mark.parametrize(("vehicle", "rotor", "share", "suite"), CASES)
 def test_it_is_told_and_lands_without_contact(

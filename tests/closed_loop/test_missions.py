@@ -125,6 +125,7 @@ def test_waypoints_beyond_the_walls_of_an_uploaded_fence_are_flown_up_to_it() ->
     assert "mission step 1 not reached" in texts
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-13")
 def test_a_mission_presses_where_it_may_and_says_where_it_may_not() -> None:
     """Places are meant on the surface: the tip finds it, in front of them or behind."""
@@ -271,6 +272,7 @@ def test_a_step_chosen_in_flight_is_flown_after_braking() -> None:
     assert math.dist(where(flight), (0.0, 0.5, -1.0)) < 0.05
 
 
+@pytest.mark.long
 def test_a_return_leads_to_the_nearest_rally_point() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))

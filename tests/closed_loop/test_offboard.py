@@ -147,6 +147,7 @@ def test_no_set_point_flies_the_vehicle_into_a_branch(attack: str) -> None:
     assert 0.02 < margin < 0.6
 
 
+@pytest.mark.long
 def test_a_set_point_in_a_branch_is_held_at_its_clearance() -> None:
     flight = offboard(among_branches(), **end_effector(p=(0.5, 0.0, -1.4)))
     flight.run(7.0)
@@ -174,6 +175,7 @@ def test_a_velocity_is_flown_in_both_frames() -> None:
     assert flight.sim.truth().v_WB == pytest.approx((0.0, 0.5, 0.0), abs=0.05)
 
 
+@pytest.mark.long
 def test_a_height_is_held_while_the_rest_is_a_velocity() -> None:
     """Mask 0xBC3, as a pilot's stick or a visual servo sends it."""
     flight = offboard(hover(), **body(p=(NAN, NAN, -1.6), v=(0.4, -0.2, NAN)))

@@ -10,7 +10,8 @@ from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import Flight
 
 
-@pytest.mark.parametrize("scale", [pytest.param(0.8, marks=pytest.mark.long), 1.2])
+@pytest.mark.long
+@pytest.mark.parametrize("scale", [0.8, 1.2])
 def test_the_sphere_is_kept_with_another_mass(scale: float) -> None:
     workspace = load_scenario("workspace")
     flight = Flight(

@@ -22,13 +22,14 @@ PLANNING = {"fsw.autopilot.periods.PLANNING_US": 50_000}
 TICK = {"fsw.autopilot.periods.TICK_US": 1_000, "sitl.periods.STEP_US": 1_000}
 
 
-@pytest.mark.parametrize("suite", ["exact", pytest.param("mocap", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("suite", ["exact", "mocap"])
 @pytest.mark.parametrize(
     ("periods", "planning_us"),
     [
-        pytest.param({}, 100_000, id="as it is", marks=pytest.mark.long),
-        pytest.param(PLANNING, 50_000, id="planner at 20 Hz", marks=pytest.mark.long),
-        pytest.param(TICK, 100_000, id="tick at 1 kHz", marks=pytest.mark.long),
+        pytest.param({}, 100_000, id="as it is"),
+        pytest.param(PLANNING, 50_000, id="planner at 20 Hz"),
+        pytest.param(TICK, 100_000, id="tick at 1 kHz"),
         pytest.param(PLANNING | TICK, 50_000, id="both"),
     ],
 )

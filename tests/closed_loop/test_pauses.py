@@ -22,6 +22,7 @@ def test_half_a_second_without_the_flight_software_costs_no_contact() -> None:
     flown(1, 0.5)
 
 
+@pytest.mark.long
 def test_half_a_second_without_plans_costs_no_contact() -> None:
     flown(1, 0.5, planner_only=True)
 

@@ -48,6 +48,7 @@ def flown(scenario: Scenario, seed: int, seconds: float) -> tuple[Flight, np.nda
     return flight, np.array(seen)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-13")
 @pytest.mark.parametrize("stiffness", [500.0, 2000.0])
 def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffness: float) -> None:
@@ -64,6 +65,7 @@ def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffnes
     assert flight.snapshot.safety.breaches == 0
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-14")
 @pytest.mark.parametrize("starts_s", [5.5, 7.0])
 def test_a_wall_that_comes_is_left_behind(starts_s: float) -> None:
@@ -95,6 +97,7 @@ def test_a_tool_that_slides_over_a_wall_keeps_the_force() -> None:
     assert math.sqrt(float(((seen[held, 0] - 3.0) ** 2).mean())) < 0.6  # 20 %
 
 
+@pytest.mark.long
 def test_a_tool_that_friction_holds_swings_no_arm_straight() -> None:
     """What was to move the tool aside pressed with 7.5 N of 5, and pushed the base away."""
     scenario = load_scenario("probe", "mocap")

@@ -70,6 +70,7 @@ def take_off(flight: Flight) -> None:
     flight.step(command(TAKEOFF))
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-12", "REQ-ACT-6")
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
@@ -235,6 +236,7 @@ def test_what_another_had_chosen_before_is_done_if_it_is_sent_again() -> None:
     assert flight.snapshot.intended_mode is Mode.TAKEOFF
 
 
+@pytest.mark.long
 def test_while_nothing_is_known_it_is_answered_again_and_may_be_asked_for() -> None:
     silent = [False]
     flight = Flight(

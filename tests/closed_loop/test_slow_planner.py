@@ -99,6 +99,7 @@ def test_a_slow_planner_has_its_response(
     assert flight.sim.min_margin_m > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize(

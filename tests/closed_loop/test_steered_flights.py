@@ -49,6 +49,7 @@ def up() -> Flight:
     return flight
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("below", [0.0, 4.0, 50.0])
 def test_a_return_to_a_home_below_the_ground_ends_on_the_ground(below: float) -> None:
@@ -113,6 +114,7 @@ def test_a_goto_towards_a_wall_stops_before_it() -> None:
     assert 0.0 < flight.sim.min_margin_m < 0.1
 
 
+@pytest.mark.long
 def test_a_takeoff_that_is_sent_again_climbs_once() -> None:
     flight = up()
     height = flight.sim.truth().p_WB[2]
@@ -211,6 +213,7 @@ def test_what_keeps_it_from_arming_is_on_show() -> None:
     assert "not armed" in flight.snapshot.arming_refusal
 
 
+@pytest.mark.long
 def test_a_heading_is_reached_without_swinging_about_it() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))
@@ -223,6 +226,7 @@ def test_a_heading_is_reached_without_swinging_about_it() -> None:
     assert turned[26:] == pytest.approx([1.5] * 14, abs=0.04)
 
 
+@pytest.mark.long
 def test_a_vehicle_that_slides_when_it_comes_down_is_not_flown_against_the_ground() -> None:
     """It drifted on its legs, pushed by a loop that could not move it, until it tipped over."""
 

@@ -39,6 +39,7 @@ def east(flight: Flight) -> float:
     return flight.state.estimate.p_WB[1]
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-11")
 @pytest.mark.parametrize(
@@ -64,6 +65,7 @@ def test_a_vehicle_whose_pose_is_lost_draws_back_from_the_wall_and_returns(spoil
     assert flight.mode is Mode.HOLD
 
 
+@pytest.mark.long
 def test_it_stays_where_clearances_do_not_grow() -> None:
     flight = beside(RIGHT, sigmas=0.0)
     begin = east(flight)

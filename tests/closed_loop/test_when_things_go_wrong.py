@@ -78,6 +78,7 @@ def test_a_plan_that_never_comes_is_counted_given_up_and_survived() -> None:
     assert flight.snapshot.failures == ()
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize("first_failure", [0, 30], ids=["from the start", "in motion"])
 def test_without_plans_the_vehicle_brakes_and_stays_put(first_failure: int) -> None:

@@ -58,6 +58,7 @@ def test_a_gyro_that_is_off_for_good_is_named_and_the_vehicle_holds(
     assert min(truth.margins_m) > 0.0
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize(
     ("suite", "axis", "size"),
@@ -91,6 +92,7 @@ def test_a_gyro_that_is_off_by_less_is_named_and_done_without(
     assert flight.sim.ended is None
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-7")
 @pytest.mark.parametrize(
     ("suite", "seconds"), [("mocap", 0.1), pytest.param("vio", 0.15, marks=in_long)]

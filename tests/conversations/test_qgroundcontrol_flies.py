@@ -154,6 +154,7 @@ def download(vehicle: Connected, kind: int) -> list[Message]:
     return found
 
 
+@pytest.mark.drawn(1)
 @either_way
 def test_a_plan_is_uploaded_started_paused_continued_and_flown_to_its_end(
     vehicle: Connected, client: Client, version: int

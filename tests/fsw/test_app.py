@@ -68,6 +68,7 @@ def options(silent: socket.socket, tmp_path: Path) -> Iterator[FswOptions]:
         signal.signal(number, handler)
 
 
+@pytest.mark.long
 def test_a_simulator_that_never_answers_ends_the_wait(
     options: FswOptions, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -155,7 +155,8 @@ for layout in sys.argv[1]:
 """
 
 
-@pytest.mark.parametrize("door", ["fsw", pytest.param("sitl", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("door", ["fsw", "sitl"])
 def test_two_layouts_from_two_processes_do_not_run_each_others_code(
     tmp_path: Path, door: str
 ) -> None:

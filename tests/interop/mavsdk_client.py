@@ -28,7 +28,7 @@ def connected(port: int) -> Iterator[System]:
         sdk.destroy()
 
 
-def eventually(true: Callable[[], bool], patience_s: float = 10.0) -> bool:
+def eventually(true: Callable[[], bool], patience_s: float = 30.0) -> bool:
     """Whether something becomes true."""
     return becomes(true, patience_s)
 

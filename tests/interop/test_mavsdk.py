@@ -27,7 +27,7 @@ from tests.interop.vehicle import FAST, PATIENT, Vehicle
 from tests.parameters_on_the_wire import LISTED
 
 PACING = FAST
-PARAMETER_METADATA = 1
+ALL_METADATA, PARAMETER_METADATA = 0, 1
 
 
 @pytest.fixture(scope="module")
@@ -134,11 +134,13 @@ def test_writing_over_ftp_is_refused_at_once(system: System) -> None:
 
 def test_the_metadata_of_the_parameters_are_found(system: System) -> None:
     metadata, done = ComponentMetadata(system), threading.Event()
+    # Until the last one: events that are subscribed to while their document is still downloaded are
+    # never explained (MAVSDK 4.1.0, where nothing is kept of an earlier download).
     metadata.subscribe_metadata_available(
-        lambda update, _: done.set() if update.type == PARAMETER_METADATA else None
+        lambda update, _: done.set() if update.type == ALL_METADATA else None
     )
     metadata.request_autopilot_component()
-    assert done.wait(10.0)
+    assert done.wait(30.0)
     document = metadata.get_metadata(1, PARAMETER_METADATA).json_metadata
     assert json.loads(document) == json.loads(parameter_document())
 

@@ -58,6 +58,7 @@ def rows(folder: Path) -> list[dict[str, object]]:
     return found
 
 
+@pytest.mark.long
 def test_a_plan_flies_the_parts_that_its_file_or_the_command_line_names(place: Path) -> None:
     ours = load_plan(place / "plan.toml")
     named = load_plan(place / "plan.toml", OwnNames("ownlaws:Ours"))

@@ -86,6 +86,7 @@ def test_a_planner_that_fails_is_braked_for_as_ours_is() -> None:
     assert result.metrics["mpc"]["fallbacks"] == 4
 
 
+@pytest.mark.long
 def test_after_a_failsafe_our_planner_flies_not_the_own_one() -> None:
     asked: list[Mode] = []
 
@@ -129,6 +130,7 @@ def into_the_wall(t: float) -> tuple[float, float, float]:
     return (0.5 * max(t - 1.0, 0.0) ** 2 / (1.0 + max(t - 1.0, 0.0)), 0.0, -0.8)
 
 
+@pytest.mark.long
 def test_the_safety_filter_holds_a_base_off_a_wall_unless_switched_off() -> None:
     scenario = pandion.load_scenario("walls-calm", duration_s=9.0)
     (front,) = [wall for wall in scenario.walls if wall.name == "front"]

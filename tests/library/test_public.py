@@ -98,6 +98,7 @@ sleep 1.2
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", ["touch campaign-numba.complete", "exit 1"])
 def test_a_first_flight_says_how_far_compiling_is_once(
     end: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path

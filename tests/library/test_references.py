@@ -133,6 +133,7 @@ def test_a_lissajous_as_a_callable_is_the_scenarios_flight() -> None:
     assert ours.tracking_rms == pytest.approx(same.tracking_rms, abs=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-13")
 def test_a_push_is_a_reference_too() -> None:
     push = Push((-1.0, 0.0, 0.0), ((0.975, 0.0, -1.2),), (4.0,), (1.0,), away_m=0.1, approach_s=2.0)

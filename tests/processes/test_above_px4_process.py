@@ -40,6 +40,7 @@ def speak(px4: Px4Companion, stream: socket.socket, seconds: float) -> None:
         time.sleep(0.004)
 
 
+@pytest.mark.long
 def test_it_streams_takes_over_gives_back_and_writes_what_it_found(tmp_path: Path) -> None:
     px4 = hovering()
     with socket.create_server(("127.0.0.1", 0)) as server:

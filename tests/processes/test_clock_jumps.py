@@ -47,14 +47,15 @@ def urgent_texts(flown: Capture) -> list[str]:
     return [values[1].rstrip(b"\0").decode() for values in texts]
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-TIME-4")
 @pytest.mark.parametrize(
     ("jump_s", "options"),
     [
         (-0.5, ()),
-        pytest.param(-0.004, ("--realtime", "--sensors", "mocap"), marks=pytest.mark.long),
-        pytest.param(-0.5, ("--realtime", "--sensors", "mocap"), marks=pytest.mark.long),
-        pytest.param(6.0, ("--realtime",), marks=pytest.mark.long),
+        (-0.004, ("--realtime", "--sensors", "mocap")),
+        (-0.5, ("--realtime", "--sensors", "mocap")),
+        (6.0, ("--realtime",)),
     ],
     ids=["back", "a little back in real time", "back in real time, measured", "ahead in real time"],
 )

@@ -73,6 +73,7 @@ def test_a_scenario_in_the_air_is_flown_from_the_ground(tmp_path: Path) -> None:
     assert (tmp_path / "truth.ulg").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_a_flight_without_a_duration(tmp_path: Path) -> None:
     with simulator("ground", "--speed", "1", "--out", str(tmp_path)) as process:
         port = until(process, "listening")[-1]["port"]
@@ -86,6 +87,7 @@ def test_ctrl_c_ends_a_flight_without_a_duration(tmp_path: Path) -> None:
     assert "ended by you" in json.loads((tmp_path / "sitl.json").read_text())["end_reason"]
 
 
+@pytest.mark.long
 def test_a_px4_that_leaves_ends_the_flight_with_the_step() -> None:
     with simulator("ground", "--speed", "1") as process:
         port = until(process, "listening")[-1]["port"]

@@ -110,6 +110,7 @@ def test_a_stall_of_one_half_ends_the_other_naming_the_step(tmp_path: Path) -> N
             assert "1.2 s" in ended["message"]
 
 
+@pytest.mark.long
 def test_an_interrupt_ends_a_simulator_that_waits() -> None:
     with SystemProcess("sitl", "--listen", "udp:127.0.0.1:0") as sitl:
         sitl.wait_for("ready")

@@ -94,7 +94,7 @@ def worst_difference(
     return worst
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("joints", range(1, 7))
 def test_forward_dynamics_equal_the_articulated_body_algorithm(joints: int) -> None:
     random = np.random.default_rng(joints)

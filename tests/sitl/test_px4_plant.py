@@ -34,9 +34,8 @@ def flight_plan(time_s: float) -> Wish:
     return Wish(True, (0.0, 0.0, height), (0.5, -0.5) if time_s > 7.0 else (0.0, 0.0))
 
 
-@pytest.mark.parametrize(
-    ("suite", "rate_hz"), [("mocap", 250), pytest.param("vio", 500, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("suite", "rate_hz"), [("mocap", 250), ("vio", 500)])
 def test_the_plant_takes_off_hovers_moves_its_arm_and_lands(suite: str, rate_hz: int) -> None:
     flight = fly("ground", flight_plan, suite=suite, seconds=15.0, rate_hz=rate_hz)
     result = flight.simulation.result()

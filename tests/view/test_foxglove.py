@@ -57,6 +57,7 @@ def check(schema: dict[str, Any], value: Any, where: str) -> None:
         check(schema["items"], part, f"{where}[]")
 
 
+@pytest.mark.long
 def test_frames_lead_from_the_world_to_the_vehicle(drawn: Messages) -> None:
     (first, *later) = [value for _, _, value in drawn["/tf"]]
     assert (first["parent_frame_id"], first["child_frame_id"]) == ("world", "ned")

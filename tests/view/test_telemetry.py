@@ -331,6 +331,7 @@ def test_junk_in_a_log_is_skipped_and_told(junk: bytes, tmp_path: Path) -> None:
     assert "are no frames" in cut.unusable[0]
 
 
+@pytest.mark.long
 def test_a_gap_of_zeros_is_passed_and_a_flood_of_markers_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -67,6 +67,7 @@ def asked(message_id: int, *values: float | bytes) -> bytes:
     return STATION.frame(message_id, *values)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("baud", [57_600, pytest.param(115_200, marks=pytest.mark.long), 921_600])
 def test_a_slow_line_is_never_more_than_80_percent_full(baud: int) -> None:
     with closing(Line(baud)) as line, link_at(SerialLine(line.device, baud)) as (link, links):

@@ -47,6 +47,7 @@ def test_a_draw_is_the_same_again_and_another_with_another_seed() -> None:
     assert repr(draw(8, 0, without)) != repr(first[0])
 
 
+@pytest.mark.long
 def test_draws_have_every_kind_mode_and_suite_that_can_be_flown() -> None:
     without = not_flown()
     drawn = [draw(1, number, without) for number in range(1500)]
@@ -143,6 +144,7 @@ def test_two_faults_are_flown_and_each_begins_at_its_time() -> None:
     assert 2.0 <= of_battery < 3.5
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("seed", "number"),

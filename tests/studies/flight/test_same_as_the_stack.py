@@ -29,10 +29,11 @@ DURATION_S = 2.0
 SEED = 100
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("suite", "apart"),
-    [("perfect", 1e-5), pytest.param("mocap", 3e-5, marks=pytest.mark.long)],
+    [("perfect", 1e-5), ("mocap", 3e-5)],
 )
 def test_in_process_and_over_the_wire_are_one_flight(
     suite: str, apart: float, tmp_path: Path

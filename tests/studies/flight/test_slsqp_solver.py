@@ -240,6 +240,7 @@ def test_what_cannot_be_kept_is_infeasible() -> None:
     assert not answer.usable
 
 
+@pytest.mark.long
 @pytest.mark.drawn(2)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("controller", VARIANTS)

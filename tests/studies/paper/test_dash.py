@@ -24,6 +24,7 @@ def flown(
     return Job("full", path, config, 1000).row()
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("case", ["I", "II"])
 def test_blf_completes_with_room_to_spare(case: Case) -> None:

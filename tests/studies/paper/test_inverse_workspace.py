@@ -47,7 +47,7 @@ def test_every_reach_of_the_other_elbow_alone_is_outside(name: str) -> None:
     assert not inside.all()
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 def test_an_inscribed_disc_is_inside_and_a_larger_one_is_not(workspace: InverseWorkspace) -> None:
     angle = np.linspace(0.0, 2.0 * math.pi, 20_001)
     largest = workspace.largest()

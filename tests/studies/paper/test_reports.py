@@ -45,6 +45,7 @@ def table4() -> Report:
     return study("table4")(TINY, Campaign(0))
 
 
+@pytest.mark.long
 def test_table_4_has_a_row_for_everyone_in_every_case(table4: Report) -> None:
     rows = table4.rows
     for row in rows:
@@ -67,6 +68,7 @@ def test_table_4_has_a_row_for_everyone_in_every_case(table4: Report) -> None:
     assert_timed_and_named(table4)
 
 
+@pytest.mark.long
 def test_table_4_at_speed_has_every_tightening_and_scenarios_of_its_own() -> None:
     report = study("table4")(replace(TINY, family="dash"), Campaign(0))
     assert {row["scenario"] for row in report.rows} == {
@@ -121,6 +123,7 @@ def test_a_page_of_tuning_seeds_says_so(table4: Report, tmp_path: Path) -> None:
     assert "not how well it carries over" in page
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("name", ["fig2", "fig6", "fig7", "fig8"])
 def test_a_figure_has_its_numbers_beside_it(name: str, tmp_path: Path) -> None:

@@ -235,7 +235,7 @@ def nearest(
     return float(found.x[which]) if found.success else None
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("rotors", range(4, 9))
 def test_of_any_layout_roll_and_pitch_that_are_too_much_are_cut_by_no_more_than_they_must(
     rotors: int,

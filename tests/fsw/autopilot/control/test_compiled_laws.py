@@ -80,7 +80,7 @@ def plan_input(random: np.random.Generator) -> PlanInput:
     )
 
 
-@pytest.mark.drawn(3)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("ticks", [1, 3])
 @pytest.mark.parametrize("tuning", TUNINGS)
 @pytest.mark.parametrize("inner", ["tracking", "pid"])

@@ -124,6 +124,7 @@ def cases() -> list[tuple[Vehicle, np.ndarray, np.ndarray]]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-13")
 def test_the_force_on_the_tool_is_observed_of_any_vehicle_in_any_direction() -> None:
     """That of the joints' reach, along the surface's normal and as a vector."""

@@ -421,6 +421,7 @@ def _position_misled(entry: int, error: np.ndarray) -> np.ndarray:
     return np.array(positions)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("entry", range(3))
 def test_the_worst_error_of_the_estimate_attains_its_bound_and_none_exceeds_it(entry: int) -> None:
     tubes = estimate_tube(AIRFRAME, TUNING, _gains(), DT)

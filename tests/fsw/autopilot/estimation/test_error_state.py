@@ -232,6 +232,7 @@ def test_integrating_exact_readings_follows_the_flight() -> None:
     assert abs(np.dot(q, truth.q[-1])) > 1.0 - 1e-10
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize(("made", "most"), [(FORCE_MADE, 1.2), (0, math.inf)])
 def test_what_rotors_do_not_know_of_a_force_does_not_grow_without_bound(
     made: int, most: float

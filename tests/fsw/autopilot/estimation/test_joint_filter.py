@@ -119,7 +119,7 @@ def test_garbage_is_not_believed_and_the_torques_carry_on() -> None:
     assert arm.error < 0.15, "of friction that is not modelled, in half a second"
 
 
-@pytest.mark.drawn(3)
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("by", [(0.2, 0.0), (0.0, -1.3), (0.3, 0.3), (1.0, -2.0)])
 @pytest.mark.parametrize("until", [1.52, 1.8, 3.0])
 def test_a_zero_that_has_moved_is_named_and_the_joint_is_followed_on(
@@ -148,6 +148,7 @@ def test_noise_of_a_tenth_of_a_second_makes_no_joint_run_away(sigma: float) -> N
     assert arm.off < 16.0
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.parametrize("bounce", [0.0, 0.5])
 def test_a_joint_without_torque_that_swings_to_its_end_stop_is_followed(bounce: float) -> None:
     """At 45 rad/s, within 15 ms, as one whose drive is dead; its zero stays where it was."""
@@ -205,6 +206,7 @@ def test_a_joint_that_falls_as_no_torque_makes_it_is_followed_and_is_no_jump(fal
     assert worst < 0.12
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("sigma", [0.01, 0.03])
 def test_noise_of_an_encoder_is_no_motion_and_it_is_known_how_large_it_is(sigma: float) -> None:

@@ -537,6 +537,7 @@ def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
     assert START + 2.5 - fused[0] > 0.2
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("sigma", [0.046, 0.07])
 def test_noise_of_attitudes_that_begins_at_once_makes_no_bias(sigma: float) -> None:
@@ -557,6 +558,7 @@ def test_noise_of_attitudes_that_begins_at_once_makes_no_bias(sigma: float) -> N
             assert abs(memory.numbers[0]["gyro_bias"]).max() < 0.1, (seed, now - START)
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize(("suite", "sigma"), [(MOCAP, 0.01), (VIO, 0.02)])
 def test_noise_of_places_that_begins_at_once_makes_no_velocity(suite: Suite, sigma: float) -> None:
@@ -767,6 +769,7 @@ def replace_suite(flown: Run, suite: Suite) -> Run:
     return replace(flown, suite=suite)
 
 
+@pytest.mark.long
 def test_a_wider_gate_lets_a_farther_reading_in() -> None:
     # One that is off by little may be the IMU's fault, and nothing is said of it.
     aside = at(1.2, lambda s: replace(s, position=(s.position[0] + 0.06, *s.position[1:])))
@@ -891,6 +894,7 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
     assert held.w_WB_B == pytest.approx(before.w_WB_B, abs=0.03), "not known: as it was"
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.parametrize("lost", [ImuSample, PoseSample])
@@ -1034,6 +1038,7 @@ def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> f
     return float(Flown(flown).in_sigmas()[6:8].max())
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-EST-2")
 def test_a_rangefinder_that_is_wrong_in_proportion_does_not_tilt_the_estimate() -> None:
     tuning = tuned(RTK.tuning, (("rangefinder.ground", 4.0),))

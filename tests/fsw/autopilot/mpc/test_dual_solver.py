@@ -206,6 +206,7 @@ def test_what_was_solved_before_leaves_no_trace() -> None:
     np.testing.assert_array_equal(kept.solve(np.zeros(theirs.inputs)).x, fresh)
 
 
+@pytest.mark.long
 def test_a_vehicle_that_is_lost_does_not_fill_the_memory() -> None:
     """From everywhere other rows bind, a hundred at once: a program of these takes 0.6 MB."""
     sides = ((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0))

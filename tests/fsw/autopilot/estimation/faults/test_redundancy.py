@@ -178,6 +178,7 @@ def test_a_gyro_whose_axes_are_off_is_well_however_long_the_vehicle_turns_on() -
     assert not suspected(flown(Wrong(), "pose", 8.0, yaw=0.6, axes=0.01))
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("seed", range(3))
 def test_a_bias_that_the_filter_finds_as_it_begins_is_no_gyro_s_fault(seed: int) -> None:
@@ -185,7 +186,7 @@ def test_a_bias_that_the_filter_finds_as_it_begins_is_no_gyro_s_fault(seed: int)
     assert not suspected(flown(Wrong(), "pose", 3.0, seed, bias=(0.008, -0.016, 0.008)))
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("suite", ["pose", "satellites"])
@@ -196,7 +197,7 @@ def test_pushes_that_turn_a_light_body_by_its_heavy_arm_are_no_gyro_s_fault(
     assert not suspected(flown(Wrong(), suite, 6.0, seed, swing=2.2))
 
 
-@pytest.mark.drawn(2)
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("size", [0.2, 0.4, 0.6, 2.0])
 def test_one_reflection_names_no_satellites_though_the_next_place_is_lost(size: float) -> None:
@@ -301,6 +302,7 @@ def test_where_rotors_half_know_it_the_field_is_suspected_and_not_the_gyro() -> 
     assert verdict.suspects & Source.GYRO
 
 
+@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("turning", [(2.0, 0.0, 0.0), (0.0, -1.5, 1.5)])
 def test_a_field_that_turns_as_the_rotors_turn_nothing_is_named(turning: Vec3) -> None:
