@@ -191,6 +191,7 @@ def test_the_worst_push_stays_inside_the_bound_that_is_printed(axis: int) -> Non
     assert not [text for text in flight.texts if "off the plan" in text]
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("stop_s", [0.7, 1.1, 3.0])
 def test_a_planner_that_stopped_holds_and_does_not_go_on_with_its_plan(stop_s: float) -> None:
@@ -224,6 +225,7 @@ def test_a_yaw_that_is_not_followed_is_told_and_planned_anew() -> None:
     assert " deg: replanning" in told[0]
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("child_frame", [1, 12])
 def test_both_conventions_of_velocities_fly_with_the_yaw_turned(child_frame: int) -> None:

@@ -171,6 +171,7 @@ def test_a_mode_that_takes_over_from_targets_far_away_begins_at_the_vehicle(numb
     assert -flight.sim.truth().p_WB[2] < began + 1.5
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-4")
 def test_a_ceiling_announced_lower_and_lower_holds_the_vehicle_above_the_ground() -> None:
     """Ten times a second, each time just above the vehicle, and coming down at 1 m/s."""

@@ -118,6 +118,7 @@ def test_so_is_one_of_a_suite(suite: str, push: float, min_calm: float) -> None:
     assert flight.calm >= min_calm * flight.loop.simulation.step
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     "fault",

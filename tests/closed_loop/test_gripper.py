@@ -62,6 +62,7 @@ def test_what_is_gripped_is_weighed_and_dropped_beside_a_wall(
     assert flight.snapshot.safety.breaches == 0
 
 
+@pytest.mark.long
 def test_a_mission_takes_a_payload_up_and_lets_go_of_it() -> None:
     flight = gripping("probe-2r", 0.2)
     steps = (

@@ -338,6 +338,7 @@ def test_the_levels_of_the_battery() -> None:
     assert FlightLimits().battery_low > FlightLimits().battery_critical
 
 
+@pytest.mark.long
 @pytest.mark.requirement("REQ-SAFE-6")
 def test_a_goto_beyond_an_exclusion_stops_before_it() -> None:
     flight = hovering()

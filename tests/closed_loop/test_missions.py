@@ -207,6 +207,7 @@ def test_pause_and_continue_come_back_to_the_current_step() -> None:
     assert "mission complete" in flight.texts
 
 
+@pytest.mark.long
 def test_the_reference_does_not_jump_from_hold_into_a_mission_and_back() -> None:
     flight = Flight(hover())
     flight.step(command(ARM, 1.0))

@@ -133,6 +133,7 @@ def among_branches() -> Scenario:
     return replace(walls(AFAR, disturbed=True), walls=(), obstacles=obstacles)
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(

@@ -94,6 +94,7 @@ def test_hold_breaks_off_the_way_to_a_place() -> None:
     assert 1.0 < flight.sim.truth().p_WB[0] < 5.0
 
 
+@pytest.mark.long
 def test_the_joints_move_and_the_body_stays() -> None:
     flight = up()
     before = flight.sim.truth().p_WB

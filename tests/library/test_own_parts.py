@@ -106,6 +106,7 @@ def test_after_a_failsafe_our_planner_flies_not_the_own_one() -> None:
     assert "hit" not in result.reason
 
 
+@pytest.mark.long
 def test_an_lqr_flies_the_workspace_and_is_judged_by_our_referee() -> None:
     result = pandion.fly("workspace-calm", duration_s=2.0, controller=Lqr())
     assert result.completed, result.reason

@@ -84,6 +84,7 @@ def test_a_byte_flipped_anywhere_is_no_traceback(
     assert refused > flips // 3
 
 
+@pytest.mark.long
 @pytest.mark.drawn(1)
 @each_command
 def test_a_log_cut_among_its_definitions_is_refused_and_among_its_data_read_up_to_there(

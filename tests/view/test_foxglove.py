@@ -89,6 +89,7 @@ def test_the_arm_hangs_where_the_kinematics_say(drawn: Messages) -> None:
     assert places == [(0.0, 0.0, 0.0), (0.0, 0.0, 0.15), (0.0, 0.0, 0.3)]
 
 
+@pytest.mark.long
 def test_zones_are_drawn_with_their_clearance(drawn: Messages) -> None:
     ((_, _, update),) = drawn["/zones"]
     names = [entity["id"] for entity in update["entities"]]

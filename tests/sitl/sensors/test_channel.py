@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from sitl.sensors.channel import Channel, Measurement
 from sitl.sensors.encoders import JointMeasurement
@@ -89,6 +90,7 @@ def test_much_jitter_delivers_nothing_before_it_is_measured_and_keeps_the_order(
     assert stamps == sorted(stamps)
 
 
+@pytest.mark.long
 def test_dropouts_and_outliers_have_the_stated_shares() -> None:
     watch, arrived = run(200.0, rate_hz=250.0, dropout_share=0.1, outlier_share=0.02)
     measured = len(watch.measured_us)

@@ -100,6 +100,7 @@ def test_rivals_have_their_settings_and_a_front_of_what_nobody_beats(tmp_path: P
     assert "<svg" in write(report, tiny, (), "rivals", tmp_path).read_text()
 
 
+@pytest.mark.long
 def test_rows_are_json_without_numbers_that_are_none(table4: Report, tmp_path: Path) -> None:
     write(table4, TINY, ("Command: test",), "table4", tmp_path)
     rows = json.loads((tmp_path / "table4-rows.json").read_text())

@@ -56,6 +56,7 @@ def covered(found: tuple[Estimate, ...], truth: float) -> int:
     return sum(one.interval[0] <= truth <= one.interval[1] for one in found)
 
 
+@pytest.mark.long
 def test_a_known_millionth_is_within_its_interval_in_nineteen_of_twenty() -> None:
     found = estimates("plane", 20)
     assert covered(found, MILLIONTH) >= 19
