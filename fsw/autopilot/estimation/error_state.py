@@ -47,7 +47,7 @@ ON_TRIAL = 8
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
 FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
-WITNESS: Final = 29  # integrals: see faults/redundancy.py
+WITNESS: Final = 29  # integrals: see faults/residuals.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(
@@ -72,7 +72,7 @@ FILTER: Final = np.dtype(
         ("steady", np.int64, (2,)),  # how many in a row were near the one before
         ("calm", np.int64, (2,)),  # how many in a row were believed
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
-        # Of the law for who is wrong (redundancy.py): which halves are not used, and of which the
+        # Of the law for who is wrong (verdict.py): which halves are not used, and of which the
         # bias may be anything; what both and the rotors have made of the vehicle since it flies;
         # and how quickly a force [m/s^3/sqrt(Hz)] and a rate [rad/s^2/sqrt(Hz)] may be off that
         # the rotors' model gives, or is compared with.
@@ -89,7 +89,7 @@ FILTER: Final = np.dtype(
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle
-        ("turns", float, (4,)),  # by how much more than the paper's it turns: redundancy.py
+        ("turns", float, (4,)),  # by how much more than the paper's it turns: residuals.py
         # Of each: angle [rad], rate [rad/s] and disturbance [rad/s^2].
         ("joints", float, (JOINTS, 3)),
         ("joint_variance", float, (3, 3)),  # [SI], of each

@@ -12,9 +12,10 @@ from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import FILTER, Filter
 from fsw.autopilot.estimation.faults.confirmation import Run
 from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
-from fsw.autopilot.estimation.faults.redundancy import MIN_WALKS, Verdict
+from fsw.autopilot.estimation.faults.residuals import MIN_WALKS
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.estimation.faults.verdict import Verdict
 from fsw.autopilot.measurements import (
     AidingSample,
     GnssSample,
@@ -181,7 +182,7 @@ def at_start(joints: int, turns: Sequence[float] = (1.0,) * 4) -> FusionMemory:
     """Memory before the first sample, of a vehicle of so many ``joints``.
 
     What rotors do not explain ``turns`` it so much [1] more than the paper's
-    (``redundancy.scale_of_turns``).
+    (``residuals.scale_of_turns``).
     """
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
     x["joint_count"], x["turns"] = joints, turns

@@ -2,7 +2,7 @@
 
 Accelerometer and gyro are judged each for itself. A reading far from the last good one is not
 believed. What jumps once is believed again as soon as it is back. On the ground so is what stays
-where it jumped to: vehicles are carried about. In flight that is for ``redundancy.py`` to say,
+where it jumped to: vehicles are carried about. In flight that is for ``verdict.py`` to say,
 which also tells which half is out, and which may be wrong.
 """
 
@@ -120,7 +120,7 @@ def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> 
 def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bool) -> int:
     """What is wrong with one half of a reading; counts what comes in a row.
 
-    Of a unit that ``flies``, that it is steady is not enough: see ``faults/redundancy.py``.
+    Of a unit that ``flies``, that it is steady is not enough: see ``faults/verdict.py``.
     """
     last, at = x.imu[(x.end - 1) % IMU_CAPACITY], 3 * half
     if not math.isfinite(reading[0] + reading[1] + reading[2]):

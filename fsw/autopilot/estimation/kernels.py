@@ -38,7 +38,7 @@ from fsw.autopilot.estimation.error_state import (
     vec3,
     vec4,
 )
-from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
@@ -131,7 +131,7 @@ def tick(
         if finite:
             found |= FINITE
         if a.dt > 0.0:
-            redundancy.witness(x, R, a.dt, model, (a.pushed[0], a.pushed[1], a.pushed[2]))
+            residuals.witness(x, R, a.dt, model, (a.pushed[0], a.pushed[1], a.pushed[2]))
     return found
 
 

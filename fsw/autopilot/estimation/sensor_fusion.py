@@ -26,12 +26,14 @@ from fsw.autopilot.estimation.error_state import (
     Array,
     Filter,
 )
-from fsw.autopilot.estimation.faults import redundancy
+from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, ended, extended
 from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
-from fsw.autopilot.estimation.faults.redundancy import EVIDENCE, NO_AID, Source, Verdict
+from fsw.autopilot.estimation.faults.residuals import EVIDENCE, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.estimation.faults.sources import Source
+from fsw.autopilot.estimation.faults.verdict import Verdict
 from fsw.autopilot.estimation.filter_start import FilterStart
 from fsw.autopilot.estimation.fusion_memory import (
     FusionMemory,
@@ -123,7 +125,7 @@ class SensorFusion:
         for sensor in self._sensors.values():
             sensor.take(memory, sensor.at_rest, t, (2.0, 2.0))
         fusion.doubt(memory.numbers, 0.0, 0.0, True)
-        redundancy.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
+        residuals.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
 
@@ -593,7 +595,7 @@ def _tilts(
     verdict, room = memory.verdict, 0.0
     if verdict.is_on:  # what fires by chance has turned nothing so far
         used = max(memory.of(Sensor.POSE).fused[1], verdict.since)
-        room = (now - used) * redundancy.size_of(evidence, Source.GYRO)
+        room = (now - used) * residuals.size_of(evidence, Source.GYRO)
     rx, ry, rz = innovation[3:]
     down = rotate_back(matrix_from_quaternion(attitude_of(x)), (0.0, 0.0, 1.0))
     along = rx * down[0] + ry * down[1] + rz * down[2]

@@ -35,7 +35,7 @@ class EstimatorTuning:
     # as quickly as the vehicle does: the pose then gives acceleration and rate.
     lost_accel_walk: float = 10.0  # m/s^3/sqrt(Hz)
     lost_gyro_walk: float = 6.0  # rad/s^2/sqrt(Hz)
-    # Where it goes on as the rotors' commands make it: faults/redundancy.py.
+    # Where it goes on as the rotors' commands make it: faults/residuals.py.
 
     # What is not known when the filter starts.
     accel_bias: float = 0.3  # m/s^2

@@ -1,6 +1,6 @@
 """What follows for the filter when sensors contradict each other, or one is named.
 
-Every 20 ms it is asked who is wrong (``redundancy.py``). Of suspects the biases are not known any
+Every 20 ms it is asked who is wrong (``verdict.py``). Of suspects the biases are not known any
 more; without who is named the filter runs again, from before it was wrong.
 
 Source: docs/decisions/0041-one-law-for-who-is-wrong.md.
@@ -28,15 +28,11 @@ from fsw.autopilot.estimation.error_state import (
     V,
     watch_biases,
 )
-from fsw.autopilot.estimation.faults import redundancy
-from fsw.autopilot.estimation.faults.redundancy import (
-    EVIDENCE,
-    NO_AID,
-    NOBODY,
-    Source,
-    Verdict,
-)
+from fsw.autopilot.estimation.faults import residuals
+from fsw.autopilot.estimation.faults.residuals import EVIDENCE, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.estimation.faults.sources import NOBODY, Source
+from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
@@ -108,7 +104,7 @@ class Arbitration:
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)
             return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
-        if now - evidence[0]["looked"] < redundancy.EVERY - _ROUNDING:
+        if now - evidence[0]["looked"] < residuals.EVERY - _ROUNDING:
             return memory, found
         return self._look(memory, now, found, damaged=damaged, touches=touches)
 
@@ -133,14 +129,14 @@ class Arbitration:
             for sample, last in zip(newest, before.seen, strict=True)
         ]
         silent = _silent(memory, now) | _stuck(memory) | (Source.MODEL if touches else NOBODY)
-        lost = redundancy.note_silence(evidence, silent, now)
+        lost = residuals.note_silence(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
-        redundancy.look(evidence, memory.numbers, now, pose, fix, field, learns)
+        residuals.look(evidence, memory.numbers, now, pose, fix, field, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
         verdict = before._replace(evidence=evidence, seen=newest)
         if before.is_on or before.wrong or max(ratios) > 1.0:
             held = Source.ATTITUDE in self._aided(memory, now)
-            verdict = redundancy.judged(
+            verdict = judged(
                 verdict,
                 ratios,
                 now,
@@ -242,7 +238,7 @@ class Arbitration:
 
 def begun(memory: FusionMemory) -> FusionMemory:
     """The memory of a filter that has just begun: what sensors say is compared from now on."""
-    verdict = memory.verdict._replace(evidence=redundancy.at_start())
+    verdict = memory.verdict._replace(evidence=residuals.at_start())
     return memory._replace(verdict=verdict, trail=None, trail_before=None)
 
 
@@ -270,7 +266,7 @@ def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
     """
     newest, verdict = memory.trail, memory.verdict
     if newest is not None:
-        decides = verdict.is_on and now - verdict.since < redundancy.UNDECIDED
+        decides = verdict.is_on and now - verdict.since < UNDECIDED
         if decides or now - newest.began < _TRAIL:
             return memory
     start = memory._replace(trail=None, trail_before=None)
@@ -284,7 +280,7 @@ def _silent(memory: FusionMemory, now: float) -> Source:
     """
     unit = now - memory.imu_came > IMU_SILENT
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
-    wrong = now - encoders.fault_at < redundancy.EVERY and encoders.fault not in _FOLLOWED
+    wrong = now - encoders.fault_at < residuals.EVERY and encoders.fault not in _FOLLOWED
     arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
     return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
 
@@ -309,7 +305,7 @@ def _widened(x: Any, verdict: Verdict, aided: bool) -> Verdict:
     for half, ((source, _), bias, state) in enumerate(zip(_HALVES, (BA, BG), (V, TH), strict=True)):
         if not source & verdict.suspects:
             continue
-        seen = redundancy.size_of(verdict.evidence, source)
+        seen = residuals.size_of(verdict.evidence, source)
         size = min(seen / _SEEN[half], _MOST[half])
         x["model_walk"][half] = min(x["model_walk"][half], size)
         grown = size**2 - unknown[half] ** 2

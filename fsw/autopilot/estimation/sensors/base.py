@@ -16,8 +16,9 @@ from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 import numpy as np
 from scipy.special import gammainccinv
 
-from fsw.autopilot.estimation.faults.redundancy import NO_AID, NOBODY, Aid, Source
+from fsw.autopilot.estimation.faults.residuals import NO_AID, Aid
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.imu import TIME_TOLERANCE
 from fsw.autopilot.measurements import AidingSample, Sensor

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import Filter, V
-from fsw.autopilot.estimation.faults.redundancy import Aid, Source
+from fsw.autopilot.estimation.faults.residuals import Aid
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
+from fsw.autopilot.estimation.faults.sources import Source
 from fsw.autopilot.estimation.fusion import (
     GNSS,
     believable,

@@ -22,7 +22,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, TH, Filter, Law, correct, vec3, vec4
-from fsw.autopilot.estimation.faults.redundancy import Aid, Source
+from fsw.autopilot.estimation.faults.residuals import Aid
+from fsw.autopilot.estimation.faults.sources import Source
 from fsw.autopilot.estimation.fusion import clear
 from fsw.autopilot.estimation.fusion_memory import NO_TURN, FusionMemory
 from fsw.autopilot.estimation.sensors.base import (

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.autopilot.estimation.error_state import BG, DELAY, TH, Filter, Law, V, vec3, vec4
-from fsw.autopilot.estimation.faults.redundancy import Aid, Source
+from fsw.autopilot.estimation.faults.residuals import Aid
 from fsw.autopilot.estimation.faults.sensor_fault import Health
+from fsw.autopilot.estimation.faults.sources import Source
 from fsw.autopilot.estimation.fusion import (
     POSE,
     believable,

@@ -13,9 +13,10 @@ from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, Law, P
 from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
-from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source, names, scale_of_turns
+from fsw.autopilot.estimation.faults.residuals import scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
+from fsw.autopilot.estimation.faults.sources import NOBODY, Source, names
 from fsw.autopilot.estimation.fusion_memory import (
     FusionMemory,
     Reset,

@@ -15,7 +15,7 @@ from enum import Enum
 from functools import partial
 from typing import Final
 
-from fsw.autopilot.estimation.faults.redundancy import UNDECIDED
+from fsw.autopilot.estimation.faults.verdict import UNDECIDED
 from fsw.autopilot.flight.commands.arming import Subject
 from fsw.autopilot.flight.failsafe import actions as actions
 from fsw.autopilot.flight.failsafe import evidence as evidence

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.estimation.error_state import BG, IMU_CAPACITY, LOST, NO_RATE
-from fsw.autopilot.estimation.faults import redundancy
-from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source
+from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
+from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
@@ -86,7 +86,7 @@ def hovered(
 def of_no_use(memory: FusionMemory) -> Source:
     evidence = memory.verdict.evidence
     assert evidence is not None
-    return redundancy.note_silence(evidence, NOBODY, memory.now)
+    return residuals.note_silence(evidence, NOBODY, memory.now)
 
 
 @pytest.mark.requirement("REQ-EST-13")

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fsw.autopilot.estimation.error_state import ERRORS, FIELD, FILTER, TH, correct, distance
-from fsw.autopilot.estimation.faults.redundancy import NOBODY, Source
+from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.sensors.gnss import velocity_rows

@@ -1,20 +1,11 @@
-r"""Who is wrong: each sensor is predicted from the others and from the rotors' model.
+"""Residuals: what each two of the sensors, or one and the rotors' model, differ by.
 
 How the vehicle turns is said by the gyro (G), by what measures attitudes (the pose P, or the
 magnetometer B) and by the rotors' model (M). How it accelerates is said by the accelerometer (A),
 by what measures places (P, or satellites N), and by the model. The attitude of a pose (Q) may be
-wrong where its place is not; not the other way round. Of each two of them there is a residual: what
-they differ by, over windows of 0.1 to 3 s. Of a culprit X all residuals with X are large and all
-others are not, so
-
-.. math:: J(X) = \sum_{k \not\ni X} \min(r_k / t_k, 5)^2, \quad
-          t_k = \text{the largest that is nominal},
-
-is least for the culprit. It is named where by how much more the next hypothesis costs adds up to 3,
-in looks in a row in which that is more than 1. Until then all that are not excluded are suspects:
-the filter takes their biases for unknown.
-Thresholds of what contains the model follow from how well it has predicted so far in this flight,
-those of measurements from the noise that they state and turn out to have.
+wrong where its place is not; not the other way round. Of each two of them there is a residual over
+windows of 0.1 to 3 s. Thresholds of what contains the model follow from how well it has predicted
+so far in this flight, those of measurements from the noise that they state and turn out to have.
 
 Source: E. Chow, A. Willsky, Analytical Redundancy and the Design of Robust Failure Detection
 Systems, IEEE TAC 29 (1984) 603; docs/decisions/0041-one-law-for-who-is-wrong.md.
@@ -23,61 +14,44 @@ Systems, IEEE TAC 29 (1984) 603; docs/decisions/0041-one-law-for-who-is-wrong.md
 from __future__ import annotations
 
 import math
-from enum import IntFlag
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.estimation.error_state import BA, WITNESS, vec3
+from fsw.autopilot.estimation.faults.sources import (
+    AA,
+    AM,
+    AN,
+    AP,
+    COUNT,
+    GB,
+    GG,
+    GM,
+    GP,
+    MB,
+    MN,
+    MP_FORCE,
+    MP_TURN,
+    NN,
+    NOBODY,
+    OF,
+    B,
+    G,
+    N,
+    P,
+    Source,
+)
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.autopilot.geometry.vectors import add_scaled, norm, subtract
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.signals import Mat3, Vec2, Vec3, Vec4
+from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
 
 Array = NDArray[np.float64]
-
-
-class Source(IntFlag):
-    """What says something of how the vehicle moves."""
-
-    GYRO = 1
-    ACCELEROMETER = 2
-    MODEL = 4
-    POSE = 8
-    GNSS = 16
-    COMPASS = 32
-    ATTITUDE = 64  # of a pose; of a ``POSE`` that is wrong it is too
-
-
-_NAMES: Final = {
-    Source.GYRO: "gyro",
-    Source.ACCELEROMETER: "accelerometer",
-    Source.MODEL: "rotors",
-    Source.POSE: "pose",
-    Source.GNSS: "GNSS",
-    Source.COMPASS: "magnetometer",
-    Source.ATTITUDE: "attitude of the pose",
-}
-
-
-def names(sources: Source) -> str:
-    """What an operator reads."""
-    return " or ".join([name for source, name in _NAMES.items() if source & sources])
-
-
-NOBODY: Final = Source(0)
-G, A, M, P, N, B, Q = Source
-# Residuals, each with who it is of. Where no pose holds the attitude, what turns an acceleration
-# into the world is the gyro's and the magnetometer's as well: see ``_sources``.
-# The last two are of one alone: a bias that is larger than a sensor of its kind has.
-GM, GP, GB, AM, AP, MP_TURN, MP_FORCE, AN, MN, NN, MB, AA, GG = range(13)
-_PQ: Final = P | Q
-OF: Final = (G | M, G | _PQ, G | B, A | M, A | P, M | _PQ, M | P, A | N, M | N, N, M | B, A, G)
-COUNT: Final = len(OF)
-# What of them says nothing, if one of these does: attitudes turn what is felt.
+# What of residuals says nothing, if one of these does: attitudes turn what is felt.
 _MASKS: Final = tuple(int(one | (G | B if k in (AN, MN) else 0)) for k, one in enumerate(OF))
 # Whose measurements each of them is read at, as ``EVIDENCE.aids``; -1: at each look.
 _KINDS: Final = tuple(0 if one & P else 1 if one & N else 2 if one & B else -1 for one in OF)
@@ -92,7 +66,7 @@ EVERY: Final = 0.02  # s, between looks
 _LONG: Final = 3.0  # s, over which means of half a second are compared
 _MEAN: Final = 0.5  # s
 # For so long [s] a reading is in a window, or in the one before it.
-_CONTAINED: Final = (*(2.0 * window for window in WINDOWS), _LONG + 2.0 * _MEAN)
+CONTAINED: Final = (*(2.0 * window for window in WINDOWS), _LONG + 2.0 * _MEAN)
 _ROWS: Final = 256  # looks: 5 s
 _AIDS: Final = 256  # measurements of a kind, at most one a look
 _MEASURED: Final = 1  # column of what is measured, after the time: place and attitude, for example
@@ -134,19 +108,6 @@ _SPEED: Final = 10.0  # m/s
 _RATE: Final = 4.0  # rad/s
 _FOLLOWS: Final = 0.5  # s, for which that tells garbage
 _NOISE: Final = 20.0  # deviations of a place that is extrapolated
-# Deciding.
-_LEAD: Final = 1.0
-_DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
-_MOST: Final = 25.0  # of one residual
-_OF_PLACES: Final = (AP, MP_FORCE)
-_TILTED: Final = 1.5  # m/s^2, that a pose shows whose attitude is off by 0.15 rad
-# What is off shows at once in the first, while the trial is this young [s], and in others later.
-_SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
-_SHOWS: Final = 1.5
-_SURE: Final = 3.0  # sum of leads
-_QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
-_AGREES: Final = 5.0  # s of agreement, until what was named is believed again
-UNDECIDED: Final = 2.0  # s, after which suspects are not told apart any more
 
 EVIDENCE: Final = np.dtype(
     [
@@ -179,6 +140,42 @@ Evidence = NDArray[Any]  # (1,) of EVIDENCE
 Aid = tuple[bool, float, Vec3, Vec4, float, float]
 """Whether there is one, its time [s], what it measures, and deviations of both [SI]."""
 NO_AID: Final[Aid] = (False, 0.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+
+
+def scale_of_turns(agility: float, swing: float) -> Vec4:
+    """How much more [1] a vehicle turns beside rotors than the paper's, by window; 1 at least.
+
+    Of its ``agility`` [rad/s^2] and its ``swing`` [rad/m] (``rotors.py``).
+    """
+    a, b, c, d = [_PUSHES * swing * math.sqrt(window) / _TURN_OFF for window in WINDOWS]
+    least = max(agility / _AGILE, 1.0)
+    return max(a, least), max(b, least), max(c, least), max(d, least)
+
+
+def at_start() -> Evidence:
+    """What is known before anything was compared."""
+    evidence = np.zeros(1, EVIDENCE)
+    evidence["silent"] = -math.inf
+    return evidence
+
+
+def note_silence(evidence: Evidence, silent: Source, now: float) -> Source:
+    """Note what says nothing of use at ``now`` [s]; what has not for the shortest window."""
+    for place, one in enumerate(Source):
+        if one & silent:
+            evidence[0]["silent"][place] = now
+    lost = NOBODY
+    for one, at in zip(Source, evidence[0]["silent"].tolist(), strict=True):
+        if now - at < CONTAINED[0]:
+            lost |= one
+    return lost
+
+
+def size_of(evidence: Evidence, source: Source) -> float:
+    """The largest residual [SI] of a ``source`` that fires; 0: none does."""
+    s = evidence[0]
+    fired = np.where(s["ratio"] > 1.0, s["size"], 0.0)
+    return float(max(fired[k] for k in range(COUNT) if OF[k] & source))
 
 
 @compilable
@@ -287,7 +284,7 @@ def _note_largest(s: Any, now: float, k: int) -> None:
         if _MASKS[k] & (1 << i):
             silent = max(silent, s.silent[i])
     for i in range(5):
-        if heard - silent >= _CONTAINED[i] and s.both[k, i] > s.ratio[k]:
+        if heard - silent >= CONTAINED[i] and s.both[k, i] > s.ratio[k]:
             s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
 
 
@@ -692,241 +689,3 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
     else:
         iron = _IRON * turned_on / over
         _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron)
-
-
-class Verdict(NamedTuple):
-    """What is known of who is wrong; times are in seconds."""
-
-    evidence: Evidence | None = None
-    since: float = -1.0  # of the trial that is on; -1: none
-    fired: float = -math.inf  # when a residual did last
-    suspects: Source = NOBODY
-    # By how much the biases of accelerometer [m/s^2] and gyro [rad/s] were unknown in this trial.
-    unknown: Vec2 = (0.0, 0.0)
-    explained: bool = False  # in this trial the rotors' model was named
-    leader: Source = NOBODY  # the one that is named once that is sure
-    sum: float = 0.0  # of its leads
-    wrong: Source = NOBODY  # not used
-    agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
-    named: Source = NOBODY  # by the last look
-    seen: tuple[object, ...] = (None, None, None)  # the last samples of pose, satellites, compass
-
-    @property
-    def is_on(self) -> bool:
-        """Whether sensors, or one and the rotors' model, contradict each other."""
-        return self.since >= 0.0
-
-    def acquitted(self) -> Verdict:
-        """The verdict after the trial is over."""
-        return self._replace(
-            since=-1.0,
-            suspects=NOBODY,
-            unknown=(0.0, 0.0),
-            explained=False,
-            leader=NOBODY,
-            sum=0.0,
-            named=NOBODY,
-        )
-
-    def on_ground(self, now: float) -> Verdict:
-        """The verdict at ``now`` [s] on the ground, where nothing is compared.
-
-        What was named is believed again after as long as if it agreed: its own checks are left.
-        """
-        agreed = tuple([now if since == math.inf else since for since in self.agreed])
-        wrong = self.wrong
-        for one, since in zip(Source, agreed, strict=True):
-            if now - since >= _AGREES:
-                wrong &= ~one
-        return self._replace(wrong=wrong, agreed=agreed)
-
-    @property
-    def contradicts(self) -> bool:
-        """Whether that is so, and not because the rotors do not give what the model says."""
-        return self.is_on and self.suspects not in (NOBODY, Source.MODEL)
-
-
-def judged(
-    verdict: Verdict,
-    ratios: tuple[float, ...],
-    now: float,
-    *,
-    holds_attitude: bool,
-    lost: Source = NOBODY,
-    damaged: bool = False,
-    sizes: tuple[float, ...] = (0.0,) * COUNT,
-) -> Verdict:
-    """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
-
-    Their ``sizes`` are in SI. Where nothing that is used ``holds_attitude``, gyro and magnetometer
-    do. What is ``lost`` says nothing, and is known to be of no use without this law. Of a
-    ``damaged`` vehicle it is known that the rotors' model is off.
-    """
-    of = _sources(holds_attitude, verdict.wrong)
-    # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's;
-    # one that was taken for unknown in this trial is whatever the suspects made of it.
-    found = holds_attitude or verdict.wrong & Q or any(verdict.unknown)
-    known = range(AA if found else COUNT)
-    used = [k for k in known if not of[k] & (verdict.wrong | lost)]
-    fires = [k for k in used if ratios[k] > 1.0]
-    verdict = _with_return(verdict, ratios, of, now, lost)
-    if not fires:
-        if verdict.is_on and now - verdict.fired > _QUIET:
-            return verdict.acquitted()
-        return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
-    gone, young = verdict.wrong | lost, not verdict.is_on or now - verdict.since < _SHOWS
-    young = young and now - _silent_at(verdict.evidence) >= _CONTAINED[3]
-    # Rotors that are known to be off say nothing of who else is wrong.
-    explained = verdict.explained or damaged
-    beside = [k for k in fires if not of[k] & M] if explained else []
-    if beside:
-        gone, fires, used = gone | M, beside, [k for k in used if not of[k] & M]
-    cost = _costs(ratios, sizes, of, used, gone, young)
-    first, *others = sorted(cost, key=cost.__getitem__)
-    lead = cost[others[0]] - cost[first] if others else math.inf
-    suspects = NOBODY
-    for one in cost:
-        # Of a bias that is too large the filter knows already.
-        if cost[one] - cost[first] < _LEAD and fires[0] < AA:
-            suspects |= one
-    leader = first if lead > _LEAD else NOBODY
-    total = lead if leader else 0.0
-    if leader and leader is verdict.leader:
-        total += verdict.sum
-    named = leader if total > _SURE else NOBODY
-    # What the rotors have been named for shows in some windows for longer than in others.
-    explained = explained or named is M
-    verdict = verdict._replace(
-        since=verdict.since if verdict.is_on else now,
-        fired=now,
-        suspects=M if explained and not beside else suspects,
-        explained=explained,
-        leader=leader,
-        sum=total,
-        named=named,
-    )
-    return verdict if not named or named is M else _convicted(verdict, named)
-
-
-def _convicted(verdict: Verdict, named: Source) -> Verdict:
-    agreed = list(verdict.agreed)
-    agreed[list(Source).index(named)] = math.inf
-    convicted = verdict._replace(wrong=verdict.wrong | named, agreed=tuple(agreed))
-    return convicted.acquitted()._replace(named=named)
-
-
-def _silent_at(evidence: Evidence | None) -> float:
-    """When what shows a change at once, the unit or the rotors, was silent last [s]."""
-    if evidence is None:
-        return -math.inf
-    silent: list[float] = evidence[0]["silent"].tolist()
-    return max(at for one, at in zip(Source, silent, strict=True) if one & (G | A | M))
-
-
-def _costs(
-    ratios: tuple[float, ...],
-    sizes: tuple[float, ...],
-    of: tuple[Source, ...],
-    used: list[int],
-    gone: Source,
-    young: bool,
-) -> dict[Source, float]:
-    """What each hypothesis costs, of a trial that is ``young`` or not."""
-    cost = {}
-    for one in Source:
-        if one & gone or not any(of[k] & one and ratios[k] > 0.0 for k in used):
-            continue
-        left = [k for k in used if not of[k] & one]
-        if one is Q:
-            # The filter has turned what is felt by it for as long as it agreed.
-            left = [k for k in left if k not in _OF_PLACES or sizes[k] > _TILTED]
-        cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in left)
-        cost[one] -= _DISTURBED if one is B else 0.0
-        cost[one] += _not_shown(one, ratios, sizes, used) if young else 0.0
-    if not any(ratios[k] > 1.0 for k in used if of[k] & Q):
-        cost.pop(Q, None)
-    if P in cost and cost.get(Q, math.inf) - cost[P] < _LEAD:
-        del cost[P]  # nothing contradicts its place
-    return cost
-
-
-def _not_shown(
-    one: Source, ratios: tuple[float, ...], sizes: tuple[float, ...], used: list[int]
-) -> float:
-    """What it costs that a half of the unit is off by more than it differs from the rotors."""
-    at_once, others = _SHOWN.get(one, (GM, ()))
-    fired = [sizes[k] for k in others if k in used and ratios[k] > 1.0]
-    if not fired or at_once not in used or not sizes[at_once] > 0.0:
-        return 0.0
-    threshold = sizes[at_once] / ratios[at_once]
-    unseen = max(max(fired) - sizes[at_once], 0.0)
-    return min((unseen / threshold) ** 2, _MOST)
-
-
-def scale_of_turns(agility: float, swing: float) -> Vec4:
-    """How much more [1] a vehicle turns beside rotors than the paper's, by window; 1 at least.
-
-    Of its ``agility`` [rad/s^2] and its ``swing`` [rad/m] (``rotors.py``).
-    """
-    a, b, c, d = [_PUSHES * swing * math.sqrt(window) / _TURN_OFF for window in WINDOWS]
-    least = max(agility / _AGILE, 1.0)
-    return max(a, least), max(b, least), max(c, least), max(d, least)
-
-
-def at_start() -> Evidence:
-    """What is known before anything was compared."""
-    evidence = np.zeros(1, EVIDENCE)
-    evidence["silent"] = -math.inf
-    return evidence
-
-
-def note_silence(evidence: Evidence, silent: Source, now: float) -> Source:
-    """Note what says nothing of use at ``now`` [s]; what has not for the shortest window."""
-    for place, one in enumerate(Source):
-        if one & silent:
-            evidence[0]["silent"][place] = now
-    lost = NOBODY
-    for one, at in zip(Source, evidence[0]["silent"].tolist(), strict=True):
-        if now - at < _CONTAINED[0]:
-            lost |= one
-    return lost
-
-
-def size_of(evidence: Evidence, source: Source) -> float:
-    """The largest residual [SI] of a ``source`` that fires; 0: none does."""
-    s = evidence[0]
-    fired = np.where(s["ratio"] > 1.0, s["size"], 0.0)
-    return float(max(fired[k] for k in range(COUNT) if OF[k] & source))
-
-
-def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:
-    if holds_attitude:
-        return OF
-    # A magnetometer that is used turns the heading, and with it what is felt.
-    turn, turned = G | B & ~wrong, (AN, MN, *(_OF_PLACES if wrong & Q else ()))
-    return tuple([one | turn if k in turned else one for k, one in enumerate(OF)])
-
-
-def _with_return(
-    verdict: Verdict,
-    ratios: tuple[float, ...],
-    of: tuple[Source, ...],
-    now: float,
-    lost: Source,
-) -> Verdict:
-    """The verdict with what was named and has agreed with all others for long believed again."""
-    if not verdict.wrong:
-        return verdict
-    agreed, wrong = list(verdict.agreed), verdict.wrong
-    for place, one in enumerate(Source):
-        if not one & wrong:
-            continue
-        others = (wrong | lost) & ~one
-        heard = [ratios[k] for k in range(COUNT) if of[k] & one and not of[k] & others]
-        if max(heard, default=0.0) > 1.0 or not any(heard):
-            agreed[place] = math.inf
-        elif agreed[place] == math.inf:
-            agreed[place] = now
-        elif now - agreed[place] >= _AGREES:
-            wrong &= ~one
-    return verdict._replace(wrong=wrong, agreed=tuple(agreed))

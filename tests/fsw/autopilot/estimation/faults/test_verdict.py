@@ -13,17 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fsw.autopilot.estimation.error_state import FILTER
-from fsw.autopilot.estimation.faults import redundancy
-from fsw.autopilot.estimation.faults.redundancy import (
-    EVERY,
-    NO_AID,
-    UNDECIDED,
-    Aid,
-    Source,
-    Verdict,
-    judged,
-    look,
-)
+from fsw.autopilot.estimation.faults import residuals, sources
+from fsw.autopilot.estimation.faults.residuals import EVERY, NO_AID, Aid, look
+from fsw.autopilot.estimation.faults.sources import Source
+from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.autopilot.signals import Vec3, Vec4
@@ -73,8 +66,8 @@ def flown(
     """
     random = np.random.default_rng(seed)
     x: Any = np.zeros(1, FILTER)
-    evidence, verdict, found = redundancy.at_start(), Verdict(), []
-    evidence["began"], x["turns"] = -1.0, redundancy.scale_of_turns(1.0, swing)
+    evidence, verdict, found = residuals.at_start(), Verdict(), []
+    evidence["began"], x["turns"] = -1.0, residuals.scale_of_turns(1.0, swing)
     s: Any = SimpleNamespace(**{name: x[name][0] for name in WITNESSED}, suspect=False, out=0)
     blown, torque = np.zeros(3), np.zeros(3)
     p, v, q, spun = np.array([0.0, 0.0, -1.2]), np.zeros(3), (1.0, 0.0, 0.0, 0.0), np.zeros(3)
@@ -109,7 +102,7 @@ def flown(
         s.newest[:3], s.newest[3:] = felt, said
         s.gyro_bias[:] = (1.0 - math.exp(-now / 0.3)) * np.array(bias)
         s.suspect = verdict.is_on or bool(verdict.wrong)
-        redundancy.witness(s, R, TICK, (*alpha.tolist(), thrust), NONE)  # type: ignore[arg-type]
+        residuals.witness(s, R, TICK, (*alpha.tolist(), thrust), NONE)  # type: ignore[arg-type]
         if tick % round(EVERY / TICK):
             continue
         pose: Aid = NO_AID
@@ -297,11 +290,11 @@ def test_iron_that_turns_with_the_vehicle_is_nobody_s_fault(iron: Vec3) -> None:
 
 @pytest.mark.requirement("REQ-EST-13")
 def test_where_rotors_half_know_it_the_field_is_suspected_and_not_the_gyro() -> None:
-    ratios = [0.0] * redundancy.COUNT
-    ratios[redundancy.GB], ratios[redundancy.MB] = 1.8, 0.7
+    ratios = [0.0] * sources.COUNT
+    ratios[sources.GB], ratios[sources.MB] = 1.8, 0.7
     verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=False)
     assert verdict.suspects == Source.COMPASS
-    ratios[redundancy.GM], ratios[redundancy.MB] = 1.3, 0.0
+    ratios[sources.GM], ratios[sources.MB] = 1.3, 0.0
     verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=False)
     assert verdict.suspects & Source.GYRO
 
@@ -330,13 +323,13 @@ def test_a_field_that_leaps_is_no_fault_of_a_gyro_that_agrees_with_the_rotors(
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize(
     ("residual", "source"),
-    [(redundancy.AA, Source.ACCELEROMETER), (redundancy.GG, Source.GYRO)],
+    [(sources.AA, Source.ACCELEROMETER), (sources.GG, Source.GYRO)],
 )
 def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     residual: int, source: Source
 ) -> None:
     """Satellites do not hold the tilt: an accelerometer that drifts turned it by 20 deg."""
-    ratios = [0.7] * redundancy.COUNT
+    ratios = [0.7] * sources.COUNT
     ratios[residual] = 2.0
     verdict = Verdict()
     for look_ in range(3):
@@ -348,13 +341,13 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     found_with = judged(found_with, tuple(ratios), 1.0, holds_attitude=False)
     assert not found_with.is_on, "it was found with an attitude that is wrong"
     x: Any = np.zeros(1, FILTER)
-    evidence = redundancy.at_start()
+    evidence = residuals.at_start()
     x["witness"][0, 0] = 1.0
     x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
     for look_ in range(60):
         look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
-    assert evidence[0]["ratio"][redundancy.AA] > 1.0
-    assert evidence[0]["ratio"][redundancy.GG] > 1.0
+    assert evidence[0]["ratio"][sources.AA] > 1.0
+    assert evidence[0]["ratio"][sources.GG] > 1.0
     x["covariance"][0] = 0.5**2 * np.eye(17)
     for look_ in range(60, 90):
         look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
@@ -364,8 +357,8 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
 @pytest.mark.requirement("REQ-EST-13")
 def test_a_bias_that_was_taken_for_unknown_is_no_evidence() -> None:
     """A field that was stuck found one of 0.14 rad/s, and the gyro was named for that."""
-    ratios = [0.0] * redundancy.COUNT
-    ratios[redundancy.GB], ratios[redundancy.GG] = 1.5, 2.0
+    ratios = [0.0] * sources.COUNT
+    ratios[sources.GB], ratios[sources.GG] = 1.5, 2.0
     verdict = Verdict(since=0.5, fired=0.98, unknown=(0.0, 0.2))
     for look_ in range(10):
         now = 1.0 + EVERY * look_
@@ -379,21 +372,21 @@ def test_a_bias_that_was_taken_for_unknown_is_no_evidence() -> None:
 def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a_tilt_explains(
     gains: float, source: Source
 ) -> None:
-    ratios, sizes = [0.0] * redundancy.COUNT, [0.0] * redundancy.COUNT
-    for k in (redundancy.GP, redundancy.MP_TURN, redundancy.AP, redundancy.MP_FORCE):
+    ratios, sizes = [0.0] * sources.COUNT, [0.0] * sources.COUNT
+    for k in (sources.GP, sources.MP_TURN, sources.AP, sources.MP_FORCE):
         ratios[k] = 3.0
-    sizes[redundancy.AP] = sizes[redundancy.MP_FORCE] = gains
+    sizes[sources.AP] = sizes[sources.MP_FORCE] = gains
     verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
     assert verdict.wrong == source
-    ratios[redundancy.GP] = ratios[redundancy.MP_TURN] = 0.0
+    ratios[sources.GP] = ratios[sources.MP_TURN] = 0.0
     verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True, sizes=tuple(sizes))
     assert verdict.wrong == Source.POSE, "its attitude agrees"
 
 
 def looked_at(ratios: dict[int, float], sizes: dict[int, float], **known: Any) -> Verdict:
     """The verdict after ten looks at the same residuals: ``ratios`` [1] and ``sizes`` [SI]."""
-    shown = tuple([ratios.get(k, 0.0) for k in range(redundancy.COUNT)])
-    off = tuple([sizes.get(k, 0.0) for k in range(redundancy.COUNT)])
+    shown = tuple([ratios.get(k, 0.0) for k in range(sources.COUNT)])
+    off = tuple([sizes.get(k, 0.0) for k in range(sources.COUNT)])
     verdict = known.pop("verdict", Verdict())
     for look_ in range(10):
         verdict = judged(verdict, shown, 10.0 + EVERY * look_, sizes=off, **known)
@@ -404,8 +397,8 @@ def looked_at(ratios: dict[int, float], sizes: dict[int, float], **known: Any) -
 @pytest.mark.parametrize("known", ["damaged", "named"])
 def test_rotors_that_are_known_to_be_off_are_no_witness_against_others(known: str) -> None:
     """Beside a limp joint a sound pose was named for an accelerometer that drifted: 51 m away."""
-    turns = {redundancy.GM: 3.0, redundancy.MP_TURN: 3.0}
-    drifts = {redundancy.AP: 4.0, redundancy.AM: 0.9}
+    turns = {sources.GM: 3.0, sources.MP_TURN: 3.0}
+    drifts = {sources.AP: 4.0, sources.AM: 0.9}
     before = looked_at(turns, {}, holds_attitude=True, damaged=known == "damaged")
     assert before.suspects == Source.MODEL
     assert before.explained
@@ -421,10 +414,10 @@ def test_rotors_that_are_known_to_be_off_are_no_witness_against_others(known: st
 @pytest.mark.parametrize(("silent", "wrong"), [(6.0, Source.ATTITUDE), (8.4, Source(0))])
 def test_what_was_not_heard_could_not_show_a_change(silent: float, wrong: Source) -> None:
     """After a gap in the unit a gyro that drifted by 0.2 rad/s^2 was taken for the pose's fault."""
-    evidence = redundancy.at_start()
-    redundancy.note_silence(evidence, Source.GYRO | Source.ACCELEROMETER, silent)
-    ratios = {redundancy.GP: 3.8, redundancy.GM: 0.5, redundancy.AM: 0.5, redundancy.AP: 0.4}
-    sizes = {redundancy.GP: 0.31, redundancy.GM: 0.1, redundancy.AM: 0.9, redundancy.AP: 0.2}
+    evidence = residuals.at_start()
+    residuals.note_silence(evidence, Source.GYRO | Source.ACCELEROMETER, silent)
+    ratios = {sources.GP: 3.8, sources.GM: 0.5, sources.AM: 0.5, sources.AP: 0.4}
+    sizes = {sources.GP: 0.31, sources.GM: 0.1, sources.AM: 0.9, sources.AP: 0.2}
     verdict = looked_at(ratios, sizes, verdict=Verdict(evidence), holds_attitude=True)
     assert verdict.wrong == wrong
     assert wrong or verdict.suspects == Source.GYRO | Source.ATTITUDE
@@ -433,16 +426,16 @@ def test_what_was_not_heard_could_not_show_a_change(silent: float, wrong: Source
 @pytest.mark.requirement("REQ-EST-13")
 def test_without_the_attitude_of_a_pose_its_place_is_the_gyro_s_evidence_too() -> None:
     """A gyro turns what is felt: the place was named for a tilt, and the vehicle fell."""
-    ratios = {redundancy.GM: 1.6, redundancy.AP: 1.7, redundancy.MP_FORCE: 1.1}
+    ratios = {sources.GM: 1.6, sources.AP: 1.7, sources.MP_FORCE: 1.1}
     tilted = looked_at(ratios, {}, verdict=Verdict(wrong=Source.ATTITUDE), holds_attitude=False)
     assert tilted.wrong & Source.GYRO
     assert not tilted.wrong & Source.POSE
 
 
 def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds() -> None:
-    fires = [0.0] * redundancy.COUNT
-    fires[redundancy.GM], fires[redundancy.GP] = 5.0, 5.0
-    agrees = tuple(0.2 for _ in range(redundancy.COUNT))
+    fires = [0.0] * sources.COUNT
+    fires[sources.GM], fires[sources.GP] = 5.0, 5.0
+    agrees = tuple(0.2 for _ in range(sources.COUNT))
     verdict, now = Verdict(), 10.0
     for _ in range(3):
         verdict, now = judged(verdict, tuple(fires), now, holds_attitude=True), now + EVERY
@@ -457,12 +450,12 @@ def test_what_was_named_is_believed_again_after_it_has_agreed_for_five_seconds()
     assert verdict.wrong == Source.GYRO, "and it can be named again"
 
 
-@given(st.lists(st.floats(0.0, 20.0), min_size=redundancy.COUNT, max_size=redundancy.COUNT))
+@given(st.lists(st.floats(0.0, 20.0), min_size=sources.COUNT, max_size=sources.COUNT))
 def test_who_is_named_has_fired_and_nobody_is_while_nothing_does(ratios: list[float]) -> None:
     verdict = judged(Verdict(), tuple(ratios), 1.0, holds_attitude=True)
     fired = Source(0)
     for k, ratio in enumerate(ratios):
-        fired |= redundancy.OF[k] if ratio > 1.0 else Source(0)
+        fired |= sources.OF[k] if ratio > 1.0 else Source(0)
     assert not verdict.wrong & ~fired
     assert bool(verdict.is_on or verdict.wrong) == (max(ratios) > 1.0)
 
@@ -474,13 +467,13 @@ def test_a_comparison_counts_as_soon_as_its_window_is_without_silence(
     since: float, kept: float
 ) -> None:
     """Of a gyro that is garbage a second after a gap in its readings, nothing was heard for 4 s."""
-    e = redundancy.at_start()
-    redundancy.note_silence(e, Source.GYRO, 10.0)
-    s = SimpleNamespace(**{name: e[0][name] for name in redundancy.EVIDENCE.fields or ()})
-    s.came[redundancy.GM] = 10.0 + since
-    s.both[redundancy.GM] = 1.5, 2.0, 3.0, 4.0, 0.0
-    redundancy._note_largest(s, 10.0 + since, redundancy.GM)
-    assert s.ratio[redundancy.GM] == kept
+    e = residuals.at_start()
+    residuals.note_silence(e, Source.GYRO, 10.0)
+    s = SimpleNamespace(**{name: e[0][name] for name in residuals.EVIDENCE.fields or ()})
+    s.came[sources.GM] = 10.0 + since
+    s.both[sources.GM] = 1.5, 2.0, 3.0, 4.0, 0.0
+    residuals._note_largest(s, 10.0 + since, sources.GM)
+    assert s.ratio[sources.GM] == kept
 
 
 @given(st.sampled_from(list(Source)), st.floats(0.0, 0.19), st.floats(1.1, 20.0))
@@ -488,12 +481,12 @@ def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
     silent: Source, later: float, ratio: float
 ) -> None:
     """Encoders that send garbage leave the rotors' model without its arm, and no gyro is wrong."""
-    evidence = redundancy.at_start()
-    redundancy.note_silence(evidence, silent, 5.0)
-    lost = redundancy.note_silence(evidence, Source(0), 5.0 + later)
+    evidence = residuals.at_start()
+    residuals.note_silence(evidence, silent, 5.0)
+    lost = residuals.note_silence(evidence, Source(0), 5.0 + later)
     assert lost == silent
-    assert not redundancy.note_silence(evidence, Source(0), 5.0 + 2.0 * redundancy.WINDOWS[0])
-    fires = tuple([ratio if of & silent else 0.0 for of in redundancy.OF])
+    assert not residuals.note_silence(evidence, Source(0), 5.0 + 2.0 * residuals.WINDOWS[0])
+    fires = tuple([ratio if of & silent else 0.0 for of in sources.OF])
     verdict = judged(Verdict(), fires, 5.0 + later, holds_attitude=True, lost=lost)
     assert not verdict.is_on
     assert not verdict.wrong
@@ -502,8 +495,8 @@ def test_what_has_said_nothing_for_some_of_the_time_is_no_witness(
 @pytest.mark.requirement("REQ-EST-13")
 def test_a_field_that_has_turned_the_heading_is_a_suspect_beside_the_gyro() -> None:
     """It turns what is felt as well, where no pose holds the attitude."""
-    ratios = [0.0] * redundancy.COUNT
-    ratios[redundancy.GB], ratios[redundancy.AN] = 1.4, 1.1
+    ratios = [0.0] * sources.COUNT
+    ratios[sources.GB], ratios[sources.AN] = 1.4, 1.1
     verdict = Verdict()
     for look_ in range(20):
         now = EVERY * look_
@@ -520,9 +513,9 @@ def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
     level: NDArray[np.float64] = np.eye(3).ravel()
     model: Vec4 = (0.1, 0.0, 0.0, G)
     R = tuple(level.tolist())
-    redundancy.witness(x, R, TICK, model, NONE)  # type: ignore[arg-type]
+    residuals.witness(x, R, TICK, model, NONE)  # type: ignore[arg-type]
     assert x.witness.any()
-    redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0), NONE)  # type: ignore[arg-type]
+    residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0), NONE)  # type: ignore[arg-type]
     assert not x.witness[:4].any()
 
 
@@ -531,6 +524,6 @@ def test_what_a_surface_pushes_is_the_rotors_model_s_as_well() -> None:
     R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     x.newest[:3] = (-1.5, 0.0, -G)  # what an accelerometer feels of it
     for _ in range(100):
-        redundancy.witness(x, R, TICK, (0.0, 0.0, 0.0, G), (-1.5, 0.0, 0.0))
-    np.testing.assert_allclose(x.witness[redundancy.MADE :][:3], (-0.3, 0.0, 0.0), atol=1e-9)
-    np.testing.assert_allclose(x.witness[redundancy.BESIDE :][:3], 0.0, atol=1e-9)
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), (-1.5, 0.0, 0.0))
+    np.testing.assert_allclose(x.witness[residuals.MADE :][:3], (-0.3, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(x.witness[residuals.BESIDE :][:3], 0.0, atol=1e-9)
