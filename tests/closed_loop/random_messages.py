@@ -71,6 +71,7 @@ plan = "none"
 kind = "hold"
 position_m = [0.0, 0.0, -1.2]
 """
+_OWNERS: Final = ((-1.0, 0.0, 0.0, -0.795), 0.1, (0.0,) * 3, 0, 0)
 _WALL: Final = """
 [[walls]]
 name = "front"
@@ -268,15 +269,15 @@ class Talkers:
         t_us = self.simulation.t_us + chance.choice((0, 0, 0, -1_000_000, 2_000_000, 10**9))
         flags = int(kind == 2 or chance.random() < 0.2)
 
-        def announce() -> None:
+        drawn = numbers, abs(self.number(0.1, 0.1)), velocity, kind, flags
+        # With the wall that another source owns in front: what does not grow is not refused for it.
+        zones = (_OWNERS, drawn) if chance.random() < 0.5 else (drawn,)
+        for index, (numbers, clearance, velocity, kind, flags) in enumerate(zones):
             self.send(
-                sender, ids.OBSTACLE_SHAPE, time_usec=max(t_us, 0),
-                clearance=clearance, velocity=velocity, numbers=(*numbers, *(0.0,) * 16)[:16],
-                index=0, count=1, kind=kind, flags=flags,
+                sender, ids.OBSTACLE_SHAPE, time_usec=max(t_us, 0), clearance=clearance,
+                velocity=velocity, numbers=(*numbers, *(0.0,) * 16)[:16],
+                index=index, count=len(zones), kind=kind, flags=flags,
             )  # fmt: skip
-
-        clearance = abs(self.number(0.1, 0.1))
-        announce()
 
     def _targets(self, sender: MessageSource) -> None:
         """A stream for some seconds, which jumps, runs or hides below the ground."""

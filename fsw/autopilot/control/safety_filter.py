@@ -22,7 +22,7 @@ The zones are those that are kept: clearances have grown by what the estimate is
 margin is that of the safe set in force.
 
 It has a room and a speed. From a zone deeper than ``ROOM`` no way leads out that is known to be
-right: it pushes nobody. And nothing is pushed faster than the law's ``speed``.
+right: it pushes nobody. And nothing is pushed faster than the law's ``speed``, by however many.
 
 The planner's own bound is :math:`h \ge \lambda`; this law has none, so in flights that go as
 planned it changes no bit. Its command can be no more than the loops stand.
@@ -91,7 +91,7 @@ class FilterLaw:
     near: float  # m from the base; zones that are farther off are left out
     lag: float  # s, tau
     level: float  # m/s^2, at most, an axis
-    speed: float  # m/s, at most, along a zone's normal
+    speed: float  # m/s, at most
 
 
 def filter_law(
@@ -200,7 +200,7 @@ def _kept_off(
         if probes[j, ON] == ON_BASE and distance + zones[zone, ADDED] > -ROOM:
             along, away = dot(n, a), dot(n, acceleration)
             needed = away + _needed(law, follows, distance, dot(n, relative), along - away)
-            lacking = min(needed, _fastest(law, dot(n, v), along)) - dot(n, wanted)
+            lacking = min(needed, _fastest(law, n, v, along)) - dot(n, wanted)
             if lacking > 0.0:
                 wanted, lacked = _within(law, add_scaled(wanted, n, lacking)), True
     return wanted, lacked, margin
@@ -217,9 +217,15 @@ def _within(law: FilterLaw, a: Vec3) -> Vec3:
 
 
 @compilable
-def _fastest(law: FilterLaw, speed: float, along: float) -> float:
-    """The acceleration [m/s^2] that brings a speed [m/s] to the most, ``along`` [m/s^2] now."""
-    return law.tuning.gamma * (law.speed - speed - law.lag * along)
+def _fastest(law: FilterLaw, n: Vec3, v: Vec3 | Floats, along: float) -> float:
+    """The acceleration [m/s^2] along ``n`` that brings ``v`` [m/s, NED] to the most, ``along`` now.
+
+    What it moves at across ``n`` leaves less of that.
+    """
+    speed = dot(n, v)
+    across = dot(v, v) - speed * speed
+    most = math.sqrt(max(law.speed * law.speed - across, 0.0))
+    return law.tuning.gamma * (most - speed - law.lag * along)
 
 
 @compilable

@@ -11,6 +11,7 @@ from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.parameters.consistency import refusals
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.signals import (
     FlightSnapshot,
     SafeSet,
@@ -92,7 +93,7 @@ class TunedAutopilot:
         now = self._loop(state.tuning).analyse(mission.safe_set)
         broken = {finding.name for finding in now if not finding.holds}
         newly = [f for f in findings if not f.holds and f.name not in broken]
-        against = refusals(tuple(newly))
+        against = (*self._for_later(state.tuning, wanted), *refusals(tuple(newly)))
         if against and state.vehicle.armed and not self._config.soft:
             texts = [StatusText(Severity.WARNING, f"refused while armed: {why}") for why in against]
             return state, False, texts
@@ -101,6 +102,15 @@ class TunedAutopilot:
         texts = [StatusText(Severity.WARNING, statement) for statement in told]
         mission = replace(mission, refusals=() if self._config.soft else refusals(findings))
         return replace(state, tuning=wanted, mission=mission), True, texts
+
+    def _for_later(self, tuning: Tuning, wanted: Tuning) -> list[str]:
+        """What of a ``wanted`` one has to wait until the vehicle is disarmed."""
+        config, changed = self._made(wanted).config, dict(set(tuning) ^ set(wanted))
+        return [
+            f"{one.name} {one.read(config):g}, set it while disarmed"
+            for one in PARAMETERS
+            if one.path in changed and one.waits_for_disarming(config)
+        ]
 
     def _loop(self, tuning: Tuning) -> Autopilot:
         """The loop of the tuning in use; it is the same almost every tick."""

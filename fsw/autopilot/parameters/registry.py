@@ -66,6 +66,10 @@ class Parameter:
         """Whether its type can hold a ``value`` [its unit] exactly, whatever its range."""
         return float(value).is_integer() if self.integer else nearest_decimal(value) == value
 
+    def waits_for_disarming(self, config: FlightConfig) -> bool:
+        """Whether its value in a ``config`` may not come while armed: anybody may send it."""
+        return self.name in _DISARMED or dict(self.choices).get(int(self.read(config))) == _ENDS
+
     def refusal(self, value: float) -> str | None:
         """Why it cannot have a ``value`` [its unit]; None if the range allows it."""
         if not self.integer:
@@ -80,6 +84,10 @@ class Parameter:
         return f"{self.name} is to be {self.least:g}..{self.most:g}, {value:g} is refused"
 
 
+# Who may let the vehicle go farther, what of it keeps clear, and what makes it fall, are chosen
+# before it flies.
+_DISARMED: Final = frozenset({"SAFE_OWNER", "PLN_BODY", "CBRK_FLIGHTTERM"})
+_ENDS: Final = "Terminate"
 _Pid = tuple[float, float, float, float]  # P, I, D and the limit
 _NIL: Final[_Pid] = (0.0, 0.0, 0.0, 0.01)
 
@@ -245,7 +253,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Margin of a plan to the joint limits"),
         ("PLN_JNT_SLACK", "planner.joint_slack", "", 0.0, 1e5, "Joint limit slack penalty"),
         ("PLN_BODY", "planner.body", "", 0.0, 1.0,
-         "What keeps clear of obstacles"),
+         "What keeps clear of obstacles; changed while disarmed"),
         ("PLN_UPS_DIST", "upset_distance", "m", 0.02, 1.0,
          "Position error above which planning restarts from the measured state"),
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0,
@@ -424,7 +432,8 @@ _ROWS: Final[dict[str, list[Row]]] = {
     ],
     "Safe set": [
         ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
-         "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
+         "MAVLink system that owns the safe set and may grow it in flight; 0: the first one; "
+         "changed while disarmed"),
         ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
          "Action when the vehicle is outside its safe set"),
         ("GF_ACTION", "limits.fence_action", "", 0.0, 6.0,
@@ -483,8 +492,8 @@ _CHOICES: Final[dict[str, Choices]] = {
         (0, "Sensors and actuators every tick, the rest at 50 Hz"),
         (1, "Everything every tick"),
     ),
-    "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold"), (6, "Terminate")),
-    "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, "Terminate")),
+    "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold"), (6, _ENDS)),
+    "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, _ENDS)),
     "COM_RC_IN_MODE": ((1, "Joystick only"), (4, "Disabled")),
     "COM_DLL_EXCEPT": tuple((bits, _exceptions(bits)) for bits in range(16)),
     "COM_FLTT_LOW_ACT": ((0, "None"), (1, "Warning"), (3, "Return")),
@@ -493,7 +502,7 @@ _CHOICES: Final[dict[str, Choices]] = {
         (1, "Hold"),
         (2, "Land"),
         (3, "Return"),
-        (4, "Terminate"),
+        (4, _ENDS),
     ),
     "FD_ACT_EN": ((0, "Disabled"), (1, "Enabled")),
     "CA_FAILURE_MODE": ((0, "Ignored"), (1, "Allocation reweighted by its effectiveness")),
@@ -504,7 +513,7 @@ _CHOICES: Final[dict[str, Choices]] = {
         (1, "Warning"),
         (2, "Hold"),
         (3, "Return"),
-        (4, "Terminate"),
+        (4, _ENDS),
         (5, "Land"),
         (6, "Retreat along the normal, then hold"),
     ),

@@ -1,7 +1,8 @@
 """Which safe set is in force: the announced one and the fence together, if they can be kept.
 
 One source owns what is announced, the first or the configured one, and one the fence. In flight any
-source may shrink either, and only its owner may grow it (``safe_set_change.growth``); every change
+source may shrink either, and only its owner may grow it (``safe_set_change.growth``) or announce a
+zone that comes so close that the vehicle must give way: it could push it into others. Every change
 and every refusal is a text that says who and what. Disarmed, another source may become the
 owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
 nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the
@@ -26,6 +27,7 @@ from fsw.autopilot.flight.safety.safe_set_change import (
 from fsw.autopilot.flight.safety.safety_watch import least
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
 from fsw.autopilot.flight.state import MissionMemory
+from fsw.autopilot.geometry.vectors import norm
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.consistency import (
@@ -55,6 +57,7 @@ from fsw.autopilot.signals import (
 from fsw.frozen import replace
 
 _SAME = 1e-3  # m; a zone that is where it was predicted is off by rounding
+_LEAP = 0.1  # m; what comes closer by more, beside where it was predicted, is another zone
 _ACCEPTED = 8  # sources whose last announcement is remembered
 
 
@@ -164,7 +167,8 @@ class SafeSetCheck:
             return mission  # in case a datagram was lost
         repeated = _is_repeated(announcement, mission.refused)
         who, safe_set = f"safe set of {source}", announcement.safe_set
-        against = against or self._outside(mission, mission.announced, safe_set, here)
+        old = mission.announced
+        against = against or self._outside(mission, old, safe_set, here, owns=owns)
         refused = replace(mission, refused=announcement, refused_count=mission.refused_count + 1)
         if against:
             if not repeated:
@@ -194,7 +198,15 @@ class SafeSetCheck:
         whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
         return f"{grown}, which {whose}"
 
-    def _outside(self, mission: MissionMemory, old: SafeSet, new: SafeSet, here: _Vehicle) -> str:
+    def _outside(
+        self,
+        mission: MissionMemory,
+        old: SafeSet,
+        new: SafeSet,
+        here: _Vehicle,
+        *,
+        owns: bool = True,
+    ) -> str:
         """Why the vehicle ``here`` cannot be in a ``new`` set that replaces an ``old`` one.
 
         Zones in force are not asked again. One that has only moved on must leave the vehicle no
@@ -209,6 +221,7 @@ class SafeSetCheck:
             against = self._outside(mission, old, standing, here)
             if against:
                 return against
+        timeout = 1e-6 * self._config.limits.zone_timeout_us
         inside = self._values(new, estimate, target)
         was = self._values(old, estimate, target) if is_update(old, new) else {}
         for number, (margin, h) in inside.items():
@@ -217,10 +230,17 @@ class SafeSetCheck:
                 continue
             which = f"zone {number + 1} ({zone.shape.kind})"
             moves_on = number in was and is_update_of(old.zones[number], zone)
+            moves_on = moves_on and margin >= was[number][0] - _LEAP
             if not margin >= (min(was[number][0] - _SAME, 0.0) if moves_on else 0.0):
                 return f"the vehicle is not inside {which}, by {-margin:.2f} m"
             if not (moves_on or h >= 0.0):
                 return f"the vehicle could not stop before {which}: it is {-h:.2f} m/s too fast"
+            speed = norm(zone.velocity)
+            if not (owns or margin >= speed * timeout):
+                return (
+                    f"{which} could reach the vehicle, {margin:.2f} m away at {speed:.2f} m/s, and "
+                    "its source does not own the safe set"
+                )
         return ""
 
     def _values(

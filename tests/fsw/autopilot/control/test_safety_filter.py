@@ -323,6 +323,8 @@ def test_nothing_is_pushed_faster_than_the_speed_of_setpoints() -> None:
         result, changed, _ = asked((AHEAD,), outside, (-speed, 0.0, 0.0), ZERO, law=law)
         assert changed is pushed
         assert bool(result[0] < 0.0) is pushed
+        across, _, _ = asked((AHEAD,), outside, (-speed, 1.2, 0.0), ZERO, law=law)
+        assert bool(across[0] < 0.0) is (math.hypot(speed, 1.2) < 1.5), "by several at once neither"
         _, unbounded, _ = asked((AHEAD,), outside, (-min(speed, 1.0), 0.0, 0.0), ZERO)
         assert unbounded
     unchanged = asked((AHEAD,), (0.85, 0.0, -1.0), (0.2, 0.0, 0.0), (0.5, 0.0, 0.0))

@@ -11,7 +11,7 @@ from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
-from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
     Mode,
@@ -109,6 +109,29 @@ def test_what_breaks_an_inequality_is_not_taken_while_armed_unless_softly(
     assert len(begins) == 1
     # Disarmed it stands against arming from now on.
     assert bool(state.mission.refusals) is (mode is Mode.DISARMED)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.DISARMED])
+@pytest.mark.parametrize(
+    ("path", "value", "waits"),
+    [
+        ("limits.safe_set_owner", 66.0, True),
+        ("planner.body", 0.0, True),
+        ("limits.fence_action", 4.0, True),
+        ("limits.station_loss_action", 5.0, True),
+        ("limits.fence_action", 5.0, False),
+    ],
+)
+def test_what_would_let_anybody_end_the_flight_waits_for_disarming(
+    path: str, value: float, waits: bool, mode: Mode
+) -> None:
+    """A stranger became the owner, had rotors fly into a wall that was kept, had it terminate."""
+    loop = TunedAutopilot(flight_config(body="full"))
+    _, outputs = tick(loop, walled(mode), ((path, value),))
+    armed = mode is Mode.HOLD
+    assert outputs.tuning_taken is not (waits and armed)
+    assert any("while disarmed" in one.text for one in outputs.texts) is (waits and armed)
 
 
 def test_what_is_broken_already_is_no_reason_against_another_change() -> None:

@@ -303,6 +303,22 @@ def test_a_stranger_cannot_shut_the_vehicle_out_in_flight() -> None:
     assert after.safe_set == walled(1.0, 5.0), "on the ground it speaks against arming"
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
+@pytest.mark.parametrize(("away", "taken"), [(0.8, False), (2.5, False), (5.0, True)])
+def test_no_zone_of_a_stranger_can_drive_the_vehicle_into_the_owners(
+    away: float, taken: bool
+) -> None:
+    """Between the owner's wall and one that came at 1.5 m/s it was pushed into the first."""
+    memory, _ = received(MissionMemory(), SafeSet((NORTH,)))
+    behind = wall((1.0, 0.0, 0.0), -away - 0.3, 0.1)
+    comes = replace(behind, velocity=(1.5, 0.0, 0.0), t_us=1_000_000)
+    added, texts = received(memory, SafeSet((NORTH, comes)), source=STRANGER)
+    assert (added.safe_set == SafeSet((NORTH, comes))) is taken
+    assert taken or "could reach the vehicle" in refused(texts)
+    owners, _ = received(memory, SafeSet((NORTH, comes)))
+    assert away < 1.0 or owners.safe_set == SafeSet((NORTH, comes))
+
+
 def announced_to(
     safe_set: SafeSet, memory: MissionMemory | None = None, *, v: Vec3 = (0.0, 0.0, 0.0),
     target: EndEffectorTarget | None = None, t_us: int = 1_000_000, **how: bool,
@@ -352,13 +368,25 @@ def test_in_flight_the_way_in_which_the_vehicle_stops_is_inside_as_well() -> Non
     assert memory.safe_set == walled(1.0, 5.0), "it flies away from it"
 
 
+def person(x: float, vx: float, t_us: int = 1_000_000) -> SafeSet:
+    at = vertical_cylinder((x, 0.0), 0.3)
+    return SafeSet((Zone(at, 0.1, velocity=(vx, 0.0, 0.0), t_us=t_us),))
+
+
+@pytest.mark.requirement("REQ-SAFE-7")
+@pytest.mark.parametrize(("leap", "taken"), [(0.08, True), (0.4, False)])
+def test_a_zone_that_leaps_towards_the_vehicle_is_another_one(leap: float, taken: bool) -> None:
+    """Leaps of one zone, each of which it was not to stop before, drove it to 2.8 m/s."""
+    before, after = person(-0.5 - leap, 0.1), person(-0.5, 1.0)
+    memory, _ = announced_to(before)
+    memory, texts = announced_to(after, memory)
+    assert memory.safe_set == (after if taken else before)
+    assert taken or "could not stop before" in refused(texts)
+
+
 def test_a_zone_that_has_turned_towards_the_vehicle_is_believed_while_that_is_outside_of_it() -> (
     None
 ):
-    def person(x: float, vx: float, t_us: int = 1_000_000) -> SafeSet:
-        at = vertical_cylinder((x, 0.0), 0.3)
-        return SafeSet((Zone(at, 0.1, velocity=(vx, 0.0, 0.0), t_us=t_us),))
-
     memory, _ = announced_to(person(-0.6, 0.1))
     memory, _ = announced_to(person(-0.5, 1.0), memory)
     assert memory.safe_set == person(-0.5, 1.0), "it cannot stop before it, and must know of it"
