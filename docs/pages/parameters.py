@@ -17,8 +17,9 @@ as PX4 sends them.
 
 A change takes effect between two ticks and as a whole
 ([decision 0012](../decisions/0012-parameters.md)). A value outside its range is refused, and while
-armed one that breaks an inequality of the [start-up analysis](../equations.md); a STATUSTEXT says
-why, and the value in force is sent back.
+armed one that breaks an inequality of the [start-up analysis](../equations.md), or says who may
+change the safe set, what keeps clear, or that a flight is terminated; a STATUSTEXT says why, and
+the value in force is sent back.
 """
 
 _READ_ONLY = """\
