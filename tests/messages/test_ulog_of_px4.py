@@ -153,6 +153,19 @@ def test_a_subscription_may_end_and_its_number_be_given_again(tmp_path: Path) ->
             b"".join(declare(f"t{k}:uint64_t timestamp;t{k + 1}[99] x;") for k in range(7))
             + declare("t7:float x;") + subscribe("t0"), 0, "too many fields",
         ),
+        # Megabytes of names out of kilobytes: of many siblings, of a long name, of a long array.
+        (
+            declare("a:" + "char a;" * 1000) + declare("b:uint64_t timestamp;" + "a a;" * 1000)
+            + subscribe("b"), 0, "too many fields",
+        ),
+        (
+            declare(f"a:char {'n' * 1000};") + declare("b:uint64_t timestamp;a[5000] a;")
+            + subscribe("b"), 0, "too many fields",
+        ),
+        (
+            declare(f"a:uint64_t timestamp;uint8_t[5000] {'n' * 1000};") + subscribe("a"),
+            0, "too many fields",
+        ),
         (PLAIN + ROW + message(b"R", struct.pack("<H", 0)) + ROW, 0, "topic 0 has 12 bytes"),
         (PLAIN + ROW + bytes(40), 0, "no kind of message"),
         (key(b"I", "char[7] sys_name", b"Pandion") + PLAIN + LATER, 0, "no kind of message"),
