@@ -6,7 +6,7 @@ a topic that was subscribed to more than once has its instance behind its name, 
 
 from __future__ import annotations
 
-import mmap
+import os
 import re
 import struct
 from collections.abc import Iterator
@@ -252,22 +252,21 @@ class UlogFile:
                 self.information[declared.name] = value
 
     def _messages(self) -> Iterator[tuple[bytes, bytes]]:
-        with (
-            open_regular(self.path) as file,
-            mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) as data,
-        ):
-            self.size = len(data)
-            while self.at + _HEADER.size <= self.size:
-                length, kind = _HEADER.unpack_from(data, self.at)
-                begin = self.at + _HEADER.size
+        with open_regular(self.path) as file:
+            # Not mapped into memory: a file that is cut meanwhile would end the process.
+            self.size = os.fstat(file.fileno()).st_size
+            file.seek(self.at)
+            while len(head := file.read(_HEADER.size)) == _HEADER.size:
+                length, kind = _HEADER.unpack(head)
+                end = self.at + _HEADER.size + length
                 joint = next((at for at in self._joints if self.at < at), self.size)
-                if begin + length > joint < self.size:
-                    self.at = joint  # the message was cut when data were appended
+                if end > joint < self.size:
+                    self.at = file.seek(joint)  # the message was cut when data were appended
                     continue
-                if begin + length > self.size:
+                if end > self.size or len(body := file.read(length)) < length:
                     break
-                self.at = begin + length
-                yield kind, data[begin : self.at]
+                self.at = end
+                yield kind, body
             self.whole = self.at == self.size
 
 

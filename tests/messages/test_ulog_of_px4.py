@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import struct
 from pathlib import Path
 from typing import Any
@@ -125,6 +126,17 @@ def test_data_that_were_appended_into_a_cut_message_are_read(tmp_path: Path) -> 
     path = tmp_path / "appended.ulg"
     path.write_bytes(log_of(PLAIN + ROW, bytes(flags)) + cut[len(first) :] + data(0, "Qf", 9, 4.5))
     assert [row["x"] for row in read(path)["foo"]] == [1.5, 4.5]
+
+
+def test_a_log_that_is_cut_while_it_is_read_is_read_up_to_there(tmp_path: Path) -> None:
+    path = tmp_path / "cut.ulg"
+    path.write_bytes(log_of(PLAIN + 10_000 * ROW))
+    log = open_log(path)
+    records = log.records()
+    next(records)
+    os.truncate(path, 200)
+    assert sum(1 for _ in records) < 10_000
+    assert not log.whole
 
 
 def test_a_subscription_may_end_and_its_number_be_given_again(tmp_path: Path) -> None:
