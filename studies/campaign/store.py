@@ -70,6 +70,7 @@ class CampaignResult:
     facts: dict[str, Any]  # campaign.json
     left_out: int  # lines of the journal that are no rows of these flights
     seal: Seal  # of the journal
+    sealed: Seal  # that campaign.json was written with
 
     @property
     def complete(self) -> bool:
@@ -100,7 +101,7 @@ def read(directory: Path) -> CampaignResult:
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
     rows, left_out, seal = _rows(directory / JOURNAL, partial(row_of, plan), digests, sealed)
     asked = max([asked, *(row.flight + 1 for row in rows[-1:])])
-    return CampaignResult(plan, rows, asked, digests, facts, left_out, seal)
+    return CampaignResult(plan, rows, asked, digests, facts, left_out, seal, sealed)
 
 
 def read_rows(directory: Path) -> KeptRows:
@@ -314,10 +315,10 @@ def _rows(
         except TypeError:
             left_out += 1
             continue
-        if key == row_key(digests.plan, row.flight, digests.code):
-            found[row.flight] = row
-        else:
+        if key != row_key(digests.plan, row.flight, digests.code):
             left_out += 1
+            continue
+        found[row.flight] = row
     if not kept:
         raise JournalError(
             f"{journal} has {seal.lines} lines, which are not the {sealed.lines} that {FACTS} was "

@@ -31,7 +31,7 @@ from studies.campaign.keys import (
     applied,
 )
 from studies.campaign.randomness import drawn, seeded, spread
-from studies.campaign.store import PLAN, CampaignResult
+from studies.campaign.store import FACTS, PLAN, CampaignResult
 from studies.campaign.values import grid_size
 from studies.statistics.binomial import bounds
 from studies.statistics.extremes import NoFitError, fit_tail
@@ -78,14 +78,9 @@ def certificate(
     What is ``required`` is in it with what was found.
 
     Raises:
-        CampaignError: Flights are missing, or there are none.
+        CampaignError: Flights are missing, or fewer than the plan has.
     """
-    missing = result.asked - len(result.rows)
-    if missing or not result.rows:
-        raise CampaignError(
-            f"{missing} of {result.asked} flights have no row, and what is missing cannot be left "
-            f"out: finish with `pandion campaign {directory / PLAN} --out {directory}`"
-        )
+    _check_whole(result, directory)
     rows_digest = digest([row.compared() for row in result.rows])
     statement = {
         "format": FORMAT,
@@ -121,6 +116,24 @@ def certificate(
     }
     rounded = _rounded(statement)
     return {**rounded, "digest": digest(_signed(rounded))}
+
+
+def _check_whole(result: CampaignResult, directory: Path) -> None:
+    """Refuse fewer flights than the file asks for: who leaves some out may choose which."""
+    finish = f"finish with `pandion campaign {directory / PLAN} --out {directory}`"
+    result.plan.check(result.asked)
+    asked = max(result.asked, result.plan.count)
+    missing = asked - len(result.rows)
+    if missing or not result.rows:
+        raise CampaignError(
+            f"{missing} of {asked} flights have no row, and what is missing cannot be left out: "
+            f"{finish}"
+        )
+    if not result.sealed.lines:
+        raise CampaignError(
+            f"{directory / FACTS} was written before the first of {asked} flights, and says "
+            f"nothing of their rows: {finish}"
+        )
 
 
 def verdicts(
@@ -249,9 +262,13 @@ def _margins(
 
 def _early(result: CampaignResult, row: CampaignRow) -> bool:
     """Whether a flight ended before its time."""
+    return not row.duration_s >= _wanted_s(result, row) - _CUT_S
+
+
+def _wanted_s(result: CampaignResult, row: CampaignRow) -> float:
+    """How long a flight is to be [s]."""
     base = result.plan.bases[row.flight % len(result.plan.cases)]
-    wanted_s = row.values.get("duration_s", base.scenario.duration_s)
-    return not row.duration_s >= wanted_s - _CUT_S
+    return row.values.get("duration_s", base.scenario.duration_s)
 
 
 def _no_tail(result: CampaignResult, place: int) -> dict[str, Any]:

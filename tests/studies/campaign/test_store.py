@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +31,27 @@ def put(
 ) -> None:
     """Rows of flights of a plan as they would be kept, without flying."""
     rows = [
-        replace(CampaignFlight(plan, k).broken(""), error=False, completed=True, margin_m=0.1)
+        replace(
+            CampaignFlight(plan, k).broken(""), error=False, completed=True, margin_m=0.1,
+            duration_s=2.0,
+        )
         for k in numbers
-    ]
+    ]  # fmt: skip
     journal = Journal(directory / JOURNAL)
     journal.append(
         (own_key or CampaignFlight(plan, row.flight).key(), row.as_line() | changed) for row in rows
     )
     journal.close()
+    seal(directory)
+
+
+def seal(directory: Path) -> None:
+    """Write of the journal what a campaign does at its end, if the facts can be read."""
+    journal = Journal(directory / JOURNAL)
+    journal.close()
+    if text := (directory / FACTS).read_text():
+        facts = json.loads(text) | {"journal": asdict(journal.seal)}
+        (directory / FACTS).write_text(json.dumps(facts))
 
 
 def begun(folder: Path, flights: int | None = None) -> tuple[Path, Path, CampaignPlan]:
