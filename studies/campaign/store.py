@@ -303,7 +303,8 @@ def _rows(
     """One row a flight, the last that was written, in their order; how many lines are none.
 
     Raises:
-        JournalError: The journal does not verify, or does not begin as it was ``sealed``.
+        JournalError: The journal does not verify, does not begin as it was ``sealed``, or has
+            another row of a flight that did not break.
     """
     found: dict[int, CampaignRow] = {}
     left_out, seal, kept = 0, Seal(), sealed == Seal()
@@ -318,6 +319,11 @@ def _rows(
         if key != row_key(digests.plan, row.flight, digests.code):
             left_out += 1
             continue
+        if row.flight in found and not found[row.flight].error:
+            raise JournalError(
+                f"{journal}, line {seal.lines} is a second row of flight {row.flight}, which "
+                "did not break and is to have one: fly the campaign again into another --out"
+            )
         found[row.flight] = row
     if not kept:
         raise JournalError(

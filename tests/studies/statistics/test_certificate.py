@@ -232,6 +232,26 @@ def test_facts_of_before_the_first_flight_hold_no_journal(tmp_path: Path) -> Non
         certificate(read(directory), directory, 0.95)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"seed": 1}, "seed"),
+        ({"scenario": "walls-calm", "fault": "wind"}, "scenario, fault"),
+        ({"values": {"vehicle_scale.mass": 1.0}}, "values"),
+        ({"duration_s": 2.1}, "duration_s"),
+        ({"duration_s": 1.0}, "duration_s"),
+        ({"duration_s": float("nan"), "completed": False}, "duration_s"),
+        ({"margin_m": float("inf")}, "margin_m"),
+    ],
+)
+def test_a_row_that_no_flight_of_the_plan_can_leave_is_refused(
+    tmp_path: Path, wrong: dict[str, Any], named: str
+) -> None:
+    directory = flown(tmp_path, {1: wrong}, 2)
+    with pytest.raises(CampaignError, match=f"flight 1 is none of .*, by its {named}: fly"):
+        certificate(read(directory), directory, 0.95)
+
+
 def test_a_tail_is_fitted_and_the_same_again(tmp_path: Path) -> None:
     directory = flown(tmp_path, {}, flights=300)
     stated = certificate(read(directory), directory, 0.95, refits=9)
