@@ -15,11 +15,12 @@ import argparse
 import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from command_line.output import print_error
 from command_line.parser import Parser
-from command_line.values import one_of, output_file
+from command_line.values import one_of, output_file, path
 
 Kind = TypeVar("Kind")
 
@@ -125,7 +126,7 @@ class Option:
 
     def _parsed(self, text: str) -> Any:
         try:
-            return self.parse(text)
+            return path(text) if self.parse is Path else self.parse(text)
         except ValueError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
 

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
+import re
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from command_line.parser import unknown_name
+from command_line.toml_tables import shown
 
 LONGEST_S = 1e9
 LARGEST_SEED = (1 << 63) - 1
+_WHOLE = re.compile(f"[0-9]{{1,{len(str(LARGEST_SEED))}}}")
 
 
 def whole(least: int = 0, most: int = LARGEST_SEED) -> Callable[[str], int]:
     """A whole number from ``least`` to ``most``."""
 
     def parse(text: str) -> int:
-        if not text.isdecimal() or not least <= int(text) <= most:
-            raise ArgumentTypeError(f"{text!r} is not a whole number from {least} to {most}")
+        if not _WHOLE.fullmatch(text) or not least <= int(text) <= most:
+            raise ArgumentTypeError(f"{shown(text)} is not a whole number from {least} to {most}")
         return int(text)
 
     return parse
@@ -28,10 +31,10 @@ def number(least: float, most: float, unit: str) -> Callable[[str], float]:
     """A number from ``least`` to ``most``, both in the ``unit`` that the sentence names [unit]."""
 
     def parse(text: str) -> float:
-        value = _float(text)
+        value = plain_float(text)
         if not least <= value <= most:
             allowed = f"a number from {least:g} to {most:g} {unit}".rstrip()
-            raise ArgumentTypeError(f"{text!r} is not {allowed}")
+            raise ArgumentTypeError(f"{shown(text)} is not {allowed}")
         return value
 
     return parse
@@ -39,9 +42,9 @@ def number(least: float, most: float, unit: str) -> Callable[[str], float]:
 
 def seconds(text: str) -> float:
     """A time that is more than nothing [s]."""
-    value = _float(text)
+    value = plain_float(text)
     if not 0.0 < value <= LONGEST_S:
-        raise ArgumentTypeError(f"{text!r} is not a positive number of seconds, such as 20")
+        raise ArgumentTypeError(f"{shown(text)} is not a positive number of seconds, such as 20")
     return value
 
 
@@ -70,8 +73,23 @@ def known(*names: str) -> Callable[[str], str]:
     return parse
 
 
+def path(text: str) -> Path:
+    """A file or folder, there or not."""
+    if not text:
+        raise ArgumentTypeError("'' is no name: give that of a file or folder")
+    try:
+        Path(text).stat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:  # such as a name of more than 255 bytes
+        why = error.strerror if isinstance(error, OSError) else error
+        raise ArgumentTypeError(f"{shown(text)} cannot be the name of a file: {why}") from None
+    return Path(text)
+
+
 def output_file(text: str) -> str:
     """A file that can be made, or ``-`` for standard output."""
+    path(text)
     if text != "-" and Path(text).is_dir():
         raise ArgumentTypeError(f"cannot write {text}: it is a directory")
     if text != "-" and not Path(text).parent.is_dir():
@@ -81,14 +99,16 @@ def output_file(text: str) -> str:
 
 def existing_file(text: str) -> Path:
     """A file that is there."""
-    if not Path(text).is_file():
+    found = path(text)
+    if not found.is_file():
         raise ArgumentTypeError(f"there is no file {text}")
-    return Path(text)
+    return found
 
 
-def _float(text: str) -> float:
+def plain_float(text: str) -> float:
+    """A number of plain digits, with none of the ``_`` that Python has among them; else NaN."""
     try:
-        return float(text)
+        return float(text) if text.isascii() and "_" not in text else math.nan
     except ValueError:
         return math.nan
 
@@ -99,10 +119,10 @@ def place(text: str) -> tuple[float, float, float]:
     Raises:
         ValueError: It is no place.
     """
-    try:
-        latitude, longitude, altitude = (float(word) for word in text.split(","))
-    except ValueError:
-        raise ValueError(f"origin '{text}' is not LATITUDE,LONGITUDE,ALTITUDE") from None
+    numbers = [plain_float(word) for word in text.split(",")]
+    if len(numbers) != 3 or any(map(math.isnan, numbers)):
+        raise ValueError(f"origin '{text}' is not LATITUDE,LONGITUDE,ALTITUDE")
+    latitude, longitude, altitude = numbers
     # At the poles there is no north.
     if not (abs(latitude) <= 89.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
         raise ValueError(

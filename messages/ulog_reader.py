@@ -6,7 +6,7 @@ a topic that was subscribed to more than once has its instance behind its name, 
 
 from __future__ import annotations
 
-import mmap
+import os
 import re
 import struct
 from collections.abc import Iterator
@@ -25,6 +25,10 @@ _NAME = re.compile(r"\w+", re.ASCII)  # of a topic; it also names a file of an e
 _MAX_BYTES: Final = 65533  # of a record behind its number
 _TEXT_HEADS: Final = {ulog.TEXT: 9, ulog.TAGGED: 11}  # bytes: severity, tag and time
 _DEEPEST: Final = 8  # types inside one another
+# Characters of the names of all values together, dots and places in arrays among them: a short file
+# can declare gigabytes of them. Logs of PX4 have some 100,000.
+_MAX_NAMES: Final = 1 << 22
+_PLACE: Final = len(".[12345]")  # what a name may have besides that of its field
 _APPENDED: Final = 1  # bit of the flags: data was appended behind the end
 _SYSTEM: Final = "Pandion"  # who wrote a log, unless it says so itself
 _DAMAGE = (ValueError, IndexError, KeyError, struct.error)  # what a wrong byte leads to
@@ -57,8 +61,10 @@ class UlogFile:
     whole: bool = True  # False once the end turned out to be cut
     unknown: dict[str, int] = field(default_factory=dict)  # kinds passed over, and how often
     _declared: dict[str, tuple[Field, ...]] = field(default_factory=dict)  # as they stand there
-    _padded: dict[str, int] = field(default_factory=dict)  # bytes of a record with its padding
-    # Bytes of the records by number, without and with padding at their end.
+    _flattened: dict[str, tuple[Field, ...]] = field(default_factory=dict)  # without nested types
+    _room: int = _MAX_NAMES  # characters of names that may still be declared
+    # Bytes of the records by topic and by number, without and with padding at their end.
+    _sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
     _lengths: dict[int, tuple[int, int]] = field(default_factory=dict)
     _joints: list[int] = field(default_factory=list)  # where data were appended
 
@@ -120,7 +126,7 @@ class UlogFile:
         topic = self.formats[name]
         if instance:
             topic = replace(topic, name=f"{name}_{instance}")
-        self._lengths[number] = (unpacker(topic).size, self._padded[name])
+        self._lengths[number] = self._sizes[name]
         self.topics[number] = topic
 
     def _check(self, record: Record, length: int) -> None:
@@ -178,8 +184,8 @@ class UlogFile:
         """Make topics of the formats; those without a time are parts of others."""
         if any(not self._is_passed_over(kind.encode()) for kind in self.unknown):
             raise ValueError(f"{', '.join(self.unknown)} is no kind of message among definitions")
-        for name, declared in self._declared.items():
-            fields = list(self._flat(declared, 0))
+        for name in self._declared:
+            fields = list(self._flat(name, 0))
             whole = struct.calcsize("<" + "".join(one.code for one in fields))
             if not fields or (fields[0].name, fields[0].type) != ("timestamp", "uint64_t"):
                 continue
@@ -187,26 +193,43 @@ class UlogFile:
                 raise ValueError(f"{name} has records of more than {_MAX_BYTES} bytes")
             while fields[-1].is_padding:
                 fields.pop()
-            self.formats[name] = Topic(name, "", "", tuple(fields[1:]))
-            self._padded[name] = whole
+            self.formats[name] = topic = Topic(name, "", "", tuple(fields[1:]))
+            self._sizes[name] = (unpacker(topic).size, whole)
 
-    def _flat(self, fields: tuple[Field, ...], depth: int) -> Iterator[Field]:
+    def _flat(self, name: str, depth: int) -> tuple[Field, ...]:
         """Fields of the format's own types; those of another format by a dotted name."""
         if depth > _DEEPEST:
             raise ValueError(f"types are nested more than {_DEEPEST} deep")
-        for one in fields:
+        if name in self._flattened:
+            return self._flattened[name]
+        fields: list[Field] = []
+        for one in self._declared[name]:
             if one.is_own:
-                yield one
+                self._take(one, max(one.values, 1), 0)
+                fields.append(one)
             elif one.type not in self._declared:
                 raise ValueError(f"{one.name} has the unknown type {one.type!r}")
             else:
-                inner = tuple(self._flat(self._declared[one.type], depth + 1))
-                if len(inner) * (one.count or 1) > _MAX_BYTES:
-                    raise ValueError(f"{one.name} has too many fields")
-                for k in range(one.count or 1):
-                    where = f"{one.name}[{k}]" if one.count else one.name
-                    for part in inner:
-                        yield replace(part, name=f"{where}.{part.name}")
+                fields += self._nested(one, self._flat(one.type, depth + 1))
+        self._flattened[name] = tuple(fields)
+        return self._flattened[name]
+
+    def _nested(self, one: Field, inner: tuple[Field, ...]) -> Iterator[Field]:
+        """The fields of a field of another format, or of its array."""
+        names = sum(max(part.values, 1) * (len(part.name) + _PLACE) for part in inner)
+        values = sum(max(part.values, 1) for part in inner)
+        times = one.count or 1
+        self._take(one, times * max(values, 1), times * names)
+        for k in range(times):
+            where = f"{one.name}[{k}]" if one.count else one.name
+            for part in inner:
+                yield replace(part, name=f"{where}.{part.name}")
+
+    def _take(self, one: Field, values: int, names: int) -> None:
+        """Take room for the names of so many values, which have ``names`` characters behind it."""
+        self._room -= values * (len(one.name) + _PLACE) + names
+        if self._room < 0:
+            raise ValueError(f"too many fields: the names have more than {_MAX_NAMES} characters")
 
     def _read_flags(self, body: bytes) -> None:
         """Note where data were appended, perhaps into the middle of a message that was cut."""
@@ -229,22 +252,21 @@ class UlogFile:
                 self.information[declared.name] = value
 
     def _messages(self) -> Iterator[tuple[bytes, bytes]]:
-        with (
-            open_regular(self.path) as file,
-            mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ) as data,
-        ):
-            self.size = len(data)
-            while self.at + _HEADER.size <= self.size:
-                length, kind = _HEADER.unpack_from(data, self.at)
-                begin = self.at + _HEADER.size
+        with open_regular(self.path) as file:
+            # Not mapped into memory: a file that is cut meanwhile would end the process.
+            self.size = os.fstat(file.fileno()).st_size
+            file.seek(self.at)
+            while len(head := file.read(_HEADER.size)) == _HEADER.size:
+                length, kind = _HEADER.unpack(head)
+                end = self.at + _HEADER.size + length
                 joint = next((at for at in self._joints if self.at < at), self.size)
-                if begin + length > joint < self.size:
-                    self.at = joint  # the message was cut when data were appended
+                if end > joint < self.size:
+                    self.at = file.seek(joint)  # the message was cut when data were appended
                     continue
-                if begin + length > self.size:
+                if end > self.size or len(body := file.read(length)) < length:
                     break
-                self.at = begin + length
-                yield kind, data[begin : self.at]
+                self.at = end
+                yield kind, body
             self.whole = self.at == self.size
 
 

@@ -13,6 +13,8 @@ from command_line.actions import read_action
 from command_line.options import OneOf, option, switch
 from command_line.output import json_text, print_error, say
 from command_line.parser import COULD_NOT_START, unknown_name
+from command_line.toml_tables import shown
+from command_line.values import plain_float
 from messages.addresses import LinkError, parse_link_address
 
 if TYPE_CHECKING:
@@ -54,10 +56,10 @@ class _Get(_Where):
 
 
 def _value(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"{text!r} is not a number") from None
+    value = plain_float(text)
+    if math.isnan(value):
+        raise ValueError(f"{shown(text)} is not a number")
+    return value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

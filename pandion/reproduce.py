@@ -15,7 +15,8 @@ from command_line.options import group, json_file, option, read
 from command_line.output import console_beside, print_error, say, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.run_directory import new_run_directory
-from command_line.values import number, one_of
+from command_line.toml_tables import shown
+from command_line.values import LARGEST_SEED, number, one_of, whole
 from command_line.version import version
 from fsw.autopilot.parameters.control_choice import KNOWN
 from pandion.cluster_options import ClusterOptions, campaign_of
@@ -45,10 +46,16 @@ def seeds(text: str) -> range:
     Raises:
         argparse.ArgumentTypeError: Not that, or empty.
     """
-    first, colon, last = text.partition(":")
-    if not (colon and first.isdecimal() and last.isdecimal() and int(first) < int(last)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not A:B with A < B, such as 100:120")
-    return range(int(first), int(last))
+    first, _, last = text.partition(":")
+    try:
+        found = range(whole()(first), whole()(last))
+    except argparse.ArgumentTypeError:
+        found = range(0)
+    if not found:
+        raise argparse.ArgumentTypeError(
+            f"{shown(text)} is not A:B with A < B, such as 100:120, both at most {LARGEST_SEED}"
+        )
+    return found
 
 
 def _seeds_text(seeds: range) -> str:

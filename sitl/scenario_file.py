@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-import tomllib
 from pathlib import Path
 from typing import Any, Final, TypeVar, get_args
 
@@ -120,9 +119,9 @@ def scenario_digest(name_or_path: str) -> str:
 def named_files(path: Path) -> list[Path]:
     """The table of points and the vehicle that a scenario file names, where they are files."""
     try:
-        table = tomllib.loads(_content(path).decode("utf-8"))
+        table = toml_table(_content(path).decode("utf-8"))
         named = [table.get("trajectory", {}).get("file"), table.get("vehicle")]
-    except (ValueError, AttributeError, RecursionError):
+    except (ValueError, AttributeError):
         return []  # whoever reads it as a scenario says what is wrong
     points, vehicle = (one if isinstance(one, str) else "" for one in named)
     return [path.parent / one for one in (points, vehicle if _is_file(vehicle) else "") if one]
@@ -283,7 +282,7 @@ def _sensors(value: Any, path: str) -> Sensors | MeasuredSensors:
     if suite == PERFECT:
         exact: Sensors = build_table(Sensors, own, path)
         return exact
-    tables = tomllib.loads((SUITES / f"{suite}.toml").read_text(encoding="utf-8"))
+    tables = toml_table((SUITES / f"{suite}.toml").read_text(encoding="utf-8"))
     if EXTRA in own:
         tables[EXTRA] = {}
     for key, part in own.items():

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
@@ -17,7 +18,9 @@ _MOST_BYTES: Final = 1024 * 1024
 # PX4's defaults of what a file does not say.
 _DEFAULTS: Final = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0,
                     "CT": 6.5, "KM": 0.05}  # fmt: skip
-_NAME: Final = re.compile(r"CA_ROTOR(\d+)_(PX|PY|PZ|AX|AY|AZ|CT|KM)")
+_NAME: Final = re.compile(r"CA_ROTOR(\d+)_(PX|PY|PZ|AX|AY|AZ|CT|KM)", re.ASCII)
+_MAX_NAME: Final = 16  # characters, of any parameter of PX4
+_MAX_VALUE: Final = 1e6  # of one; none has such
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +48,11 @@ def read_rotors(path: Path) -> tuple[Rotor, ...]:
         raise VehicleError(f"rotors {path} are {error}") from error
     # A whole vehicle's file will do as well.
     own = {"rotors": table["rotors"]} if "rotors" in table else {}
-    found: _Rotors = TableReader(VehicleError).build(_Rotors, own, "")
+    return _built(own)
+
+
+def _built(table: dict[str, Any]) -> tuple[Rotor, ...]:
+    found: _Rotors = TableReader(VehicleError).build(_Rotors, table, "")
     return found.rotors
 
 
@@ -56,7 +63,7 @@ def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
     turns counter-clockwise.
 
     Raises:
-        VehicleError: It has none, or a value is no number.
+        VehicleError: It has none, or says what cannot be.
     """
     values: dict[str, float] = {}
     for number, line in enumerate(text.splitlines(), start=1):
@@ -65,30 +72,35 @@ def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
         if at is None or line.lstrip().startswith("#"):
             continue
         try:
-            values[words[at]] = float(words[at + 1])
+            value = float(words[at + 1])
         except (IndexError, ValueError):
+            value = math.nan
+        if not abs(value) <= _MAX_VALUE or len(words[at]) > _MAX_NAME:
             raise VehicleError(
-                f"line {number} = {shown(line)}: must be a name and a number"
-            ) from None
+                f"line {number} = {shown(line)}: must be a name of at most {_MAX_NAME} characters "
+                f"and a number from {-_MAX_VALUE:g} to {_MAX_VALUE:g}"
+            )
+        values[words[at]] = value
     known = [match for name in values if (match := _NAME.fullmatch(name))]
-    count = int(values.get("CA_ROTOR_COUNT", 1 + max((int(m[1]) for m in known), default=-1)))
-    if not 1 <= count <= ROTORS_MAX:
+    count = values.get("CA_ROTOR_COUNT", 1 + max((int(m[1]) for m in known), default=-1))
+    if count not in range(1, ROTORS_MAX + 1):
         raise VehicleError(
-            f"CA_ROTOR_COUNT = {count}: must be 4 to {ROTORS_MAX}; a file of parameters with "
+            f"CA_ROTOR_COUNT = {count:g}: must be 4 to {ROTORS_MAX}; a file of parameters with "
             "CA_ROTORn_PX and others describes the rotors"
         )
-    return tuple(_rotor(values, i) for i in range(count))
+    return _built({"rotors": [_rotor(values, i) for i in range(int(count))]})
 
 
-def _rotor(values: dict[str, float], i: int) -> Rotor:
+def _rotor(values: dict[str, float], i: int) -> dict[str, Any]:
+    """As a table of a vehicle's file, whose ranges then hold here too."""
     v = {key: values.get(f"CA_ROTOR{i}_{key}", default) for key, default in _DEFAULTS.items()}
-    length = (v["AX"] ** 2 + v["AY"] ** 2 + v["AZ"] ** 2) ** 0.5
+    length = math.hypot(v["AX"], v["AY"], v["AZ"])
     if not length > 0.0:
         raise VehicleError(f"CA_ROTOR{i}_AX, _AY, _AZ: must be a direction, are all 0")
-    return Rotor(
-        position=(v["PX"], v["PY"], v["PZ"]),
-        axis=(v["AX"] / length, v["AY"] / length, v["AZ"] / length),
-        spin="ccw" if v["KM"] > 0.0 else "cw",
-        torque_per_thrust=abs(v["KM"]),
-        thrust_max=v["CT"],
-    )
+    return {
+        "position": [v["PX"], v["PY"], v["PZ"]],
+        "axis": [v["AX"] / length, v["AY"] / length, v["AZ"] / length],
+        "spin": "ccw" if v["KM"] > 0.0 else "cw",
+        "torque_per_thrust": abs(v["KM"]),
+        "thrust_max": v["CT"],
+    }

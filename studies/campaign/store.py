@@ -70,6 +70,7 @@ class CampaignResult:
     facts: dict[str, Any]  # campaign.json
     left_out: int  # lines of the journal that are no rows of these flights
     seal: Seal  # of the journal
+    sealed: Seal  # that campaign.json was written with
 
     @property
     def complete(self) -> bool:
@@ -100,7 +101,7 @@ def read(directory: Path) -> CampaignResult:
         raise CampaignError(f"{directory / PLAN} was changed after it was flown; fly it again")
     rows, left_out, seal = _rows(directory / JOURNAL, partial(row_of, plan), digests, sealed)
     asked = max([asked, *(row.flight + 1 for row in rows[-1:])])
-    return CampaignResult(plan, rows, asked, digests, facts, left_out, seal)
+    return CampaignResult(plan, rows, asked, digests, facts, left_out, seal, sealed)
 
 
 def read_rows(directory: Path) -> KeptRows:
@@ -302,7 +303,8 @@ def _rows(
     """One row a flight, the last that was written, in their order; how many lines are none.
 
     Raises:
-        JournalError: The journal does not verify, or does not begin as it was ``sealed``.
+        JournalError: The journal does not verify, does not begin as it was ``sealed``, or has
+            another row of a flight that did not break.
     """
     found: dict[int, CampaignRow] = {}
     left_out, seal, kept = 0, Seal(), sealed == Seal()
@@ -314,10 +316,15 @@ def _rows(
         except TypeError:
             left_out += 1
             continue
-        if key == row_key(digests.plan, row.flight, digests.code):
-            found[row.flight] = row
-        else:
+        if key != row_key(digests.plan, row.flight, digests.code):
             left_out += 1
+            continue
+        if row.flight in found and not found[row.flight].error:
+            raise JournalError(
+                f"{journal}, line {seal.lines} is a second row of flight {row.flight}, which "
+                "did not break and is to have one: fly the campaign again into another --out"
+            )
+        found[row.flight] = row
     if not kept:
         raise JournalError(
             f"{journal} has {seal.lines} lines, which are not the {sealed.lines} that {FACTS} was "

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from pathlib import Path
+
+from command_line.bounded_toml import toml_table
 
 
 def deviations(*topics: str) -> tuple[str, ...]:
@@ -14,4 +15,4 @@ def deviations(*topics: str) -> tuple[str, ...]:
 
 @cache
 def _sentences() -> dict[str, list[str]]:
-    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    return toml_table(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

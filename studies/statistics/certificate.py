@@ -19,7 +19,7 @@ import numpy as np
 
 from command_line.version import version
 from fsw.autopilot.tuning import flat
-from studies.campaign.flight import CampaignRow
+from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.keys import (
     AIR,
     FAULT,
@@ -31,7 +31,7 @@ from studies.campaign.keys import (
     applied,
 )
 from studies.campaign.randomness import drawn, seeded, spread
-from studies.campaign.store import PLAN, CampaignResult
+from studies.campaign.store import FACTS, PLAN, CampaignResult
 from studies.campaign.values import grid_size
 from studies.statistics.binomial import bounds
 from studies.statistics.extremes import NoFitError, fit_tail
@@ -44,6 +44,7 @@ _QUANTILES: Final = (0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0)
 _MAX_FITS: Final = 8
 _MAX_POINTS: Final = 20  # of a grid that are listed, for each key
 _FIRST_FLIGHTS: Final = 20  # of a configuration, that are looked at for random numbers
+_DRAWN: Final = ("scenario", "suite", "controller", "fault", "seed", "values")  # of a row, by plan
 _CUT_S: Final = 0.01  # by which a flight may end before its time
 
 _NO_PROOF: Final = "no proof"  # is in every sentence about flights that bounds do not hold for
@@ -78,14 +79,10 @@ def certificate(
     What is ``required`` is in it with what was found.
 
     Raises:
-        CampaignError: Flights are missing, or there are none.
+        CampaignError: Flights are missing, or are not those of the plan.
     """
-    missing = result.asked - len(result.rows)
-    if missing or not result.rows:
-        raise CampaignError(
-            f"{missing} of {result.asked} flights have no row, and what is missing cannot be left "
-            f"out: finish with `pandion campaign {directory / PLAN} --out {directory}`"
-        )
+    _check_whole(result, directory)
+    _check_planned(result, directory)
     rows_digest = digest([row.compared() for row in result.rows])
     statement = {
         "format": FORMAT,
@@ -121,6 +118,45 @@ def certificate(
     }
     rounded = _rounded(statement)
     return {**rounded, "digest": digest(_signed(rounded))}
+
+
+def _check_whole(result: CampaignResult, directory: Path) -> None:
+    """Refuse fewer flights than the file asks for: who leaves some out may choose which."""
+    finish = f"finish with `pandion campaign {directory / PLAN} --out {directory}`"
+    result.plan.check(result.asked)
+    asked = max(result.asked, result.plan.count)
+    missing = asked - len(result.rows)
+    if missing or not result.rows:
+        raise CampaignError(
+            f"{missing} of {asked} flights have no row, and what is missing cannot be left out: "
+            f"{finish}"
+        )
+    if not result.sealed.lines:
+        raise CampaignError(
+            f"{directory / FACTS} was written before the first of {asked} flights, and says "
+            f"nothing of their rows: {finish}"
+        )
+
+
+def _check_planned(result: CampaignResult, directory: Path) -> None:
+    """Refuse a row that says what a flight of the plan cannot be."""
+    for row in result.rows:
+        if wrong := list(_unplanned(result, row)):
+            raise CampaignError(
+                f"flight {row.flight} is none of {directory / PLAN}, by its {', '.join(wrong)}: "
+                "fly the campaign again into another --out"
+            )
+
+
+def _unplanned(result: CampaignResult, row: CampaignRow) -> Iterator[str]:
+    """Fields of a row that a flight of this number cannot have."""
+    drawn = CampaignFlight(result.plan, row.flight).broken("")
+    yield from (name for name in _DRAWN if getattr(row, name) != getattr(drawn, name))
+    within = 0.0 <= row.duration_s <= _wanted_s(result, row) + _CUT_S
+    if not within or (row.completed and _early(result, row)):
+        yield "duration_s"
+    if row.completed and not math.isfinite(row.margin_m or 0.0):
+        yield "margin_m"
 
 
 def verdicts(
@@ -249,9 +285,13 @@ def _margins(
 
 def _early(result: CampaignResult, row: CampaignRow) -> bool:
     """Whether a flight ended before its time."""
+    return not row.duration_s >= _wanted_s(result, row) - _CUT_S
+
+
+def _wanted_s(result: CampaignResult, row: CampaignRow) -> float:
+    """How long a flight is to be [s]."""
     base = result.plan.bases[row.flight % len(result.plan.cases)]
-    wanted_s = row.values.get("duration_s", base.scenario.duration_s)
-    return not row.duration_s >= wanted_s - _CUT_S
+    return row.values.get("duration_s", base.scenario.duration_s)
 
 
 def _no_tail(result: CampaignResult, place: int) -> dict[str, Any]:

@@ -8,7 +8,6 @@ differences within pairs are compared, which sees much smaller changes than two 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -16,12 +15,14 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
+from command_line.bounded_toml import TomlError, toml_table
 from studies.campaign.flight import CampaignRow
 from studies.campaign.store import KeptRows
 from studies.statistics.violations import ANY, violates
 
 _FEWEST: Final = 2  # values that have a spread
 _MAX_LINES: Final = 40  # of what differs between the plans
+_MAX_KEY: Final = 200  # characters of a key there
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,21 +95,21 @@ def changes(first: KeptRows, second: KeptRows) -> list[str]:
 def _of_files(one: str, other: str) -> Iterator[str]:
     """Keys of two campaign files whose values differ."""
     try:
-        first, second = (dict(_keys(tomllib.loads(text))) for text in (one, other))
-    except tomllib.TOMLDecodeError:
+        first, second = (dict(_keys(toml_table(text))) for text in (one, other))
+    except TomlError:
         if one != other:
             yield "campaign.toml: the files differ, and one of them cannot be read"
         return
     for key in [*first, *(key for key in second if key not in first)]:
         before, after = first.get(key, "nothing"), second.get(key, "nothing")
         if before != after:
-            yield f"{key}: {before} -> {after}"
+            yield f"{'.'.join(key)[:_MAX_KEY]}: {before} -> {after}"
 
 
-def _keys(table: Any, path: str = "") -> Iterator[tuple[str, str]]:
+def _keys(table: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:
     if isinstance(table, dict):
         for key, part in table.items():
-            yield from _keys(part, f"{path}.{key}" if path else key)
+            yield from _keys(part, (*path, key))
     else:
         yield path, repr(table)
 

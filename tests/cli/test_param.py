@@ -56,7 +56,7 @@ def test_set_and_get_in_a_new_file(tmp_path: Path, capsys: pytest.CaptureFixture
     ("arguments", "code", "reported"),
     [
         (["set", "PID_YAW_P", "99"], 1, "PID_YAW_P is to be 0..50, 99 is refused"),
-        (["set", "PID_YAW_P", "nan"], 1, "nan is refused"),
+        (["set", "PID_YAW_P", "nan"], 2, "'nan' is not a number"),
         (["set", "PID_YAW_Q", "1"], 1, "unknown parameter PID_YAW_Q; did you mean PID_YAW_P?"),
         (["get", "WAL_ALPHA"], 1, "did you mean WALL_ALPHA?"),
         (["set", "PID_YAW_P", "much"], 2, "'much' is not a number"),

@@ -33,6 +33,15 @@ OF_FLY = [
     (["fly", "walls", "--gcs", "udp:127.0.0.1:70000"], ["70000"]),
     (["fly", "walls", "--gcs", "udp:127.0.0.1:14550", "more"], ["more"]),
     (["fly", "walls", "--json", "no/such/result.json"], ["no/such/result.json"]),
+    (["fly", "walls", "--json", "a" * 300], ["--json", "name too long"]),
+    (["campaign", "x.toml", "--tls-key", "a" * 300], ["--tls-key", "name too long"]),
+    (["view", "a" * 300], ["LOG", "name too long"]),
+    (["fly", "walls", "--out", ""], ["--out", "'' is no name"]),
+    (["fly", "walls", "--seed", "9" * 5000], ["is not a whole number from 0 to 9223372036854775"]),
+    (["fly", "walls", "--seed", "\N{ARABIC-INDIC DIGIT THREE}"], ["is not a whole number"]),
+    (["fly", "walls", "--duration", "1_0"], ["'1_0' is not a positive number"]),
+    (["param", "set", "MPC_XY_VEL_MAX", "1_0"], ["'1_0' is not a number"]),
+    (["faults", "--seed", "0:" + "9" * 5000], ["is not A:B", "at most 9223372036854775807"]),
 ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import struct
 from pathlib import Path
 from typing import Any
@@ -127,6 +128,17 @@ def test_data_that_were_appended_into_a_cut_message_are_read(tmp_path: Path) -> 
     assert [row["x"] for row in read(path)["foo"]] == [1.5, 4.5]
 
 
+def test_a_log_that_is_cut_while_it_is_read_is_read_up_to_there(tmp_path: Path) -> None:
+    path = tmp_path / "cut.ulg"
+    path.write_bytes(log_of(PLAIN + 10_000 * ROW))
+    log = open_log(path)
+    records = log.records()
+    next(records)
+    os.truncate(path, 200)
+    assert sum(1 for _ in records) < 10_000
+    assert not log.whole
+
+
 def test_a_subscription_may_end_and_its_number_be_given_again(tmp_path: Path) -> None:
     path = tmp_path / "removed.ulg"
     bar = declare("bar:uint64_t timestamp;double y;")
@@ -152,6 +164,19 @@ def test_a_subscription_may_end_and_its_number_be_given_again(tmp_path: Path) ->
         (
             b"".join(declare(f"t{k}:uint64_t timestamp;t{k + 1}[99] x;") for k in range(7))
             + declare("t7:float x;") + subscribe("t0"), 0, "too many fields",
+        ),
+        # Megabytes of names out of kilobytes: of many siblings, of a long name, of a long array.
+        (
+            declare("a:" + "char a;" * 1000) + declare("b:uint64_t timestamp;" + "a a;" * 1000)
+            + subscribe("b"), 0, "too many fields",
+        ),
+        (
+            declare(f"a:char {'n' * 1000};") + declare("b:uint64_t timestamp;a[5000] a;")
+            + subscribe("b"), 0, "too many fields",
+        ),
+        (
+            declare(f"a:uint64_t timestamp;uint8_t[5000] {'n' * 1000};") + subscribe("a"),
+            0, "too many fields",
         ),
         (PLAIN + ROW + message(b"R", struct.pack("<H", 0)) + ROW, 0, "topic 0 has 12 bytes"),
         (PLAIN + ROW + bytes(40), 0, "no kind of message"),

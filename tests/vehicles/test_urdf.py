@@ -236,8 +236,25 @@ def test_px4s_parameters_are_rotors_with_px4s_defaults() -> None:
     assert rotors == rotors_from_parameters(PARAMS)
     with pytest.raises(VehicleError, match=r"CA_ROTOR_COUNT = 0: must be 4 to 8"):
         rotors_from_parameters("1\t1\tMPC_XY_VEL_MAX\t4\t9")
-    with pytest.raises(VehicleError, match=r"line 1 = .*: must be a name and a number"):
+    with pytest.raises(VehicleError, match=r"line 1 = .*: must be a name of at most 16 .* number"):
         rotors_from_parameters("1\t1\tCA_ROTOR0_PX\tfast\t9")
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("CA_ROTOR_COUNT nan", "must be a name of at most 16 characters and a number"),
+        ("CA_ROTOR_COUNT inf", "and a number from -1e"),
+        ("CA_ROTOR_COUNT 4.7", "CA_ROTOR_COUNT = 4.7: must be 4 to 8"),
+        (f"CA_ROTOR{'9' * 5000}_PX 1", "must be a name of at most 16 characters"),
+        ("CA_ROTOR0_AX 1e200", "and a number from -1e"),
+        ("CA_ROTOR0_PX inf", "and a number from -1e"),
+        ("CA_ROTOR0_PX 100", r"position.* = .*100.0.*: must be .*-10 to 10"),
+    ],
+)
+def test_parameters_that_no_rotor_has_are_refused(line: str, why: str) -> None:
+    with pytest.raises(VehicleError, match=why):
+        rotors_from_parameters(f"{PARAMS}\n{line}")
 
 
 def test_rotors_are_those_of_a_vehicles_file(tmp_path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 
 from studies.campaign.campaign import Campaign
 from studies.campaign.flight import CampaignFlight, CampaignRow
-from studies.campaign.journal import Journal, JournalInUseError
+from studies.campaign.journal import Journal, JournalError, JournalInUseError
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
 from studies.campaign.store import FACTS, JOURNAL, PLAN, begin, read, refuse_campaign
@@ -31,14 +31,27 @@ def put(
 ) -> None:
     """Rows of flights of a plan as they would be kept, without flying."""
     rows = [
-        replace(CampaignFlight(plan, k).broken(""), error=False, completed=True, margin_m=0.1)
+        replace(
+            CampaignFlight(plan, k).broken(""), error=False, completed=True, margin_m=0.1,
+            duration_s=2.0,
+        )
         for k in numbers
-    ]
+    ]  # fmt: skip
     journal = Journal(directory / JOURNAL)
     journal.append(
         (own_key or CampaignFlight(plan, row.flight).key(), row.as_line() | changed) for row in rows
     )
     journal.close()
+    seal(directory)
+
+
+def seal(directory: Path) -> None:
+    """Write of the journal what a campaign does at its end, if the facts can be read."""
+    journal = Journal(directory / JOURNAL)
+    journal.close()
+    if text := (directory / FACTS).read_text():
+        facts = json.loads(text) | {"journal": asdict(journal.seal)}
+        (directory / FACTS).write_text(json.dumps(facts))
 
 
 def begun(folder: Path, flights: int | None = None) -> tuple[Path, Path, CampaignPlan]:
@@ -197,6 +210,16 @@ def test_a_row_under_the_key_of_another_flight_is_flown_again(tmp_path: Path) ->
     assert CampaignFlight(plan, 0).from_line(row.as_line()) == row
     with pytest.raises(TypeError, match="flight = 0 under the key of flight 1"):
         CampaignFlight(plan, 1).from_line(row.as_line())
+
+
+def test_a_flight_that_did_not_break_has_one_row(tmp_path: Path) -> None:
+    _, directory, plan = begun(tmp_path)
+    put(directory, plan, range(2), error=True, completed=False)
+    put(directory, plan, range(4))  # what broke was flown again
+    assert read(directory).complete
+    put(directory, plan, range(1), margin_m=0.2)
+    with pytest.raises(JournalError, match="line 7 is a second row of flight 0"):
+        read(directory)
 
 
 def test_facts_are_on_the_disk_before_their_name_is(

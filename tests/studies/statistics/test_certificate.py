@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,14 @@ import pytest
 import sitl
 from pandion.certify import main
 from studies.campaign.flight import CampaignFlight, CampaignRow
-from studies.campaign.journal import Journal
+from studies.campaign.journal import Journal, Seal
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
 from studies.campaign.store import FACTS, JOURNAL, begin, read
 from studies.statistics.binomial import bounds
 from studies.statistics.certificate import ANY, certificate, violates
 from studies.statistics.certificate_page import sentences, statement_in
+from tests.studies.campaign.test_store import seal
 
 FILE = """\
 flights = {flights}
@@ -72,6 +73,7 @@ def flown(
     rows = [row(plan, k, **changed.get(k, {})) for k in range(flights)]
     journal.append((key(plan, one), one.as_line()) for one in rows if one.reason != "lost")
     journal.close()
+    seal(directory)
     return directory
 
 
@@ -213,6 +215,43 @@ def test_flights_without_a_row_are_not_left_out(tmp_path: Path) -> None:
         certificate(read(directory), directory, 0.95)
 
 
+def test_fewer_flights_than_the_file_asks_for_are_not_certified(tmp_path: Path) -> None:
+    directory = flown(tmp_path, {k: {"reason": "lost"} for k in range(3, 8)}, 8)
+    facts = json.loads((directory / FACTS).read_text())
+    (directory / FACTS).write_text(json.dumps(facts | {"flights": 3}))
+    assert read(directory).complete
+    with pytest.raises(CampaignError, match="5 of 8 flights have no row"):
+        certificate(read(directory), directory, 0.95)
+
+
+def test_facts_of_before_the_first_flight_hold_no_journal(tmp_path: Path) -> None:
+    directory = flown(tmp_path, {}, 2)
+    facts = json.loads((directory / FACTS).read_text())
+    (directory / FACTS).write_text(json.dumps(facts | {"journal": asdict(Seal())}))
+    with pytest.raises(CampaignError, match=r"before the first of 2 flights.*finish with `pandion"):
+        certificate(read(directory), directory, 0.95)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"seed": 1}, "seed"),
+        ({"scenario": "walls-calm", "fault": "wind"}, "scenario, fault"),
+        ({"values": {"vehicle_scale.mass": 1.0}}, "values"),
+        ({"duration_s": 2.1}, "duration_s"),
+        ({"duration_s": 1.0}, "duration_s"),
+        ({"duration_s": float("nan"), "completed": False}, "duration_s"),
+        ({"margin_m": float("inf")}, "margin_m"),
+    ],
+)
+def test_a_row_that_no_flight_of_the_plan_can_leave_is_refused(
+    tmp_path: Path, wrong: dict[str, Any], named: str
+) -> None:
+    directory = flown(tmp_path, {1: wrong}, 2)
+    with pytest.raises(CampaignError, match=f"flight 1 is none of .*, by its {named}: fly"):
+        certificate(read(directory), directory, 0.95)
+
+
 def test_a_tail_is_fitted_and_the_same_again(tmp_path: Path) -> None:
     directory = flown(tmp_path, {}, flights=300)
     stated = certificate(read(directory), directory, 0.95, refits=9)
@@ -224,12 +263,14 @@ def test_a_tail_is_fitted_and_the_same_again(tmp_path: Path) -> None:
 
 
 def changed(directory: Path, number: int, **fields: Any) -> None:
-    """Append another row of a flight, as a repeated flight would."""
+    """Write the journal again with another row of a flight."""
     result = read(directory)
-    old = next(one for one in result.rows if one.flight == number)
+    rows = [replace(one, **fields) if one.flight == number else one for one in result.rows]
+    (directory / JOURNAL).unlink()
     journal = Journal(directory / JOURNAL)
-    journal.append([(key(result.plan, old), replace(old, **fields).as_line())])
+    journal.append((key(result.plan, one), one.as_line()) for one in rows)
     journal.close()
+    seal(directory)
 
 
 def test_the_command_writes_a_page_that_verifies_until_a_row_changes(

@@ -101,6 +101,13 @@ def test_what_changed_between_the_plans_is_named(tmp_path: Path) -> None:
     assert "vary.vehicle_scale.mass.uniform: [0.95, 1.05] -> [0.95, 1.1]" in lines
 
 
+@pytest.mark.parametrize("text", ["a = " + "9" * 5000, "a = " + "[" * 5000, "a." * 5000 + "b = 1"])
+def test_a_campaign_file_that_cannot_be_read_is_a_difference(tmp_path: Path, text: str) -> None:
+    one, other = read_rows(campaign(tmp_path / "a")), read_rows(campaign(tmp_path / "b"))
+    (line,) = changes(one, replace(other, file=text))
+    assert "one of them cannot be read" in line
+
+
 def test_a_campaign_of_other_code_is_compared_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -47,11 +47,17 @@ MOVES_NOTHING: Final = frozenset(
     }
 )
 GRIPPER_OF_PX4: Final = "gripper not moved: above PX4 it is PX4's; ask PX4 for it"
+_ROUNDED: Final = 1.0 + 2.0**-22  # of a bound: two last bits of float32, which links round to
 _AT_REST: Final[Vec3] = (0.0, 0.0, 0.0)
 _AXES: Final = ("north", "east", "down")
 _WHAT: Final = ("position", "velocity", "acceleration")
 _UNITS: Final = ("m", "m/s", "m/s^2")
 _MOST: Final = (MAX_DISTANCE, MAX_SPEED, MAX_ACCELERATION)
+
+
+def _within(size: float, most: float) -> bool:
+    """Whether a number or the size of a vector is within a bound, both in one unit; NaN is not."""
+    return abs(size) <= most * _ROUNDED
 
 
 def safe_set_problem(safe_set: SafeSet, max_speed: float = math.inf) -> str | None:
@@ -77,12 +83,12 @@ def zone_problem(zone: Zone, max_speed: float = math.inf) -> str | None:
     if len(zone.shape.numbers) != kind.size:
         return kind.check(zone.shape)
     for number, meaning, most in zip(zone.shape.numbers, kind.meaning, kind.farthest, strict=True):
-        if not abs(number) <= most:
+        if not _within(number, most):
             return f"{meaning} is {number:g}; at most {most:g} is accepted"
     if not 0.0 <= zone.clearance <= MAX_CLEARANCE:
         return f"a clearance of {zone.clearance:g} m is outside 0 to {MAX_CLEARANCE:g} m"
     speed = math.hypot(*zone.velocity)
-    if not speed <= min(max_speed, MAX_SPEED):
+    if not _within(speed, min(max_speed, MAX_SPEED)):
         most = min(max_speed, MAX_SPEED)
         return f"it moves at {speed:g} m/s; at most {most:g} m/s is expected (SUR_V_ZONE)"
     if zone.touch is not None:
@@ -145,22 +151,22 @@ def motion_refusal(setpoint: MotionSetpoint) -> str | None:
         if vector is None:
             continue
         size = math.hypot(*[0.0 if math.isnan(x) else x for x in vector])
-        if not size <= most:
+        if not _within(size, most):
             return f"{what} out of range: {size:g} {unit}, at most {most:g} {unit}"
     given = [vector for vector in vectors if vector is not None]
     for axis, name in enumerate(_AXES):
         if given and all(math.isnan(vector[axis]) for vector in given):
             return f"{name} has no position, velocity or acceleration"
-    if setpoint.yaw is not None and not abs(setpoint.yaw) <= MAX_YAW:
+    if setpoint.yaw is not None and not _within(setpoint.yaw, MAX_YAW):
         return f"yaw out of range: {setpoint.yaw:g} rad, at most {MAX_YAW:.2f} rad"
-    if setpoint.yaw_rate is not None and not abs(setpoint.yaw_rate) <= MAX_RATE:
+    if setpoint.yaw_rate is not None and not _within(setpoint.yaw_rate, MAX_RATE):
         return f"yaw rate out of range: {setpoint.yaw_rate:g} rad/s, at most {MAX_RATE:g} rad/s"
     return None
 
 
 def place_problem(place: Vec3) -> str | None:
     """Why a ``place`` [m, NED] is none to fly to, or to look at."""
-    if math.hypot(*place) <= MAX_DISTANCE:
+    if _within(math.hypot(*place), MAX_DISTANCE):
         return None
     return f"the place is more than {MAX_DISTANCE:g} m from the origin"
 
@@ -174,7 +180,7 @@ def bounded_update(update: MissionUpdate | None) -> tuple[MissionUpdate | None, 
     if wrong is not None:
         kept = replace(kept, steps=None, current=None)
         against.append(f"mission refused: step {wrong[0]}: {wrong[1]}")
-    if not all(math.hypot(*place) <= MAX_DISTANCE for place in update.rally or ()):
+    if not all(_within(math.hypot(*place), MAX_DISTANCE) for place in update.rally or ()):
         kept = replace(kept, rally=None)
         against.append(f"rally points refused: one is more than {MAX_DISTANCE:g} m away")
     return kept, against
@@ -207,9 +213,9 @@ def _jump_problem(steps: tuple[MissionStep, ...], number: int) -> str | None:
 
 def step_problem(step: MissionStep) -> str | None:
     """Why a step of a mission is out of range; a stay without end is infinite."""
-    if step.position is not None and not all(abs(x) <= MAX_DISTANCE for x in step.position):
+    if step.position is not None and not all(_within(x, MAX_DISTANCE) for x in step.position):
         return f"the place is more than {MAX_DISTANCE:g} m from the origin"
-    if step.yaw is not None and not abs(step.yaw) <= MAX_YAW:
+    if step.yaw is not None and not _within(step.yaw, MAX_YAW):
         return "yaw out of range"
     if step.speed is not None and not 0.0 < step.speed <= MAX_SPEED:
         return f"a speed of {step.speed:g} m/s is outside 0 to {MAX_SPEED:g} m/s"

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fsw.autopilot.flight.commands.bounds import (
     MAX_CLEARANCE,
+    MAX_YAW,
     bounded_update,
+    motion_refusal,
     place_problem,
     safe_set_problem,
     step_problem,
@@ -25,6 +28,7 @@ from fsw.autopilot.signals import (
     MissionAction,
     MissionStep,
     MissionUpdate,
+    MotionSetpoint,
     SafeSet,
     Shape,
     Vec3,
@@ -79,6 +83,15 @@ def test_what_is_out_of_bounds_is_named_with_the_bound(zone: Zone, words: str) -
     assert (
         safe_set_problem(SafeSet((PERSON, zone)), 1.0) == f"zone 2 ({zone.shape.kind}): {problem}"
     )
+
+
+def test_what_is_rounded_to_float32_on_the_link_may_be_just_at_its_bound() -> None:
+    north, east = (float(np.float32(1.5 * part)) for part in (0.28, 0.96))
+    assert math.hypot(north, east) > 1.5
+    assert zone_problem(replace(PERSON, velocity=(north, east, 0.0)), 1.5) is None
+    yaw = float(np.float32(MAX_YAW))
+    assert yaw > MAX_YAW
+    assert motion_refusal(MotionSetpoint(True, (0.0, 0.0, -2.0), yaw=yaw)) is None
 
 
 @pytest.mark.parametrize(
