@@ -139,7 +139,7 @@ def fly(
     if parts != OwnParts(allow_slow=allow_slow) or not safety_filter:
         raise ValueError("processes=True flies no own planner, controller or disturbance")
     given = str(scenario) if isinstance(scenario, str) and reference is None else None
-    return _in_two_processes(job, given, sensors, duration_s)
+    return _in_two_processes(job, given, sensors, duration_s, vehicle)
 
 
 def with_parameters(
@@ -282,7 +282,11 @@ def _reports(
 
 
 def _in_two_processes(
-    job: Job, given: str | None, sensors: str | None, duration_s: float | None
+    job: Job,
+    given: str | None,
+    sensors: str | None,
+    duration_s: float | None,
+    vehicle: str | None,
 ) -> Result:
     folder = TemporaryDirectory(prefix="pandion-")
     out = Path(folder.name) / "flight"
@@ -292,6 +296,7 @@ def _in_two_processes(
     else:
         words += [f"--sensors={sensors}"] if sensors is not None else []
         words += [f"--duration={duration_s!r}"] if duration_s is not None else []
+        words += [f"--vehicle={vehicle}"] if vehicle is not None else []
     changed, params = changed_parameters(job), None
     if changed:
         params = Path(folder.name) / "own.params"

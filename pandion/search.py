@@ -50,10 +50,10 @@ def _search(options: SearchTaskOptions, file: Path) -> int:
 
 def _written(found: Found, folder: Path) -> str:
     """Write both scenarios; the sentence that says where."""
-    from sitl.scenario_text import scenario_text
+    from sitl.scenario_text import write_scenario
 
     scenarios = found.task.scenarios(found.shares, whole=True)
     for scenario, name in zip(scenarios, (CALM, DISTURBED), strict=True):
-        text = scenario_text(scenario, f"found by pandion search, {found.task.plan.name}")
-        (folder / name).write_text(text, encoding="utf-8")
+        comment = f"found by pandion search, {found.task.plan.name}"
+        write_scenario(scenario, folder / name, comment)
     return f"scenarios {folder / CALM} and {folder / DISTURBED}; pandion fly {folder / DISTURBED}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,9 +18,11 @@ import pandion
 from fsw.autopilot.parameters.flight_config import flight_config
 from pandion.result import table_rows
 from sitl.scenario_file import load_scenario
+from sitl.scenario_text import scenario_text
 from studies.campaign.plan import load_plan
 from studies.flight.closed_loop import simulate
 from tests.library.conftest import BRIEF_S
+from vehicles.vehicle_file import PACKAGED
 
 Flown = Callable[[str], pandion.Result]
 # The suite gnss knows its height too badly to fly between these walls, and refuses to.
@@ -154,6 +157,28 @@ def test_a_scenario_is_changed_saved_and_flown_again(tmp_path: Path) -> None:
     assert replace(pandion.load_scenario(path), name=near.name) == near
     first, again = (pandion.fly(one, log=False) for one in (near, path))
     assert first.truth == again.truth
+
+
+def test_an_own_vehicle_is_flown_by_a_relative_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "byo").mkdir()
+    shutil.copyfile(PACKAGED / "hexa-3r.toml", tmp_path / "byo" / "mine.toml")
+    monkeypatch.chdir(tmp_path)
+    result = pandion.fly("walls", vehicle="byo/mine.toml", duration_s=0.1)
+    assert result.topics["sim_ground_truth"]["q_arm"].shape[1] == 3
+    (tmp_path / "one.toml").write_text(
+        'vehicle = "byo/mine.toml"\n' + scenario_text(pandion.load_scenario("walls"))
+    )
+    found = pandion.load_scenario("one.toml", duration_s=0.1)
+    monkeypatch.chdir("/")
+    assert pandion.fly(found).truth == result.truth
+
+
+@pytest.mark.long
+def test_an_own_vehicle_flies_in_two_processes() -> None:
+    result = pandion.fly("walls", vehicle="hexa-3r", duration_s=0.1, processes=True)
+    assert result.topics["sim_ground_truth"]["q_arm"].shape[1] == 3
 
 
 def test_a_flight_that_is_over_is_not_stepped() -> None:
