@@ -6,7 +6,7 @@ A key is declared once: its name carries the unit, its annotation the type and t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Final, Literal, TypeAlias
@@ -400,6 +400,11 @@ def vehicle_of(scenario: Scenario) -> Vehicle:
     """
     path = Path(scenario.vehicle)
     return _vehicle(scenario.vehicle, path.stat().st_mtime_ns if path.is_file() else 0)
+
+
+def identity(scenario: Scenario) -> tuple[Scenario, Vehicle]:
+    """What a flight depends on: the vehicle as it is described, not where its file lies."""
+    return replace(scenario, vehicle=""), vehicle_of(scenario)
 
 
 def start_angles(scenario: Scenario) -> tuple[float, ...]:
