@@ -8,6 +8,7 @@ mode commands of the scenario's pilot come on the first two ticks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -453,7 +454,7 @@ def _trace_point(simulation: Simulation) -> TracePoint:
         p_WB=truth.p_WB,
         p_WE=truth.p_WE,
         p_target=truth.target.p,
-        margin_m=min(truth.margins_m),
+        margin_m=min(truth.margins_m, default=math.inf),
     )
 
 
