@@ -19,7 +19,7 @@ DISTURBED, CALM = "found.toml", "found-calm.toml"
 def main(argv: list[str]) -> int:
     """Search; returns the exit code."""
     what = "Search for a scenario that decides between controllers, judged on other seeds."
-    return run_task("search", what, argv, _example, _search)
+    return run_task("search", what, argv, SearchTaskOptions, _example, _search)
 
 
 def _example() -> Path:
