@@ -344,7 +344,8 @@ def _files(scenarios: tuple[str, ...], folder: Path) -> tuple[str, ...]:
         if one.is_absolute() != folder.is_absolute() or ".." in one.parts[len(folder.parts) :]:
             raise CampaignError(
                 f'scenarios: the file "{one}" that one of them names must be beside the campaign '
-                "file or in a folder there, so that the campaign can be kept as a whole"
+                "file or in a folder there, and be named from there, so that the campaign can be "
+                "kept as a whole"
             )
         found.append(str(one.relative_to(folder)))
     return tuple(dict.fromkeys(found))
