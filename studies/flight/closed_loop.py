@@ -408,7 +408,7 @@ def check_body(scenario: Scenario, config: FlightConfig) -> None:
     except ScenarioError as error:
         raise ScenarioError(
             f"body {body!r} keeps clear, the scenario is for {scenario.body!r}: {error}; use "
-            f"flight_config(body={scenario.body!r})"
+            f"body={scenario.body!r}"
         ) from None
 
 
@@ -459,7 +459,6 @@ def _trace_point(simulation: Simulation) -> TracePoint:
 
 
 def _insist(outputs: TickOutputs) -> None:
-    for ack in outputs.acks:
-        if ack.result != 0:
-            texts = "; ".join(text.text for text in outputs.texts)
-            raise RefusedError(f"command {ack.command} was answered with {ack.result}: {texts}")
+    if any(ack.result != 0 for ack in outputs.acks):
+        # Beside the answer, which says why not, there may be news of other things.
+        raise RefusedError("; ".join(text.text for text in outputs.texts if text.prompt))
