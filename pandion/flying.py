@@ -258,6 +258,7 @@ def _reports(
     sitl = {
         "scenario": job.scenario.name,
         "seed": job.seed,
+        "vehicle": vehicle_of(job.scenario).name,
         "sensors": suite_of(job.scenario),
         **asdict(truth),
         "real_time_factor": truth.duration_s / max(took_s, 1e-9),

@@ -105,7 +105,7 @@ def test_topics_are_arrays_and_files_are_those_of_a_flight(flown: Flown, tmp_pat
     page = log.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "front" in page  # a margin: the scenario beside the log was found
     rows = dict(table_rows(dict(result.metrics), result.truth.tracking_error_max_m))
-    assert rows["sensors"] == "mocap"
+    assert (rows["vehicle"], rows["sensors"]) == ("paper", "mocap")
     assert "completed, flew 0.8 s; minimum margin" in repr(result)
 
 
@@ -166,6 +166,7 @@ def test_an_own_vehicle_is_flown_by_a_relative_path(
     shutil.copyfile(PACKAGED / "hexa-3r.toml", tmp_path / "byo" / "mine.toml")
     monkeypatch.chdir(tmp_path)
     result = pandion.fly("walls", vehicle="byo/mine.toml", duration_s=0.1)
+    assert result.metrics["vehicle"] == "mine"
     assert result.topics["sim_ground_truth"]["q_arm"].shape[1] == 3
     (tmp_path / "one.toml").write_text(
         'vehicle = "byo/mine.toml"\n' + scenario_text(pandion.load_scenario("walls"))
