@@ -55,6 +55,8 @@ def fly_words(job: Job, controller: str, scenario: str, params: Path | None) -> 
         words.append(f"--controller={controller}")
     if job.config.inner == "pid":
         words.append("--tracking=pid")
+    if job.config.planner.body != job.scenario.body:
+        words.append(f"--body={job.config.planner.body}")
     if job.config.soft:
         words.append("--allow-inconsistent")
     return words

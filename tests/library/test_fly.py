@@ -136,6 +136,8 @@ def test_parameters_change_the_flight_and_their_ranges_hold(tmp_path: Path) -> N
         ({"scenario": "ground"}, "starts on the ground"),
         ({"controller": "lqr"}, 'unknown controller "lqr"'),
         ({"sensors": "gps"}, "must be one of"),
+        ({"tracking": "pi"}, 'unknown tracking "pi"; known: lqr, pid'),
+        ({"body": "arm"}, 'unknown body "arm"; known: points, full'),
         ({"duration_s": -1.0}, "duration_s = -1.0"),
         ({"duration_s": float("nan")}, "duration_s"),
         ({"seed": -1}, "seed = -1"),
@@ -177,9 +179,17 @@ def test_an_own_vehicle_is_flown_by_a_relative_path(
 
 
 @pytest.mark.long
-def test_an_own_vehicle_flies_in_two_processes() -> None:
-    result = pandion.fly("walls", vehicle="hexa-3r", duration_s=0.1, processes=True)
-    assert result.topics["sim_ground_truth"]["q_arm"].shape[1] == 3
+def test_another_vehicle_and_body_fly_in_two_processes() -> None:
+    result = pandion.fly("crossing", vehicle="hexa-3r", duration_s=0.1, processes=True, body="full")
+    assert result.metrics["vehicle"] == "hexa-3r"
+    assert pandion.load_log(result.path).information["body"] == "full"
+
+
+def test_what_keeps_clear_is_the_scenarios_or_another() -> None:
+    free = replace(pandion.load_scenario("walls", duration_s=0.1), walls=())
+    for body, flown in ((None, "points"), ("full", "full")):
+        result = pandion.fly(free, body=body)  # type: ignore[arg-type]
+        assert pandion.load_log(result.path).information["body"] == flown
 
 
 def test_a_flight_that_is_over_is_not_stepped() -> None:
