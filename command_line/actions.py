@@ -24,7 +24,8 @@ def read_action(
     if "_ARGCOMPLETE" in os.environ:
         _complete(actions, argv)
     if not argv or argv[0] in ("-h", "--help"):
-        rows = (f"  {name:8}{what}" for name, (_, _, what) in actions.items())
+        width = 2 + max(map(len, actions))
+        rows = (f"  {name:{width}}{what}" for name, (_, _, what) in actions.items())
         print("\n".join((f"usage: {prog} ACTION {usage}", "", purpose, "", "actions:", *rows, "")))
         print(f"`{prog} ACTION --help` prints the options of an action.")
         return 0

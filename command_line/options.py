@@ -48,7 +48,7 @@ class Option:
     off: str = ""  # of a switch: the option that says the opposite
     old: str = ""  # the option's name until the last release
     one_of: OneOf | None = None
-    required: bool = False  # of a positional argument
+    required: bool = False  # there is no default
     repeated: bool = False  # may be given again: the value is a tuple of all
 
     def field(self) -> Any:
@@ -100,7 +100,8 @@ class Option:
             )
             return parser.add_argument(name, metavar=flag, **self._valued(), **many)
         if value:
-            more = {"action": _Collect} if self.repeated else {}
+            more: dict[str, Any] = {"action": _Collect} if self.repeated else {}
+            more |= {"required": True} if self.required else {}
             action = into.add_argument(flag, dest=name, metavar=value, **self._valued(), **more)
             if self.old:
                 self._declare_old(into, name, nargs=None, type=self._parsed)

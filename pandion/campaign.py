@@ -188,7 +188,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     """One flight in this process, its trace, and what flies it with both processes and a log."""
     from fsw.storage.parameter_file import save
-    from sitl.scenario_text import scenario_text
+    from sitl.scenario_text import write_scenario
     from studies.campaign.flight import CampaignFlight
     from studies.campaign.keys import CampaignError
     from studies.flight.fly_again import changed_parameters, fly_command
@@ -216,7 +216,7 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     trace, scenario, params = (stem.with_suffix(end) for end in (".json", ".toml", ".params"))
     trace.write_text(json_text(traced) + "\n", encoding="utf-8")
     comment = f"flight {number} of campaign {plan.name}: {flight.case}"
-    scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
+    write_scenario(job.scenario, scenario, comment)
     save(params, changed_parameters(job))
     say(f"trace {trace}", console)
     command = fly_command(command_name(), job, flight.case.controller, scenario, params)

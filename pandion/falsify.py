@@ -101,7 +101,7 @@ def _config(options: FalsifyOptions, scenario: Scenario) -> FlightConfig:
 
 
 def _search(options: FalsifyOptions, scenario: Scenario) -> int:
-    from sitl.scenario_text import scenario_text
+    from sitl.scenario_text import write_scenario
     from studies.search.falsify import as_scenario, search_and_fly
 
     console = console_beside(options.json)
@@ -127,7 +127,7 @@ def _search(options: FalsifyOptions, scenario: Scenario) -> int:
     kept.write_text(json_text(_as_file(scenario, outcome.worst)), encoding="utf-8")
     flown = folder / "worst.toml"
     comment = f"found by pandion falsify {options.scenario}: {_found(outcome.worst)}"
-    flown.write_text(scenario_text(as_scenario(scenario, outcome.worst), comment), encoding="utf-8")
+    write_scenario(as_scenario(scenario, outcome.worst), flown, comment)
     hardest = outcome.worst_force
     if hardest is not None:
         pressed = folder / "hardest.json"

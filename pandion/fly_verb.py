@@ -71,6 +71,7 @@ class PlannedFlight:
 
     options: FlyOptions
     name: str  # of the scenario
+    vehicle: str  # that flies, by its own name
     sensors: str  # suite
     body: str  # that the scenario is for
     believed: str  # vehicle, by name or path, that the flight software flies
@@ -127,6 +128,7 @@ def planned(options: FlyOptions) -> PlannedFlight:
     return PlannedFlight(
         options=options,
         name=scenario.name,
+        vehicle=vehicle_of(scenario).name,
         sensors=suite_of(scenario),
         body=scenario.body,
         believed=believed,
@@ -172,8 +174,8 @@ def _banner(flight: PlannedFlight, display: Display) -> None:
     endless = math.isinf(flight.duration_s)
     length = "until interrupted" if endless else f"{flight.duration_s:g} s"
     display.say(
-        f"Pandion {version()}: {flight.name}, seed {options.seed}, {flight.sensors} sensors, "
-        f"{length}, {options.control.controller} controller, {pacing}"
+        f"Pandion {version()}: {flight.name}, seed {options.seed}, vehicle {flight.vehicle}, "
+        f"{flight.sensors} sensors, {length}, {options.control.controller} controller, {pacing}"
     )
     if options.control.body not in (None, flight.body):
         display.say(

@@ -7,11 +7,11 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from pandion.scenarios import AnyScenario, load_scenario, save_scenario
 from sitl.gripped import PayloadUse
 from sitl.limits import LimitUse
 from sitl.result import TruthResult
-from sitl.scenario import Points, vehicle_of
+from sitl.scenario import Body, Points, vehicle_of
 from sitl.scenario_file import ScenarioError, scenario_digest, suite_of
 from sitl.simulation import STEP_US, Simulation
 from sitl.touch import TouchUse
@@ -44,6 +44,7 @@ from studies.flight.own_parts import OwnLaw, OwnParts, PushLaw
 from studies.flight.result import FlightResult
 
 Tracking = Literal["lqr", "pid"]
+Word = TypeVar("Word", bound=str)
 _INNER: Final[dict[str, Literal["tracking", "pid"]]] = {"lqr": "tracking", "pid": "pid"}
 
 
@@ -59,6 +60,7 @@ def fly(
     reference: AnyReference | None = None,
     disturbance: PushLaw | None = None,
     tracking: Tracking = "lqr",
+    body: Body | None = None,
     safety_filter: bool = True,
     allow_inconsistent: bool = False,
     allow_slow: bool = False,
@@ -86,6 +88,7 @@ def fly(
         disturbance: Acceleration (3,) [m/s², NED] of the base at a time [s], on top of the
             scenario's.
         tracking: Inner loop that tracks the plan, ``lqr`` or ``pid``.
+        body: What keeps clear of zones, ``full`` or ``points``; None: the scenario's.
         safety_filter: False: nothing keeps a controller off a zone, and the flight says so.
         allow_inconsistent: Fly a configuration that cannot keep its safe set.
         allow_slow: Fly own parts that a vehicle could not wait for.
@@ -123,8 +126,8 @@ def fly(
     name = "blf" if own else str(controller)
     config = flight_config(
         name,
-        _INNER[tracking],
-        body=flown.body,
+        _INNER[_known("tracking", tracking, _INNER)],
+        body=_known("body", body or flown.body, get_args(Body)),
         soft=allow_inconsistent,
         vehicle=vehicle_of(flown),
     )
@@ -139,7 +142,14 @@ def fly(
     if parts != OwnParts(allow_slow=allow_slow) or not safety_filter:
         raise ValueError("processes=True flies no own planner, controller or disturbance")
     given = str(scenario) if isinstance(scenario, str) and reference is None else None
-    return _in_two_processes(job, given, sensors, duration_s)
+    return _in_two_processes(job, given, sensors, duration_s, vehicle)
+
+
+def _known(what: str, word: Word, known: Collection[Word]) -> Word:
+    """The word, if it is a known one."""
+    if word not in known:
+        raise ValueError(f'unknown {what} "{word}"; known: {", ".join(known)}')
+    return word
 
 
 def with_parameters(
@@ -258,6 +268,7 @@ def _reports(
     sitl = {
         "scenario": job.scenario.name,
         "seed": job.seed,
+        "vehicle": vehicle_of(job.scenario).name,
         "sensors": suite_of(job.scenario),
         **asdict(truth),
         "real_time_factor": truth.duration_s / max(took_s, 1e-9),
@@ -282,7 +293,11 @@ def _reports(
 
 
 def _in_two_processes(
-    job: Job, given: str | None, sensors: str | None, duration_s: float | None
+    job: Job,
+    given: str | None,
+    sensors: str | None,
+    duration_s: float | None,
+    vehicle: str | None,
 ) -> Result:
     folder = TemporaryDirectory(prefix="pandion-")
     out = Path(folder.name) / "flight"
@@ -292,6 +307,7 @@ def _in_two_processes(
     else:
         words += [f"--sensors={sensors}"] if sensors is not None else []
         words += [f"--duration={duration_s!r}"] if duration_s is not None else []
+        words += [f"--vehicle={vehicle}"] if vehicle is not None else []
     changed, params = changed_parameters(job), None
     if changed:
         params = Path(folder.name) / "own.params"

@@ -14,6 +14,7 @@ _FACTS = (
     "scenario",
     "scenario_digest",
     "seed",
+    "vehicle",
     "pacing",
     "controller",
     "inner",

@@ -44,6 +44,10 @@ class _Plant:
         "sensors of the vehicle (default the scenario's, mocap where they have no noise)",
         one_of("suite", *(name for name in SUITE_NAMES if name != PERFECT)),
     )
+    airframe: str | None = option(
+        "--airframe NAME",
+        "vehicle that comes with Pandion, or a .toml file (default the scenario's)",
+    )
     rate_hz: int = option("--rate HZ", "steps a second, 250 or 500", rate, default=250)
 
 
@@ -109,9 +113,9 @@ def parameters(options: _Plant) -> dict[str, int | float]:
     from sitl.sensors.keys import MeasuredSensors
     from sitl.start import flown_vehicle
 
-    scenario = load_scenario(options.scenario, options.sensors)
+    scenario = load_scenario(options.scenario, options.sensors, options.airframe)
     if suite_of(scenario) == PERFECT:
-        scenario = load_scenario(options.scenario, NOISY)
+        scenario = load_scenario(options.scenario, NOISY, options.airframe)
     assert isinstance(scenario.sensors, MeasuredSensors)
     return px4_parameters(flown_vehicle(scenario), scenario.sensors, options.rate_hz)
 

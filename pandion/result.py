@@ -45,6 +45,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "scenario": reports.scenario,
         "controller": reports.controller,
         "seed": reports.seed,
+        "vehicle": truth.get("vehicle"),
         "sensors": truth.get("sensors"),
         "duration_s": truth.get("duration_s", 0.0),
         "completed": bool(truth.get("completed"))
@@ -98,6 +99,7 @@ def table_rows(result: dict[str, Any], tracking_max_m: float | None) -> Rows:
     return [
         *first_rows(result, tracking_max_m),
         ("flown", f"{result['duration_s']:.1f} s"),
+        ("vehicle", result["vehicle"] or "unknown"),
         ("sensors", result["sensors"] or "unknown"),
         *[(f"margin {name}", _mm(value)) for name, value in _shown(result["margins_m"]).items()],
         *[(f"limit {name.replace('_', ' ')}", _use(use)) for name, use in result["limits"].items()],

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from sitl.scenario import Scenario
 from sitl.scenario_file import load_scenario as load_by_name
 from sitl.scenario_file import parse_scenario, with_vehicle
-from sitl.scenario_text import scenario_text
+from sitl.scenario_text import scenario_text, write_scenario
 from sitl.scenario_validation import check
 
 AnyScenario: TypeAlias = str | Path | Scenario
@@ -57,5 +57,5 @@ def save_scenario(scenario: Scenario, path: Path | str) -> Path:
         OSError: The file cannot be written.
     """
     written = Path(path)
-    written.write_text(scenario_text(scenario), encoding="utf-8")
+    write_scenario(scenario, written)
     return written

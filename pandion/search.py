@@ -19,7 +19,7 @@ DISTURBED, CALM = "found.toml", "found-calm.toml"
 def main(argv: list[str]) -> int:
     """Search; returns the exit code."""
     what = "Search for a scenario that decides between controllers, judged on other seeds."
-    return run_task("search", what, argv, _example, _search)
+    return run_task("search", what, argv, SearchTaskOptions, _example, _search)
 
 
 def _example() -> Path:
@@ -50,10 +50,10 @@ def _search(options: SearchTaskOptions, file: Path) -> int:
 
 def _written(found: Found, folder: Path) -> str:
     """Write both scenarios; the sentence that says where."""
-    from sitl.scenario_text import scenario_text
+    from sitl.scenario_text import write_scenario
 
     scenarios = found.task.scenarios(found.shares, whole=True)
     for scenario, name in zip(scenarios, (CALM, DISTURBED), strict=True):
-        text = scenario_text(scenario, f"found by pandion search, {found.task.plan.name}")
-        (folder / name).write_text(text, encoding="utf-8")
+        comment = f"found by pandion search, {found.task.plan.name}"
+        write_scenario(scenario, folder / name, comment)
     return f"scenarios {folder / CALM} and {folder / DISTURBED}; pandion fly {folder / DISTURBED}"

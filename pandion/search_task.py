@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from command_line.options import group, json_file, option, read, switch
 from command_line.values import whole
 from pandion.campaign_run import exit_code
 from pandion.cluster_options import ClusterOptions
-from pandion.own_options import OwnOptions
 
 _PRINTED: Final = 0  # exit code
 
@@ -24,7 +23,6 @@ class SearchTaskOptions:
     example: bool = switch("--example", "print such a file to begin with")
     seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
     cluster: ClusterOptions = group(ClusterOptions)
-    own: OwnOptions = group(OwnOptions)
     out: Path | None = option(
         "--out DIR",
         "where what is found and the journal go; the same command goes on with a journal that is "
@@ -34,18 +32,22 @@ class SearchTaskOptions:
     json: str | None = json_file("what was found")
 
 
+Options = TypeVar("Options", bound=SearchTaskOptions)
+
+
 def run_task(
     verb: str,
     what: str,
     argv: list[str],
+    kind: type[Options],
     example: Callable[[], Path],
-    run: Callable[[SearchTaskOptions, Path], int],
+    run: Callable[[Options, Path], int],
 ) -> int:
-    """Read the options of a ``verb`` and ``run`` its task, or print its ``example``.
+    """Read the options of a ``verb``, of a ``kind``, and ``run`` its task or print its ``example``.
 
     Returns the exit code. Both import what they need when they are called.
     """
-    options = read(SearchTaskOptions, f"pandion {verb}", what, argv)
+    options = read(kind, f"pandion {verb}", what, argv)
 
     if options.example:
         print(example().read_text(encoding="utf-8"), end="")

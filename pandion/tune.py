@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from command_line.options import group
 from command_line.output import json_text
 from pandion.campaign_run import begin
+from pandion.own_options import OwnOptions
 from pandion.search_task import SearchTaskOptions, run_task
 
 if TYPE_CHECKING:
@@ -16,10 +19,17 @@ BETTER, NOTHING = 0, 1  # exit codes
 PARAMS = "tuned.params"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TuneOptions(SearchTaskOptions):
+    """A search for parameters, with which whoever flies may be another."""
+
+    own: OwnOptions = group(OwnOptions)
+
+
 def main(argv: list[str]) -> int:
     """Tune; returns the exit code."""
     what = "Improve parameters against a cost and a chance constraint, judged on other flights."
-    return run_task("tune", what, argv, _example, _tune)
+    return run_task("tune", what, argv, TuneOptions, _example, _tune)
 
 
 def _example() -> Path:
@@ -28,7 +38,7 @@ def _example() -> Path:
     return EXAMPLE
 
 
-def _tune(options: SearchTaskOptions, file: Path) -> int:
+def _tune(options: TuneOptions, file: Path) -> int:
     from studies.search.tune import as_json, load_task, sentences, tune
 
     task = load_task(file, options.own.names)

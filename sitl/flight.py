@@ -144,6 +144,7 @@ class Flight:
         return {
             "scenario": self._simulation.scenario.name,
             "seed": self._options.seed,
+            "vehicle": self._simulation.vehicle.name,
             "sensors": suite_of(self._simulation.scenario),
             **dataclasses.asdict(result),
             "end_kind": None

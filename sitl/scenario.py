@@ -6,10 +6,10 @@ A key is declared once: its name carries the unit, its annotation the type and t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
 
 from command_line.ranges import Range as Range
 from sitl.faults.keys import Fault
@@ -19,6 +19,8 @@ from sitl.ranges import V3 as V3
 from sitl.ranges import WORLD_M as WORLD_M
 from sitl.sensors.keys import MeasuredSensors
 from vehicles.description import Vehicle
+
+PAPER: Final = "paper"  # the vehicle of a scenario that names none
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,7 +358,7 @@ class Scenario:
     pilot: Pilot
     trajectory: Trajectory
     description: str = ""
-    vehicle: str = "paper"  # one that comes with Pandion, or the path of a vehicle file
+    vehicle: str = PAPER  # one that comes with Pandion, or the path of a vehicle file
     # What of the vehicle keeps clear and is judged: the paper's three points, or all of it.
     body: Body = "full"
     walls: tuple[ScenarioWall, ...] = ()
@@ -370,6 +372,16 @@ class Scenario:
     air: AirKeys = AirKeys()
     actuators: ActuatorKeys = ActuatorKeys()
     faults: tuple[Fault, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Name a vehicle's file from the root: found from any directory, wherever this goes."""
+        if is_vehicle_file(self.vehicle):
+            object.__setattr__(self, "vehicle", str(Path(self.vehicle).absolute()))
+
+
+def is_vehicle_file(vehicle: str) -> bool:
+    """Whether a vehicle is named by its file, and not one of those that come with Pandion."""
+    return vehicle.endswith(".toml")
 
 
 @lru_cache(maxsize=16)
@@ -388,6 +400,11 @@ def vehicle_of(scenario: Scenario) -> Vehicle:
     """
     path = Path(scenario.vehicle)
     return _vehicle(scenario.vehicle, path.stat().st_mtime_ns if path.is_file() else 0)
+
+
+def identity(scenario: Scenario) -> tuple[Scenario, Vehicle]:
+    """What a flight depends on: the vehicle as it is described, not where its file lies."""
+    return replace(scenario, vehicle=""), vehicle_of(scenario)
 
 
 def start_angles(scenario: Scenario) -> tuple[float, ...]:

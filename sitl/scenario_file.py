@@ -19,6 +19,7 @@ from sitl.scenario import (
     ScenarioZone,
     Sensors,
     Trajectory,
+    is_vehicle_file,
     start_angles,
     vehicle_of,
 )
@@ -124,12 +125,9 @@ def named_files(path: Path) -> list[Path]:
     except (ValueError, AttributeError):
         return []  # whoever reads it as a scenario says what is wrong
     points, vehicle = (one if isinstance(one, str) else "" for one in named)
-    return [path.parent / one for one in (points, vehicle if _is_file(vehicle) else "") if one]
-
-
-def _is_file(vehicle: str) -> bool:
-    """Whether a vehicle is named by its file, and not one of those that come with Pandion."""
-    return vehicle.endswith(".toml")
+    return [
+        path.parent / one for one in (points, vehicle if is_vehicle_file(vehicle) else "") if one
+    ]
 
 
 def _path(name_or_path: str) -> Path:
@@ -183,7 +181,7 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
     if isinstance(curve, dict) and curve.get("kind") == "points" and "file" in curve:
         table["trajectory"] = _with_points(curve, folder)
     vehicle = table.get("vehicle")
-    if isinstance(vehicle, str) and _is_file(vehicle) and folder is not None:
+    if isinstance(vehicle, str) and is_vehicle_file(vehicle) and folder is not None:
         table["vehicle"] = str(folder / vehicle)
     scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
     if "vehicle" in table:

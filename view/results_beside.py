@@ -48,6 +48,7 @@ _INNER: Final = {
 _COUNT: Final = (int, type(None))
 _SHAPES: Final[Mapping[str, Mapping[str, Any]]] = {
     "result": {
+        "vehicle": (str, type(None)),
         "sensors": (str, type(None)),
         "duration_s": _NUMBER,
         "completed": (bool,),

@@ -19,7 +19,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
 from fsw.autopilot.tuning import tuned
 from sitl.faults.keys import SENSORS, Fault
-from sitl.scenario import Scenario, vehicle_of
+from sitl.scenario import Scenario, identity, vehicle_of
 from sitl.scenario_file import (
     ScenarioError,
     build_table,
@@ -163,7 +163,8 @@ class CampaignPlan:
     def digest(self) -> str:
         """Of everything that a flight depends on but its number and the code."""
         size = self.count if self.design == "latin-hypercube" else 0
-        text = repr((self.seed, self.design, size, self.cases, self.bases, self.varied))
+        bases = [(identity(base.scenario), base.config) for base in self.bases]
+        text = repr((self.seed, self.design, size, self.cases, bases, self.varied))
         return hashlib.sha256(text.encode()).hexdigest()[:_DIGEST_DIGITS]
 
     def most(self) -> int:
@@ -343,7 +344,8 @@ def _files(scenarios: tuple[str, ...], folder: Path) -> tuple[str, ...]:
         if one.is_absolute() != folder.is_absolute() or ".." in one.parts[len(folder.parts) :]:
             raise CampaignError(
                 f'scenarios: the file "{one}" that one of them names must be beside the campaign '
-                "file or in a folder there, so that the campaign can be kept as a whole"
+                "file or in a folder there, and be named from there, so that the campaign can be "
+                "kept as a whole"
             )
         found.append(str(one.relative_to(folder)))
     return tuple(dict.fromkeys(found))

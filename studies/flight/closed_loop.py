@@ -8,6 +8,7 @@ mode commands of the scenario's pilot come on the first two ticks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -407,7 +408,7 @@ def check_body(scenario: Scenario, config: FlightConfig) -> None:
     except ScenarioError as error:
         raise ScenarioError(
             f"body {body!r} keeps clear, the scenario is for {scenario.body!r}: {error}; use "
-            f"flight_config(body={scenario.body!r})"
+            f"body={scenario.body!r}"
         ) from None
 
 
@@ -453,12 +454,11 @@ def _trace_point(simulation: Simulation) -> TracePoint:
         p_WB=truth.p_WB,
         p_WE=truth.p_WE,
         p_target=truth.target.p,
-        margin_m=min(truth.margins_m),
+        margin_m=min(truth.margins_m, default=math.inf),
     )
 
 
 def _insist(outputs: TickOutputs) -> None:
-    for ack in outputs.acks:
-        if ack.result != 0:
-            texts = "; ".join(text.text for text in outputs.texts)
-            raise RefusedError(f"command {ack.command} was answered with {ack.result}: {texts}")
+    if any(ack.result != 0 for ack in outputs.acks):
+        # Beside the answer, which says why not, there may be news of other things.
+        raise RefusedError("; ".join(text.text for text in outputs.texts if text.prompt))

@@ -188,4 +188,5 @@ def _trace_point(plant: DoubleIntegrator) -> TracePoint:
     now, p_WB = plant.places, plant.state.p
     margins = plant.evaluator.margins(now, plant.time_s)
     aim, p_WE = plant.clock.target_at(plant.time_s).p, three(now[-1], 0)
-    return TracePoint(t_s=plant.time_s, p_WB=p_WB, p_WE=p_WE, p_target=aim, margin_m=min(margins))
+    least = min(margins, default=math.inf)
+    return TracePoint(t_s=plant.time_s, p_WB=p_WB, p_WE=p_WE, p_target=aim, margin_m=least)

@@ -8,14 +8,14 @@ from pathlib import Path
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.storage.parameter_file import save
 from sitl.scenario_file import load_scenario
-from sitl.scenario_text import scenario_text
+from sitl.scenario_text import write_scenario
 from studies.flight.job import Job, Outcome
 
 
 def keep(job: Job, controller: str, stem: Path, comment: str) -> str:
     """Write ``stem``.toml, and .params where parameters differ; the command that flies it."""
     scenario, params = stem.with_suffix(".toml"), stem.with_suffix(".params")
-    scenario.write_text(scenario_text(job.scenario, comment), encoding="utf-8")
+    write_scenario(job.scenario, scenario, comment)
     changed = changed_parameters(job)
     if changed:
         save(params, changed)
@@ -55,6 +55,8 @@ def fly_words(job: Job, controller: str, scenario: str, params: Path | None) -> 
         words.append(f"--controller={controller}")
     if job.config.inner == "pid":
         words.append("--tracking=pid")
+    if job.config.planner.body != job.scenario.body:
+        words.append(f"--body={job.config.planner.body}")
     if job.config.soft:
         words.append("--allow-inconsistent")
     return words

@@ -18,7 +18,7 @@ import fsw
 import sitl
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from sitl.result import TruthResult
-from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario
+from sitl.scenario import EncoderErrors, ImuErrors, PoseErrors, Scenario, identity
 from sitl.sensors.keys import MeasuredSensors
 from studies.flight import (
     closed_loop,
@@ -76,7 +76,9 @@ class Job:
         Seeds that change nothing are left out, so that calm air is flown once.
         """
         distinct = self if self.random else replace(self, seed=0)
-        return hashlib.sha256((repr(distinct) + sources()).encode()).hexdigest()[:32]
+        scenario, vehicle = identity(self.scenario)
+        text = repr((replace(distinct, scenario=scenario), vehicle)) + sources()
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def row(self) -> Outcome:
         """See :class:`studies.campaign.ports.Flight`."""

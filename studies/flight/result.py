@@ -31,7 +31,7 @@ class TracePoint:
     p_WB: V3  # m, NED
     p_WE: V3  # m, NED, end-effector
     p_target: V3  # m, NED, its reference
-    margin_m: float  # the smallest
+    margin_m: float  # the smallest; infinite without constraints
 
 
 @dataclass(slots=True)

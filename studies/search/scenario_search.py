@@ -175,8 +175,12 @@ def load_task(path: Path) -> Task:
         keys: _Keys = build_table(_Keys, own[TABLE], TABLE)
     except ScenarioError as error:
         raise CampaignError(f"{path}: {error}") from None
-    scenario = plan.bases[0].scenario
+    scenario, config = plan.bases[0].scenario, plan.bases[0].config
     for wrong, why in (
+        (
+            config.own_planner or config.own_controller,
+            "a search is between Pandion's controllers: leave out own_planner and own_controller",
+        ),
         (len(plan.bases) > 1, "name one scenario and no suites: it is what is searched"),
         (not plan.varied, "nothing to search; add [vary]"),
         (not keys.marks, f"{TABLE}.marks = []: say of at least one controller what it is to do"),

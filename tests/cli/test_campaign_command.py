@@ -13,11 +13,13 @@ import pytest
 
 from pandion.campaign import main
 from sitl.scenario_file import load_scenario
+from sitl.scenario_text import scenario_text
 from studies.campaign.plan import load_plan
 from studies.campaign.store import read
 from studies.flight.closed_loop import RefusedError
 from studies.flight.job import Job, fly_job
 from studies.flight.result import FlightResult
+from vehicles.vehicle_file import PACKAGED
 
 TINY = """
 flights = 3
@@ -127,6 +129,23 @@ def test_a_flight_is_flown_again_with_what_pandion_fly_needs(
     assert flown.vehicle_scale.mass == row.values["vehicle_scale.mass"]
     said = capsys.readouterr().out
     assert f"pandion fly {tmp_path / 'flight-1.toml'} --seed={row.seed}" in said
+
+
+def test_a_flight_of_an_own_vehicle_is_written_where_its_vehicle_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(job: Job, *, traced: bool = False) -> FlightResult:
+        raise RefusedError("it will not arm")
+
+    monkeypatch.setattr("studies.campaign.flight.fly_job", refused)
+    monkeypatch.chdir(tmp_path)
+    shutil.copyfile(PACKAGED / "hexa-3r.toml", "mine.toml")
+    own = scenario_text(load_scenario("walls-calm", None, "hexa-3r"))
+    Path("own.toml").write_text(own.replace("hexa-3r", "mine.toml"))
+    Path("one.toml").write_text(TINY.replace('"walls-calm", ', ""))
+    assert main(["one.toml", "--flight=1", "--out=else/where"]) == 0
+    found = load_scenario("else/where/flight-1.toml")
+    assert found.vehicle == str(tmp_path / "mine.toml")
 
 
 def test_a_flight_that_is_refused_leaves_its_row_and_no_trace(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pandion import search
 from pandion.campaign_run import begin, exit_code
 from pandion.search_task import SearchTaskOptions
 from studies.campaign.keys import CampaignError
@@ -47,6 +48,16 @@ def test_what_is_wrong_in_the_program_is_no_sentence() -> None:
 
     with pytest.raises(ZeroDivisionError):
         exit_code("tune", answer)
+
+
+def test_a_search_between_our_controllers_takes_no_part_of_ones_own(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for part in ("--planner", "--controller"):
+        with pytest.raises(SystemExit) as stop:
+            search.main(["x.toml", f"{part}=a:B"])
+        assert stop.value.code == 2
+        assert f"unknown option {part}" in capsys.readouterr().err
 
 
 def test_a_directory_of_that_name_is_made_where_none_is_given(

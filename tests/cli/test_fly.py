@@ -46,6 +46,7 @@ def test_the_result_has_exactly_the_keys_that_its_page_promises(lockstep: Flight
     for key in ("mpc", "inner", "control_effort"):
         assert set(result[key]) == set(promised[key])
     assert (result["scenario"], result["seed"], result["controller"]) == ("walls", 2, "blf")
+    assert result["vehicle"] == "paper"
     assert result["completed"] is True
     assert result["duration_s"] == pytest.approx(3.0)
     assert result["min_margin_m"] == min(result["margins_m"].values())
@@ -57,6 +58,7 @@ def test_the_result_has_exactly_the_keys_that_its_page_promises(lockstep: Flight
 def test_the_verdict_is_told_and_the_files_are_there(lockstep: Flight) -> None:
     reported = lockstep.done.stderr
     assert "PASS" in reported
+    assert ": walls, seed 2, vehicle paper, " in reported
     assert "QGroundControl connects on UDP" in reported
     assert "minimum margin" in reported
     assert lockstep.directory.name == "walls-seed2-1"

@@ -76,6 +76,16 @@ def test_the_words_of_a_value_make_the_same_value(
     assert read(Example, "test", "Test.", as_words(value)) == value
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needed:
+    out: Path = option("--out FILE", "where to", Path, required=True)
+
+
+def test_an_option_without_a_default_must_be_given(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--out" in refused(Needed, capsys=capsys)
+    assert read(Needed, "test", "Test.", ["--out=x"]) == Needed(out=Path("x"))
+
+
 def test_what_the_processes_are_started_with_survives_the_command_line() -> None:
     links = LinkChoice(
         gcs="udp:127.0.0.1:9", api="none", allow_remote=True, autopilot="generic",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import socket
 import struct
 import threading
@@ -24,7 +25,7 @@ from sitl.scenario_file import SUITE_NAMES, load_scenario
 from sitl.sensors.keys import MeasuredSensors
 from tests.sitl.vehicles import random_vehicle
 from vehicles.description import Vehicle
-from vehicles.vehicle_file import load_vehicle
+from vehicles.vehicle_file import PACKAGED, load_vehicle
 
 PARAM_REQUEST_READ, PARAM_VALUE, PARAM_SET, SET_GPS_GLOBAL_ORIGIN = 20, 22, 23, 48
 MEASURED = [name for name in SUITE_NAMES if name != "perfect"]
@@ -83,6 +84,24 @@ def test_the_papers_vehicle_has_the_values_that_were_flown_with_px4(
     }
     assert {name: values[name] for name in flown} == flown
     assert "IMU_INTEG_RATE" not in values
+
+
+@pytest.mark.parametrize("action", ["params", "env"])
+def test_an_own_vehicle_is_named_by_its_file(
+    action: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.toml").write_text((PACKAGED / "hexa-3r.toml").read_text())
+    assert main([action, "ground", f"--airframe={tmp_path / 'mine.toml'}"]) == 0
+    assert re.search(r"CA_ROTOR_COUNT[ =]6\n", capsys.readouterr().out)
+    assert main([action, "ground", "--airframe=papr"]) == 2
+    assert 'did you mean "paper"' in capsys.readouterr().err
+
+
+def test_the_actions_of_the_help_are_apart_from_what_they_do(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--help"]) == 0
+    assert re.search(r"^  identify  find out", capsys.readouterr().out, re.M)
 
 
 def test_the_rate_loop_keeps_its_bandwidth_on_another_vehicle() -> None:

@@ -41,6 +41,19 @@ def test_paper_is_listed_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -> 
     assert "." in out[out.index("from the right") :]
 
 
+@pytest.mark.parametrize(
+    ("words", "missing"),
+    [(("import", "robot.urdf"), "--rotors"), (("export", "paper"), "--urdf")],
+)
+def test_a_file_that_is_needed_must_be_given(
+    words: tuple[str, str], missing: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(list(words))
+    assert stop.value.code == 2
+    assert capsys.readouterr().err == f"pandion vehicle {words[0]}: {missing} must be given\n"
+
+
 def test_the_figures_of_paper_are_those_of_a_plus_quadrotor() -> None:
     found = figures(PAPER)
     assert found.hover_throttle == pytest.approx(0.5)

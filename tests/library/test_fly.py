@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,9 +18,11 @@ import pandion
 from fsw.autopilot.parameters.flight_config import flight_config
 from pandion.result import table_rows
 from sitl.scenario_file import load_scenario
+from sitl.scenario_text import scenario_text
 from studies.campaign.plan import load_plan
 from studies.flight.closed_loop import simulate
 from tests.library.conftest import BRIEF_S
+from vehicles.vehicle_file import PACKAGED
 
 Flown = Callable[[str], pandion.Result]
 # The suite gnss knows its height too badly to fly between these walls, and refuses to.
@@ -102,7 +105,7 @@ def test_topics_are_arrays_and_files_are_those_of_a_flight(flown: Flown, tmp_pat
     page = log.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "front" in page  # a margin: the scenario beside the log was found
     rows = dict(table_rows(dict(result.metrics), result.truth.tracking_error_max_m))
-    assert rows["sensors"] == "mocap"
+    assert (rows["vehicle"], rows["sensors"]) == ("paper", "mocap")
     assert "completed, flew 0.8 s; minimum margin" in repr(result)
 
 
@@ -133,6 +136,8 @@ def test_parameters_change_the_flight_and_their_ranges_hold(tmp_path: Path) -> N
         ({"scenario": "ground"}, "starts on the ground"),
         ({"controller": "lqr"}, 'unknown controller "lqr"'),
         ({"sensors": "gps"}, "must be one of"),
+        ({"tracking": "pi"}, 'unknown tracking "pi"; known: lqr, pid'),
+        ({"body": "arm"}, 'unknown body "arm"; known: points, full'),
         ({"duration_s": -1.0}, "duration_s = -1.0"),
         ({"duration_s": float("nan")}, "duration_s"),
         ({"seed": -1}, "seed = -1"),
@@ -154,6 +159,37 @@ def test_a_scenario_is_changed_saved_and_flown_again(tmp_path: Path) -> None:
     assert replace(pandion.load_scenario(path), name=near.name) == near
     first, again = (pandion.fly(one, log=False) for one in (near, path))
     assert first.truth == again.truth
+
+
+def test_an_own_vehicle_is_flown_by_a_relative_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "byo").mkdir()
+    shutil.copyfile(PACKAGED / "hexa-3r.toml", tmp_path / "byo" / "mine.toml")
+    monkeypatch.chdir(tmp_path)
+    result = pandion.fly("walls", vehicle="byo/mine.toml", duration_s=0.1)
+    assert result.metrics["vehicle"] == "mine"
+    assert result.topics["sim_ground_truth"]["q_arm"].shape[1] == 3
+    (tmp_path / "one.toml").write_text(
+        'vehicle = "byo/mine.toml"\n' + scenario_text(pandion.load_scenario("walls"))
+    )
+    found = pandion.load_scenario("one.toml", duration_s=0.1)
+    monkeypatch.chdir("/")
+    assert pandion.fly(found).truth == result.truth
+
+
+@pytest.mark.long
+def test_another_vehicle_and_body_fly_in_two_processes() -> None:
+    result = pandion.fly("crossing", vehicle="hexa-3r", duration_s=0.1, processes=True, body="full")
+    assert result.metrics["vehicle"] == "hexa-3r"
+    assert pandion.load_log(result.path).information["body"] == "full"
+
+
+def test_what_keeps_clear_is_the_scenarios_or_another() -> None:
+    free = replace(pandion.load_scenario("walls", duration_s=0.1), walls=())
+    for body, flown in ((None, "points"), ("full", "full")):
+        result = pandion.fly(free, body=body)  # type: ignore[arg-type]
+        assert pandion.load_log(result.path).information["body"] == flown
 
 
 def test_a_flight_that_is_over_is_not_stepped() -> None:

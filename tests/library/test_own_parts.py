@@ -254,5 +254,7 @@ def test_a_named_part_of_another_text_is_refused() -> None:
 
 
 def test_refusals_of_the_vehicle_come_through() -> None:
-    with pytest.raises(RefusedError, match="the tilt gives"):
+    with pytest.raises(RefusedError, match=r"^not armed: .*the tilt gives") as found:
         pandion.fly("walls", duration_s=0.1, params={"PLN_TILT_MAX": 12.0}, log=False)
+    assert str(found.value).count("the tilt gives") == 1, "why not, once, and no other news"
+    assert "safe set of" not in str(found.value)

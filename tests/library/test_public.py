@@ -27,7 +27,7 @@ ScenarioError Simulator __version__ fly load_log load_scenario save_scenario sce
 """
 FLY = """
 scenario seed sensors duration_s params planner controller reference disturbance tracking
-safety_filter allow_inconsistent allow_slow vehicle log processes
+body safety_filter allow_inconsistent allow_slow vehicle log processes
 """
 OF_A_RESULT = """
 completed frame information margins metrics min_margin overridden_s parameters path reason report

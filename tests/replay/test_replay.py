@@ -56,6 +56,14 @@ def test_the_same_code_does_the_same(
     assert replayed(path) == Replayed(len(flown), None, 0)
 
 
+def test_what_a_log_holds_names_the_vehicle(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    assert main([str(path), "--json", str(tmp_path / "found.json")]) == 0
+    assert json.loads((tmp_path / "found.json").read_text())["vehicle"] == "paper"
+
+
 def with_another_gain() -> FlightConfig:
     config = flight_config(body="points")
     tuning = replace(config.tuning, joint=replace(config.tuning.joint, kp=625.001))

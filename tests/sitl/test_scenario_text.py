@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from sitl.faults.keys import Fault
-from sitl.scenario import Scenario, Sensors, Sequence, Wind
-from sitl.scenario_file import ScenarioError, load_scenario, parse_scenario, scenario_names
-from sitl.scenario_text import scenario_text
+from sitl.scenario import Scenario, Sensors, Sequence, Wind, vehicle_of
+from sitl.scenario_file import (
+    ScenarioError,
+    load_scenario,
+    parse_scenario,
+    scenario_digest,
+    scenario_names,
+    with_vehicle,
+)
+from sitl.scenario_text import scenario_text, write_scenario
+from vehicles.vehicle_file import PACKAGED
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -36,6 +45,27 @@ def _found() -> Scenario:
         faults=(Fault("motor", "weak", start_s=3.0, share=0.9),),
         description='"quoted", a \\ and µ',
     )
+
+
+def test_a_vehicles_file_is_the_same_wherever_the_scenario_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "byo").mkdir()
+    text = (PACKAGED / "hexa-3r.toml").read_text(encoding="utf-8")
+    (tmp_path / "byo" / "mine.toml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    found = with_vehicle(load_scenario("walls"), "byo/mine.toml")
+    write_scenario(found, Path("byo/beside.toml"))
+    assert 'vehicle = "mine.toml"' in Path("byo/beside.toml").read_text(), "both can be moved"
+    write_scenario(found, Path("above.toml"))
+    monkeypatch.chdir("/")
+    (tmp_path / "else").mkdir()
+    write_scenario(found, tmp_path / "else" / "there.toml")
+    for place in ("byo/beside.toml", "above.toml", "else/there.toml"):
+        again = load_scenario(str(tmp_path / place))
+        assert vehicle_of(again) == vehicle_of(found)
+        assert again.vehicle == str(tmp_path / "byo" / "mine.toml")
+        assert scenario_digest(str(tmp_path / place))
 
 
 def test_what_a_search_found_comes_back_to_the_last_digit_after_its_comment() -> None:

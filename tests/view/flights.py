@@ -55,7 +55,8 @@ def write_flight(directory: Path, seconds: int = SECONDS, **result: Any) -> Path
     limits = {"tilt": {"unit": "rad", "most": 0.4, "largest": 0.1, "at_s": 1.0, "beyond_s": 0.0,
                        "kept": True}}  # fmt: skip
     found = {
-        "scenario": "walls", "controller": "blf", "seed": 3, "sensors": "mocap",
+        "scenario": "walls", "controller": "blf", "seed": 3, "vehicle": "paper",
+        "sensors": "mocap",
         "duration_s": 4.0, "completed": True, "end_reason": "flew 4.0 s",
         "tracking_error_rms_m": 0.005, "control_effort": {"sum": 1.0, "mean": 0.1},
         "control_smoothness": {"sum": 1.0, "mean": 0.1},

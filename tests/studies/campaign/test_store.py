@@ -10,12 +10,15 @@ from typing import Any
 
 import pytest
 
+from sitl.scenario_file import load_scenario
+from sitl.scenario_text import scenario_text
 from studies.campaign.campaign import Campaign
 from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.journal import Journal, JournalError, JournalInUseError
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
 from studies.campaign.store import FACTS, JOURNAL, PLAN, begin, read, refuse_campaign
+from vehicles.vehicle_file import PACKAGED
 
 FILE = """\
 flights = 4
@@ -61,6 +64,25 @@ def begun(folder: Path, flights: int | None = None) -> tuple[Path, Path, Campaig
     plan = load_plan(source)
     begin(directory, source, plan, flights)
     return source, directory, plan
+
+
+def test_a_campaign_of_an_own_vehicle_is_read_from_its_kept_copy(tmp_path: Path) -> None:
+    """A plan is of what the vehicle is, not of where its file lies."""
+    vehicle, directory = tmp_path / "mine.toml", tmp_path / "out"
+    vehicle.write_text((PACKAGED / "hexa-3r.toml").read_text())
+    text = scenario_text(replace(load_scenario("walls-calm"), vehicle="hexa-3r"))
+    (tmp_path / "own.toml").write_text(text.replace("hexa-3r", "mine.toml"))
+    source = tmp_path / "small.toml"
+    source.write_text(FILE.replace("walls-calm", "own.toml"))
+    plan = load_plan(source)
+    begin(directory, source, plan)
+    put(directory, plan, range(4))
+    assert read(directory).complete
+    assert load_plan(directory / PLAN).flight(1).job.key() == plan.flight(1).job.key()
+    kept = directory / "mine.toml"
+    kept.write_text(kept.read_text().replace("mass = 2.0128", "mass = 2.5"))
+    with pytest.raises(CampaignError, match="was changed after it was flown"):
+        read(directory)
 
 
 def test_rows_of_another_command_do_not_stand_for_flights(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from fsw.autopilot.signals import PlanInput
 from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.simulation import Simulation
 from studies.flight import closed_loop
-from studies.flight.job import Job, fly_job, score
+from studies.flight.job import Job, PlantName, fly_job, score
 from studies.paper.cases import configuration, scenario
 from vehicles.vehicle_file import load_vehicle
 
@@ -47,6 +47,13 @@ def test_the_full_plant_flies_and_flies_the_same_again(case: str) -> None:
     assert first.truth.min_margin_m is not None
     assert min(point.margin_m for point in first.planner.trace) >= first.truth.min_margin_m
     assert not again.planner.trace
+
+
+@pytest.mark.parametrize("plant", ["full", "double-integrator"])
+def test_a_flight_without_constraints_has_a_trace(plant: PlantName) -> None:
+    free = replace(load_scenario("walls-calm"), walls=(), duration_s=0.1)
+    result = fly_job(Job(plant, free, flight_config(body="points"), 0), traced=True)
+    assert [point.margin_m for point in result.planner.trace] == [math.inf] * 3
 
 
 @pytest.mark.parametrize("vehicle", ["paper", "hexa-3r"])
@@ -114,7 +121,7 @@ def test_a_flight_that_cannot_start_is_a_row() -> None:
 def test_a_body_that_starts_outside_the_safe_set_is_refused() -> None:
     """It would be thrown out at the first tick."""
     flown = replace(load_scenario("walls-calm"), duration_s=0.1)
-    with pytest.raises(ScenarioError, match=r"flight_config\(body='points'\)") as found:
+    with pytest.raises(ScenarioError, match="use body='points'") as found:
         closed_loop.simulate(flown, 0, flight_config())
     assert "starts outside its safe set: margin" in str(found.value)
     assert Job("full", flown, flight_config(), 0).row().error

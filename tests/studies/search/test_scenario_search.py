@@ -132,6 +132,11 @@ def test_a_flight_that_cannot_be_flown_is_no_failure_of_a_controller(tmp_path: P
         ('["walls"]', '["walls-calm"]', "no disturbances"),
         ('["walls"]', '["walls", "walls-grazing"]', "name one scenario"),
         ("candidates = 80", "candidates = 0", "candidates"),
+        (
+            "flights = ",
+            'own_planner = "fractions:Fraction"\nflights = ',
+            "between Pandion's controllers",
+        ),
     ],
 )
 def test_a_file_that_makes_no_sense_is_refused_in_a_sentence(

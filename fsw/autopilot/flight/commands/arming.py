@@ -146,8 +146,11 @@ def failed(context: CommandContext) -> Failed:
 
 
 def joined(found: Failed) -> str:
-    """All that speaks against arming, as the operator reads it."""
-    return "not armed: " + "; ".join(sentence for _, sentence in found)
+    """All that speaks against arming, as the operator reads it, each once."""
+    said = [sentence for _, sentence in found]
+    return "not armed: " + "; ".join(
+        one for k, one in enumerate(said) if not any(one in other for other in said[k + 1 :])
+    )
 
 
 def refusal(context: CommandContext, *, force: bool = False) -> str | None:
