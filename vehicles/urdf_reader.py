@@ -121,6 +121,10 @@ def vehicle_from_urdf(
     base = _with_inertia(bodies[root], root, notes)
     mass, com, inertia = _turned(base, turn).numbers(f'link "{root}"')
     p_tip = _place_in(edges, chain[-1].child, tip)
+    if not p_tip.any():
+        notes.append(
+            "the end-effector lies on the last joint: name a link by --tip, or set [end_effector]"
+        )
     vehicle = Vehicle(
         name=name,
         base=Base(mass=mass, com=com, inertia=inertia),

@@ -219,6 +219,12 @@ def test_an_arm_that_is_named_further_than_it_turns_is_refused(tip: str, words: 
         vehicle_from_urdf(followed, "mine", PAPER.rotors, "right")
 
 
+def test_an_end_effector_on_the_last_joint_is_said() -> None:
+    vehicle, notes = vehicle_from_urdf(ROBOT, "mine", PAPER.rotors, "lower")
+    assert vehicle.end_effector.position == (0.0, 0.0, 0.0)
+    assert any(note.startswith("the end-effector lies on the last joint") for note in notes)
+
+
 PARAMS = "\n".join(
     f"1\t1\tCA_ROTOR{i}_{key}\t{value}\t9"
     for i, (x, y, km) in enumerate(

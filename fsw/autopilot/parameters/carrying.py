@@ -66,7 +66,7 @@ def _by_joints(airframe: Airframe, field: float) -> list[PayloadRange]:
             centre = math.hypot(*b.com[3 * i : 3 * i + 3])
             own += b.mass[i] * (length - lengths[i] + centre)
         held = _TORQUE * airframe.joint_torque_max[k] / field - own
-        found.append(PayloadRange(held / length, f"joint {k + 1}'s torque"))
+        found.append(PayloadRange(_per_lever(held, length), f"joint {k + 1}'s torque"))
     return found
 
 
@@ -81,4 +81,9 @@ def _by_balance(airframe: Airframe) -> float:
     top = np.array(airframe.rotor_thrust_max[: airframe.rotors])
     hover = airframe.mass * GRAVITY / airframe.rotors
     left = float(np.minimum(hover, top - hover).min())
-    return _TURNED * left * airframe.rotors * airframe.rotor_lever / (GRAVITY * reach)
+    return _per_lever(_TURNED * left * airframe.rotors * airframe.rotor_lever / GRAVITY, reach)
+
+
+def _per_lever(moment: float, lever: float) -> float:
+    """The mass of a moment [kg m] on a lever [m]; without a lever nothing is bounded."""
+    return moment / lever if lever > 0.0 else math.copysign(math.inf, moment)

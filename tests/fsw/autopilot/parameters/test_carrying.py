@@ -44,3 +44,11 @@ def test_weak_rotors_carry_less_and_a_light_vehicle_bears_no_heavy_loss() -> Non
     farther = replace(strong, rotor_lever=0.5)
     most, by = payload_range(replace(PROBE, airframe=farther), loop)
     assert (most, by) == (pytest.approx(0.2 * airframe.mass), "its loss in flight")
+
+
+def test_a_payload_on_a_joint_s_own_place_does_not_load_it() -> None:
+    bodies = replace(PROBE.airframe.bodies, tip=(0.0, 0.0, 0.0))
+    on_joint = replace(PROBE, airframe=replace(PROBE.airframe, bodies=bodies))
+    most, by = payload_range(on_joint, loop_tube(PROBE))
+    assert most > payload_range(PROBE, loop_tube(PROBE)).most
+    assert "joint 2" not in by
