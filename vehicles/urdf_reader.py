@@ -113,11 +113,7 @@ def vehicle_from_urdf(
     for edge in chain:
         body, (R, p) = _with_inertia(bodies[edge.child], edge.child, notes), places[edge.name]
         joints.append(_joint(edge, body, turn @ R @ turn, turn @ p, turn, notes))
-    still = [edge for edge in edges.values() if edge.kind != "fixed" and edge not in chain]
-    if still:
-        notes.append(
-            f"{len(still)} joints beside the arm stay at zero: {_listed(one.name for one in still)}"
-        )
+    notes += _still(edges, chain, tip)
     base = _with_inertia(bodies[root], root, notes)
     mass, com, inertia = _turned(base, turn).numbers(f'link "{root}"')
     p_tip = _place_in(edges, chain[-1].child, tip)
@@ -272,9 +268,8 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     moving = {link: [edge for edge in _path(edges, link) if edge.kind != "fixed"] for link in links}
     if not tip:
         most = max(map(len, moving.values()))
-        parents = {edge.parent for edge in edges.values()}
-        ends = [one for one in links if len(moving[one]) == most and one not in parents]
-        ends = list(dict.fromkeys(_before_fingers(edges, one) for one in ends))
+        last = dict.fromkeys(_arm_s_end(edges, one) for one in links if len(moving[one]) == most)
+        ends = list(dict.fromkeys(end for one in last for end in _fixed_ends(edges, one)))
         if len(ends) > 1:
             raise VehicleError(
                 f"{len(ends)} links are behind {most} joints each: name the one that the arm ends "
@@ -284,6 +279,11 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     if not moving[tip]:
         raise VehicleError(f'no joint moves the link "{tip}": an arm must have at least one')
     for edge in moving[tip]:
+        if edge.kind == "floating":
+            raise VehicleError(
+                f'joint "{edge.name}" is floating: the base flies as it is: remove this joint and '
+                f'the link "{edge.parent}" it is on'
+            )
         if edge.kind not in _MOVE:
             raise VehicleError(
                 f'joint "{edge.name}" is {shown(edge.kind)}: joints of an arm must be revolute, '
@@ -297,11 +297,39 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     return moving[tip], tip
 
 
-def _before_fingers(edges: dict[str, _Edge], link: str) -> str:
-    """The last link of an arm with a gripper, whose fingers slide or follow each other."""
+def _arm_s_end(edges: dict[str, _Edge], link: str) -> str:
+    """The last link before a joint that is none of an arm, as of fingers; without arm the link."""
     path = _path(edges, link)
     arm = list(takewhile(lambda edge: edge.kind == "fixed" or _of_arm(edge), path))
-    return arm[-1].child if arm else path[0].parent if path else link
+    return arm[-1].child if any(map(_of_arm, arm)) else link
+
+
+def _fixed_ends(edges: dict[str, _Edge], link: str) -> list[str]:
+    """The outermost links that are fixed to a link, or itself."""
+    on_it = [edge.child for edge in edges.values() if edge.parent == link and edge.kind == "fixed"]
+    return [end for one in on_it for end in _fixed_ends(edges, one)] or [link]
+
+
+def _still(edges: dict[str, _Edge], chain: list[_Edge], tip: str) -> list[str]:
+    """Which joints stay at zero and why, a sentence each."""
+    still = [edge for edge in edges.values() if edge.kind != "fixed" and edge not in chain]
+    ways = {
+        edge.name: [one.name for one in _path(edges, edge.child) if one.kind != "fixed"]
+        for edge in still
+    }
+    arm, notes = [edge.name for edge in chain], []
+    ends = [edge for edge in still if ways[edge.name][:-1] == arm and not _of_arm(edge)]
+    behind = [name for name, way in ways.items() if any(end.name in way for end in ends)]
+    if ends:
+        why = _listed(f"{end.name} ({end.kind if end.kind not in _MOVE else 'mimic'})"
+                      for end in ends)  # fmt: skip
+        notes.append(
+            f"the arm ends before joint {why}, so these stay at zero: {_listed(behind)}; the "
+            f"end-effector is the link {tip}"
+        )
+    if beside := [name for name in ways if name not in behind]:
+        notes.append(f"{len(beside)} joints beside the arm stay at zero: {_listed(beside)}")
+    return notes
 
 
 def _of_arm(edge: _Edge) -> bool:

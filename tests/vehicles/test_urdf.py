@@ -197,10 +197,49 @@ def test_what_exporters_write_is_read_and_what_was_assumed_is_said() -> None:
     assert (shoulder.position_min, shoulder.position_max) == (-math.inf, math.inf)
     assert any("joint arm/1: 0 to 0 is no limit" in note for note in notes)
     assert any("link lower: no inertia: 20 mm of gyration" in note for note in notes)
-    assert any(
-        "2 joints beside the arm stay at zero: finger_left, finger_right" in n for n in notes
-    )
+    assert (
+        "the arm ends before joint finger_left (prismatic), finger_right (prismatic), so these "
+        "stay at zero: finger_left, finger_right; the end-effector is the link hand"
+    ) in notes
     assert min(elbow.link.inertia[:3]) == pytest.approx(0.1 * 0.02**2), "of hand and fingers"
+
+
+FINGER = """
+  <link name="finger"><inertial><mass value="0.01"/>
+    <inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="slide" type="prismatic"><parent link="lower"/><child link="finger"/></joint>
+</robot>"""
+
+
+def test_fingers_leave_the_end_effector_at_the_link_that_is_fixed_beyond_them() -> None:
+    vehicle, notes = vehicle_from_urdf(
+        ROBOT.replace("</robot>", FINGER), "mine", PAPER.rotors, frd=True
+    )
+    assert vehicle.end_effector.position == pytest.approx((0.2, 0.01, 0.0))
+    assert any("before joint slide (prismatic)" in n and n.endswith("link gripper") for n in notes)
+    assert "1 joints beside the arm stay at zero: j_p1" in notes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('name="elbow" type="continuous"', 'name="elbow" type="planar"', "elbow (planar)"),
+        ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="g"/>', "elbow (mimic)"),
+    ],
+)
+def test_a_joint_that_ends_the_arm_early_is_named(old: str, new: str, why: str) -> None:
+    robot = ROBOT.replace(old, new, 1).replace("j_p1", "j_p2").replace("continuous", "fixed", 1)
+    vehicle, notes = vehicle_from_urdf(robot, "mine", PAPER.rotors)
+    assert [joint.name for joint in vehicle.joints] == ["shoulder_yaw"]
+    assert any(f"the arm ends before joint {why}" in note for note in notes)
+    assert any(note.endswith("elbow; the end-effector is the link upper") for note in notes)
+
+
+def test_a_root_that_floats_is_refused_with_its_reason() -> None:
+    root = '<link name="world"/><joint name="free" type="floating"><parent link="world"/>'
+    root += '<child link="base"/></joint></robot>'
+    with pytest.raises(VehicleError, match=r'joint "free" is floating: .* the link "world"'):
+        vehicle_from_urdf(ROBOT.replace("</robot>", root), "mine", PAPER.rotors)
 
 
 @pytest.mark.parametrize(
