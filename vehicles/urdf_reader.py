@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise, takewhile
@@ -156,6 +157,7 @@ def _elements(text: str) -> tuple[dict[str, _Body], dict[str, _Edge]]:
         raise VehicleError(f"no URDF: it is not XML: {error}") from None
     if robot.tag != "robot":
         raise VehicleError(f"no URDF: its root must be <robot>, is <{shown(robot.tag)}>")
+    _check_names(robot)
     links = {_name(one): _body(one) for one in robot.findall("link")}
     if not 0 < len(links) <= _MOST_LINKS:
         raise VehicleError(f"links: must be 1 to {_MOST_LINKS} of them, are {len(links)}")
@@ -170,6 +172,13 @@ def _elements(text: str) -> tuple[dict[str, _Body], dict[str, _Edge]]:
     if len(set(parents)) < len(parents) or len(parents) != len(links) - 1:
         raise VehicleError("links must hang together as one tree, each from one joint at most")
     return links, edges
+
+
+def _check_names(robot: ET.Element) -> None:
+    for kind in ("link", "joint"):
+        for name, count in Counter(map(_name, robot.findall(kind))).items():
+            if count > 1:
+                raise VehicleError(f"there are {count} {kind}s {shown(name)}: rename all but one")
 
 
 def _name(element: ET.Element) -> str:

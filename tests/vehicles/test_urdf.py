@@ -122,6 +122,8 @@ def test_a_vehicle_is_the_same_when_its_text_has_been_read() -> None:
         ('mass value="0.2"', 'mass value="0"', 'link "upper" has no mass'),
         ('axis xyz="0 1 0"', 'axis xyz="0 0 0"', "joints[1].axis"),
         ('child link="upper"', 'child link="base"', "as one tree"),
+        ('link name="battery"', 'link name="base"', "there are 2 links 'base': rename"),
+        ('joint name="elbow"', 'joint name="g"', "there are 2 joints 'g'"),
         ('ixx="0.001" iyy="0.001" izz="0.0001"', 'ixx="0.001" iyy="0.001" izz="0.1"',
          "no body has this"),
     ],
