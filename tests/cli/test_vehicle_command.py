@@ -146,7 +146,7 @@ def test_what_cannot_be_is_refused(capsys: pytest.CaptureFixture[str], tmp_path:
     path.write_text(vehicle_text(PAPER).replace("mass = 3.1", "mass = 0"))
     code, out, err = run(capsys, "check", str(path))
     assert (code, out) == (1, "")
-    assert err == "pandion vehicle: base.mass = 0: must be 1e-06 to 1000\n"
+    assert err == "pandion vehicle: base.mass = 0: must be 1e-06 to 1000 kg\n"
     code, _, err = run(capsys, "show", "papr")
     assert (code, 'did you mean "paper"' in err) == (1, True)
 
@@ -194,7 +194,7 @@ def test_numbers_of_a_urdf_are_kept_in_their_ranges(
     rotors.write_text(PARAMS)
     code, out, err = run(capsys, "import", str(robot), "--rotors", str(rotors))
     assert (code, out) == (1, "")
-    assert "must be -10 to 10" in err
+    assert "must be -10 to 10 m" in err
 
 
 @pytest.mark.drawn(2)

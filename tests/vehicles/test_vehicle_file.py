@@ -84,7 +84,7 @@ def test_the_six_entries_are_those_of_the_matrix() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("mass = 3.1", "mass = -1.0", "base.mass = -1.0: must be 1e-06 to 1000"),
+        ("mass = 3.1", "mass = -1.0", "base.mass = -1.0: must be 1e-06 to 1000 kg"),
         ("mass = 3.1", "mass = nan", "base.mass = nan: must be"),
         ("mass = 3.1", 'mass = "3"', "base.mass = '3': must be a number"),
         ("mass = 3.1", "mas = 3.1", 'unknown key "base.mas" = 3.1, did you mean "mass"?'),
