@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Final
+from typing import Final, get_type_hints
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
@@ -25,8 +26,10 @@ class _Rotors:
     rotors: tuple[Rotor, ...]
 
 
-def read_rotors(path: Path) -> tuple[Rotor, ...]:
-    """The rotors of a file: .toml with [[rotors]], anything else PX4's parameters.
+def read_rotors(path: Path) -> tuple[tuple[Rotor, ...], list[str]]:
+    """The rotors of a file and what was assumed, a sentence each.
+
+    It is .toml with [[rotors]], anything else PX4's parameters.
 
     Raises:
         VehicleError: It cannot be read, or says what cannot be.
@@ -46,11 +49,13 @@ def read_rotors(path: Path) -> tuple[Rotor, ...]:
     # A whole vehicle's file will do as well.
     own = {"rotors": table["rotors"]} if "rotors" in table else {}
     found: _Rotors = TableReader(VehicleError).build(_Rotors, own, "")
-    return found.rotors
+    return found.rotors, _assumed(_missing(own["rotors"]))
 
 
-def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
+def rotors_from_parameters(text: str) -> tuple[tuple[Rotor, ...], list[str]]:
     """The rotors that PX4's parameters ``CA_ROTORn_*`` describe, of a file of QGroundControl.
+
+    And what was assumed, a sentence each.
 
     CT is the thrust at full command [N], KM the torque per thrust [m], positive for a rotor that
     turns counter-clockwise.
@@ -77,7 +82,33 @@ def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
             f"CA_ROTOR_COUNT = {count}: must be 4 to {ROTORS_MAX}; a file of parameters with "
             "CA_ROTORn_PX and others describes the rotors"
         )
-    return tuple(_rotor(values, i) for i in range(count))
+    missing = [
+        f"CA_ROTORn_{key} = {default:g}"
+        for key, default in _DEFAULTS.items()
+        if any(f"CA_ROTOR{i}_{key}" not in values for i in range(count))
+    ]
+    # All other numbers of a rotor PX4 does not know.
+    missing += _missing([("torque_per_thrust",)])
+    return tuple(_rotor(values, i) for i in range(count)), _assumed(missing)
+
+
+def _missing(tables: Sequence[Collection[str]]) -> list[str]:
+    """The numbers of rotors that not each table has, with their defaults."""
+    hints = get_type_hints(Rotor, include_extras=True)
+    return [
+        f"{one.name} = {one.default:g} {hints[one.name].__metadata__[0].unit}"
+        for one in fields(Rotor)
+        if isinstance(one.default, float) and any(one.name not in table for table in tables)
+    ]
+
+
+def _assumed(missing: Iterable[str]) -> list[str]:
+    listed = ", ".join(missing)
+    return (
+        [f"rotors: not given for each, so assumed: {listed}: put in the real ones"]
+        if listed
+        else []
+    )
 
 
 def _rotor(values: dict[str, float], i: int) -> Rotor:

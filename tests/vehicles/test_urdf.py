@@ -276,11 +276,15 @@ PARAMS = "\n".join(
 
 
 def test_px4s_parameters_are_rotors_with_px4s_defaults() -> None:
-    rotors = rotors_from_parameters("# a comment\n1\t1\tCA_ROTOR_COUNT\t4\t6\n" + PARAMS)
+    rotors, notes = rotors_from_parameters("# a comment\n1\t1\tCA_ROTOR_COUNT\t4\t6\n" + PARAMS)
     assert [rotor.spin for rotor in rotors] == ["ccw", "ccw", "cw", "cw"]
     assert rotors[2].position == (0.15, -0.15, 0.0)
     assert (rotors[0].thrust_max, rotors[0].axis) == (6.5, (0.0, 0.0, -1.0))
-    assert rotors == rotors_from_parameters(PARAMS)
+    assert (rotors, notes) == rotors_from_parameters(PARAMS)
+    (note,) = notes
+    assert "CA_ROTORn_PZ = 0, " in note
+    assert "CA_ROTORn_CT = 6.5, lag = 0.04 s, radius = 0.165 m, half_height = 0.02 m" in note
+    assert "KM" not in note
     with pytest.raises(VehicleError, match=r"CA_ROTOR_COUNT = 0: must be 4 to 8"):
         rotors_from_parameters("1\t1\tMPC_XY_VEL_MAX\t4\t9")
     with pytest.raises(VehicleError, match=r"line 1 = .*: must be a name and a number"):
@@ -288,7 +292,11 @@ def test_px4s_parameters_are_rotors_with_px4s_defaults() -> None:
 
 
 def test_rotors_are_those_of_a_vehicles_file(tmp_path) -> None:
-    assert read_rotors(PACKAGED / "paper.toml") == PAPER.rotors
+    whole = PACKAGED / "x500-2r.toml"
+    assert read_rotors(whole) == (load_vehicle("x500-2r").rotors, [])
+    (tmp_path / "some.toml").write_text(whole.read_text().replace("lag = ", "# ", 1))
+    (note,) = read_rotors(tmp_path / "some.toml")[1]
+    assert note == "rotors: not given for each, so assumed: lag = 0.04 s: put in the real ones"
     with pytest.raises(VehicleError, match="cannot read rotors"):
         read_rotors(tmp_path / "none.params")
     (tmp_path / "empty.toml").write_text("")
