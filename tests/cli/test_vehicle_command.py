@@ -120,6 +120,23 @@ def test_what_the_simulator_or_the_flight_software_refuse_is_said(
     )
 
 
+def test_feet_above_the_body_and_rotors_within_walls_are_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    x500 = load_vehicle("x500-2r")
+    above = tuple((x, y, -0.3) for x, y, _ in x500.feet.positions)
+    rotors = tuple(replace(rotor, radius=2.0) for rotor in x500.rotors)
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        vehicle_text(replace(x500, rotors=rotors, feet=replace(x500.feet, positions=above)))
+    )
+    code, _, err = run(capsys, "check", str(path))
+    said = " ".join(err.split())
+    assert code == 0
+    assert "it does not fly ground: the base hit the ground at 0.00 s: see where feet" in said
+    assert "it does not fly walls --body full: the scenario starts outside its safe set" in said
+
+
 def test_weak_joints_and_tilted_rotors_are_said(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -137,7 +154,10 @@ def test_weak_joints_and_tilted_rotors_are_said(
     assert "joint joint1 cannot hold its own arm" in err
     assert "torque_max is 0.3 N m" in err
     assert "lateral thrust of tilted rotors is not used: 2" in err
-    assert "it does not fly walls, workspace, branches: start.arm_deg" in " ".join(err.split())
+    assert (
+        "it does not fly walls, walls --body full, workspace, branches: start.arm_deg"
+        in " ".join(err.split())
+    )
     assert "3 warnings" in out
 
 
@@ -204,8 +224,11 @@ def test_every_vehicle_that_comes_with_pandion_is_sound(
 ) -> None:
     code, out, err = run(capsys, "check", name)
     assert code == 0
-    if name == "probe-2r":  # whose tool is ahead of its base, not below it
-        assert "it does not fly workspace" in err
+    # Their rotors reach into the zones of `walls`; and a tool ahead of the base, not below it.
+    refused = {"paper": "walls --body full", "octo-4r": "walls --body full",
+               "probe-2r": "workspace"}.get(name)  # fmt: skip
+    if refused:
+        assert f"it does not fly {refused}: " in err
         assert err.count("\n") == 1
     else:
         assert err == ""
