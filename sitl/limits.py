@@ -22,6 +22,7 @@ from sitl.plant.vector import Array
 from vehicles.description import Vehicle
 
 _ANGLE_KEPT = math.radians(0.5)  # rad, beyond an angle that still counts as kept
+_RATE_KEPT = 0.02  # share of a joint's rate
 _COMMAND_KEPT = 1e-6  # share of a command's most: commands travel as single precision
 
 
@@ -64,7 +65,10 @@ def limits(vehicle: Vehicle) -> tuple[Limit, ...]:
     thrusts = {rotor.thrust_max for rotor in vehicle.rotors}
     found = (
         *(Limit(key, "rad", most, _ANGLE_KEPT) for key, _, _, most in _angles(vehicle)),
-        *(Limit(f"{_key(one.name)}_rate", "rad/s", one.rate_max, 0.1) for one in vehicle.joints),
+        *(
+            Limit(f"{_key(one.name)}_rate", "rad/s", one.rate_max, _RATE_KEPT * one.rate_max)
+            for one in vehicle.joints
+        ),
         Limit("tilt", "rad", own.tilt, _ANGLE_KEPT),
         Limit("roll_pitch_rate", "rad/s", own.roll_pitch_rate, 0.1),
         Limit("yaw_rate", "rad/s", own.yaw_rate, 0.05),

@@ -204,6 +204,15 @@ def test_every_limit_is_judged_whatever_joints_are_named() -> None:
     assert [key for key, use in uses.items() if not use.kept] == ["joint_yaw_rate"]
 
 
+def test_a_slow_joint_may_not_turn_at_twice_its_rate() -> None:
+    first, second = PAPER.joints
+    vehicle = replace(PAPER, joints=(replace(first, rate_max=0.05), second))
+    record, state = LimitRecord(vehicle), at_rest(4, 2)
+    StateView(state).qd_arm[:] = 0.1, 5.09
+    add(record, [state], (0.0, 0.0), 0.0)
+    assert [key for key, use in record.uses().items() if not use.kept] == ["joint_1_rate"]
+
+
 def test_drives_that_are_not_alike_are_judged_by_the_share_of_each() -> None:
     vehicle = random_vehicle(3, 5, np.random.default_rng(1))
     record, state = LimitRecord(vehicle), at_rest(5, 3)
