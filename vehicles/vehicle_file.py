@@ -47,6 +47,11 @@ def read_text(name_or_path: str) -> tuple[str, str]:
     path = Path(name_or_path)
     if name_or_path in vehicle_names():
         path = PACKAGED / f"{name_or_path}.toml"
+    elif path.suffix == ".urdf":
+        raise VehicleError(
+            f"{name_or_path} is a URDF: make a vehicle's file of it first, with: pandion vehicle "
+            f"import {name_or_path} --rotors FILE --out {path.stem}.toml"
+        )
     elif path.suffix != ".toml":
         raise VehicleError(
             f'unknown vehicle "{name_or_path}"{nearest(name_or_path, vehicle_names())}; '

@@ -144,3 +144,8 @@ def test_a_file_that_is_none_is_refused_in_a_sentence(tmp_path) -> None:
         load_vehicle(str(tmp_path / "long.toml"))
     with pytest.raises(VehicleError, match="nested too deeply"):
         parse_vehicle("a = " + "[" * 5000, "mine")
+
+
+def test_a_urdf_in_place_of_a_vehicle_is_to_be_imported_first() -> None:
+    with pytest.raises(VehicleError, match=r"import my/octo.urdf --rotors FILE --out octo.toml$"):
+        load_vehicle("my/octo.urdf")
