@@ -10,7 +10,7 @@ import math
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise, takewhile
 from typing import Final
 
@@ -42,6 +42,7 @@ _MOVE: Final = ("revolute", "continuous")
 _RATE, _TORQUE = 5.0, 2.0  # rad/s, N m; of a joint that does not say
 _NONE: Final = 1e-9  # m^2, inertia over mass
 _GYRATION: Final = 0.02  # m, of a link that has a mass and no inertia
+_NAME_LETTERS: Final = 32
 _CLEAR: Final = 0.02  # m, of the feet below the arm
 
 
@@ -111,9 +112,10 @@ def vehicle_from_urdf(
     turn = np.eye(3) if frd else _HALF_TURN
     root = _root(links, edges)
     joints = []
-    for edge in chain:
+    for edge, called in zip(chain, _own_names(chain, notes), strict=True):
         body, (R, p) = _with_inertia(bodies[edge.child], edge.child, notes), places[edge.name]
-        joints.append(_joint(edge, body, turn @ R @ turn, turn @ p, turn, notes))
+        joint = _joint(edge, body, turn @ R @ turn, turn @ p, turn, notes)
+        joints.append(replace(joint, name=called))
     notes += _still(edges, chain, tip)
     base = _with_inertia(bodies[root], root, notes)
     mass, com, inertia = _turned(base, turn).numbers(f'link "{root}"')
@@ -129,6 +131,7 @@ def vehicle_from_urdf(
         joints=tuple(joints),
         end_effector=EndEffector(position=_v3(turn @ p_tip)),
         feet=_feet(rotors, joints, turn @ p_tip),
+        rest_posture=_rest(joints, notes),
         critical_points=(
             CriticalPoint(name="base", on="base"),
             *(
@@ -401,6 +404,38 @@ def _turned(body: _Body, turn: Array) -> _Body:
     return _Body().with_part(body, turn, np.zeros(3))
 
 
+def _own_names(chain: list[_Edge], notes: list[str]) -> list[str]:
+    """A name of letters, digits and "_" for each joint, which nothing else of a vehicle has."""
+    found, taken = [], {"base", "end_effector"}
+    for k, edge in enumerate(chain, start=1):
+        name = "".join(c if c.isascii() and c.isalnum() else "_" for c in edge.name)[:_NAME_LETTERS]
+        if not name.strip("_"):
+            name = f"joint_{k}"
+        elif name[0].isdigit():
+            name = f"joint_{name}"[:_NAME_LETTERS]
+        others = (f"{name[: _NAME_LETTERS - 4]}_{i}" for i in range(k, k + len(taken)))
+        name = next(one for one in (name, *others) if one not in taken)
+        found.append(name)
+        taken.add(name)
+    if changed := [
+        f"{shown(edge.name)} is {name}" for edge, name in zip(chain, found, strict=True)
+        if name != edge.name
+    ]:  # fmt: skip
+        notes.append(f"joints are renamed: {', '.join(changed)}")
+    return found
+
+
+def _rest(joints: Sequence[Joint], notes: list[str]) -> tuple[float, ...]:
+    """The angles [rad] that are nearest to zero within the limits; none if all are zero."""
+    rest = tuple(min(max(0.0, one.position_min), one.position_max) for one in joints)
+    if not any(rest):
+        return ()
+    notes.append(
+        f"a joint cannot be at zero: rest_posture is {shown([*rest])} rad, the nearest allowed"
+    )
+    return rest
+
+
 def _joint(edge: _Edge, body: _Body, R: Array, p: Array, turn: Array, notes: list[str]) -> Joint:
     limit, dynamics = edge.element.find("limit"), edge.element.find("dynamics")
     rate = _stated(limit, edge.name, "velocity", (100.0, _RATE, "rad/s"), notes)
@@ -414,7 +449,7 @@ def _joint(edge: _Edge, body: _Body, R: Array, p: Array, turn: Array, notes: lis
     size = float(np.linalg.norm(edge.axis))
     mass, com, inertia = _turned(body, turn).numbers(f'link "{edge.child}"')
     return Joint(
-        name="".join(c if c.isascii() and c.isalnum() else "_" for c in edge.name)[:32],
+        name=edge.name,
         axis=_v3(turn @ edge.axis / size if size > 0.0 else edge.axis),
         xyz=_v3(p),
         rpy=_angles(R),

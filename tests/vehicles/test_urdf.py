@@ -237,6 +237,33 @@ def test_a_joint_that_ends_the_arm_early_is_named(old: str, new: str, why: str) 
     assert any(note.endswith("elbow; the end-effector is the link upper") for note in notes)
 
 
+@pytest.mark.parametrize(
+    ("names", "called"),
+    [
+        (("关节", "夹子"), ["joint_1", "joint_2"]),
+        (("1", "2"), ["joint_1", "joint_2"]),
+        (("base", "end_effector"), ["base_1", "end_effector_2"]),
+        (("a b", "a.b"), ["a_b", "a_b_2"]),
+        (("2", "关节"), ["joint_2", "joint_2_2"]),
+        (("x" * 40, "x" * 41), ["x" * 32, "x" * 28 + "_2"]),
+    ],
+)
+def test_joints_get_names_that_a_vehicle_may_have(
+    names: tuple[str, str], called: list[str]
+) -> None:
+    robot = ROBOT.replace("shoulder.yaw", names[0]).replace('"elbow"', f'"{names[1]}"')
+    vehicle, notes = vehicle_from_urdf(robot, "mine", PAPER.rotors)
+    assert [joint.name for joint in vehicle.joints] == called
+    assert any(note.endswith(f"{names[1]!r} is {called[1]}") for note in notes)
+
+
+def test_a_joint_that_cannot_be_at_zero_rests_as_near_to_it_as_allowed() -> None:
+    robot = ROBOT.replace('lower="-1.5"', 'lower="0.3"')
+    vehicle, notes = vehicle_from_urdf(robot, "mine", PAPER.rotors)
+    assert vehicle.rest_posture == vehicle.home_posture == (0.3, 0.0)
+    assert "a joint cannot be at zero: rest_posture is [0.3, 0.0] rad, the nearest allowed" in notes
+
+
 def test_a_root_that_floats_is_refused_with_its_reason() -> None:
     root = '<link name="world"/><joint name="free" type="floating"><parent link="world"/>'
     root += '<child link="base"/></joint></robot>'
