@@ -115,9 +115,9 @@ def test_what_the_simulator_or_the_flight_software_refuse_is_said(
     aside = replace(PAPER, end_effector=EndEffector(position=(0.2, 0.0, 0.15)))
     path.write_text(vehicle_text(aside), encoding="utf-8")
     _, _, err = run(capsys, "check", str(path))
-    assert "it does not fly workspace: the scenario starts outside its safe set" in " ".join(
-        err.split()
-    )
+    said = " ".join(err.split())
+    assert "it does not fly workspace: the scenario starts outside its safe set" in said
+    assert "or begin in another posture (start.arm_deg, or home_posture of the vehicle)" in said
 
 
 def test_feet_above_the_body_and_rotors_within_walls_are_said(
@@ -155,7 +155,7 @@ def test_weak_joints_and_tilted_rotors_are_said(
     assert "torque_max is 0.3 N m" in err
     assert "lateral thrust of tilted rotors is not used: 2" in err
     assert (
-        "it does not fly walls, walls --body full, workspace, branches: start.arm_deg"
+        "it does not fly walls, walls --body full, workspace, branches: home_posture = ["
         in " ".join(err.split())
     )
     assert "3 warnings" in out
