@@ -13,6 +13,7 @@ class Range(NamedTuple):
     high: float
     step: float | None = None
     or_inf: bool = False
+    unit: str = ""  # where a key's name does not end with it
 
     def contains(self, value: float) -> bool:
         """Whether a value [unit of the key] is in the range; NaN is not."""
@@ -25,4 +26,5 @@ class Range(NamedTuple):
 
     def __str__(self) -> str:
         grid = f" in steps of {self.step:g}" if self.step is not None else ""
-        return f"{self.low:g} to {self.high:g}{grid}{' or inf' if self.or_inf else ''}"
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{self.low:g} to {self.high:g}{unit}{grid}{' or inf' if self.or_inf else ''}"

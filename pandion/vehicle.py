@@ -165,7 +165,7 @@ def _import(options: _Import) -> int:
     from vehicles.urdf_reader import MAX_BYTES, vehicle_from_urdf
     from vehicles.vehicle_file import VehicleError, parse_vehicle, vehicle_text
 
-    rotors = read_rotors(options.rotors)
+    rotors, assumed = read_rotors(options.rotors)
     try:
         robot = read_bounded(options.urdf, MAX_BYTES).decode("utf-8-sig")
     except OSError as error:
@@ -175,7 +175,7 @@ def _import(options: _Import) -> int:
     name = options.out.stem if options.out is not None else options.urdf.stem
     read, notes = vehicle_from_urdf(robot, name, rotors, options.tip, frd=options.frd)
     vehicle, softer = soften(read)
-    notes += softer
+    notes = [*assumed, *notes, *softer]
     comment = f"From {options.urdf.name} and {options.rotors.name}, by pandion vehicle import."
     text = vehicle_text(vehicle, comment)
     parse_vehicle(text, name)  # every number within its range

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -10,8 +11,8 @@ from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.simulation import Simulation
 from studies.flight.closed_loop import RefusedError, ScenarioFlight
 
-TRIED: Final = ("ground", "walls", "workspace", "branches")
-_STEPS: Final = 2  # to arm and to follow the trajectory
+TRIED: Final = ("ground", "walls", "walls --body full", "workspace", "branches")
+_STEPS: Final = {"ground": 1, "airborne": 2}  # to arm, and to follow the trajectory
 
 
 def refusals(vehicle: str) -> list[str]:
@@ -35,14 +36,17 @@ def _joined(names: list[str]) -> str:
 
 def _refusal(name: str, vehicle: str) -> str | None:
     try:
+        name, _, body = name.partition(" --body ")
         scenario = load_scenario(name, None, vehicle)
+        if body == "full":
+            scenario = replace(scenario, body="full")
         simulation = Simulation(scenario, 0)
-        if scenario.start.kind == "ground":
-            return None
         config = flight_config(body=scenario.body, vehicle=vehicle_of(scenario))
         flight = ScenarioFlight(simulation, config)
-        for _ in range(_STEPS):
+        for _ in range(_STEPS[scenario.start.kind]):
             flight.step()
     except (ScenarioError, RefusedError) as error:
         return str(error)
-    return None
+    if simulation.ended is None:
+        return None
+    return f"{simulation.ended.sentence}: see where feet.positions and [[parts]] are"

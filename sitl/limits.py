@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from sitl.plant.vector import Array
 from vehicles.description import Vehicle
 
 _ANGLE_KEPT = math.radians(0.5)  # rad, beyond an angle that still counts as kept
+_RATE_KEPT = 0.02  # share of a joint's rate
 _COMMAND_KEPT = 1e-6  # share of a command's most: commands travel as single precision
 
 
@@ -62,15 +63,26 @@ def limits(vehicle: Vehicle) -> tuple[Limit, ...]:
     own = vehicle.limits
     torques = {joint.torque_max for joint in vehicle.joints}
     thrusts = {rotor.thrust_max for rotor in vehicle.rotors}
-    return (
+    found = (
         *(Limit(key, "rad", most, _ANGLE_KEPT) for key, _, _, most in _angles(vehicle)),
-        *(Limit(f"{_key(one.name)}_rate", "rad/s", one.rate_max, 0.1) for one in vehicle.joints),
+        *(
+            Limit(f"{_key(one.name)}_rate", "rad/s", one.rate_max, _RATE_KEPT * one.rate_max)
+            for one in vehicle.joints
+        ),
         Limit("tilt", "rad", own.tilt, _ANGLE_KEPT),
         Limit("roll_pitch_rate", "rad/s", own.roll_pitch_rate, 0.1),
         Limit("yaw_rate", "rad/s", own.yaw_rate, 0.05),
         _command("joint_torque", "N m", torques),
         _command("rotor_thrust", "N", thrusts),
     )
+    # From the last, so that the base keeps its keys: a joint may be named as one of them.
+    kept: dict[str, Limit] = {}
+    for limit in reversed(found):
+        key = limit.key
+        while key in kept:
+            key = f"joint_{key}"
+        kept[key] = replace(limit, key=key)
+    return tuple(reversed(kept.values()))
 
 
 def _command(key: str, unit: str, most: set[float]) -> Limit:

@@ -278,5 +278,6 @@ def check_start(keys: tuple[str, ...], margins: tuple[float, ...]) -> None:
         if not (margin > 0.0):
             raise ScenarioError(
                 f"the scenario starts outside its safe set: margin {key} = "
-                f"{1000.0 * margin:.1f} mm at t = 0, must be above 0"
+                f"{1000.0 * margin:.1f} mm at t = 0, must be above 0: move what is near, or begin "
+                "in another posture (start.arm_deg, or home_posture of the vehicle)"
             )

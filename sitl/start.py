@@ -125,8 +125,11 @@ def hovering(vehicle: Vehicle, scenario: Scenario, p_target: V3) -> tuple[Array,
     try:
         trim = level_hover(vehicle, angles)
     except NoTrimError as error:
-        shown = [round(math.degrees(angle), 6) for angle in angles]
-        raise ScenarioError(f"start.arm_deg = {shown}: {error}") from error
+        # Where the scenario does not say it, the vehicle's posture is what can be changed.
+        asked = scenario.start.arm_deg
+        key, unit = ("start.arm_deg", math.radians(1.0)) if asked else ("home_posture", 1.0)
+        shown = [round(angle / unit, 6) for angle in angles]
+        raise ScenarioError(f"{key} = {shown}: {error}") from error
     place = (p_target[0] - c * x + s * y, p_target[1] - s * x - c * y, p_target[2] - z)
     return _level(vehicle, place, yaw, trim, angles), trim
 

@@ -20,12 +20,12 @@ ROTORS_MAX: Final = 8
 V3: TypeAlias = tuple[float, float, float]
 V6: TypeAlias = tuple[float, float, float, float, float, float]
 
-_ANGLE: Final = Range(-4.0 * math.pi, 4.0 * math.pi)  # rad
+_ANGLE: Final = Range(-4.0 * math.pi, 4.0 * math.pi, unit="rad")
 _AXIS: Final = Range(-1.05, 1.05)  # [1]; whoever rounds a unit vector need not do it well
-_INERTIA: Final = Range(-1000.0, 1000.0)  # kg m^2
-_MASS: Final = Range(1e-6, 1000.0)  # kg
-_PLACE: Final = Range(-10.0, 10.0)  # m
-_RADIUS: Final = Range(0.0, 10.0)  # m
+_INERTIA: Final = Range(-1000.0, 1000.0, unit="kg m^2")
+_MASS: Final = Range(1e-6, 1000.0, unit="kg")
+_PLACE: Final = Range(-10.0, 10.0, unit="m")
+_RADIUS: Final = Range(0.0, 10.0, unit="m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,13 +44,13 @@ class Rotor:
 
     position: Annotated[V3, _PLACE]  # m, of the hub in B (PX, PY, PZ)
     spin: Literal["ccw", "cw"]  # seen against its axis (KM > 0 is counter-clockwise)
-    thrust_max: Annotated[float, Range(0.001, 10_000.0)]  # N
+    thrust_max: Annotated[float, Range(0.001, 10_000.0, unit="N")]
     axis: Annotated[V3, _AXIS] = (0.0, 0.0, -1.0)  # [1], of the thrust, unit (AX, AY, AZ)
-    torque_per_thrust: Annotated[float, Range(0.0, 1.0)] = 0.016  # m (|KM|)
-    lag: Annotated[float, Range(0.001, 0.5)] = 0.04  # s, of the thrust behind its command
-    radius: Annotated[float, Range(0.001, 5.0)] = 0.165  # m, of the blades
-    # m, half the height of what the blades sweep, as they flap and the hubs yield
-    half_height: Annotated[float, Range(0.0, 1.0)] = 0.02
+    torque_per_thrust: Annotated[float, Range(0.0, 1.0, unit="m")] = 0.016  # |KM|
+    lag: Annotated[float, Range(0.001, 0.5, unit="s")] = 0.04  # of the thrust behind its command
+    radius: Annotated[float, Range(0.001, 5.0, unit="m")] = 0.165  # of the blades
+    # half the height of what the blades sweep, as they flap and the hubs yield
+    half_height: Annotated[float, Range(0.0, 1.0, unit="m")] = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,11 +74,12 @@ class Joint:
     # rad; without them the joint turns freely, or as far as ``coupled_limits`` let it
     position_min: Annotated[float, _ANGLE] = -math.inf
     position_max: Annotated[float, _ANGLE] = math.inf
-    rate_max: Annotated[float, Range(0.01, 100.0)]  # rad/s, either way
-    torque_max: Annotated[float, Range(0.001, 10_000.0)]  # N m, either way
-    viscous: Annotated[float, Range(0.0, 100.0)] = 0.0  # N m s/rad
-    coulomb: Annotated[float, Range(0.0, 1000.0)] = 0.0  # N m
-    armature: Annotated[float, Range(0.0, 100.0)] = 0.0  # kg m^2, of the motor behind its gear
+    rate_max: Annotated[float, Range(0.01, 100.0, unit="rad/s")]  # either way
+    torque_max: Annotated[float, Range(0.001, 10_000.0, unit="N m")]  # either way
+    viscous: Annotated[float, Range(0.0, 100.0, unit="N m s/rad")] = 0.0
+    coulomb: Annotated[float, Range(0.0, 1000.0, unit="N m")] = 0.0
+    # of the motor behind its gear
+    armature: Annotated[float, Range(0.0, 100.0, unit="kg m^2")] = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,17 +88,17 @@ class CoupledLimit:
 
     name: str
     row: tuple[Annotated[float, Range(-100.0, 100.0)], ...]  # (j,) [1]
-    minimum: Annotated[float, Range(-1000.0, 1000.0)]  # rad
-    maximum: Annotated[float, Range(-1000.0, 1000.0)]  # rad
+    minimum: Annotated[float, Range(-1000.0, 1000.0, unit="rad")]
+    maximum: Annotated[float, Range(-1000.0, 1000.0, unit="rad")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndStops:
     """Springs and dampers beyond each limit of a joint or of a sum of them; they never pull."""
 
-    beyond: Annotated[float, Range(0.0, 1.0)] = math.radians(3.0)  # rad, behind the limit
-    stiffness: Annotated[float, Range(0.0, 1e6)] = 600.0  # N m/rad
-    damping: Annotated[float, Range(0.0, 1e4)] = 0.6  # N m s/rad
+    beyond: Annotated[float, Range(0.0, 1.0, unit="rad")] = math.radians(3.0)  # behind the limit
+    stiffness: Annotated[float, Range(0.0, 1e6, unit="N m/rad")] = 600.0
+    damping: Annotated[float, Range(0.0, 1e4, unit="N m s/rad")] = 0.6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,31 +113,32 @@ class Feet:
     """Where the vehicle stands: points that are rigid on the base."""
 
     positions: tuple[Annotated[V3, _PLACE], ...]  # m, in B
-    stiffness: Annotated[float, Range(10.0, 1e7)] = 4000.0  # N/m, each
-    dissipation: Annotated[float, Range(0.0, 1000.0)] = 4.0  # s/m, of Hunt and Crossley
+    stiffness: Annotated[float, Range(10.0, 1e7, unit="N/m")] = 4000.0  # each
+    dissipation: Annotated[float, Range(0.0, 1000.0, unit="s/m")] = 4.0  # of Hunt and Crossley
     friction: Annotated[float, Range(0.0, 10.0)] = 0.7  # Coulomb's coefficient
-    slip_rate: Annotated[float, Range(0.001, 1.0)] = 0.03  # m/s, width of its smoothed change
+    slip_rate: Annotated[float, Range(0.001, 1.0, unit="m/s")] = 0.03  # of its smoothed change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Battery:
     """A straight line of the voltage over the charge, less the drop at the inner resistance."""
 
-    capacity: Annotated[float, Range(0.01, 1000.0)] = 10.0  # A h
-    full: Annotated[float, Range(1.0, 1000.0)] = 16.8  # V
-    empty: Annotated[float, Range(1.0, 1000.0)] = 13.6  # V
-    resistance: Annotated[float, Range(0.0, 10.0)] = 0.02  # ohm
+    capacity: Annotated[float, Range(0.01, 1000.0, unit="A h")] = 10.0
+    full: Annotated[float, Range(1.0, 1000.0, unit="V")] = 16.8
+    empty: Annotated[float, Range(1.0, 1000.0, unit="V")] = 13.6
+    resistance: Annotated[float, Range(0.0, 10.0, unit="ohm")] = 0.02
     efficiency: Annotated[float, Range(0.05, 1.0)] = 0.55  # figure of merit, motor and controller
-    idle_power: Annotated[float, Range(0.0, 10_000.0)] = 8.0  # W, electronics and arm
+    idle_power: Annotated[float, Range(0.0, 10_000.0, unit="W")] = 8.0  # electronics and arm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """What the vehicle keeps to in flight."""
 
-    tilt: Annotated[float, Range(0.05, 1.5)] = math.radians(25.0)  # rad, of -z_B and the vertical
-    roll_pitch_rate: Annotated[float, Range(0.1, 20.0)] = 3.0  # rad/s, of both together
-    yaw_rate: Annotated[float, Range(0.05, 20.0)] = 1.0  # rad/s
+    # of -z_B and the vertical
+    tilt: Annotated[float, Range(0.05, 1.5, unit="rad")] = math.radians(25.0)
+    roll_pitch_rate: Annotated[float, Range(0.1, 20.0, unit="rad/s")] = 3.0  # of both together
+    yaw_rate: Annotated[float, Range(0.05, 20.0, unit="rad/s")] = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

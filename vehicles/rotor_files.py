@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_type_hints
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
@@ -28,8 +29,10 @@ class _Rotors:
     rotors: tuple[Rotor, ...]
 
 
-def read_rotors(path: Path) -> tuple[Rotor, ...]:
-    """The rotors of a file: .toml with [[rotors]], anything else PX4's parameters.
+def read_rotors(path: Path) -> tuple[tuple[Rotor, ...], list[str]]:
+    """The rotors of a file and what was assumed, a sentence each.
+
+    It is .toml with [[rotors]], anything else PX4's parameters.
 
     Raises:
         VehicleError: It cannot be read, or says what cannot be.
@@ -48,7 +51,7 @@ def read_rotors(path: Path) -> tuple[Rotor, ...]:
         raise VehicleError(f"rotors {path} are {error}") from error
     # A whole vehicle's file will do as well.
     own = {"rotors": table["rotors"]} if "rotors" in table else {}
-    return _built(own)
+    return _built(own), _assumed(_missing(own["rotors"]))
 
 
 def _built(table: dict[str, Any]) -> tuple[Rotor, ...]:
@@ -56,8 +59,10 @@ def _built(table: dict[str, Any]) -> tuple[Rotor, ...]:
     return found.rotors
 
 
-def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
+def rotors_from_parameters(text: str) -> tuple[tuple[Rotor, ...], list[str]]:
     """The rotors that PX4's parameters ``CA_ROTORn_*`` describe, of a file of QGroundControl.
+
+    And what was assumed, a sentence each.
 
     CT is the thrust at full command [N], KM the torque per thrust [m], positive for a rotor that
     turns counter-clockwise.
@@ -88,7 +93,34 @@ def rotors_from_parameters(text: str) -> tuple[Rotor, ...]:
             f"CA_ROTOR_COUNT = {count:g}: must be 4 to {ROTORS_MAX}; a file of parameters with "
             "CA_ROTORn_PX and others describes the rotors"
         )
-    return _built({"rotors": [_rotor(values, i) for i in range(int(count))]})
+    missing = [
+        f"CA_ROTORn_{key} = {default:g}"
+        for key, default in _DEFAULTS.items()
+        if any(f"CA_ROTOR{i}_{key}" not in values for i in range(int(count)))
+    ]
+    # All other numbers of a rotor PX4 does not know.
+    missing += _missing([("torque_per_thrust",)])
+    tables = [_rotor(values, i) for i in range(int(count))]
+    return _built({"rotors": tables}), _assumed(missing)
+
+
+def _missing(tables: Sequence[Collection[str]]) -> list[str]:
+    """The numbers of rotors that not each table has, with their defaults."""
+    hints = get_type_hints(Rotor, include_extras=True)
+    return [
+        f"{one.name} = {one.default:g} {hints[one.name].__metadata__[0].unit}"
+        for one in fields(Rotor)
+        if isinstance(one.default, float) and any(one.name not in table for table in tables)
+    ]
+
+
+def _assumed(missing: Iterable[str]) -> list[str]:
+    listed = ", ".join(missing)
+    return (
+        [f"rotors: not given for each, so assumed: {listed}: put in the real ones"]
+        if listed
+        else []
+    )
 
 
 def _rotor(values: dict[str, float], i: int) -> dict[str, Any]:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise, takewhile
 from typing import Final
 
@@ -41,6 +42,7 @@ _MOVE: Final = ("revolute", "continuous")
 _RATE, _TORQUE = 5.0, 2.0  # rad/s, N m; of a joint that does not say
 _NONE: Final = 1e-9  # m^2, inertia over mass
 _GYRATION: Final = 0.02  # m, of a link that has a mass and no inertia
+_NAME_LETTERS: Final = 32
 _CLEAR: Final = 0.02  # m, of the feet below the arm
 
 
@@ -110,17 +112,18 @@ def vehicle_from_urdf(
     turn = np.eye(3) if frd else _HALF_TURN
     root = _root(links, edges)
     joints = []
-    for edge in chain:
+    for edge, called in zip(chain, _own_names(chain, notes), strict=True):
         body, (R, p) = _with_inertia(bodies[edge.child], edge.child, notes), places[edge.name]
-        joints.append(_joint(edge, body, turn @ R @ turn, turn @ p, turn, notes))
-    still = [edge for edge in edges.values() if edge.kind != "fixed" and edge not in chain]
-    if still:
-        notes.append(
-            f"{len(still)} joints beside the arm stay at zero: {_listed(one.name for one in still)}"
-        )
+        joint = _joint(edge, body, turn @ R @ turn, turn @ p, turn, notes)
+        joints.append(replace(joint, name=called))
+    notes += _still(edges, chain, tip)
     base = _with_inertia(bodies[root], root, notes)
     mass, com, inertia = _turned(base, turn).numbers(f'link "{root}"')
     p_tip = _place_in(edges, chain[-1].child, tip)
+    if not p_tip.any():
+        notes.append(
+            "the end-effector lies on the last joint: name a link by --tip, or set [end_effector]"
+        )
     vehicle = Vehicle(
         name=name,
         base=Base(mass=mass, com=com, inertia=inertia),
@@ -128,6 +131,7 @@ def vehicle_from_urdf(
         joints=tuple(joints),
         end_effector=EndEffector(position=_v3(turn @ p_tip)),
         feet=_feet(rotors, joints, turn @ p_tip),
+        rest_posture=_rest(joints, notes),
         critical_points=(
             CriticalPoint(name="base", on="base"),
             *(
@@ -156,6 +160,7 @@ def _elements(text: str) -> tuple[dict[str, _Body], dict[str, _Edge]]:
         raise VehicleError(f"no URDF: it is not XML: {error}") from None
     if robot.tag != "robot":
         raise VehicleError(f"no URDF: its root must be <robot>, is <{shown(robot.tag)}>")
+    _check_names(robot)
     links = {_name(one): _body(one) for one in robot.findall("link")}
     if not 0 < len(links) <= _MOST_LINKS:
         raise VehicleError(f"links: must be 1 to {_MOST_LINKS} of them, are {len(links)}")
@@ -170,6 +175,13 @@ def _elements(text: str) -> tuple[dict[str, _Body], dict[str, _Edge]]:
     if len(set(parents)) < len(parents) or len(parents) != len(links) - 1:
         raise VehicleError("links must hang together as one tree, each from one joint at most")
     return links, edges
+
+
+def _check_names(robot: ET.Element) -> None:
+    for kind in ("link", "joint"):
+        for name, count in Counter(map(_name, robot.findall(kind))).items():
+            if count > 1:
+                raise VehicleError(f"there are {count} {kind}s {shown(name)}: rename all but one")
 
 
 def _name(element: ET.Element) -> str:
@@ -268,9 +280,8 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     moving = {link: [edge for edge in _path(edges, link) if edge.kind != "fixed"] for link in links}
     if not tip:
         most = max(map(len, moving.values()))
-        parents = {edge.parent for edge in edges.values()}
-        ends = [one for one in links if len(moving[one]) == most and one not in parents]
-        ends = list(dict.fromkeys(_before_fingers(edges, one) for one in ends))
+        last = dict.fromkeys(_arm_s_end(edges, one) for one in links if len(moving[one]) == most)
+        ends = list(dict.fromkeys(end for one in last for end in _fixed_ends(edges, one)))
         if len(ends) > 1:
             raise VehicleError(
                 f"{len(ends)} links are behind {most} joints each: name the one that the arm ends "
@@ -280,6 +291,11 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     if not moving[tip]:
         raise VehicleError(f'no joint moves the link "{tip}": an arm must have at least one')
     for edge in moving[tip]:
+        if edge.kind == "floating":
+            raise VehicleError(
+                f'joint "{edge.name}" is floating: the base flies as it is: remove this joint and '
+                f'the link "{edge.parent}" it is on'
+            )
         if edge.kind not in _MOVE:
             raise VehicleError(
                 f'joint "{edge.name}" is {shown(edge.kind)}: joints of an arm must be revolute, '
@@ -293,11 +309,39 @@ def _chain(links: dict[str, _Body], edges: dict[str, _Edge], tip: str) -> tuple[
     return moving[tip], tip
 
 
-def _before_fingers(edges: dict[str, _Edge], link: str) -> str:
-    """The last link of an arm with a gripper, whose fingers slide or follow each other."""
+def _arm_s_end(edges: dict[str, _Edge], link: str) -> str:
+    """The last link before a joint that is none of an arm, as of fingers; without arm the link."""
     path = _path(edges, link)
     arm = list(takewhile(lambda edge: edge.kind == "fixed" or _of_arm(edge), path))
-    return arm[-1].child if arm else path[0].parent if path else link
+    return arm[-1].child if any(map(_of_arm, arm)) else link
+
+
+def _fixed_ends(edges: dict[str, _Edge], link: str) -> list[str]:
+    """The outermost links that are fixed to a link, or itself."""
+    on_it = [edge.child for edge in edges.values() if edge.parent == link and edge.kind == "fixed"]
+    return [end for one in on_it for end in _fixed_ends(edges, one)] or [link]
+
+
+def _still(edges: dict[str, _Edge], chain: list[_Edge], tip: str) -> list[str]:
+    """Which joints stay at zero and why, a sentence each."""
+    still = [edge for edge in edges.values() if edge.kind != "fixed" and edge not in chain]
+    ways = {
+        edge.name: [one.name for one in _path(edges, edge.child) if one.kind != "fixed"]
+        for edge in still
+    }
+    arm, notes = [edge.name for edge in chain], []
+    ends = [edge for edge in still if ways[edge.name][:-1] == arm and not _of_arm(edge)]
+    behind = [name for name, way in ways.items() if any(end.name in way for end in ends)]
+    if ends:
+        why = _listed(f"{end.name} ({end.kind if end.kind not in _MOVE else 'mimic'})"
+                      for end in ends)  # fmt: skip
+        notes.append(
+            f"the arm ends before joint {why}, so these stay at zero: {_listed(behind)}; the "
+            f"end-effector is the link {tip}"
+        )
+    if beside := [name for name in ways if name not in behind]:
+        notes.append(f"{len(beside)} joints beside the arm stay at zero: {_listed(beside)}")
+    return notes
 
 
 def _of_arm(edge: _Edge) -> bool:
@@ -360,6 +404,38 @@ def _turned(body: _Body, turn: Array) -> _Body:
     return _Body().with_part(body, turn, np.zeros(3))
 
 
+def _own_names(chain: list[_Edge], notes: list[str]) -> list[str]:
+    """A name of letters, digits and "_" for each joint, which nothing else of a vehicle has."""
+    found, taken = [], {"base", "end_effector"}
+    for k, edge in enumerate(chain, start=1):
+        name = "".join(c if c.isascii() and c.isalnum() else "_" for c in edge.name)[:_NAME_LETTERS]
+        if not name.strip("_"):
+            name = f"joint_{k}"
+        elif name[0].isdigit():
+            name = f"joint_{name}"[:_NAME_LETTERS]
+        others = (f"{name[: _NAME_LETTERS - 4]}_{i}" for i in range(k, k + len(taken)))
+        name = next(one for one in (name, *others) if one not in taken)
+        found.append(name)
+        taken.add(name)
+    if changed := [
+        f"{shown(edge.name)} is {name}" for edge, name in zip(chain, found, strict=True)
+        if name != edge.name
+    ]:  # fmt: skip
+        notes.append(f"joints are renamed: {', '.join(changed)}")
+    return found
+
+
+def _rest(joints: Sequence[Joint], notes: list[str]) -> tuple[float, ...]:
+    """The angles [rad] that are nearest to zero within the limits; none if all are zero."""
+    rest = tuple(min(max(0.0, one.position_min), one.position_max) for one in joints)
+    if not any(rest):
+        return ()
+    notes.append(
+        f"a joint cannot be at zero: rest_posture is {shown([*rest])} rad, the nearest allowed"
+    )
+    return rest
+
+
 def _joint(edge: _Edge, body: _Body, R: Array, p: Array, turn: Array, notes: list[str]) -> Joint:
     limit, dynamics = edge.element.find("limit"), edge.element.find("dynamics")
     rate = _stated(limit, edge.name, "velocity", (100.0, _RATE, "rad/s"), notes)
@@ -373,7 +449,7 @@ def _joint(edge: _Edge, body: _Body, R: Array, p: Array, turn: Array, notes: lis
     size = float(np.linalg.norm(edge.axis))
     mass, com, inertia = _turned(body, turn).numbers(f'link "{edge.child}"')
     return Joint(
-        name="".join(c if c.isascii() and c.isalnum() else "_" for c in edge.name)[:32],
+        name=edge.name,
         axis=_v3(turn @ edge.axis / size if size > 0.0 else edge.axis),
         xyz=_v3(p),
         rpy=_angles(R),

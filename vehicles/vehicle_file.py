@@ -47,6 +47,11 @@ def read_text(name_or_path: str) -> tuple[str, str]:
     path = Path(name_or_path)
     if name_or_path in vehicle_names():
         path = PACKAGED / f"{name_or_path}.toml"
+    elif path.suffix == ".urdf":
+        raise VehicleError(
+            f"{name_or_path} is a URDF: make a vehicle's file of it first, with: pandion vehicle "
+            f"import {name_or_path} --rotors FILE --out {path.stem}.toml"
+        )
     elif path.suffix != ".toml":
         raise VehicleError(
             f'unknown vehicle "{name_or_path}"{nearest(name_or_path, vehicle_names())}; '
@@ -226,14 +231,15 @@ def posture_problem(vehicle: Vehicle, angles: tuple[float, ...], unit: float = 1
     Angles are written in a ``unit`` [rad].
     """
     listed = [round(angle / unit, 6) for angle in angles]
+    word = "rad" if unit == 1.0 else "deg"
     if len(angles) != len(vehicle.joints):
         return f" = {shown(listed)}: must be {len(vehicle.joints)} angles, one for each joint"
     for i, (angle, joint) in enumerate(zip(angles, vehicle.joints, strict=True)):
         low, high = joint.position_min, joint.position_max
         if not low <= angle <= high:
             return (
-                f"[{i}] = {listed[i]:g}: must be {low / unit:g} to {high / unit:g}, the limits of "
-                f'joint "{joint.name}"'
+                f"[{i}] = {listed[i]:g}: must be {low / unit:g} to {high / unit:g} {word}, the "
+                f'limits of joint "{joint.name}"'
             )
     for limit in vehicle.coupled_limits:
         value = sum(factor * q for factor, q in zip(limit.row, angles, strict=True))
@@ -241,7 +247,7 @@ def posture_problem(vehicle: Vehicle, angles: tuple[float, ...], unit: float = 1
             return (
                 f' = {shown(listed)}: must keep the coupled limit "{limit.name}": its row makes '
                 f"{value / unit:.4g}, allowed is {limit.minimum / unit:g} to "
-                f"{limit.maximum / unit:g}"
+                f"{limit.maximum / unit:g} {word}"
             )
     return None
 

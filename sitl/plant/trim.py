@@ -49,11 +49,11 @@ def level_hover(vehicle: Vehicle, angles: tuple[float, ...]) -> Trim:
                 f"rotor {number} would need {thrust:.2f} N to hover, "
                 f"it can give 0 to {rotor.thrust_max:.2f} N"
             )
-    for number, (torque, joint) in enumerate(zip(needed[6:], vehicle.joints, strict=True), start=1):
+    for torque, joint in zip(needed[6:], vehicle.joints, strict=True):
         if not (abs(torque) <= joint.torque_max):
             raise NoTrimError(
-                f"joint {number} would need {torque:.3f} N·m to hold the arm, "
-                f"it can give ±{joint.torque_max:.3f} N·m"
+                f"joint {joint.name} would need {torque:.3f} N·m to hold the arm, it can give "
+                f"±{joint.torque_max:.3f} N·m; choose a posture that takes less"
             )
     return Trim(tuple(np.maximum(thrusts, 0.0).tolist()), tuple(needed[6:].tolist()))
 

@@ -190,6 +190,29 @@ def test_a_joint_that_never_is_at_zero_keeps_its_limits() -> None:
     assert (use.largest, use.kept, use.beyond_s) == (-0.5, True, 0.0)
 
 
+def test_every_limit_is_judged_whatever_joints_are_named() -> None:
+    names = ("yaw", "a1", "a_1")
+    joints = tuple(replace(PAPER.joints[0], name=name) for name in names)
+    sum_of_two = replace(PAPER.coupled_limits[0], name="yaw", row=(1.0, 1.0, 0.0))
+    vehicle = replace(PAPER, joints=joints, coupled_limits=(sum_of_two,))
+    record, state = LimitRecord(vehicle), at_rest(4, 3)
+    StateView(state, 3).qd_arm[0] = 2.0 * joints[0].rate_max
+    add(record, [state], (0.0, 0.0), 0.0)
+    uses = record.uses()
+    assert len(uses) == len(record.limits)
+    assert uses["yaw_rate"].most == PAPER.limits.yaw_rate
+    assert [key for key, use in uses.items() if not use.kept] == ["joint_yaw_rate"]
+
+
+def test_a_slow_joint_may_not_turn_at_twice_its_rate() -> None:
+    first, second = PAPER.joints
+    vehicle = replace(PAPER, joints=(replace(first, rate_max=0.05), second))
+    record, state = LimitRecord(vehicle), at_rest(4, 2)
+    StateView(state).qd_arm[:] = 0.1, 5.09
+    add(record, [state], (0.0, 0.0), 0.0)
+    assert [key for key, use in record.uses().items() if not use.kept] == ["joint_1_rate"]
+
+
 def test_drives_that_are_not_alike_are_judged_by_the_share_of_each() -> None:
     vehicle = random_vehicle(3, 5, np.random.default_rng(1))
     record, state = LimitRecord(vehicle), at_rest(5, 3)

@@ -155,7 +155,7 @@ def test_a_wrong_line_is_refused_with_key_value_and_what_is_allowed(
         ("[sensors.imu]\nlatency_ms = 3", ["sensors.imu.latency_ms", "steps of 2"]),
         ("[sensors]\nimmu = {}", ['"sensors.immu"', '"imu"']),
         ("[vehicle_scale]\nmass = 30", ["vehicle_scale.mass = 30", "0.2 to 5"]),
-        ("[vehicle_scale]\nmass = 3", ["start.arm_deg", "rotor 1 would need"]),
+        ("[vehicle_scale]\nmass = 3", ["home_posture", "rotor 1 would need"]),
         ('name = "x"', ['unknown key "name"']),
     ],
 )

@@ -122,6 +122,8 @@ def test_a_vehicle_is_the_same_when_its_text_has_been_read() -> None:
         ('mass value="0.2"', 'mass value="0"', 'link "upper" has no mass'),
         ('axis xyz="0 1 0"', 'axis xyz="0 0 0"', "joints[1].axis"),
         ('child link="upper"', 'child link="base"', "as one tree"),
+        ('link name="battery"', 'link name="base"', "there are 2 links 'base': rename"),
+        ('joint name="elbow"', 'joint name="g"', "there are 2 joints 'g'"),
         ('ixx="0.001" iyy="0.001" izz="0.0001"', 'ixx="0.001" iyy="0.001" izz="0.1"',
          "no body has this"),
     ],
@@ -197,10 +199,76 @@ def test_what_exporters_write_is_read_and_what_was_assumed_is_said() -> None:
     assert (shoulder.position_min, shoulder.position_max) == (-math.inf, math.inf)
     assert any("joint arm/1: 0 to 0 is no limit" in note for note in notes)
     assert any("link lower: no inertia: 20 mm of gyration" in note for note in notes)
-    assert any(
-        "2 joints beside the arm stay at zero: finger_left, finger_right" in n for n in notes
-    )
+    assert (
+        "the arm ends before joint finger_left (prismatic), finger_right (prismatic), so these "
+        "stay at zero: finger_left, finger_right; the end-effector is the link hand"
+    ) in notes
     assert min(elbow.link.inertia[:3]) == pytest.approx(0.1 * 0.02**2), "of hand and fingers"
+
+
+FINGER = """
+  <link name="finger"><inertial><mass value="0.01"/>
+    <inertia ixx="1e-6" iyy="1e-6" izz="1e-6" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="slide" type="prismatic"><parent link="lower"/><child link="finger"/></joint>
+</robot>"""
+
+
+def test_fingers_leave_the_end_effector_at_the_link_that_is_fixed_beyond_them() -> None:
+    vehicle, notes = vehicle_from_urdf(
+        ROBOT.replace("</robot>", FINGER), "mine", PAPER.rotors, frd=True
+    )
+    assert vehicle.end_effector.position == pytest.approx((0.2, 0.01, 0.0))
+    assert any("before joint slide (prismatic)" in n and n.endswith("link gripper") for n in notes)
+    assert "1 joints beside the arm stay at zero: j_p1" in notes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('name="elbow" type="continuous"', 'name="elbow" type="planar"', "elbow (planar)"),
+        ('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="g"/>', "elbow (mimic)"),
+    ],
+)
+def test_a_joint_that_ends_the_arm_early_is_named(old: str, new: str, why: str) -> None:
+    robot = ROBOT.replace(old, new, 1).replace("j_p1", "j_p2").replace("continuous", "fixed", 1)
+    vehicle, notes = vehicle_from_urdf(robot, "mine", PAPER.rotors)
+    assert [joint.name for joint in vehicle.joints] == ["shoulder_yaw"]
+    assert any(f"the arm ends before joint {why}" in note for note in notes)
+    assert any(note.endswith("elbow; the end-effector is the link upper") for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("names", "called"),
+    [
+        (("关节", "夹子"), ["joint_1", "joint_2"]),
+        (("1", "2"), ["joint_1", "joint_2"]),
+        (("base", "end_effector"), ["base_1", "end_effector_2"]),
+        (("a b", "a.b"), ["a_b", "a_b_2"]),
+        (("2", "关节"), ["joint_2", "joint_2_2"]),
+        (("x" * 40, "x" * 41), ["x" * 32, "x" * 28 + "_2"]),
+    ],
+)
+def test_joints_get_names_that_a_vehicle_may_have(
+    names: tuple[str, str], called: list[str]
+) -> None:
+    robot = ROBOT.replace("shoulder.yaw", names[0]).replace('"elbow"', f'"{names[1]}"')
+    vehicle, notes = vehicle_from_urdf(robot, "mine", PAPER.rotors)
+    assert [joint.name for joint in vehicle.joints] == called
+    assert any(note.endswith(f"{names[1]!r} is {called[1]}") for note in notes)
+
+
+def test_a_joint_that_cannot_be_at_zero_rests_as_near_to_it_as_allowed() -> None:
+    robot = ROBOT.replace('lower="-1.5"', 'lower="0.3"')
+    vehicle, notes = vehicle_from_urdf(robot, "mine", PAPER.rotors)
+    assert vehicle.rest_posture == vehicle.home_posture == (0.3, 0.0)
+    assert "a joint cannot be at zero: rest_posture is [0.3, 0.0] rad, the nearest allowed" in notes
+
+
+def test_a_root_that_floats_is_refused_with_its_reason() -> None:
+    root = '<link name="world"/><joint name="free" type="floating"><parent link="world"/>'
+    root += '<child link="base"/></joint></robot>'
+    with pytest.raises(VehicleError, match=r'joint "free" is floating: .* the link "world"'):
+        vehicle_from_urdf(ROBOT.replace("</robot>", root), "mine", PAPER.rotors)
 
 
 @pytest.mark.parametrize(
@@ -219,6 +287,12 @@ def test_an_arm_that_is_named_further_than_it_turns_is_refused(tip: str, words: 
         vehicle_from_urdf(followed, "mine", PAPER.rotors, "right")
 
 
+def test_an_end_effector_on_the_last_joint_is_said() -> None:
+    vehicle, notes = vehicle_from_urdf(ROBOT, "mine", PAPER.rotors, "lower")
+    assert vehicle.end_effector.position == (0.0, 0.0, 0.0)
+    assert any(note.startswith("the end-effector lies on the last joint") for note in notes)
+
+
 PARAMS = "\n".join(
     f"1\t1\tCA_ROTOR{i}_{key}\t{value}\t9"
     for i, (x, y, km) in enumerate(
@@ -229,11 +303,15 @@ PARAMS = "\n".join(
 
 
 def test_px4s_parameters_are_rotors_with_px4s_defaults() -> None:
-    rotors = rotors_from_parameters("# a comment\n1\t1\tCA_ROTOR_COUNT\t4\t6\n" + PARAMS)
+    rotors, notes = rotors_from_parameters("# a comment\n1\t1\tCA_ROTOR_COUNT\t4\t6\n" + PARAMS)
     assert [rotor.spin for rotor in rotors] == ["ccw", "ccw", "cw", "cw"]
     assert rotors[2].position == (0.15, -0.15, 0.0)
     assert (rotors[0].thrust_max, rotors[0].axis) == (6.5, (0.0, 0.0, -1.0))
-    assert rotors == rotors_from_parameters(PARAMS)
+    assert (rotors, notes) == rotors_from_parameters(PARAMS)
+    (note,) = notes
+    assert "CA_ROTORn_PZ = 0, " in note
+    assert "CA_ROTORn_CT = 6.5, lag = 0.04 s, radius = 0.165 m, half_height = 0.02 m" in note
+    assert "KM" not in note
     with pytest.raises(VehicleError, match=r"CA_ROTOR_COUNT = 0: must be 4 to 8"):
         rotors_from_parameters("1\t1\tMPC_XY_VEL_MAX\t4\t9")
     with pytest.raises(VehicleError, match=r"line 1 = .*: must be a name of at most 16 .* number"):
@@ -258,7 +336,11 @@ def test_parameters_that_no_rotor_has_are_refused(line: str, why: str) -> None:
 
 
 def test_rotors_are_those_of_a_vehicles_file(tmp_path) -> None:
-    assert read_rotors(PACKAGED / "paper.toml") == PAPER.rotors
+    whole = PACKAGED / "x500-2r.toml"
+    assert read_rotors(whole) == (load_vehicle("x500-2r").rotors, [])
+    (tmp_path / "some.toml").write_text(whole.read_text().replace("lag = ", "# ", 1))
+    (note,) = read_rotors(tmp_path / "some.toml")[1]
+    assert note == "rotors: not given for each, so assumed: lag = 0.04 s: put in the real ones"
     with pytest.raises(VehicleError, match="cannot read rotors"):
         read_rotors(tmp_path / "none.params")
     (tmp_path / "empty.toml").write_text("")

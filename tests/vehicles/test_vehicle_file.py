@@ -84,7 +84,7 @@ def test_the_six_entries_are_those_of_the_matrix() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("mass = 3.1", "mass = -1.0", "base.mass = -1.0: must be 1e-06 to 1000"),
+        ("mass = 3.1", "mass = -1.0", "base.mass = -1.0: must be 1e-06 to 1000 kg"),
         ("mass = 3.1", "mass = nan", "base.mass = nan: must be"),
         ("mass = 3.1", 'mass = "3"', "base.mass = '3': must be a number"),
         ("mass = 3.1", "mas = 3.1", 'unknown key "base.mas" = 3.1, did you mean "mass"?'),
@@ -144,3 +144,8 @@ def test_a_file_that_is_none_is_refused_in_a_sentence(tmp_path) -> None:
         load_vehicle(str(tmp_path / "long.toml"))
     with pytest.raises(VehicleError, match="nested too deeply"):
         parse_vehicle("a = " + "[" * 5000, "mine")
+
+
+def test_a_urdf_in_place_of_a_vehicle_is_to_be_imported_first() -> None:
+    with pytest.raises(VehicleError, match=r"import my/octo.urdf --rotors FILE --out octo.toml$"):
+        load_vehicle("my/octo.urdf")

@@ -1,7 +1,8 @@
 """What a gripper may hold: a payload that joints and rotors carry, and that may get lost.
 
 * Joints: each carries its own arm and the payload, the arm stretched out level from it, with a
-  share of its torque; what the loops take to follow is in the field.
+  share of its torque. What the loops take to follow adds to weight. In flight that is felt along
+  the body's z axis, and a joint holds the part of it that is across the joint's own axis.
 * Rotors: they carry all of it at the largest tilt, and balance the payload at the arm's full
   reach, with shares of their thrust.
 * A payload that is lost without a command leaves loops that believe in it for a moment: the
@@ -37,10 +38,10 @@ class PayloadRange(NamedTuple):
 def payload_range(config: FlightConfig, loop: Tube) -> PayloadRange:
     """The range of a vehicle with the loop ``loop_tube(config)``."""
     airframe = config.airframe
-    field = GRAVITY + loop.acceleration * config.surroundings.disturbance
+    followed = loop.acceleration * config.surroundings.disturbance
     bounds = (
-        *_by_joints(airframe, field),
-        PayloadRange(_by_thrust(airframe, field), "the rotors' thrust"),
+        *_by_joints(airframe, followed),
+        PayloadRange(_by_thrust(airframe, GRAVITY + followed), "the rotors' thrust"),
         PayloadRange(_by_balance(airframe), "the rotors' torque at the arm's full reach"),
         PayloadRange(HEAVIEST * airframe.mass, "its loss in flight"),
     )
@@ -57,16 +58,37 @@ def _lengths(b: Bodies) -> list[float]:
     return found
 
 
-def _by_joints(airframe: Airframe, field: float) -> list[PayloadRange]:
+def _across(b: Bodies) -> list[float]:
+    """Most of each joint's axis that is across the body's z axis, with the joints before free [1].
+
+    Two angles bound where an axis may point: a joint turns it about its own, which is as far off z.
+    """
+    found, least, most = [], 0.0, 0.0  # rad, from z to the axis before
+    before = np.array([0.0, 0.0, 1.0])
+    for k in range(b.joints):
+        axis = np.array(b.axis[3 * k : 3 * k + 3])
+        here = np.reshape(b.turned[9 * k : 9 * k + 9], (3, 3)) @ axis
+        off = math.atan2(float(np.linalg.norm(np.cross(before, here))), float(before @ here))
+        least, most = (
+            max(0.0, least - off, off - most),
+            min(math.pi, most + off, 2.0 * math.pi - least - off),
+        )
+        found.append(math.sin(min(max(0.5 * math.pi, least), most)))
+        before = axis
+    return found
+
+
+def _by_joints(airframe: Airframe, followed: float) -> list[PayloadRange]:
     b, lengths = airframe.bodies, _lengths(airframe.bodies)
     found = []
-    for k, length in enumerate(lengths):
+    for k, (length, across) in enumerate(zip(lengths, _across(b), strict=True)):
         own = 0.0  # kg m
         for i in range(k, b.joints):
             centre = math.hypot(*b.com[3 * i : 3 * i + 3])
             own += b.mass[i] * (length - lengths[i] + centre)
-        held = _TORQUE * airframe.joint_torque_max[k] / field - own
-        found.append(PayloadRange(held / length, f"joint {k + 1}'s torque"))
+        most = _TORQUE * airframe.joint_torque_max[k]
+        held = _per(most, GRAVITY * across + followed) - own
+        found.append(PayloadRange(_per(held, length), f"joint {k + 1}'s torque"))
     return found
 
 
@@ -81,4 +103,9 @@ def _by_balance(airframe: Airframe) -> float:
     top = np.array(airframe.rotor_thrust_max[: airframe.rotors])
     hover = airframe.mass * GRAVITY / airframe.rotors
     left = float(np.minimum(hover, top - hover).min())
-    return _TURNED * left * airframe.rotors * airframe.rotor_lever / (GRAVITY * reach)
+    return _per(_TURNED * left * airframe.rotors * airframe.rotor_lever / GRAVITY, reach)
+
+
+def _per(load: float, lever: float) -> float:
+    """A ``load`` by a lever [m] or a field [m/s^2]; where there is none, nothing is bounded."""
+    return load / lever if lever > 0.0 else math.copysign(math.inf, load)
