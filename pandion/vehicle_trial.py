@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 from fsw.autopilot.parameters.flight_config import flight_config
@@ -11,7 +10,7 @@ from sitl.scenario_file import ScenarioError, load_scenario
 from sitl.simulation import Simulation
 from studies.flight.closed_loop import RefusedError, ScenarioFlight
 
-TRIED: Final = ("ground", "walls", "walls --body full", "workspace", "branches")
+TRIED: Final = ("ground", "walls", "gate", "workspace", "branches")
 _STEPS: Final = {"ground": 1, "airborne": 2}  # to arm, and to follow the trajectory
 
 
@@ -36,10 +35,7 @@ def _joined(names: list[str]) -> str:
 
 def _refusal(name: str, vehicle: str) -> str | None:
     try:
-        name, _, body = name.partition(" --body ")
         scenario = load_scenario(name, None, vehicle)
-        if body == "full":
-            scenario = replace(scenario, body="full")
         simulation = Simulation(scenario, 0)
         config = flight_config(body=scenario.body, vehicle=vehicle_of(scenario))
         flight = ScenarioFlight(simulation, config)

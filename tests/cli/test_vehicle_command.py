@@ -147,7 +147,7 @@ def test_feet_above_the_body_and_rotors_within_walls_are_said(
     said = " ".join(err.split())
     assert code == 0
     assert "it does not fly ground: the base hit the ground at 0.00 s: see where feet" in said
-    assert "it does not fly walls --body full: the scenario starts outside its safe set" in said
+    assert "it does not fly gate: the scenario starts outside its safe set" in said
 
 
 def test_weak_joints_and_tilted_rotors_are_said(
@@ -167,9 +167,8 @@ def test_weak_joints_and_tilted_rotors_are_said(
     assert "joint joint1 cannot hold its own arm" in err
     assert "torque_max is 0.3 N m" in err
     assert "lateral thrust of tilted rotors is not used: 2" in err
-    assert (
-        "it does not fly walls, walls --body full, workspace, branches: home_posture = ["
-        in " ".join(err.split())
+    assert "it does not fly walls, gate, workspace, branches: home_posture = [" in " ".join(
+        err.split()
     )
     assert "3 warnings" in out
 
@@ -237,11 +236,8 @@ def test_every_vehicle_that_comes_with_pandion_is_sound(
 ) -> None:
     code, out, err = run(capsys, "check", name)
     assert code == 0
-    # Their rotors reach into the zones of `walls`; and a tool ahead of the base, not below it.
-    refused = {"paper": "walls --body full", "octo-4r": "walls --body full",
-               "probe-2r": "workspace"}.get(name)  # fmt: skip
-    if refused:
-        assert f"it does not fly {refused}: " in err
+    if name == "probe-2r":  # its tool is ahead of the base, not below it
+        assert "it does not fly workspace: " in err
         assert err.count("\n") == 1
     else:
         assert err == ""
