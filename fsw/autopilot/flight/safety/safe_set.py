@@ -192,11 +192,17 @@ class SafeSetCheck:
 
     def _against(self, mission: MissionMemory, safe_set: SafeSet) -> str:
         """Why a source that does not own the safe set may not change it so."""
-        grown = growth(mission.announced, safe_set)
-        if not grown:
+        against = growth(mission.announced, safe_set)
+        for number, zone in enumerate(safe_set.zones, start=1):
+            # It goes where anybody sends targets, and the vehicle with it.
+            if kind_of(zone.shape).follows_target and zone not in mission.announced.zones:
+                against = (
+                    against or f"zone {number} ({zone.shape.kind}) would follow the target in a set"
+                )
+        if not against:
             return ""
         whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
-        return f"{grown}, which {whose}"
+        return f"{against}, which {whose}"
 
     def _outside(
         self,

@@ -304,6 +304,20 @@ def test_a_stranger_cannot_shut_the_vehicle_out_in_flight() -> None:
 
 
 @pytest.mark.requirement("REQ-SAFE-9")
+def test_no_stranger_ties_the_vehicle_to_where_anybody_sends_targets() -> None:
+    """A sphere that leapt with the targets of three senders pulled it into the owner's wall."""
+    memory, _ = received(MissionMemory(), SafeSet((NORTH,)))
+    both = SafeSet((NORTH, SPHERE))
+    kept, texts = received(memory, both, source=STRANGER)
+    assert kept.safe_set == SafeSet((NORTH,))
+    assert "would follow the target" in refused(texts)
+    assert received(memory, both)[0].safe_set == both
+    owned, _ = received(MissionMemory(), both)
+    shrunk, _ = received(owned, SafeSet((NORTH, SPHERE, TREE)), source=STRANGER)
+    assert shrunk.safe_set == SafeSet((NORTH, SPHERE, TREE)), "it was there before"
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
 @pytest.mark.parametrize(("away", "taken"), [(0.8, False), (2.5, False), (5.0, True)])
 def test_no_zone_of_a_stranger_can_drive_the_vehicle_into_the_owners(
     away: float, taken: bool
