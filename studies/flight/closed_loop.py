@@ -459,6 +459,8 @@ def _trace_point(simulation: Simulation) -> TracePoint:
 
 
 def _insist(outputs: TickOutputs) -> None:
-    if any(ack.result != 0 for ack in outputs.acks):
+    denied = [ack.command for ack in outputs.acks if ack.result != 0]
+    if denied:
         # Beside the answer, which says why not, there may be news of other things.
-        raise RefusedError("; ".join(text.text for text in outputs.texts if text.prompt))
+        why = "; ".join(text.text for text in outputs.texts if text.prompt)
+        raise RefusedError(why or f"command {denied[0]} was refused without a reason")

@@ -107,7 +107,7 @@ def test_a_px4_that_refuses_offboard_is_not_pressed() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seconds", [11.0, pytest.param(31.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seconds", [11.0, 31.0])
 def test_walls_are_kept_in_calm_air(seconds: float) -> None:
     """Past the first wall, and all the way."""
     flight = handed_over(AbovePx4(load_scenario("walls-calm", "mocap")))
@@ -176,7 +176,6 @@ def test_a_px4_that_falls_silent_is_told_and_gets_no_more_set_points() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_worst_push_stays_inside_the_bound_that_is_printed(axis: int) -> None:
     scenario = replace(still(), disturbances=(worst_push(3.0, axis),))
@@ -192,7 +191,6 @@ def test_the_worst_push_stays_inside_the_bound_that_is_printed(axis: int) -> Non
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("stop_s", [0.7, 1.1, 3.0])
 def test_a_planner_that_stopped_holds_and_does_not_go_on_with_its_plan(stop_s: float) -> None:
     flight = handed_over(AbovePx4(still()))
@@ -226,7 +224,6 @@ def test_a_yaw_that_is_not_followed_is_told_and_planned_anew() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("child_frame", [1, 12])
 def test_both_conventions_of_velocities_fly_with_the_yaw_turned(child_frame: int) -> None:
     flight = AbovePx4(still(yaw_deg=90.0), child_frame=child_frame)

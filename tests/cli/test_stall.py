@@ -66,7 +66,6 @@ NOT_SENT = r"FAIL fsw: the simulator sent nothing for .* after step \d{3,}; sitl
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("pace", "half", "number", "sentence"),
     [

@@ -107,7 +107,6 @@ def test_a_calm_tick_is_a_whole_one_to_the_last_bit(
 
 
 @pytest.mark.long
-@pytest.mark.drawn(2)
 @pytest.mark.parametrize(
     ("suite", "push", "min_calm"),
     [("mocap", 0.0, 0.85), ("vio", 0.0, 0.7), in_long("rtk", 0.0, 0.7), ("mocap", 3.0, 0.0)],
@@ -119,7 +118,6 @@ def test_so_is_one_of_a_suite(suite: str, push: float, min_calm: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     "fault",
     [

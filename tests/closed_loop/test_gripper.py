@@ -110,7 +110,6 @@ def test_a_payload_that_is_too_heavy_is_told_and_landed_with_until_it_is_let_go_
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-16")
 @pytest.mark.parametrize("disturbance", [SHAKEN, PUSHED_DOWN])
 def test_a_payload_in_the_range_is_no_matter(disturbance: Disturbance) -> None:

@@ -134,7 +134,6 @@ def among_branches() -> Scenario:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-6")
 @pytest.mark.parametrize(
     "attack", ["the end-effector behind the wall", "5 m/s at the wall", "nose down"]

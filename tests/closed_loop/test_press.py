@@ -66,7 +66,6 @@ def test_a_wall_is_pressed_on_with_the_force_asked_for_and_never_harder(stiffnes
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-14")
 @pytest.mark.parametrize("starts_s", [5.5, 7.0])
 def test_a_wall_that_comes_is_left_behind(starts_s: float) -> None:

@@ -71,7 +71,6 @@ def take_off(flight: Flight) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-12", "REQ-ACT-6")
 @pytest.mark.parametrize("suite", ["perfect", "mocap"])
 def test_what_had_failed_flies_again_after_a_restart_and_not_before(suite: str) -> None:

@@ -100,7 +100,6 @@ def test_a_slow_planner_has_its_response(
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-PLAN-2")
 @pytest.mark.parametrize(
     ("name", "gone_s"),
@@ -128,7 +127,6 @@ def test_a_planner_that_is_gone_costs_no_barrier(name: str, gone_s: float) -> No
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("tilt_deg", [4.0, 12.0])
 def test_without_plans_it_brakes_with_the_tilt_that_the_plan_may_use(tilt_deg: float) -> None:
     """PLN_TILT_MAX reaches braking: at a metre a second it leans as far as that, no farther."""

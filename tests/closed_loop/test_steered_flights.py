@@ -50,7 +50,6 @@ def up() -> Flight:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("below", [0.0, 4.0, 50.0])
 def test_a_return_to_a_home_below_the_ground_ends_on_the_ground(below: float) -> None:
     flight = up()

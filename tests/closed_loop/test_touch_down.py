@@ -109,7 +109,6 @@ def test_a_landing_ends_within_a_second_of_the_ground(suite: str, mass: float) -
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-MODE-13")
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.TRAJECTORY])
 def test_a_vehicle_that_sinks_to_the_ground_and_believes_to_fly_stops_its_rotors(

@@ -40,7 +40,6 @@ def east(flight: Flight) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-SAFE-11")
 @pytest.mark.parametrize(
     "spoil",

@@ -62,7 +62,6 @@ def test_whatever_is_wrong_with_it_is_told_and_nothing_is_touched(suite: str, se
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize(
     ("mode", "suite", "faults"),

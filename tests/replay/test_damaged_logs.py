@@ -63,10 +63,13 @@ class Attempt:
 
 
 @pytest.mark.drawn(1)
-@pytest.mark.parametrize("flips", [8, pytest.param(120, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("flips", "refused_least"), [(8, 2), pytest.param(120, 41, marks=pytest.mark.long)]
+)
 @each_command
 def test_a_byte_flipped_anywhere_is_no_traceback(
     flips: int,
+    refused_least: int,
     command: Callable[[Path], int],
     whole: bytes,
     definitions: int,
@@ -81,11 +84,11 @@ def test_a_byte_flipped_anywhere_is_no_traceback(
             damaged = bytearray(whole)
             damaged[chance.randrange(first, last)] ^= chance.randrange(1, 256)
             refused += attempt(damaged) == 2
-    assert refused > flips // 5, "most flips are in text and numbers, which may be anything"
+    # Most flips are in text and numbers, which may be anything, and eight are few.
+    assert refused >= refused_least
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @each_command
 def test_a_log_cut_among_its_definitions_is_refused_and_among_its_data_read_up_to_there(
     command: Callable[[Path], int],

@@ -22,7 +22,8 @@ The zones are those that are kept: clearances have grown by what the estimate is
 margin is that of the safe set in force.
 
 It has a room and a speed. From a zone deeper than ``ROOM`` no way leads out that is known to be
-right: it pushes nobody. And nothing is pushed faster than the law's ``speed``, by however many.
+right: it pushes nobody. And nothing is pushed faster than the law's ``speed``, by however many
+zones: what the vehicle moves at across a normal leaves less along it.
 
 The planner's own bound is :math:`h \ge \lambda`; this law has none, so in flights that go as
 planned it changes no bit. Its command can be no more than the loops stand.

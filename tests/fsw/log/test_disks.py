@@ -54,7 +54,7 @@ def small_disk() -> Iterator[None]:
 @pytest.mark.requirement("REQ-LOG-1")
 @pytest.mark.parametrize(
     "lockstep",
-    [pytest.param(True, id="lockstep", marks=pytest.mark.long), pytest.param(False, id="realtime")],
+    [pytest.param(True, id="lockstep"), pytest.param(False, id="realtime")],
 )
 def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     lockstep: bool, tmp_path: Path, small_disk: None

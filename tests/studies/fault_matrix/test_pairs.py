@@ -145,7 +145,6 @@ def test_two_faults_are_flown_and_each_begins_at_its_time() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("seed", "number"),
     # The first one is the shortest flight, for `make test`. In those of 611 a replay took in what

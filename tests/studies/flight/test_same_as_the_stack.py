@@ -30,7 +30,6 @@ SEED = 100
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize(
     ("suite", "apart"),
     [("perfect", 1e-5), ("mocap", 3e-5)],

@@ -241,7 +241,6 @@ def test_what_cannot_be_kept_is_infeasible() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(2)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("controller", VARIANTS)
 def test_plans_come_back_through_the_planner(controller: str, case: str) -> None:

@@ -25,7 +25,6 @@ def flown(
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("case", ["I", "II"])
 def test_blf_completes_with_room_to_spare(case: Case) -> None:
     row = flown(case, "blf")

@@ -125,7 +125,6 @@ def test_a_page_of_tuning_seeds_says_so(table4: Report, tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("name", ["fig2", "fig6", "fig7", "fig8"])
 def test_a_figure_has_its_numbers_beside_it(name: str, tmp_path: Path) -> None:
     report = study(name)(TINY, Campaign(0, report=silent))

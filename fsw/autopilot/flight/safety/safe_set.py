@@ -192,13 +192,7 @@ class SafeSetCheck:
 
     def _against(self, mission: MissionMemory, safe_set: SafeSet) -> str:
         """Why a source that does not own the safe set may not change it so."""
-        against = growth(mission.announced, safe_set)
-        for number, zone in enumerate(safe_set.zones, start=1):
-            # It goes where anybody sends targets, and the vehicle with it.
-            if kind_of(zone.shape).follows_target and zone not in mission.announced.zones:
-                against = (
-                    against or f"zone {number} ({zone.shape.kind}) would follow the target in a set"
-                )
+        against = growth(mission.announced, safe_set) or _follows(mission.announced, safe_set)
         if not against:
             return ""
         whose = "no source owns" if mission.owner is None else f"{mission.owner} owns"
@@ -391,6 +385,14 @@ def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement
     if refused is None or announcement.source != refused.source:
         return False
     return is_update(refused.safe_set, announcement.safe_set)
+
+
+def _follows(old: SafeSet, new: SafeSet) -> str:
+    """What ties the vehicle anew to where anybody sends targets, in words; empty if nothing."""
+    for number, zone in enumerate(new.zones, start=1):
+        if kind_of(zone.shape).follows_target and zone not in old.zones:
+            return f"zone {number} ({zone.shape.kind}) would follow the target in a set"
+    return ""
 
 
 def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, chosen: int) -> bool:

@@ -131,7 +131,6 @@ def test_wind_is_cancelled_whole_once_it_is_believed(sign: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_lasting_push_is_taken_for_wind_up_to_its_limit_and_forgotten(sign: float) -> None:
     """Half of what has not been believed yet within ln 2 time constants, never past the limit."""

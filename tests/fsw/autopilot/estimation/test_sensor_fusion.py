@@ -895,7 +895,6 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-2")
 @pytest.mark.parametrize("lost", [ImuSample, PoseSample])
 def test_a_covariance_stays_one_after_a_sensor_was_lost_and_back_for_long(lost: type) -> None:

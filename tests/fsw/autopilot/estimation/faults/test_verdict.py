@@ -202,7 +202,6 @@ def test_one_reflection_names_no_satellites_though_the_next_place_is_lost(size: 
 
 
 @pytest.mark.long
-@pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("seed", range(3))
 def test_garbage_of_satellites_accuses_nobody(seed: int) -> None:
