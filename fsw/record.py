@@ -180,8 +180,12 @@ class _Several(_Number):
             return self
         views = record._views
         if self._at not in views:
-            view = record.numbers[self._at : self._at + self.count]
-            views[self._at] = view if self._kind is None else self._kind(view)
+            end = self._at + self.count
+            if self._kind is None:
+                views[self._at] = record.numbers[self._at : end]
+            else:
+                part = memoryview(record.memory).cast("B")[self._at * _NUMBER : end * _NUMBER]
+                views[self._at] = self._kind(part)
         return views[self._at]
 
     def __set__(self, record: Record, value: Any) -> None:

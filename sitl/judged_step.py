@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from sitl.body import Parts
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 from sitl.limits import Bounds, Use, record_use
 from sitl.plant.aerial_manipulator import Plant
 from sitl.plant.integrator import Held, step
@@ -31,7 +31,7 @@ class Judge(NamedTuple):
     use: Use
 
 
-@compiled
+@kernel
 def watched_step(
     plants: Sequence[Plant],
     blocks: Sequence[Held],
@@ -75,7 +75,7 @@ def watched_step(
     return speed, felt, clear
 
 
-@compiled
+@kernel
 def judge_steps(
     judge: Judge,
     places: Array,

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 from sitl.plant.state import Q_WB, THRUST, W_WB_B
 from sitl.plant.vector import Array
 from vehicles.description import Vehicle
@@ -144,6 +144,7 @@ class Use(NamedTuple):
     when_s: Array  # (limits,) s, when that was
     beyond_s: Array  # (limits,) s, spent beyond the limit
     steps: Array  # (1,) how many have been recorded
+    now: Array  # (limits,) magnitudes of one step
 
 
 class LimitRecord:
@@ -156,12 +157,13 @@ class LimitRecord:
         self._largest = np.where(one_sided, -math.inf, 0.0)
         self._when_s = np.zeros(len(self.limits))
         self._beyond_s = np.zeros(len(self.limits))
-        self._steps = np.zeros(1)
+        self._steps, self._now = np.zeros(1), np.zeros(len(self.limits))
 
     @property
     def arrays(self) -> tuple[Bounds, Use]:
         """The limits and the memory behind the record, for ``record_use``."""
-        return self._bounds, Use(self._largest, self._when_s, self._beyond_s, self._steps)
+        record = Use(self._largest, self._when_s, self._beyond_s, self._steps, self._now)
+        return self._bounds, record
 
     def uses(self) -> dict[str, LimitUse]:
         """By the limit's key; empty before the first step."""
@@ -196,7 +198,7 @@ def spoken(value: float, unit: str) -> str:
     return f"{value:.2f} {unit}"
 
 
-@compiled
+@kernel
 def record_use(
     states: Array,
     sent: tuple[float, float],
@@ -213,11 +215,10 @@ def record_use(
         instants: Time one step before the first, and between two steps [s].
         record: Overwritten.
     """
-    largest, when_s, beyond_s = record.largest, record.when_s, record.beyond_s
+    largest, when_s, beyond_s, used = record.largest, record.when_s, record.beyond_s, record.now
     record.steps[0] += states.shape[0]
     before_s, step_s = instants
     most, first, (angles, joints) = bounds.most, bounds.angles, bounds.share.shape
-    used = np.empty(most.shape[0])
     for k in range(states.shape[0]):
         x = states[k]
         for i in range(angles):

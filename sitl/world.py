@@ -178,15 +178,19 @@ class Headroom(NamedTuple):
     left: Array  # (margins,) m
     shift: Array  # (zones, 3) m, NED, by which each zone had moved
     places: Array  # (rows, 3) m, NED, and 1 the base's axes: where the vehicle was
+    now: Array  # (margins,) m, of one step, infinite where not worked out
+    lowest: Array  # (margins,) m, up to that step
+    when_s: Array  # (margins,) s, when that was
 
 
 def headroom(table: ZoneTable, margins: int, rows: int) -> Headroom:
     """Before the first step, with so many ``margins`` and places in ``rows``: none."""
     nowhere = np.full((len(table.kind), 3), math.nan)
-    return Headroom(np.zeros(margins), nowhere, np.full((rows, 3), math.nan))
+    before = np.full((rows, 3), math.nan)
+    return Headroom(np.zeros(margins), nowhere, before, *np.zeros((3, margins)))
 
 
-@compiled
+@kernel
 def record_if_clear(
     table: ZoneTable,
     parts: Parts,
@@ -217,26 +221,35 @@ def record_if_clear(
         infinity, with nothing recorded, if any point is not clearly above ground or any part not
         within every margin.
     """
-    margins = np.full((places.shape[0], lowest.shape[0]), np.inf)
     before_s, step_s = instants
     curve, starts_s = aim
+    for i in range(lowest.shape[0]):
+        room.lowest[i], room.when_s[i] = lowest[i], when_s[i]
     for k in range(places.shape[0]):
         time_s = before_s + (k + 1) * step_s
         target = (0.0, 0.0, 0.0)
         if curve.shape[0]:
             target = place_on_curve(curve, time_s - starts_s)
-        if not _is_clear(table, parts, places[k], time_s, target, lowest, margins[k], room):
-            return -math.inf
-    for k in range(places.shape[0]):
         for i in range(lowest.shape[0]):
-            if margins[k, i] < lowest[i]:
-                lowest[i] = margins[k, i]
-                when_s[i] = before_s + (k + 1) * step_s
-    free, last = math.inf, places[places.shape[0] - 1]
-    for k in parts.ground:
-        free = min(free, -float(last[k, 2]))
+            room.now[i] = math.inf
+        if not _is_clear(table, parts, places[k], time_s, target, lowest, room):
+            return -math.inf
+        for i in range(lowest.shape[0]):
+            if room.now[i] < room.lowest[i]:
+                room.lowest[i], room.when_s[i] = room.now[i], time_s
     for i in range(lowest.shape[0]):
-        free = min(free, room.left[i] + _held_back(lowest[i]))
+        lowest[i], when_s[i] = room.lowest[i], room.when_s[i]
+    return _free(parts, places[places.shape[0] - 1], lowest, room.left)
+
+
+@compilable
+def _free(parts: Parts, places: Array, lowest: Array, left: Array) -> float:
+    """How far all may travel from ``places`` (rows, 3) [m, NED] until there can be an incident."""
+    free = math.inf
+    for i in range(parts.ground.shape[0]):
+        free = min(free, -places[parts.ground[i], 2])
+    for i in range(lowest.shape[0]):
+        free = min(free, left[i] + _held_back(lowest[i]))
     return max(free, 0.0)
 
 
@@ -248,10 +261,9 @@ def _is_clear(
     time_s: float,
     target: V3,
     lowest: Array,
-    margins: Array,
     room: Headroom,
 ) -> bool:
-    """Whether one step had no incident; the margins that may be below the lowest go to margins."""
+    """Whether one step had no incident; the margins that may be below the lowest go to ``now``."""
     for k in range(parts.ground.shape[0]):
         if not places[parts.ground[k], 2] < 0.0:
             return False
@@ -267,7 +279,7 @@ def _is_clear(
                 continue
             room.left[i] -= away
             if not room.left[i] > 0.0:
-                room.left[i] = _look(table, z, shift, parts, b, places, lowest[i], margins, i)
+                room.left[i] = _look(table, z, shift, parts, b, places, lowest[i], room.now, i)
                 if room.left[i] == -math.inf:
                     return False
             i += 1

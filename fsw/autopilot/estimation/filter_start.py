@@ -20,6 +20,7 @@ from fsw.autopilot.geometry.quaternion import normalised
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample
 from fsw.autopilot.signals import Vec3, Vec4
+from fsw.frozen import replace
 
 _LOOKED_AT: Final = 16  # samples
 _REST: Vec3 = (0.0, 0.0, 0.0)
@@ -40,11 +41,11 @@ class FilterStart:
         Without poses start from a GNSS position, gravity and the compass.
         """
         if not memory.numbers["end"][0]:
-            return memory._replace(waiting=())
+            return replace(memory, waiting=())
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, MagneticSample) and memory.field is None:
-                memory = memory._replace(field=sample.field)
+                memory = replace(memory, field=sample.field)
         for one in reversed(memory.waiting):
             sample = one.sample
             if isinstance(sample, PoseSample):
@@ -58,8 +59,9 @@ class FilterStart:
                 self._from_gnss(memory, sample, memory.field)
                 break
         else:
-            return memory._replace(waiting=memory.waiting[-_LOOKED_AT:])
-        return memory._replace(
+            return replace(memory, waiting=memory.waiting[-_LOOKED_AT:])
+        return replace(
+            memory,
             started=True,
             waiting=(),
             delay_sigma=self._tuning.pose.delay_sigma,
@@ -73,7 +75,7 @@ class FilterStart:
         self._begin(memory, sample.time, state, *noise)
         if not sample.drifts:
             return memory
-        return memory._replace(frame=FrameDrift.at_start(memory.numbers[0], noise, stated))
+        return replace(memory, frame=FrameDrift.at_start(memory.numbers[0], noise, stated))
 
     def _from_gnss(self, memory: FusionMemory, sample: GnssSample, field: Vec3) -> None:
         x, tuning = memory.numbers, self._tuning

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import FILTER, Filter
@@ -25,6 +26,7 @@ from fsw.autopilot.measurements import (
     Sensor,
 )
 from fsw.autopilot.signals import JointVector, Vec3, Vec4
+from fsw.frozen import dataclass, replace
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
@@ -68,7 +70,8 @@ class Trail(NamedTuple):
         return found[::-1]
 
 
-class FusionMemory(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class FusionMemory:
     """What the estimator carries from tick to tick."""
 
     numbers: Filter
@@ -122,7 +125,7 @@ class FusionMemory(NamedTuple):
 
     def noting(self, health: Health) -> FusionMemory:
         """The memory with the health of one sensor renewed."""
-        return self._replace(health=(*self.without(health.sensor), health))
+        return replace(self, health=(*self.without(health.sensor), health))
 
     def noting_fault(self, sensor: Sensor, fault: SensorFault, now: float) -> FusionMemory:
         """The memory with a ``fault`` of a sensor that was seen at ``now`` [s]."""
@@ -141,11 +144,11 @@ class FusionMemory(NamedTuple):
         """The memory after a ``sample`` that is plausible, whether it is used or not."""
         match sample:
             case PoseSample():
-                return self._replace(newest_pose=sample)
+                return replace(self, newest_pose=sample)
             case GnssSample():
-                return self._replace(gnss=sample)
+                return replace(self, gnss=sample)
             case MagneticSample():
-                return self._replace(newest_field=sample)
+                return replace(self, newest_field=sample)
         return self
 
     def after(self, one: Waiting, health: Health, runs: tuple[Run, ...]) -> FusionMemory:
@@ -154,8 +157,8 @@ class FusionMemory(NamedTuple):
         if isinstance(sample, PoseSample):
             pose, counter = sample, sample.reset_counter
         known, waiting = (*self.without(health.sensor), health), self.waiting[1:]
-        return self._replace(
-            waiting=waiting, health=known, pose=pose, reset_counter=counter, runs=runs
+        return replace(
+            self, waiting=waiting, health=known, pose=pose, reset_counter=counter, runs=runs
         )
 
     def without(self, sensor: Sensor) -> list[Health]:
@@ -169,13 +172,13 @@ class FusionMemory(NamedTuple):
 
         ``velocity`` [m/s, NED] and ``turn`` [1] as in ``Reset``.
         """
-        return self._replace(reset=Reset(self.reset.number + 1, position, velocity, turn))
+        return replace(self, reset=Reset(self.reset.number + 1, position, velocity, turn))
 
 
-def copied(x: Filter) -> Filter:
-    """Another filter with the same numbers; as bytes in a fortieth of the time of an array."""
+def copied(x: NDArray[Any]) -> NDArray[Any]:
+    """Another record (1,) with the same numbers; as bytes in a fortieth of the time of an array."""
     memory: Any = x.base
-    return np.ndarray(1, FILTER, bytearray(memory if type(memory) is bytearray else x.tobytes()))
+    return np.ndarray(1, x.dtype, bytearray(memory if type(memory) is bytearray else x.tobytes()))
 
 
 def at_start(joints: int, turns: Sequence[float] = (1.0,) * 4) -> FusionMemory:

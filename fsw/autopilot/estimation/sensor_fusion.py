@@ -11,7 +11,7 @@ makes of the filter.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -184,7 +184,8 @@ class SensorFusion:
         if trail is not None:
             tick = samples, now, joint_acceleration, model, pushed
             trail = Trail(trail.start, trail.began, (tick, trail.ticks))
-        memory = memory._replace(
+        memory = replace(
+            memory,
             numbers=x,
             now=now,
             imu_came=imu_came,
@@ -239,7 +240,7 @@ class SensorFusion:
         now: float,
         estimate: StateEstimate | None,
         *,
-        aloft: bool = True,
+        aloft: Callable[[], bool] = lambda: True,
         flies: bool = True,
         damaged: bool = False,
         touches: bool = False,
@@ -281,7 +282,7 @@ class SensorFusion:
         if estimate is not None and _rests(memory, now):
             return memory, estimate
         x = copied(memory.numbers)
-        memory = memory._replace(numbers=x)
+        memory = replace(memory, numbers=x)
         self._asked.begin(now, 0.0, (), UNKNOWN)
         if not memory.started:
             memory = self._start(memory)
@@ -335,13 +336,13 @@ class SensorFusion:
             health, used, half = _as_judged(memory.verdict, sensor.source, health, now, half)
         if not used:
             if isinstance(sample, GnssSample) and fault is SensorFault.NO_FIX:
-                memory = memory._replace(without_fix=sample)
-            return memory._replace(health=(*others, health), delay=delay)
+                memory = replace(memory, without_fix=sample)
+            return replace(memory, health=(*others, health), delay=delay)
         waiting = (*memory.waiting, Waiting(time, memory.arrivals, sample, half))
         if len(waiting) > 1 and waiting[-2].time > time:
             waiting = tuple(sorted(waiting))
         arrivals, known = memory.arrivals + 1, (*others, health)
-        return memory._replace(waiting=waiting, health=known, arrivals=arrivals, delay=delay)
+        return replace(memory, waiting=waiting, health=known, arrivals=arrivals, delay=delay)
 
     def _with_delay_known(self, memory: FusionMemory) -> FusionMemory:
         """The memory after the parameters of the pose's delay may have changed in flight."""
@@ -354,7 +355,7 @@ class SensorFusion:
         M[DELAY], M[:, DELAY], x["shared"][DELAY] = 0.0, 0.0, 0.0
         x["with_offset"][DELAY] = 0.0
         M[DELAY, DELAY] = sigma**2
-        return memory._replace(delay_sigma=sigma)
+        return replace(memory, delay_sigma=sigma)
 
     def _delay(self, before: float, delay: float, apart: float) -> float:
         """How long measurements take, after one did so, ``apart`` [s] from its sensor's last one.
@@ -371,7 +372,7 @@ class SensorFusion:
         if sensor.source is Source.COMPASS and memory.verdict.suspects & Source.COMPASS:
             # A heading that may be wrong is not needed, and turns what else is measured. It may be
             # so since it has come.
-            return memory._replace(waiting=memory.waiting[1:])
+            return replace(memory, waiting=memory.waiting[1:])
         announced, drifts = False, False
         if isinstance(sample, PoseSample):
             memory = self._with_delay_known(memory)
@@ -475,7 +476,7 @@ class SensorFusion:
             and not _tilts(memory, sample, innovation, now)
         )
         if announced and run is not None and not believed:
-            memory = memory._replace(reset_counter=counter)
+            memory = replace(memory, reset_counter=counter)
         if believed and any(1.0 < r < math.inf for r in ratio):
             memory = sensor.take(memory, sample, one.time, ratio)
             if not announced and isinstance(sample, PoseSample):
@@ -496,8 +497,8 @@ class SensorFusion:
         innovation: tuple[float, ...],
     ) -> Run:
         """The run of refused samples that this one goes on with, or begins."""
-        scale = np.maximum(memory.numbers[0]["noise_scale"], 1.0)[sensor.noise_scales].tolist()
-        rooms = partial(sensor.rooms, sample, tuple(scale))
+        scales = memory.numbers["noise_scale"][0, sensor.noise_scales].tolist()
+        rooms = partial(sensor.rooms, sample, tuple([max(scale, 1.0) for scale in scales]))
         new = Run(type(sample), sample.time, sample.time, innovation)
         seldom = memory.of(sensor.sensor).apart >= 0.25
         return extended(memory.runs, new, rooms, seldom=seldom)
@@ -507,7 +508,7 @@ class SensorFusion:
     ) -> FusionMemory:
         """The memory after a frame that drifts has moved, to where a pose says it is."""
         moved = memory.frame.moved(memory.numbers[0], self._pose.stated(sample), announced)
-        return memory._replace(frame=moved)
+        return replace(memory, frame=moved)
 
 
 def _rests(memory: FusionMemory, now: float) -> bool:
@@ -526,7 +527,8 @@ def _rests(memory: FusionMemory, now: float) -> bool:
 def _anew(memory: FusionMemory) -> FusionMemory:
     """The memory with a filter that starts from the next samples, because it is no number."""
     x = memory.numbers[0]
-    return memory._replace(
+    return replace(
+        memory,
         numbers=at_start(int(x["joint_count"]), x["turns"]).numbers,
         joints_came=-1.0,
         imu_came=-1.0,

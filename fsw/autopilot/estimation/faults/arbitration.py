@@ -29,16 +29,17 @@ from fsw.autopilot.estimation.error_state import (
     watch_biases,
 )
 from fsw.autopilot.estimation.faults import residuals
-from fsw.autopilot.estimation.faults.residuals import EVIDENCE, NO_AID
+from fsw.autopilot.estimation.faults.residuals import NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged
-from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail
+from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail, copied
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
 from fsw.autopilot.estimation.sensors.base import AidingSensor
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import StateEstimate
+from fsw.frozen import replace
 
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
 # Of a suspect: the most that its bias may be off, for how long it has been so [s], and the share of
@@ -82,7 +83,7 @@ class Arbitration:
         now: float,
         found: StateEstimate,
         *,
-        aloft: bool,
+        aloft: Callable[[], bool],
         flies: bool,
         damaged: bool,
         touches: bool = False,
@@ -96,7 +97,9 @@ class Arbitration:
         evidence = memory.verdict.evidence
         if evidence is None:
             return begun(memory), found
-        if not aloft:
+        if now - evidence["looked"][0] < residuals.EVERY - _ROUNDING:
+            return memory, found
+        if not aloft():
             # What is in doubt is so until the rotors stand, on the ground too: else its bias would
             # be the one of before.
             if memory.verdict.is_on and flies:
@@ -104,8 +107,6 @@ class Arbitration:
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)
             return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
-        if now - evidence[0]["looked"] < residuals.EVERY - _ROUNDING:
-            return memory, found
         return self._look(memory, now, found, damaged=damaged, touches=touches)
 
     def _look(
@@ -119,8 +120,8 @@ class Arbitration:
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory after a look at whether all sensors agree, and the state with it."""
         before = memory.verdict
-        evidence = np.empty(1, EVIDENCE)
-        evidence[:] = before.evidence
+        assert before.evidence is not None
+        evidence = copied(before.evidence)
         newest = memory.newest_pose, memory.gnss, memory.newest_field
         pose, fix, field = [
             NO_AID
@@ -145,7 +146,7 @@ class Arbitration:
                 damaged=damaged,
                 sizes=tuple(evidence[0]["size"].tolist()),
             )
-        memory = memory._replace(verdict=verdict)
+        memory = replace(memory, verdict=verdict)
         state: StateEstimate | None = found
         if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
             memory, state = self._convicted(memory, before, now, found)
@@ -168,7 +169,7 @@ class Arbitration:
         """The memory with a filter that knows the verdict, and the state with it."""
         verdict = memory.verdict
         x = memory.numbers.copy()
-        memory = memory._replace(numbers=x)
+        memory = replace(memory, numbers=x)
         new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
         # A half that has jumped, and stays, is believed where the rotors are named for it, and
         # where it agrees. Garbage does not stay.
@@ -184,7 +185,7 @@ class Arbitration:
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
             verdict = _widened(x.view(np.recarray)[0], verdict, bool(self._aided(memory, now)))
-            memory = memory._replace(verdict=verdict)
+            memory = replace(memory, verdict=verdict)
         # What the rotors explain, nobody else was wrong about.
         acquits = verdict.explained and not before.explained and any(before.unknown)
         if not (new or believes or acquits):
@@ -209,7 +210,7 @@ class Arbitration:
         for name in ("out", "suspect"):
             numbers[name] = x[name]
         numbers["believed"] = believed
-        back = back._replace(numbers=numbers, verdict=memory.verdict)
+        back = replace(back, numbers=numbers, verdict=memory.verdict)
         for trail in trails:
             for tick in trail.inputs():
                 back, state = self._again(back, tick)
@@ -220,7 +221,8 @@ class Arbitration:
         for name in ("witness", "baseline", "model_walk"):
             numbers[name] = memory.numbers[name]
         health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
-        start = memory._replace(
+        start = replace(
+            memory,
             numbers=numbers,
             health=health,
             waiting=back.waiting,
@@ -233,20 +235,20 @@ class Arbitration:
             trail=None,
             trail_before=None,
         )
-        return start._replace(trail=Trail(start, now)), state
+        return replace(start, trail=Trail(start, now)), state
 
 
 def begun(memory: FusionMemory) -> FusionMemory:
     """The memory of a filter that has just begun: what sensors say is compared from now on."""
     verdict = memory.verdict._replace(evidence=residuals.at_start())
-    return memory._replace(verdict=verdict, trail=None, trail_before=None)
+    return replace(memory, verdict=verdict, trail=None, trail_before=None)
 
 
 def _anew(memory: FusionMemory) -> FusionMemory:
     """The memory without what has been compared so far: rotors do not explain what legs feel."""
     x = memory.numbers.copy()
     x["suspect"] = 0
-    return begun(memory._replace(numbers=x, verdict=memory.verdict.acquitted()))
+    return begun(replace(memory, numbers=x, verdict=memory.verdict.acquitted()))
 
 
 def _on_ground(memory: FusionMemory, now: float) -> FusionMemory:
@@ -256,7 +258,7 @@ def _on_ground(memory: FusionMemory, now: float) -> FusionMemory:
     if verdict.wrong is not memory.verdict.wrong:
         x = x.copy()
         x["out"] = _halves(verdict.wrong)
-    return memory._replace(numbers=x, verdict=verdict)
+    return replace(memory, numbers=x, verdict=verdict)
 
 
 def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
@@ -269,8 +271,8 @@ def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
         decides = verdict.is_on and now - verdict.since < UNDECIDED
         if decides or now - newest.began < _TRAIL:
             return memory
-    start = memory._replace(trail=None, trail_before=None)
-    return memory._replace(trail_before=newest, trail=Trail(start, now))
+    start = replace(memory, trail=None, trail_before=None)
+    return replace(memory, trail_before=newest, trail=Trail(start, now))
 
 
 def _silent(memory: FusionMemory, now: float) -> Source:

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 
-import numpy as np
 from scipy.special import gammainccinv
 
 from fsw.autopilot.estimation.faults.residuals import NO_AID, Aid
@@ -131,9 +130,9 @@ class AidingSensor(ABC, Generic[S, T]):
 
     def deviations(self, memory: FusionMemory, variances: Iterable[Sequence[float]]) -> list[float]:
         """Of the worst axis of each part, with the noise that there lately was [SI]."""
-        scales = np.maximum(memory.numbers[0]["noise_scale"], 1.0)[self.noise_scales]
+        scales = memory.numbers["noise_scale"][0, self.noise_scales].tolist()
         pairs = zip(variances, scales, strict=True)
-        return [math.sqrt(max(variance) * scale) for variance, scale in pairs]
+        return [math.sqrt(max(variance) * max(scale, 1.0)) for variance, scale in pairs]
 
     def aid(self, memory: FusionMemory, sample: S) -> Aid:
         """What a measurement says to the law for who is wrong."""

@@ -216,7 +216,7 @@ class SensedState:
             samples,
             now,
             estimate,
-            aloft=is_aloft(state, now, self._legs, self._stale),
+            aloft=lambda: is_aloft(state, now, self._legs, self._stale),
             flies=state.vehicle.flies,
             damaged=bool(state.damage.rotor or state.damage.joint),
             # What pushes back, or was just gripped, turns the vehicle by more than is known of it.
@@ -298,7 +298,7 @@ def _report(
 def _report_seldom(memory: FusionMemory, now: float, texts: list[StatusText]) -> FusionMemory:
     """Report sensors that have begun to come less often than they did."""
     sample_rates, seldom = looked(memory.sample_rates, memory.health, now)
-    memory = memory._replace(sample_rates=sample_rates)
+    memory = replace(memory, sample_rates=sample_rates)
     for sensor in seldom:
         memory = memory.noting(memory.of(sensor).with_fault(SensorFault.RATE_TOO_LOW, now))
         texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.RATE_TOO_LOW)))
@@ -348,7 +348,7 @@ def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemo
     """The memory with an arm that stands still where a ``reading`` is, and nothing disturbs it."""
     numbers = copied(memory.numbers)
     kernels.set_joints(numbers, law, reading.time, padded(reading.angles, JOINT_CAPACITY))
-    return memory._replace(numbers=numbers)
+    return replace(memory, numbers=numbers)
 
 
 def _aiding(

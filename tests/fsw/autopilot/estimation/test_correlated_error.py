@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 from fsw.autopilot.flight.safety.uncertain_clearance import pose_covariance
 from fsw.autopilot.measurements import GnssSample, PoseSample, Sensor
+from fsw.frozen import replace
 from tests.fsw.random_states import estimate_of
 
 TUNING = EstimatorTuning()
@@ -26,7 +27,7 @@ TURN = (0.01**2, 0.02**2, 0.03**2)
 
 def memory(*, drifts: bool = False) -> FusionMemory:
     pose = PoseSample(1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), FINE, TURN, 0, drifts)
-    return at_start(2)._replace(pose=pose)
+    return replace(at_start(2), pose=pose)
 
 
 def deviations(found: Vec6) -> list[float]:
@@ -47,7 +48,7 @@ def test_the_attitudes_error_is_turned_from_the_bodys_axes() -> None:
 
 def test_of_odometry_only_its_noise_counts_for_its_drift_is_in_the_covariance() -> None:
     noise = FrameDrift(place_noise=(1e-6, 4e-6, 9e-6), attitude_noise=(16e-6, 25e-6, 36e-6))
-    found = correlated_error(memory(drifts=True)._replace(frame=noise), TUNING)
+    found = correlated_error(replace(memory(drifts=True), frame=noise), TUNING)
     assert deviations(found) == pytest.approx([0.001, 0.002, 0.003, 0.004, 0.005, 0.006])
 
 
@@ -57,13 +58,13 @@ def test_the_position_that_was_used_last_counts(
 ) -> None:
     fix = GnssSample(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1e-5, 1e-5, 0.05**2), FINE)
     health = (Health(Sensor.POSE, fused=(pose_at,) * 2), Health(Sensor.GNSS, fused=(fix_at,) * 2))
-    both = memory()._replace(gnss=fix, health=health)
+    both = replace(memory(), gnss=fix, health=health)
     assert deviations(correlated_error(both, TUNING))[0] == pytest.approx(least)
 
 
 def test_without_a_pose_satellites_count_and_without_both_nothing() -> None:
     fix = GnssSample(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1e-5, 1e-5, 0.05**2), FINE)
-    found = correlated_error(at_start(2)._replace(gnss=fix), TUNING)
+    found = correlated_error(replace(at_start(2), gnss=fix), TUNING)
     least = TUNING.gnss.position_floor
     assert deviations(found) == pytest.approx([least, least, 0.05, 0.0, 0.0, 0.0])
     assert not any(correlated_error(at_start(2), TUNING))

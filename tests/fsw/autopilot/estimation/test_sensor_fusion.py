@@ -923,7 +923,7 @@ def test_a_filter_without_numbers_starts_anew(name: str, at: tuple[int, int], va
         if tick == 700:
             numbers = memory.numbers.copy()
             numbers[name][0][at] = value
-            memory = memory._replace(numbers=numbers)
+            memory = replace(memory, numbers=numbers)
         memory, estimate = fusion.step(memory, samples, now)
         estimates.append(estimate)
     assert memory.restarts == 1
@@ -984,7 +984,7 @@ def test_a_receiver_that_falls_silent_has_no_fix_any_more() -> None:
         return report.fix.kind, report.fix.satellites
 
     assert kind(flown.memory, 0.5) == (3, 255)
-    assert kind(flown.memory._replace(now=flown.now + 0.6), 0.5) == (1, 255)
+    assert kind(replace(flown.memory, now=flown.now + 0.6), 0.5) == (1, 255)
 
 
 def test_satellites_that_came_once_too_seldom_do_not_confirm_each_other() -> None:

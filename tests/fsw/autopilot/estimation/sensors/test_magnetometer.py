@@ -191,7 +191,7 @@ def test_a_reading_that_waits_is_not_used_once_its_sensor_is_a_suspect() -> None
     fusion_, memory, last = SensorFusion(RTK.tuning, 2), at_start(2), START + 1.0
     for now, samples in run(RTK, 0, 1.5):
         doubted = Source.COMPASS if now > last else NOBODY
-        memory = memory._replace(verdict=memory.verdict._replace(suspects=doubted))
+        memory = replace(memory, verdict=memory.verdict._replace(suspects=doubted))
         memory, _ = fusion_.step(memory, samples, now)
     assert memory.of(Sensor.MAGNETOMETER).fused[0] <= last < memory.of(Sensor.GNSS).fused[0]
     assert memory.of(Sensor.MAGNETOMETER).came > now - 0.1, "it is heard"
