@@ -97,6 +97,7 @@ from fsw.autopilot.estimation.sensors.ceiling_finder import CeilingFinder
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.measurements import CeilingSample
 from fsw.autopilot.parameters.registry import BY_NAME
+from fsw.frozen import replace
 from fsw.link.inbox import Inbox
 from fsw.link.wire.decode_sensors import SampleDecoder
 from fsw.log.samples import Samples
@@ -110,7 +111,7 @@ from tests.sitl.sensors.readings import HOVER, reading
 # A filter that is a decimetre too high learns its height, and nothing of a reading that is far off.
 x = at_start(2).numbers.view(numpy.recarray)
 x["q"], x["p"], x["covariance"] = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.1), 0.01 * numpy.eye(ERRORS)
-memory, finder = at_start(2)._replace(numbers=x), CeilingFinder(EstimatorTuning().ceiling_finder)
+memory, finder = replace(at_start(2), numbers=x), CeilingFinder(EstimatorTuning().ceiling_finder)
 (ratio,) = finder.fuse(memory, CeilingSample(0.0, 4.0, 1e-4), False)
 assert ratio < 1.0
 assert abs(x[0]["p"][2] + 1.0) < 0.01, x[0]["p"]

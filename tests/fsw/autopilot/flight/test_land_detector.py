@@ -171,7 +171,7 @@ def test_a_rangefinder_that_is_known_to_be_wrong_does_not_say_how_high_it_is(
 ) -> None:
     """Stuck at 2 m it kept rotors running on the ground, without a gyro, until the vehicle fell."""
     health = Health(Sensor.RANGEFINDER).with_fault(fault, 1.99)
-    fusion = at_start(2)._replace(health=(health,))
+    fusion = replace(at_start(2), health=(health,))
     low = vehicle_at((0.0, 0.0, GROUND_Z - 0.05), t_us=2_000_000)
     state = replace(flying(Mode.DESCEND, ranges=(seen(2.0),)), fusion=fusion)
     state = replace(state, aiding=Aiding(height_sigma=0.04, gyro_lost=True))
