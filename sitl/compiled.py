@@ -29,22 +29,33 @@ def cache() -> KernelCache:
     return _CACHE
 
 
-def compiled(function: Callable[P, R]) -> Callable[P, R]:
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` to machine code on first call, cached on disk.
+
+    It allocates nothing and returns no array, works on memory that its caller holds, and so needs
+    no reference counts; with them the plant takes 3.6 times as long. Allocating in a kernel is a
+    compile-time error.
 
     ``error_model="numpy"``: a division by zero gives inf/nan, which the simulation detects as
     divergence, instead of an exception test in every division.
     """
-    return _njit(function, counts_references=True)
-
-
-def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Like ``compiled``, for a function that allocates nothing and returns no array.
-
-    It works on memory its caller holds, so it needs no reference counts; with them the plant
-    takes 3.6 times as long. Allocating in a kernel is a compile-time error.
-    """
-    return _njit(function, counts_references=False)
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_CACHE.folder)
+    try:
+        dispatcher = numba.njit(
+            cache=_CACHE.folder is not None,
+            fastmath=False,
+            nogil=True,
+            error_model="numpy",
+            no_cfunc_wrapper=True,  # nothing in C calls a kernel
+            _nrt=False,  # numba's own switch for its runtime, undocumented
+        )(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    compile_for_types(dispatcher, numba.types.unliteral)
+    compile_quietly(dispatcher)
+    compile_within(dispatcher, callees_without_code)
+    return cast(Callable[P, R], dispatcher)
 
 
 def machine_code(function: Callable[P, R], *example: Any) -> Callable[P, R]:
@@ -63,23 +74,3 @@ def compilable(function: Callable[P, R]) -> Callable[P, R]:
     """Let compiled code take a function into itself; called from Python it stays Python."""
     same: Callable[P, R] = register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
     return same
-
-
-def _njit(function: Callable[P, R], counts_references: bool) -> Callable[P, R]:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_CACHE.folder)
-    try:
-        dispatcher = numba.njit(
-            cache=_CACHE.folder is not None,
-            fastmath=False,
-            nogil=True,
-            error_model="numpy",
-            no_cfunc_wrapper=True,  # nothing in C calls a kernel
-            _nrt=counts_references,  # numba's own switch for its runtime, undocumented
-        )(function)
-    finally:
-        numba.config.CACHE_DIR = before
-    compile_for_types(dispatcher, numba.types.unliteral)
-    compile_quietly(dispatcher)
-    compile_within(dispatcher, callees_without_code)
-    return cast(Callable[P, R], dispatcher)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sitl.body import BALL, SHAFT, TIP, Parts, as_arrays, parts_of, spoken
-from sitl.compiled import compilable, compiled, kernel
+from sitl.compiled import compilable, kernel
 from sitl.distance import part_bound, part_distance
 from sitl.nearest import nearest
 from sitl.plant.vector import V3, Array, dot, put_row, row, sub
@@ -113,7 +113,7 @@ def zone_table(zones: tuple[Zone, ...]) -> ZoneTable:
     )
 
 
-@compiled
+@kernel
 def moved(table: ZoneTable, zone: int, time_s: float, target: V3) -> V3:
     """How far a zone has moved [m, NED]; one that follows is as far as ``target`` [m, NED]."""
     if table.follows[zone]:
@@ -129,7 +129,7 @@ def moved(table: ZoneTable, zone: int, time_s: float, target: V3) -> V3:
     )
 
 
-@compiled
+@kernel
 def fill_margins(
     table: ZoneTable, parts: Parts, places: Array, time_s: float, target: V3, out: Array
 ) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from sitl.compiled import compilable, compiled, kernel
+from sitl.compiled import compilable, kernel
 from sitl.plant.aerial_manipulator import (
     Inputs,
     Plant,
@@ -218,7 +218,7 @@ def held() -> Sequence[Held]:
     return cast(Sequence[Held], np.array([pack_params(Held(inputs, memory))]))
 
 
-@compiled
+@kernel
 def integrate(
     plant: Plant,
     state: Array,
@@ -239,7 +239,7 @@ def integrate(
     return run_steps(plant, state, inputs, step, places, states, blocks[0].memory)
 
 
-@compiled
+@kernel
 def step(
     plants: Sequence[Plant],
     blocks: Sequence[Held],
@@ -274,7 +274,7 @@ def step(
     return arrival.landing_speed, arrival.felt
 
 
-@compiled
+@kernel
 def places(plant: Plant, state: Array, blocks: Sequence[Held], out: Array) -> None:
     """``places_of_bodies`` for one state (n,) [SI], into out (1, 2 + j, 3) [m, NED].
 

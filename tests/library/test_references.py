@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import pandion
 from pandion.references import trajectory
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 from sitl.mission_clock import MissionClock
 from sitl.scenario import Circle, Lissajous, Points, Polynomial, Push, Trajectory
 from sitl.scenario_file import parse_scenario, scenario_digest
@@ -38,7 +38,7 @@ def wave(t: float) -> tuple[float, float, float]:
     return 0.2 * math.sin(0.5 * t), 0.1 * math.cos(0.4 * t), -1.0
 
 
-@compiled
+@kernel
 def _compiled(row: Any, t: float) -> Any:
     return place_on_curve(row, t)
 
