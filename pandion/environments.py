@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pandion.scenarios import AnyScenario, load_scenario
-from sitl.compiled import compiled
+from sitl.compiled import kernel
 from sitl.plant.parameters import GRAVITY
 from sitl.plant.state import Q_WB, THRUST, V_WB, W_WB_B
 from sitl.plant.vector import Array
@@ -152,7 +152,7 @@ class PandionEnv(gymnasium.Env[Floats, Floats]):
         return out, error, margin
 
 
-@compiled
+@kernel
 def _observe_into(
     table: Any,
     parts: Any,

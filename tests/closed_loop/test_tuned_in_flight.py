@@ -23,7 +23,7 @@ EVERYTHING: Tuning = (
     ("planner.walls.lambda_", 0.33),
     ("tuning.yaw.kp", 6.0),
     ("tuning.joint.kp", 380.0),
-    ("tuning.tracking.input_weight", 1.3e-7),
+    ("tuning.tracking.input_weight", 1.7e-7),
     ("tuning.tracking.observer_bandwidth", 120.0),
     ("limits.climb_speed", 0.3),
     ("upset_distance", 0.2),
@@ -186,7 +186,7 @@ def test_walls_are_kept_whatever_harmless_is_changed_in_flight() -> None:
         (("planner.weights.tracking", 15.0), ("planner.weights.velocity", 3.0)),
         (("tuning.yaw.kp", 5.0), ("tuning.joint.kp", 450.0)),
         (("planner.walls.lambda_", 0.36), ("planner.limits.joint_acc", 8.0)),
-        (("tuning.tracking.input_weight", 1.4e-7),),
+        (("tuning.tracking.input_weight", 1.7e-7),),
         (("tuning.tracking.observer_bandwidth", 120.0),),
         (),
     ]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fsw.autopilot.flight.autopilot import Autopilot, Controlled
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.parameters.consistency import refusals
+from fsw.autopilot.parameters.consistency import refusals, weakened
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import PARAMETERS
@@ -87,13 +87,11 @@ class TunedAutopilot:
     def _retune(
         self, state: FlightState, wanted: Tuning
     ) -> tuple[FlightState, bool, list[StatusText]]:
-        """Take a tuning into use; in the air none that breaks an inequality which holds now."""
+        """Take a tuning into use; while armed none that makes a promise of the analysis weaker."""
         mission = state.mission
         findings = self._made(wanted).analyse(mission.safe_set)
-        now = self._loop(state.tuning).analyse(mission.safe_set)
-        broken = {finding.name for finding in now if not finding.holds}
-        newly = [f for f in findings if not f.holds and f.name not in broken]
-        against = (*self._for_later(state.tuning, wanted), *refusals(tuple(newly)))
+        newly = weakened(findings, self._loop(state.tuning).analyse(mission.safe_set))
+        against = (*self._for_later(state.tuning, wanted), *[one.statement for one in newly])
         if against and state.vehicle.armed and not self._config.soft:
             texts = [StatusText(Severity.WARNING, f"refused while armed: {why}") for why in against]
             return state, False, texts

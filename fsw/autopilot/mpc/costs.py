@@ -16,8 +16,8 @@ Source: docs/equations.md E18, E20, E21.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass, fields
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -55,6 +55,17 @@ class CostWeights:
     home_to_touch: float = 0.1
     inputs: float = 0.02  # on a_d, yaw and joint accelerations alike
     relative_velocity: bool = True  # v_e - v_d in eq 20 instead of the printed v_e
+
+    @property
+    def scale(self) -> float:
+        """How many times as large as by default the largest of the weights is [1], 1 at least.
+
+        Slacks cost as many times as much: what has to be kept outweighs what is wanted, whatever
+        that weighs.
+        """
+        weights = [one for one in fields(self) if not one.name.endswith(("_lead", "_velocity"))]
+        larger = [getattr(self, one.name) / cast(float, one.default) for one in weights]
+        return float(max(1.0, *larger))
 
 
 class Quadratic(NamedTuple):

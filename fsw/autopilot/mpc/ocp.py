@@ -32,7 +32,7 @@ class Ocp:
         self._costs, self._barriers = parts.costs, parts.barriers
         self.follows_zones = parts.follows_zones
         blocks: list[tuple[ConstraintBlock, float | None]] = [
-            (self._limits.rows, config.joint_slack)
+            (self._limits.rows, config.weights.scale * config.joint_slack)
         ]
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self.qp = QpData(config.horizon, model.inputs, config.limits, tuple(blocks))

@@ -44,7 +44,7 @@ def _blf(config: PlannerConfig, model: CondensedModel, safe_set: SafeSet) -> Ocp
         most=config.limits.most,
         least_lambda=config.lambda_min,
     )
-    return OcpTerms(costs, (barrier,), config.barrier_slack)
+    return OcpTerms(costs, (barrier,), config.weights.scale * config.barrier_slack)
 
 
 VARIANTS: dict[str, Callable[[PlannerConfig, CondensedModel, SafeSet], OcpTerms]] = {"blf": _blf}

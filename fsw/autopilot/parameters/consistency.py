@@ -44,6 +44,9 @@ _SIGMAS = 3.0  # that count where clearances do not grow
 # How far what turns the base may move it off its plan. Vehicles that come with Pandion have 5 mm at
 # most; two that had 21 and 22 mm left the safe set.
 _TURNED = 0.01  # m
+# Times a limit that the worst disturbance uses, from which a loop is none: one that needed seven
+# times its jerk flew into a wall in still air.
+_SATURATED = 2.0
 _SEEN_S = 0.02  # in which the observer sees what begins: two of its time constants
 
 
@@ -52,9 +55,14 @@ class Finding:
     """One inequality of the analysis."""
 
     name: str
-    holds: bool
+    left: float  # of what is compared, in its unit; negative: it does not hold
     statement: str  # with numbers, and what is enough where it does not hold
     refuses: bool = True  # a finding that only warns says False
+
+    @property
+    def holds(self) -> bool:
+        """Whether the inequality does."""
+        return self.left >= 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +127,9 @@ def _touched(config: FlightConfig, safe_set: SafeSet, loop: Tube) -> list[Findin
         if zone.touch is not None:
             against = against_touching(config, zone, loop)
             found.append(
-                Finding("touch", not against, f"zone {number} cannot be touched: {against}")
+                Finding(
+                    "touch", -1.0 if against else 0.0, f"zone {number} cannot be touched: {against}"
+                )
             )
     return found
 
@@ -142,6 +152,19 @@ def _loop_beside(
 def refusals(findings: tuple[Finding, ...]) -> tuple[str, ...]:
     """The statements that speak against flying."""
     return tuple(f.statement for f in findings if f.refuses and not f.holds)
+
+
+def weakened(findings: tuple[Finding, ...], before: tuple[Finding, ...]) -> list[Finding]:
+    """Those that held ``before`` and do not now, or that refuse and have less left than before."""
+    had: dict[str, float] = {}
+    for one in before:
+        had[one.name] = min(one.left, had.get(one.name, math.inf))
+
+    def is_weaker(one: Finding) -> bool:
+        left = had.get(one.name, 0.0)
+        return not one.holds and (left >= 0.0 or (one.refuses and one.left < left))
+
+    return [one for one in findings if is_weaker(one)]
 
 
 def warnings(findings: tuple[Finding, ...]) -> tuple[str, ...]:
@@ -218,7 +241,7 @@ def _estimate(
     place = "for which clearances grow" if grows else "for which the zone does not shrink"
     return _finding(
         "estimate",
-        room >= needed,
+        room - needed,
         f"estimate from {accuracy.source}, {sigmas:g} sigma: a place off by "
         f"{1e3 * reach.clearance:.0f} mm, {place}; a velocity off by "
         f"{1e3 * sigmas * accuracy.velocity:.0f} mm/s and a tilt off by "
@@ -255,7 +278,7 @@ def _actuation(
     )
     return _finding(
         "actuation",
-        wanted <= available,
+        available - wanted,
         f"braking needs {parts} = {wanted:.2f} m/s^2 and the tilt gives {available:.2f}",
         remedy,
     )
@@ -272,7 +295,7 @@ def _room_in_sphere(tuning: BarrierTuning, radius: float) -> Finding:
     at_centre = tuning.approach_speed(radius)
     return _finding(
         "sphere",
-        at_centre >= tuning.lambda_,
+        at_centre - tuning.lambda_,
         f"h2a and h2b at the centre are S(r) = {at_centre:.3f} m/s and lambda is "
         f"{tuning.lambda_:.3f}",
         f"lambda <= {at_centre:.3f} m/s or r >= {stand_off(tuning):.3f} m is enough",
@@ -284,7 +307,7 @@ def _wind_in_sphere(tuning: BarrierTuning, loop: Tube, radius: float) -> Finding
     needed, spare = stand_off(tuning) + loop.wind_beyond, radius - stand_off(tuning)
     return _finding(
         "wind",
-        radius >= needed,
+        radius - needed,
         f"wind that is cancelled can push the base {loop.wind_beyond * 1e3:.0f} mm further off "
         f"its plan when it turns, and the sphere has {spare * 1e3:.0f} mm to spare",
         f"r >= {needed:.3f} m is enough",
@@ -300,7 +323,7 @@ def _links(config: FlightConfig, clearance: float) -> Finding:
     left = math.sqrt(max(clearance**2 - 0.25 * longest**2, 0.0))
     return _finding(
         "links",
-        left > 0.0,
+        left if left > 0.0 else -1.0,
         f"with both ends of a link {clearance * 1e3:.0f} mm from a point, the middle of the "
         f"longest, {longest * 1e3:.0f} mm, keeps {left * 1e3:.0f} mm",
         f"a clearance above {0.5 * longest * 1e3:.0f} mm is enough",
@@ -312,7 +335,7 @@ def _base_tube(tuning: BarrierTuning, loop: Tube, surroundings: DisturbanceModel
     reach, room = base_reach(loop, surroundings.disturbance), stand_off(tuning)
     return _finding(
         "tube",
-        room >= reach,
+        room - reach,
         f"no disturbance within {surroundings.disturbance:g} m/s^2 on one axis pushes the base "
         f"further than {reach * 1e3:.0f} mm off its plan, which keeps {room * 1e3:.0f} mm from "
         f"the boundary: margin {(room - reach) * 1e3:+.0f} mm",
@@ -334,7 +357,7 @@ def _returns(config: FlightConfig, loop: Tube) -> list[Finding]:
     return [
         _finding(
             "return of lambda",
-            room >= 0.0,
+            room,
             f"after little disturbance the plan keeps {kept * 1e3:.0f} mm, and when "
             f"{config.surroundings.disturbance:g} m/s^2 begin on one axis lambda is back with "
             f"{room * 1e3:+.0f} mm left",
@@ -390,7 +413,7 @@ def _tube_of_all_axes(
     reach = _reach(safe_set, across, up)
     return _finding(
         "tube of all axes",
-        room >= reach and whole,
+        room - reach if whole else most - expected,
         f"pushed within {most:.2f} m/s^2 on all axes at once the base can be {across * 1e3:.0f} mm "
         f"off its plan on a horizontal axis and {up * 1e3:.0f} mm vertically, {reach * 1e3:.0f} mm "
         f"towards the boundary, and the plan keeps {room * 1e3:.0f} mm",
@@ -428,7 +451,7 @@ def _end_effector_tube(config: FlightConfig, loop: Tube) -> Finding:
     )
     return _finding(
         "end-effector tube",
-        room >= reach,
+        room - reach,
         f"an end-effector that hangs {surroundings.hanging * 1e3:.0f} mm below the base can be "
         f"pushed {reach * 1e3:.0f} mm across the arm's plane{along}, by the worst disturbance "
         f"({expected * 1e3:.0f} mm expected at random), and the plan keeps {room * 1e3:.0f} mm",
@@ -462,7 +485,7 @@ def _part_tube(config: FlightConfig, zones: list[Zone]) -> Finding:
     most, room = max(far, key=lambda reach: reach.worst), stand_off(config.planner.walls)
     return _finding(
         "part tube",
-        room >= most.worst,
+        room - most.worst,
         f"the worst disturbance on one axis and the tilt against it can move the {most.name} "
         f"{most.worst * 1e3:.0f} mm towards a boundary ({most.expected * 1e3:.0f} mm expected at "
         f"random), and the plan keeps {room * 1e3:.0f} mm",
@@ -492,11 +515,11 @@ def _limits(config: FlightConfig, loop: Tube, surroundings: DisturbanceModel) ->
     worst = max(used, key=lambda name: used[name])
     return _finding(
         "limits",
-        used[worst] <= 1.0,
+        1.0 - used[worst],
         f"the tube holds while no limit is reached: the worst disturbance of {disturbance:g} "
         f"m/s^2 on one axis uses {used[worst]:.0%} of the {worst}",
         f"up to {disturbance / used[worst]:.2f} m/s^2 none is",
-        refuses=False,
+        refuses=used[worst] > _SATURATED,
     )
 
 
@@ -513,7 +536,7 @@ def _turned(config: FlightConfig) -> Finding:
     off = GRAVITY * (pushed + rubbed) / stiffness
     return _finding(
         "turned",
-        off <= _TURNED,
+        _TURNED - off,
         f"friction of its joints turns the base by {rubbed:.1f} rad/s^2, and a push of "
         f"{surroundings.disturbance:g} m/s^2 by {pushed:.1f}: that holds it {1e3 * off:.0f} mm off "
         f"its plan, of {1e3 * _TURNED:.0f} mm",
@@ -535,7 +558,7 @@ def _px4_loops(config: FlightConfig, loop: Tube, others: list[Zone]) -> list[Fin
     px4, holds = config.px4, is_stable(config.px4)
     settles = _finding(
         "PX4's loops",
-        holds,
+        0.0 if holds else -1.0,
         f"PX4's loops {'settle' if holds else 'do not settle'} as they are believed to be: "
         f"PX4_XY_P {px4.position_gain:g}, PX4_XY_V_P {px4.velocity_gain:g}, "
         f"PX4_TILT_KP {px4.tilt_kp:g}, PX4_TILT_KD {px4.tilt_kd:g}, a delay of "
@@ -550,7 +573,7 @@ def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: floa
     margin = (tuning.lambda_ - least) / tuning.slope
     return _finding(
         "sampled",
-        tuning.lambda_ >= least,
+        tuning.lambda_ - least,
         f"rejecting {surroundings.disturbance:g} m/s^2 by planning alone needs lambda >= "
         f"d (1 + k_S T/2) / gamma = {least:.3f} m/s and lambda is {tuning.lambda_:.3f}: margin "
         f"{margin * 1e3:+.0f} mm",
@@ -560,7 +583,7 @@ def _sampled(tuning: BarrierTuning, surroundings: DisturbanceModel, period: floa
 
 
 def _finding(
-    name: str, holds: bool, statement: str, remedy: str, *, refuses: bool = True
+    name: str, left: float, statement: str, remedy: str, *, refuses: bool = True
 ) -> Finding:
-    sentence = statement if holds else f"{statement}; {remedy}"
-    return Finding(name, holds, sentence, refuses)
+    found = Finding(name, left, statement, refuses)
+    return found if found.holds else replace(found, statement=f"{statement}; {remedy}")

@@ -68,7 +68,8 @@ class Parameter:
 
     def waits_for_disarming(self, config: FlightConfig) -> bool:
         """Whether its value in a ``config`` may not come while armed: anybody may send it."""
-        return self.name in _DISARMED or dict(self.choices).get(int(self.read(config))) == _ENDS
+        chosen = dict(self.choices).get(int(self.read(config)))
+        return self.name in _DISARMED or self.path.startswith(_ASSUMED) or chosen == _ENDS
 
     def refusal(self, value: float) -> str | None:
         """Why it cannot have a ``value`` [its unit]; None if the range allows it."""
@@ -84,9 +85,10 @@ class Parameter:
         return f"{self.name} is to be {self.least:g}..{self.most:g}, {value:g} is refused"
 
 
-# Who may let the vehicle go farther, what of it keeps clear, and what makes it fall, are chosen
-# before it flies.
+# Who may let the vehicle go farther, what of it keeps clear, what makes it fall, and what promises
+# are made for, are chosen before it flies.
 _DISARMED: Final = frozenset({"SAFE_OWNER", "PLN_BODY", "CBRK_FLIGHTTERM"})
+_ASSUMED: Final = "surroundings."
 _ENDS: Final = "Terminate"
 _Pid = tuple[float, float, float, float]  # P, I, D and the limit
 _NIL: Final[_Pid] = (0.0, 0.0, 0.0, 0.01)
@@ -262,7 +264,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
     "Barriers": [
         *_barrier("WALL", "planner.walls", "Walls and obstacles"),
         *_barrier("SPH", "planner.workspace", "Workspace sphere"),
-        ("BAR_SLACK", "planner.barrier_slack", "", 0.0, 1e5, "Barrier slack penalty"),
+        ("BAR_SLACK", "planner.barrier_slack", "", 20.0, 1e5, "Barrier slack penalty"),
         ("SUR_DISTURB", "surroundings.disturbance", "m/s^2", 0.0, 3.0,
          "Assumed disturbance per axis (start-up analysis)"),
         ("SUR_HOLD", "surroundings.disturbance_hold", "s", 0.01, 2.0,

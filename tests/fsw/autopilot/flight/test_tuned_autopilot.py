@@ -106,7 +106,6 @@ def test_what_breaks_an_inequality_is_not_taken_while_armed_unless_softly(
     contradict = Condition.PARAMETERS_CONTRADICT.value
     assert ("refused while armed" in begins) is not taken
     assert (contradict in begins) is (mode is Mode.DISARMED), "told once, by its row"
-    assert len(begins) == 1
     # Disarmed it stands against arming from now on.
     assert bool(state.mission.refusals) is (mode is Mode.DISARMED)
 
@@ -121,6 +120,7 @@ def test_what_breaks_an_inequality_is_not_taken_while_armed_unless_softly(
         ("limits.fence_action", 4.0, True),
         ("limits.station_loss_action", 5.0, True),
         ("limits.fence_action", 5.0, False),
+        ("surroundings.disturbance", 0.0, True),
     ],
 )
 def test_what_would_let_anybody_end_the_flight_waits_for_disarming(
@@ -132,6 +132,24 @@ def test_what_would_let_anybody_end_the_flight_waits_for_disarming(
     armed = mode is Mode.HOLD
     assert outputs.tuning_taken is not (waits and armed)
     assert any("while disarmed" in one.text for one in outputs.texts) is (waits and armed)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.DISARMED])
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("tuning.tracking.jerk_limit", 2.0),
+        ("tuning.tracking.acceleration_limit", 0.5),
+        ("planner.walls.lambda_", 0.1),
+    ],
+)
+def test_while_armed_no_promise_becomes_weaker(path: str, value: float, mode: Mode) -> None:
+    """A vehicle that was not let jerk flew into the wall, with a warning."""
+    loop = TunedAutopilot(CONFIG)
+    _, outputs = tick(loop, walled(mode), ((path, value),))
+    assert outputs.tuning_taken is (mode is Mode.DISARMED)
+    assert any("refused while armed" in one.text for one in outputs.texts) is (mode is Mode.HOLD)
 
 
 def test_what_is_broken_already_is_no_reason_against_another_change() -> None:

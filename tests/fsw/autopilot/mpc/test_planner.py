@@ -127,6 +127,29 @@ def test_a_wall_between_vehicle_and_target_is_kept_without_slack() -> None:
     assert (speed_left > 0.0).all()
 
 
+@pytest.mark.requirement("REQ-SAFE-9")
+@pytest.mark.parametrize(
+    ("weight", "value"),
+    [
+        ("inputs", 10.0),
+        ("inputs", 100.0),
+        ("tracking", 1000.0),
+        ("tracking_terminal", 5000.0),
+        ("velocity_terminal", 5000.0),
+    ],
+)
+@pytest.mark.parametrize("speed", [0.4, 0.6])
+def test_a_wall_outweighs_whatever_a_weight_is_set_to(
+    speed: float, weight: str, value: float
+) -> None:
+    """Inputs that cost 500 times as much, set on the way to a wall, flew a rotor into it."""
+    asked = hovering((0.5, 0.0, -1.2))._replace(v=(speed, 0.0, 0.0)), below((3.0, 0.0, -1.2)), AHEAD
+    usual = planned(planner().plan(request(*asked)))
+    weights = replace(CONFIG.weights, **{weight: value})
+    answer = planned(planner(replace(CONFIG, weights=weights)).plan(request(*asked)))
+    assert answer.slack_max < usual.slack_max + 0.01
+
+
 def test_outside_the_safe_set_it_is_softened_and_the_plan_returns() -> None:
     start = hovering((1.2, 0.0, -1.2))  # beyond the wall
     answer = planned(planner().plan(request(start, below(start.p), AHEAD)))

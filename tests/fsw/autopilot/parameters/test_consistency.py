@@ -21,6 +21,7 @@ from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet
+from fsw.autopilot.tuning import tuned
 from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.1),))
@@ -224,3 +225,12 @@ def test_a_slower_planner_brings_lambda_back_later() -> None:
     slower = replace(config, plan_delay_ticks=100)
     loop = loop_tube(config)
     assert return_room(slower, loop, 0.2) < return_room(config, loop, 0.2) - 0.002
+
+
+def test_a_loop_that_saturates_at_half_the_disturbance_keeps_the_vehicle_on_the_ground() -> None:
+    """It flew into a wall in still air."""
+    config = flight_config(body="points")
+    for jerk, refused in ((20.0, False), (2.0, True)):
+        changed = tuned(config, (("tuning.tracking.jerk_limit", jerk),))
+        found = analyse(changed, WALLS, loop_tube(changed))
+        assert any("no limit is reached" in why for why in refusals(found)) is refused
