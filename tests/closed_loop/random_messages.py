@@ -4,17 +4,19 @@ Frames are made, cut and handed on as a link does, to the inbox and to the servi
 parameters, each from one of a few senders: the simulator, a ground station, and two strangers, one
 of whom writes the ids of the first. Half of what is drawn is any payload at all, half is what an
 adversary would send: zones on and around the vehicle, targets below the ground and far away,
-setpoints, missions and fences, and mode after mode. Left out is what ends a flight by its meaning
-(termination, disarming by force), and parameters that somebody may set are not drawn with their
-names: who may set a gain needs no message to crash.
+setpoints, missions and fences, mode after mode, and parameters, at an end of a range or between.
+Left out is what ends a flight by its meaning (termination, disarming by force), and the speed that
+is judged.
 """
 
 from __future__ import annotations
 
 import math
 import random
+import struct
 from collections import Counter, deque
 from collections.abc import Callable
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -24,6 +26,7 @@ from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.signals import (
     Arm,
     Command,
@@ -34,6 +37,7 @@ from fsw.autopilot.signals import (
     Place,
     SwitchMode,
     TakeOff,
+    TickInputs,
     TickOutputs,
     Vec3,
 )
@@ -99,8 +103,22 @@ _MAIN_SUB: Final = (
     (6, 0),
 )
 _ANY: Final = (math.nan, math.inf, -math.inf, 3.396e38, -3.4e38, 1e20, 1e30, 0.0, -1.0, 1e4)
+_SET: Final = [one for one in PARAMETERS if one.name != "STR_V_MAX"]
 _STREAM_S: Final = 0.1
 _QUIET_S: Final = 2.0  # of a message's follow-ups
+
+
+class _AtOnce(Executor):
+    """Does what it is handed before it returns."""
+
+    def submit(self, job: Callable[..., Any], /, *about: Any, **more: Any) -> Future[Any]:
+        """See ``Executor``."""
+        done: Future[Any] = Future()
+        try:
+            done.set_result(job(*about, **more))
+        except ValueError as error:
+            done.set_exception(error)
+        return done
 
 
 @dataclass
@@ -137,9 +155,10 @@ class Talkers:
                 clearance=lambda: config.limits.fence_clearance,
             )
         )
-        parameters = ParameterStore(config, self.flight.prepare)
+        self.parameters = ParameterStore(config, self.flight.prepare)
+        self.parameters.open(_AtOnce(), save=lambda values: None)
         self.services: list[LinkService] = [
-            MissionService(self.missions), ParameterService(parameters)
+            MissionService(self.missions), ParameterService(self.parameters)
         ]  # fmt: skip
         planner = InlinePlanner(Planner(config.planner, config.airframe, processor_time_us))
         self.loop = ClosedLoop(self.simulation, self.flight.tick, planner, config.airframe)
@@ -207,7 +226,7 @@ class Talkers:
         chance.choice(
             (self._targets, self._targets, self._setpoints, self._setpoints, self._attitudes,
              self._joints, self._mode, self._mode, self._places, self._speeds, self._mission,
-             self._fence, self._nothing)
+             self._fence, self._nothing, self._parameter)
         )(sender)  # fmt: skip
 
     def near(self, spread: float = 1.5) -> Vec3:
@@ -420,6 +439,22 @@ class Talkers:
             mission_type=1,
         )  # fmt: skip
 
+    def _parameter(self, sender: MessageSource) -> None:
+        """Any of them, at an end of its range, between, or near what it is."""
+        chance, one = self.chance, self.chance.choice(_SET)
+        now, values = self.parameters.values[one.name], (one.least, one.most)
+        value = chance.choice((*values, chance.uniform(*values), now * chance.uniform(0.5, 2.0)))
+        if one.choices:
+            value = chance.choice(one.choices)[0]
+        value = round(value) if one.integer else value
+        if self.loop.state.vehicle.armed or not self.wall:  # disarmed, whose wall it is may be set
+            bits = struct.unpack("<f", struct.pack("<i", value))[0] if one.integer else value
+            self.send(
+                sender, ids.PARAM_SET, param_id=one.name.encode(), param_value=bits,
+                param_type=dialect.MAV_PARAM_TYPE_INT32 if one.integer
+                else dialect.MAV_PARAM_TYPE_REAL32,
+            )  # fmt: skip
+
     def _nothing(self, sender: MessageSource) -> None:
         self.send(sender, ids.MISSION_CLEAR_ALL, mission_type=self.chance.choice((0, 1, 255)))
 
@@ -447,6 +482,24 @@ class Talkers:
             for action in wanted
         )
 
+    def _inputs(self, time_s: float, outputs: TickOutputs | None) -> TickInputs:
+        """What the next tick is given."""
+        sensors, samples = self.loop.observe()
+        inputs = self.inbox.take_inputs(
+            sensors,
+            self.loop.planner.take(sensors.t_us),
+            self.parameters.take_tuning(),
+            self.missions.take_update(),
+        )
+        heard_now = inputs.ground_station_heard or self.simulation.step % 500 == 0
+        return replace(
+            inputs,
+            samples=samples,
+            commands=(*inputs.commands, *self._operator(time_s, outputs)),
+            announced=(*self.loop.announced(), *inputs.announced),
+            ground_station_heard=heard_now,
+        )
+
     @collector_off()
     def fly(self, seconds: float, rate: float) -> Outcome:
         """Fly while ``rate`` [1/s] messages are drawn."""
@@ -462,18 +515,10 @@ class Talkers:
                 self.later = [one for one in self.later if one[0] > time_s]
                 for action in due:
                     action()
-            sensors, samples = loop.observe()
-            inputs = self.inbox.take_inputs(
-                sensors, loop.planner.take(sensors.t_us), None, self.missions.take_update()
-            )
-            inputs = replace(
-                inputs,
-                samples=samples,
-                commands=(*inputs.commands, *self._operator(time_s, outputs)),
-                announced=(*loop.announced(), *inputs.announced),
-                ground_station_heard=inputs.ground_station_heard or simulation.step % 500 == 0,
-            )
+            inputs = self._inputs(time_s, outputs)
             outputs = loop.step(inputs)
+            if inputs.tuning is not None:
+                self.parameters.settle(outputs.tuning_taken)
             self.missions.observe(outputs.snapshot)
             outcome.modes[outputs.snapshot.mode.value] += 1
             outcome.texts.extend((round(time_s, 2), one.text) for one in outputs.texts)
