@@ -250,7 +250,7 @@ def test_a_requirement_is_not_met_by_flights_that_prove_nothing(tmp_path: Path) 
     assert main([str(directory), "--require=margin>=0.01"]) == 0
 
 
-@pytest.mark.parametrize("text", ["p>0.1", "speed<3", "margin"])
+@pytest.mark.parametrize("text", ["p>0.1", "speed<3", "margin", "p<0.\u0661", "p<1e", "p<1@9.9.9%"])
 def test_what_is_no_requirement_is_refused(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
