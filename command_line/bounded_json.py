@@ -75,8 +75,9 @@ def unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """
     found = dict(pairs)
     if len(found) < len(pairs):
-        name, times = Counter(name for name, _ in pairs).most_common(1)[0]
-        raise JsonError(f"has {shown(name)} {times} times in one object: leave one")
+        counts = Counter(name for name, _ in pairs)
+        name = next(name for name, times in counts.items() if times > 1)
+        raise JsonError(f"has {shown(name)} {counts[name]} times in one object: leave one")
     return found
 
 
