@@ -1,13 +1,15 @@
-"""JSON that somebody else may have written: an object of bounded depth with finite numbers."""
+"""JSON that somebody else may have written: bounded, with finite numbers and no name twice."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from command_line.bounded_file import read_bounded
+from command_line.toml_tables import SHOWN, shown
 
 MAX_DEPTH: Final = 16  # of arrays and objects in each other; what we write has 5
 _LARGEST: Final = 1 << 64  # of an integer
@@ -40,11 +42,13 @@ def json_object(text: str | bytes, *, not_finite: bool = False) -> dict[str, Any
 
     Raises:
         JsonError: It is no JSON, no object, nested too deeply, or has a value that JSON does not
-            have: NaN, a number beyond a double or 64 bits, a text that is no Unicode.
+            have: NaN, a number beyond a double or 64 bits, a text that is no Unicode; or a name is
+            twice in one object.
     """
     try:
-        found = json.loads(
+        found = json.loads(  # noqa: TID251
             text,
+            object_pairs_hook=unrepeated,
             parse_constant=float if not_finite else _no_number,
             parse_float=_finite,
             parse_int=_in_range,
@@ -61,6 +65,22 @@ def json_object(text: str | bytes, *, not_finite: bool = False) -> dict[str, Any
     return found
 
 
+def unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The object of these pairs: what ``json.loads`` is to call for each, as its hook for pairs.
+
+    Without it the last of several values of a name counts, and other readers take the first.
+
+    Raises:
+        JsonError: A name is there twice.
+    """
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        counts = Counter(name for name, _ in pairs)
+        name = next(name for name, times in counts.items() if times > 1)
+        raise JsonError(f"has {shown(name)} {counts[name]} times in one object: leave one")
+    return found
+
+
 def json_numbers(text: str | bytes) -> dict[str, float]:
     """The numbers by name that a text is; true and false count as 1 and 0.
 
@@ -70,7 +90,7 @@ def json_numbers(text: str | bytes) -> dict[str, float]:
     found = json_object(text)
     for name, value in found.items():
         if not isinstance(value, int | float):
-            raise JsonError(f"has a wrong value: {name} must be a number")
+            raise JsonError(f"has a wrong value: {name[:SHOWN]} must be a number")
     return found
 
 

@@ -22,6 +22,7 @@ _PLAIN: Final = {
     "ß": "ss",
     "≤": "<=", "≥": ">=", "±": "+/-", "λ": "lambda", "σ": "sigma", "μ": "u", "µ": "u", "·": "*",
 }  # fmt: skip
+_MAX_SENTENCE: Final = 1000  # characters
 
 
 def print_anything() -> None:
@@ -73,7 +74,14 @@ def print_error(program: str, sentence: object) -> None:
     if isinstance(sentence, OSError) and sentence.strerror:
         where = "" if sentence.filename is None else f"{sentence.filename}: "
         sentence = f"{where}{sentence.strerror}"
-    say(f"{program}: {sentence}", sys.stderr)
+    say(f"{program}: {_shortened(str(sentence))}", sys.stderr)
+
+
+def _shortened(sentence: str) -> str:
+    """The sentence without its middle if it is long: a name or value of a file may have 1 MB."""
+    if len(sentence) <= _MAX_SENTENCE:
+        return sentence
+    return f"{sentence[: _MAX_SENTENCE // 2]}…{sentence[-_MAX_SENTENCE // 2 :]}"
 
 
 def command_name(program: str = "pandion") -> str:

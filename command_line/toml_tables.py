@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import math
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -155,11 +154,7 @@ class TableReader:
     def _number(self, value: Any, allowed: Range, path: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(f"{path} = {shown(value)}: must be a number ({allowed})")
-        try:
-            number = float(value)
-        except OverflowError:
-            # An integer beyond all floats; infinity may be allowed, and is not meant.
-            number = math.nan
+        number = float(value)  # of an integer as well: toml_table lets none pass beyond all floats
         if not allowed.contains(number):
             raise self.error(f"{path} = {shown(value)}: must be {allowed}")
         return number

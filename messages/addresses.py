@@ -15,7 +15,9 @@ Address: TypeAlias = tuple[str, int]
 """Host and port of a UDP socket; of a stream its name and its port or baud."""
 
 FORMS: Final = "udp:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD"
-_FORM: Final = re.compile(r"(?P<kind>udp|tcp|tcpin|serial):(?P<where>[^\0]+):(?P<number>\d{1,9})")
+_FORM: Final = re.compile(
+    r"(?P<kind>udp|tcp|tcpin|serial):(?P<where>[^\0]+):(?P<number>\d{1,9})", re.ASCII
+)
 _HOST: Final = re.compile(r"[^:\s]+")
 _SLOWEST, _FASTEST = 9_600, 4_000_000  # baud
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,9 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.bounded_file import read_bounded
+from command_line.bounded_json import JsonError
 from command_line.options import group, json_file, option, read
 from command_line.output import console_beside, json_text, print_error, try_write
 from command_line.parser import COULD_NOT_START
+from command_line.toml_tables import shown
 from command_line.values import number, whole
 from pandion.cluster_options import ClusterOptions, campaign_of
 from pandion.display import Display
@@ -28,6 +29,9 @@ CERTIFIED, DIFFERS = 0, 1  # exit codes
 _INTERRUPTED: Final = 1  # as well
 PAGE = "certificate.html"
 _MAX_BYTES: Final = 64 * 1024 * 1024  # of a page that is read
+_LEAST, _MOST = 0.5, 0.999999  # confidence [1]
+_MAX_REFITS: Final = 100_000
+_WRITTEN: Final = "give what `pandion certify` has written"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +42,7 @@ class CertifyOptions:
         "CAMPAIGN_DIR", "directory that `pandion campaign` has written", Path, required=True
     )
     confidence: float = option(
-        "--confidence P", "of every bound and interval", number(0.5, 0.999999, ""), default=0.95
+        "--confidence P", "of every bound and interval", number(_LEAST, _MOST, ""), default=0.95
     )
     verify: Path | None = option(
         "--verify FILE",
@@ -151,7 +155,7 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
     written = options.html or options.campaign / PAGE
     lost = try_write(options.json, json_text(stated, 1) + "\n")
     lost += try_write(written, page(stated, result))
-    display.say(f"page {written}; {stated['commands'][0]} --verify {written}")
+    display.say(f"page {written}; pandion certify {options.campaign} --verify {written}")
     for what in lost:
         print_error("pandion certify", f"cannot write {what}")
     met = all(one["met"] for one in stated.get("required", ()))
@@ -160,21 +164,22 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
 
 def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
     from studies.statistics.certificate import certificate, differences, tampered
+    from studies.statistics.certificate_page import page_differences
 
-    stated = _statement(path)
+    stated, text = _statement(path)
     display = Display(console_beside(options.json))
     found = certificate(
         result, options.campaign, stated["confidence"], stated["refits"], _stated_required(stated)
     )
-    wrong = differences(stated, found)
+    wrong = differences(stated, found) or list(page_differences(text, found, result))
     if tampered(stated):
         wrong.insert(0, "the certificate was changed: its digest is not that of its statement")
     for line in wrong:
         display.say(line)
     if not wrong:
         display.say(f"{path} is what {options.campaign} shows, digest {stated['digest']}")
-    text = json_text({"same": not wrong, "differences": wrong}, 1) + "\n"
-    for what in try_write(options.json, text):
+    said = json_text({"same": not wrong, "differences": wrong}, 1) + "\n"
+    for what in try_write(options.json, said):
         print_error("pandion certify", f"cannot write {what}")
     return DIFFERS if wrong else CERTIFIED
 
@@ -184,36 +189,55 @@ def _stated_required(stated: dict[str, Any]) -> list[Requirement]:
 
     try:
         return [requirement(one["text"]) for one in stated.get("required", ())]
-    except (TypeError, KeyError, ValueError) as error:
+    except ValueError as error:
         raise NoCertificateError(f"what the certificate requires cannot be read: {error}") from None
 
 
-def _statement(path: Path) -> dict[str, Any]:
+def _statement(path: Path) -> tuple[dict[str, Any], str]:
+    """The statement that a file holds, and the text of the file."""
     from studies.statistics.certificate import FORMAT
     from studies.statistics.certificate_page import statement_in
 
+    none = f"{path} holds no certificate of this version"
     try:
-        stated = statement_in(read_bounded(path, _MAX_BYTES).decode("utf-8"))
+        text = read_bounded(path, _MAX_BYTES).decode("utf-8")
+        stated = statement_in(text)
     except UnicodeDecodeError:
-        stated = None
-    if stated is None or stated.get("format") != FORMAT:
-        raise NoCertificateError(
-            f"{path} holds no certificate of this version; give what `pandion certify` has written"
-        )
-    if not _finite(stated):
-        raise NoCertificateError(
-            f"{path} holds no certificate: a number is not finite, and no certificate has such"
-        )
+        raise NoCertificateError(f"{none}: it is not UTF-8; {_WRITTEN}") from None
+    except JsonError as problem:
+        raise NoCertificateError(f"{none}: it {problem}; {_WRITTEN}") from None
+    if stated.get("format") != FORMAT:
+        raise NoCertificateError(f"{none}; {_WRITTEN}")
+    _check_used(stated, path)
+    return stated, text
+
+
+def _check_used(stated: dict[str, Any], path: Path) -> None:
+    """Refuse other types of what is used to compute it again; all else is compared with that."""
     confidence, refits = stated.get("confidence"), stated.get("refits")
-    known = isinstance(confidence, float) and 0.0 < confidence < 1.0
-    if not known or not isinstance(refits, int) or not 1 <= refits <= 100_000:
-        raise NoCertificateError(f"{path}: confidence or refits is no number that can be used")
-    return stated
+    required = stated.get("required", [])
+    for name, known, allowed in (
+        (
+            "confidence",
+            type(confidence) is float and _LEAST <= confidence <= _MOST,
+            f"a number from {_LEAST:g} to {_MOST:g}",
+        ),
+        (
+            "refits",
+            type(refits) is int and 1 <= refits <= _MAX_REFITS,
+            f"a whole number from 1 to {_MAX_REFITS}",
+        ),
+        (
+            "required",
+            isinstance(required, list) and all(map(_has_text, required)),
+            'an array of objects that each have a "text", such as "p<0.01@95%"',
+        ),
+    ):
+        if not known:
+            raise NoCertificateError(
+                f"{path}: {name} = {shown(stated.get(name))}: must be {allowed}; {_WRITTEN}"
+            )
 
 
-def _finite(stated: dict[str, Any]) -> bool:
-    try:
-        json.dumps(stated, allow_nan=False)
-    except (ValueError, RecursionError):
-        return False
-    return True
+def _has_text(one: Any) -> bool:
+    return isinstance(one, dict) and isinstance(one.get("text"), str)

@@ -136,7 +136,7 @@ class Child:
 def _event(line: bytes) -> Event | None:
     """An event, or None for a line that some library printed."""
     try:
-        event = json.loads(line)
+        event = json.loads(line)  # noqa: TID251  # of our own process, or none
     except ValueError:
         return None
     return event if isinstance(event, dict) and "event" in event else None

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from command_line.bounded_json import JsonError, read_json
 from command_line.output import json_text
 from sitl.result import TruthResult
 from sitl.scenario import Scenario
 from studies.flight.job import Outcome
+
+_MAX_BYTES: Final = 16 * 1024 * 1024  # of result.json
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -77,12 +79,18 @@ class Log:
 
     @cached_property
     def metrics(self) -> Mapping[str, Any]:
-        """``result.json`` beside the log; empty where there is none."""
+        """``result.json`` beside the log; empty where there is none.
+
+        Raises:
+            ValueError: It is damaged.
+        """
         file = (self.path if self.path.is_dir() else self.path.parent) / "result.json"
-        found: dict[str, Any] = {}
-        if file.exists():
-            found = json.loads(file.read_text(encoding="utf-8"))
-        return found
+        try:
+            return read_json(file, _MAX_BYTES)
+        except FileNotFoundError:
+            return {}
+        except JsonError as problem:
+            raise ValueError(f"{file} {problem}") from None
 
     def frame(self, topic: str) -> Any:
         """A topic as a pandas DataFrame with the time [s] as its index.

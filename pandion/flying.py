@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from typing import Any, Final, Literal, TypeVar, get_args
 
 import numpy as np
 
+from command_line.bounded_json import read_json
 from command_line.revision import revision
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import CONTROLLERS, FlightConfig, flight_config
@@ -45,6 +45,7 @@ from studies.flight.result import FlightResult
 
 Tracking = Literal["lqr", "pid"]
 Word = TypeVar("Word", bound=str)
+_MAX_BYTES: Final = 16 * 1024 * 1024  # of a result that is read
 _INNER: Final[dict[str, Literal["tracking", "pid"]]] = {"lqr": "tracking", "pid": "pid"}
 
 
@@ -321,8 +322,8 @@ def _in_two_processes(
     )
     if not (out / "sitl.json").exists():
         raise RuntimeError(ran.stderr.strip() or "the flight could not be started")
-    metrics = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    found = json.loads((out / "sitl.json").read_text(encoding="utf-8"))
+    metrics = read_json(out / "result.json", _MAX_BYTES)
+    found = read_json(out / "sitl.json", _MAX_BYTES)
     known = TruthResult.__dataclass_fields__
     found["limits"] = {key: LimitUse(**use) for key, use in found["limits"].items()}
     found["touches"] = {name: TouchUse(**use) for name, use in found["touches"].items()}

@@ -11,6 +11,7 @@ from typing import Any, Final, TypeVar, get_args
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.toml_tables import TableReader, nearest, shown
+from command_line.values import plain_float
 from sitl.ranges import ROUNDED
 from sitl.scenario import (
     V3,
@@ -240,10 +241,7 @@ def read_points(path: Path) -> tuple[dict[str, list[Any]], bytes]:
         )
     found: list[list[float]] = []
     for number, line in rows[1:]:
-        try:
-            values = [float(word) for word in line.split(",")]
-        except ValueError:
-            values = []
+        values = [plain_float(word) for word in line.split(",")]
         if len(values) != len(head) or not all(map(math.isfinite, values)):
             raise ScenarioError(
                 f"points {path}, line {number}: must be {len(head)} finite numbers, is "

@@ -12,6 +12,7 @@ from typing import Any, Final, get_type_hints
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.toml_tables import TableReader, shown
+from command_line.values import plain_float
 from vehicles.description import ROTORS_MAX, Rotor
 from vehicles.vehicle_file import VehicleError
 
@@ -76,10 +77,7 @@ def rotors_from_parameters(text: str) -> tuple[tuple[Rotor, ...], list[str]]:
         at = next((k for k, word in enumerate(words) if word.startswith("CA_ROTOR")), None)
         if at is None or line.lstrip().startswith("#"):
             continue
-        try:
-            value = float(words[at + 1])
-        except (IndexError, ValueError):
-            value = math.nan
+        value = plain_float("".join(words[at + 1 : at + 2]))
         if not abs(value) <= _MAX_VALUE or len(words[at]) > _MAX_NAME:
             raise VehicleError(
                 f"line {number} = {shown(line)}: must be a name of at most {_MAX_NAME} characters "

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.toml_tables import nearest, shown
+from command_line.values import plain_float
 from vehicles.description import (
     V3,
     V6,
@@ -195,10 +196,7 @@ def _numbers(element: ET.Element | None, key: str, default: V3) -> Array:
     text = element.get(key) if element is not None else None
     if text is None:
         return np.array(default)
-    try:
-        found = np.array([float(word) for word in text.split()])
-    except ValueError:
-        found = np.zeros(0)
+    found = np.array([plain_float(word) for word in text.split()])
     if found.shape != (3,) or not (np.abs(found) <= _MOST).all():
         raise VehicleError(f"{key} = {shown(text)}: must be 3 numbers of at most {_MOST:g}")
     return found
@@ -208,10 +206,7 @@ def _number(element: ET.Element | None, key: str, default: float) -> float:
     text = element.get(key) if element is not None else None
     if text is None:
         return default
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = plain_float(text)
     if not abs(value) <= _MOST:
         raise VehicleError(f"{key} = {shown(text)}: must be a number of at most {_MOST:g}")
     return value

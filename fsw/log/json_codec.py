@@ -17,6 +17,8 @@ from typing import Any, Final, NamedTuple
 
 import orjson
 
+from command_line.bounded_json import unrepeated
+
 _NULL: Final = b"null"
 
 Convert = Callable[[Any], Any]
@@ -75,7 +77,8 @@ class JsonCodec:
             ValueError: The text is not what :meth:`encode` writes.
         """
         try:
-            return self._codecs[name].read(json.loads(text))
+            found = json.loads(text, object_pairs_hook=unrepeated)  # noqa: TID251  # NaN is in it
+            return self._codecs[name].read(found)
         except (TypeError, LookupError, AttributeError, ArithmeticError, ValueError) as error:
             raise ValueError(f"input {name} cannot be read: {error}") from None
         except RecursionError:

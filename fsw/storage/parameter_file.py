@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import codecs
 import contextlib
+import math
 import os
 import tempfile
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from command_line.bounded_file import read_bounded
+from command_line.values import plain_float
 from fsw.autopilot.parameters.facts import ALIASES, FACT_BY_NAME
 from fsw.autopilot.parameters.param_type import as_text, field_of, nearest_decimal
 from fsw.autopilot.parameters.registry import BY_NAME
@@ -142,10 +144,9 @@ def _entry(words: list[str]) -> dict[str, float]:
     parameter, fact = BY_NAME.get(ALIASES.get(name, name)), FACT_BY_NAME.get(name)
     if parameter is None and fact is None:
         raise ValueError(f"{name[:40]} is unknown")
-    try:
-        value = float(number)
-    except ValueError:
-        raise ValueError(f"{number[:40]} is not a number") from None
+    value = plain_float(number)
+    if math.isnan(value):
+        raise ValueError(f"{number[:40]} is not a number")
     if parameter is None:
         assert fact is not None
         # A file that a ground station saved holds them as well, and they say nothing new.

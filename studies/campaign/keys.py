@@ -151,7 +151,7 @@ def _range_at(value: Any, path: list[str], key: str) -> Range:
     allowed: Range | None = None
     for name in path:
         if isinstance(value, tuple):
-            if not name.isdecimal() or int(name) >= len(value):
+            if name not in map(str, range(len(value))):
                 known = ", ".join(str(i) for i in range(len(value))) or "none"
                 raise CampaignError(f'unknown key "{key}": "{name}" is not a place ({known})')
             value = value[int(name)]

@@ -9,6 +9,7 @@ campaign.html   the page
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 from collections.abc import Callable, Iterable
@@ -126,9 +127,9 @@ def _known_facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal]:
     kept = _facts(directory)
     if kept is None:
         raise CampaignError(
-            f"{directory} is no directory of a campaign: {FACTS} is not there, is damaged or of "
-            "another version; give what `pandion campaign --out` was given, or mend it with that "
-            "command"
+            f"{directory} is no directory of a campaign: {FACTS} is not there, is damaged, was "
+            "changed or is of another version; give what `pandion campaign --out` was given, or "
+            "mend it with that command"
         )
     return kept
 
@@ -138,10 +139,11 @@ def _facts(directory: Path) -> tuple[dict[str, Any], Digests, int, Seal] | None:
     try:
         facts = read_json(directory / FACTS, _MAX_BYTES)
         digests, asked = Digests(**facts["digests"]), facts["flights"]
+        whole = sealed_facts(facts) == facts
         sealed = kept_row(Seal, facts.pop("journal"))
     except (OSError, ValueError, TypeError, KeyError):
         return None
-    known = all(isinstance(one, str) for one in asdict(digests).values())
+    known = whole and all(isinstance(one, str) for one in asdict(digests).values())
     if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MAX_FLIGHTS:
         return None
     return (facts, digests, asked, sealed) if known else None
@@ -255,18 +257,20 @@ def write_facts(
 
     ``seal`` is that of the journal: what it has now, it must have for ever.
     """
-    facts = {
-        "name": plan.name,
-        "flights": asked,
-        "digests": asdict(Digests(plan.digest, code(), packages())),
-        "journal": asdict(seal),
-        "version": version(),
-        "seed": plan.seed,
-        "design": plan.design,
-        "cases": [str(case) for case in plan.cases],
-        "varied": [str(one) for one in plan.varied],
-        **(more or {}),
-    }
+    facts = sealed_facts(
+        {
+            "name": plan.name,
+            "flights": asked,
+            "digests": asdict(Digests(plan.digest, code(), packages())),
+            "journal": asdict(seal),
+            "version": version(),
+            "seed": plan.seed,
+            "design": plan.design,
+            "cases": [str(case) for case in plan.cases],
+            "varied": [str(one) for one in plan.varied],
+            **(more or {}),
+        }
+    )
     unfinished = directory / f"{FACTS}.new"
     with unfinished.open("w", encoding="utf-8") as file:
         file.write(json_text(facts, 1) + "\n")
@@ -279,6 +283,12 @@ def write_facts(
     finally:
         os.close(folder)
     return facts
+
+
+def sealed_facts(facts: dict[str, Any]) -> dict[str, Any]:
+    """The facts with the digest of all of them, the seal of the journal too, as their ``seal``."""
+    own = {name: part for name, part in facts.items() if name != "seal"}
+    return own | {"seal": hashlib.sha256(json_text(own).encode()).hexdigest()}
 
 
 def _check_same(directory: Path, there: CampaignResult, own: Digests) -> None:

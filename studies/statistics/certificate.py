@@ -19,7 +19,7 @@ import numpy as np
 
 from command_line.version import version
 from fsw.autopilot.tuning import flat
-from studies.campaign.flight import CampaignFlight, CampaignRow
+from studies.campaign.flight import CampaignFlight, CampaignRow, code
 from studies.campaign.keys import (
     AIR,
     FAULT,
@@ -38,7 +38,7 @@ from studies.statistics.extremes import NoFitError, fit_tail
 from studies.statistics.requirement import Requirement, judge
 from studies.statistics.violations import ANY, VIOLATIONS, violates
 
-FORMAT: Final = "pandion-certificate-2"
+FORMAT: Final = "pandion-certificate-3"
 _DIGITS: Final = 10  # of what is computed, so that the last bits of another machine do not count
 _QUANTILES: Final = (0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0)
 _MAX_FITS: Final = 8
@@ -100,7 +100,8 @@ def certificate(
         "random": sorted(_drawn(result)),
         "not_varied": list(_not_varied(result)),
         "versions": {
-            "flown": result.facts.get("version", "unknown"),
+            # Of the rows nothing but the digest of the code is known for certain.
+            "flown": version() if result.digests.code == code() else "not known: by other code",
             "certified": version(),
         },
         "digests": {
@@ -112,8 +113,8 @@ def certificate(
         },
         **_required(result, confidence, required),
         "commands": [
-            f"pandion certify {directory} --confidence {confidence!r}",
-            f"pandion campaign {directory / PLAN} --flights {result.asked} --out AGAIN",
+            f"pandion certify DIR --confidence {confidence!r}",
+            f"pandion campaign DIR/{PLAN} --flights {result.asked} --out AGAIN",
         ],
     }
     rounded = _rounded(statement)
@@ -176,9 +177,9 @@ def _required(
 
 
 def differences(stated: Any, found: Any, path: str = "") -> list[str]:
-    """Where two statements differ, a sentence each; the commands may name other directories."""
+    """Where two statements differ, a sentence each."""
     if isinstance(stated, dict) and isinstance(found, dict):
-        keys = sorted({*stated, *found} - ({"commands"} if not path else set()))
+        keys = sorted({*stated, *found})
         return [
             line
             for key in keys
@@ -213,8 +214,8 @@ def digest(value: Any) -> str:
 
 
 def _signed(statement: dict[str, Any]) -> dict[str, Any]:
-    """What the digest covers: all but itself and the directory in the commands."""
-    return {key: part for key, part in statement.items() if key not in ("digest", "commands")}
+    """What the digest covers: all but itself."""
+    return {key: part for key, part in statement.items() if key != "digest"}
 
 
 def _short(value: Any) -> str:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import html
-import json
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import Any, Final
 
+from command_line.bounded_json import json_object
 from command_line.html_page import document, items, table, verdict
 from command_line.output import json_text
 from studies.campaign.store import CampaignResult
-from studies.drawing import BASE, WALL, NoMatplotlibError, drawable, sheet
+from studies.drawing import BASE, WALL, drawable
 from studies.statistics.violations import ANY, VIOLATIONS
 
 _HOLDER: Final = ('<script type="application/json" id="certificate">', "</script>")
+_HELD: Final = re.compile("(.*?)".join(map(re.escape, _HOLDER)), re.DOTALL)
 _MAX_DRAWN: Final = 8
+_BARS: Final = 50
 
 MEANING: Final = (
     "The bounds are of Clopper and Pearson. They hold for flights drawn as these were, whatever "
@@ -106,10 +110,7 @@ def page(stated: dict[str, Any], result: CampaignResult) -> str:
     for one in stated["margins"]:
         text = f"{one['name']}: {_margin_sentence(one)}. {tail_sentence(one['tail'])}."
         parts.append(f"<p>{html.escape(text)}</p>")
-    try:
-        parts.append(_histograms(stated, result))
-    except NoMatplotlibError as error:
-        parts.append(f"<p>No figures: {html.escape(str(error))}</p>")
+    parts += _histograms(stated, result)
     for name in ("varied", "random", "not_varied"):
         heading = {"varied": "Varied", "random": "Random in every flight"}.get(name, "Not varied")
         parts += [f"<h2>{heading}</h2>", items(stated[name] or ["nothing"])]
@@ -121,15 +122,32 @@ def page(stated: dict[str, Any], result: CampaignResult) -> str:
     return document(title, parts)
 
 
-def statement_in(text: str) -> dict[str, Any] | None:
-    """The statement in the text of a JSON file or of a page; None if there is none."""
-    begin, end = map(re.escape, _HOLDER)
-    held = re.search(f"{begin}(.*?){end}", text, re.DOTALL)
-    try:
-        found = json.loads(held[1] if held else text)
-    except (ValueError, RecursionError):
-        return None
-    return found if isinstance(found, dict) else None
+def statement_in(text: str) -> dict[str, Any]:
+    """The statement in the text of a JSON file or of a page.
+
+    Raises:
+        JsonError: There is none.
+    """
+    held = _HELD.search(text)
+    return json_object(held[1] if held else text)
+
+
+def page_differences(text: str, stated: dict[str, Any], result: CampaignResult) -> Iterator[str]:
+    """Where a page is first not as it is written for a statement; nothing of a JSON file.
+
+    People read the page and not the statement in it, so all of it must be so: it depends on nothing
+    but the statement, the rows and this version.
+    """
+    if not _HELD.search(text):
+        return
+    lines = zip_longest(text.split("\n"), page(stated, result).split("\n"))
+    for number, (one, other) in enumerate(lines, start=1):
+        if one != other:
+            yield (
+                f"line {number} of the page is not as it is written for its statement: the page "
+                "was changed, or is of another version"
+            )
+            return
 
 
 def _findings(stated: dict[str, Any]) -> str:
@@ -175,7 +193,7 @@ def _provenance(stated: dict[str, Any]) -> list[str]:
         *(f"Command: {command}" for command in stated["commands"]),
         f"Pandion {versions['flown']} flew, {versions['certified']} certified",
         *(f"{name}: {value}" for name, value in digests.items()),
-        f"statement: {stated['digest']} (SHA-256 of its canonical JSON without the commands)",
+        f"statement: {stated['digest']} (SHA-256 of its canonical JSON without this digest)",
         "pandion certify DIR --verify THIS_PAGE computes all of it again and says what differs",
     ]
 
@@ -195,22 +213,39 @@ def _margin_sentence(one: dict[str, Any]) -> str:
     return f"margins of {one['flights']} flights: {texts}{cut}"
 
 
-def _histograms(stated: dict[str, Any], result: CampaignResult) -> str:
+def _histograms(stated: dict[str, Any], result: CampaignResult) -> Iterator[str]:
     count = len(result.plan.cases)
     names = [str(case) for case in result.plan.cases]
-    shown = [one for one in stated["margins"] if one["quantiles_m"]][:_MAX_DRAWN]
-    drawn = sheet(max(len(shown), 1), 1, 9.0, max(1.7 * len(shown), 1.7))
-    for (ax,), one in zip(drawn.axes, shown, strict=False):
-        margins = drawable(
+    for one in [one for one in stated["margins"] if one["quantiles_m"]][:_MAX_DRAWN]:
+        margins_mm = drawable(
             1e3 * row.margin_m
             for row in result.rows
             if names[row.flight % count] == one["name"] and row.margin_m is not None
         )
-        ax.hist(margins, bins=50, color=BASE)
-        ax.axvline(0.0, color=WALL, linewidth=1.0)
-        ax.set_title(f"{one['name']}: minimum margin [mm]", fontsize=8, loc="left")
-    svg = drawn.svg()
-    return f"<figure>{svg[svg.index('<svg') :]}</figure>"
+        if margins_mm:
+            yield _histogram(one["name"], margins_mm)
+
+
+def _histogram(name: str, margins_mm: Sequence[float]) -> str:
+    """How often there was which minimum margin [mm].
+
+    It is drawn here, of bars that are 10 wide and at most 100 high: a library's drawing depends on
+    its version and settings, and a page must be the same wherever it is written.
+    """
+    low, high = min(margins_mm), max(margins_mm)
+    span = high - low or 1.0
+    bars = Counter(min(int(_BARS * ((one - low) / span)), _BARS - 1) for one in margins_mm)
+    most = max(bars.values())
+    path = "".join(f"M{10 * k} 100v{-100 * bars[k] / most:.1f}h9V100z" for k in sorted(bars))
+    zero = f'<path stroke="{WALL}" d="M{-10 * _BARS * low / span:.1f} 0V100"/>'
+    ends = f'<text y="115">{low:+.1f} mm</text>'
+    ends += f'<text x="{10 * _BARS}" y="115" text-anchor="end">{high:+.1f} mm</text>'
+    caption = f"{name}: minimum margin, of {most} flights in the highest bar"
+    return (
+        f'<figure><svg viewBox="0 0 {10 * _BARS} 120" width="{20 * _BARS}" font-size="12">'
+        f'<path fill="{BASE}" d="{path}"/>{zero if low <= 0.0 <= high else ""}{ends}</svg>'
+        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+    )
 
 
 def _percent(share: float) -> str:

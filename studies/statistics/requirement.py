@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
+from command_line.values import plain_float
 from studies.campaign.flight import CampaignRow
 from studies.statistics.binomial import bounds
 from studies.statistics.violations import ANY, violates
@@ -24,7 +25,8 @@ _SIGNS: Final[dict[str, Callable[[float, float], bool]]] = {
 }
 _FORM: Final = re.compile(
     r"\s*(?P<name>[a-z-]+)\s*(?P<sign>[<>]=?)\s*(?P<limit>[-+.\deE]+)\s*(?P<unit>%|mm|m)?"
-    r"\s*(?:@\s*(?P<confidence>[.\d]+)\s*%)?\s*"
+    r"\s*(?:@\s*(?P<confidence>[.\d]+)\s*%)?\s*",
+    re.ASCII,
 )
 _UNITS: Final = {None: 1.0, "%": 100.0, "m": 1.0, "mm": 1000.0}  # in one of 1 or metres
 _HELP: Final = (
@@ -71,14 +73,13 @@ def requirement(text: str) -> Requirement:
     name = form["name"] if form else ""
     if form is None or name not in (*_PROBABILITIES, *_LENGTHS):
         raise ValueError(f"'{text}' is no requirement; {_HELP}")
-    try:
-        limit = float(form["limit"]) / _UNITS[form["unit"]]
-    except ValueError:
-        raise ValueError(f"'{text}': {form['limit']} is no number; {_HELP}") from None
+    limit = plain_float(form["limit"]) / _UNITS[form["unit"]]
+    confidence = None if form["confidence"] is None else plain_float(form["confidence"]) / 100.0
+    if math.isnan(limit):
+        raise ValueError(f"'{text}': {form['limit']} is no number; {_HELP}")
     upward = form["sign"].startswith(">")
     if upward != (name == "margin"):
         raise ValueError(f"'{text}': a bound of {name} is {'<' if upward else '>'}; {_HELP}")
-    confidence = None if form["confidence"] is None else float(form["confidence"]) / 100.0
     if name in _LENGTHS and (confidence is not None or form["unit"] == "%"):
         raise ValueError(f"'{text}': {name} is a length and is not estimated: no %, no @")
     if name in _PROBABILITIES and form["unit"] in ("m", "mm"):

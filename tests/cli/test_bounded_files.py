@@ -119,6 +119,9 @@ def test_a_file_of_its_length_is_read_and_a_longer_one_is_not(tmp_path: Path) ->
         read_bounded(Path("/proc/self/status"), 2)  # whose length is 0 by its status
 
 
+LONG = 200_000  # bytes, as much as a scenario may have
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -132,11 +135,15 @@ def test_a_file_of_its_length_is_read_and_a_longer_one_is_not(tmp_path: Path) ->
         ('{"a": 18446744073709551616}', "must have at most 64 bits"),
         ('{"a": %s}' % ("9" * 5000), "must have at most 64 bits"),
         ('{"a": {"\\ud800": 1}}', "has a text that is not Unicode"),
+        ('{"a": 6000, "b": 1, "a": 6}', "has 'a' 2 times in one object: leave one"),
+        ('{"b": [{"a": 1, "\\u0061": 1}]}', "has 'a' 2 times"),
+        ('{"%s": 1, "%s": 1}' % (("k" * LONG,) * 2), "has 'k{79}… 2 times in one object"),
     ],
 )  # fmt: skip
 def test_json_that_nobody_of_us_writes_is_refused(text: str, said: str) -> None:
-    with pytest.raises(JsonError, match=said):
+    with pytest.raises(JsonError, match=said) as refusal:
         json_object(text)
+    assert len(str(refusal.value)) < 300
 
 
 def test_json_that_we_write_is_read() -> None:
@@ -156,7 +163,6 @@ def test_json_in_a_file_that_is_missing_or_too_long(tmp_path: Path) -> None:
         read_json(tmp_path / "long.json", 10)
 
 
-LONG = 200_000  # bytes, as much as a scenario may have
 CHAIN = f"a{'.a' * (MAX_PARTS - 1)}"  # a key of as many parts as it may have
 
 
@@ -172,7 +178,14 @@ CHAIN = f"a{'.a' * (MAX_PARTS - 1)}"  # a key of as many parts as it may have
         (r'"\\".' * (LONG // 5) + "a = 1", "nested too deeply"),
         (f"{CHAIN}.a = 1", "nested too deeply"),
         (f"{CHAIN} = 1", None),
-        ("a" * LONG + " = 1", None),
+        ("a" * LONG + " = 1", "a key must have at most 128 characters, and this has"),
+        (f"[[a]]\nb = [{{{'c' * 129} = 1}}]", "a key must have at most 128 characters"),
+        (f"{'a' * 128} = 1", None),
+        (f"[{'a' * LONG}]\n[{'a' * LONG}]", "not TOML: Cannot declare .*a…a.* twice"),
+        ("a = " + "9" * 5000, "an integer of thousands of digits: an integer must have at most 64"),
+        (f"[[a]]\nb = [0, {10**400}]", r"a\[0\].b\[1\] = 1000+…: an integer must have at most 64"),
+        (f"a = 0x1{'0' * 5000}", "a = a number too long to show: an integer must have at most 64"),
+        (f"a = {-(1 << 64) + 1}", None),
         ("a" + " " * LONG + "= 1", None),
         (f"a = [{'1.5, ' * (LONG // 5)}]", None),
         (f"a = '{'.' * LONG}'", None),
@@ -189,5 +202,6 @@ def test_toml_is_read_or_refused_in_bounded_time(text: str, complaint: str | Non
     if complaint is None:
         toml_table(text)
     else:
-        with pytest.raises(TomlError, match=complaint):
+        with pytest.raises(TomlError, match=complaint) as refusal:
             toml_table(text)
+        assert len(str(refusal.value)) < 300

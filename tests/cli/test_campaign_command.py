@@ -15,7 +15,7 @@ from pandion.campaign import main
 from sitl.scenario_file import load_scenario
 from sitl.scenario_text import scenario_text
 from studies.campaign.plan import load_plan
-from studies.campaign.store import read
+from studies.campaign.store import read, sealed_facts
 from studies.flight.closed_loop import RefusedError
 from studies.flight.job import Job, fly_job
 from studies.flight.result import FlightResult
@@ -178,7 +178,7 @@ def test_flights_of_another_campaign_are_not_mixed_in(
         (changed / one).write_text((out / one).read_text())
     facts = json.loads((out / "campaign.json").read_text())
     facts["digests"]["code"] = "0" * 32
-    (changed / "campaign.json").write_text(json.dumps(facts))
+    (changed / "campaign.json").write_text(json.dumps(sealed_facts(facts)))
     assert main([str(file), "--workers=0", f"--out={changed}"]) == 2
     assert "flights of other code" in capsys.readouterr().err
 

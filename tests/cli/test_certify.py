@@ -6,12 +6,14 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from command_line.output import print_error
+from command_line.version import version
 from pandion.campaign import main as campaign
 from pandion.certify import main
 from studies.campaign.journal import Journal
@@ -21,7 +23,7 @@ from studies.campaign.store import FACTS, JOURNAL, begin, read
 from studies.search.tune import EXAMPLE
 from studies.statistics.certificate import certificate, digest
 from tests.cli.command import one_sentence
-from tests.studies.campaign.test_store import FILE, begun, put
+from tests.studies.campaign.test_store import FILE, begun, put, seal, write_anew
 
 
 @pytest.mark.long
@@ -94,7 +96,7 @@ def test_a_certificate_with_numbers_that_are_none_is_refused(
     kept.write_text(text.replace('"flights": 4', f'"flights": {number}', 1))
     capsys.readouterr()
     assert main([str(directory), f"--verify={kept}"]) == 2
-    assert "a number is not finite" in capsys.readouterr().err
+    assert "every number must be finite" in capsys.readouterr().err
 
 
 def test_a_damaged_row_is_told_in_a_sentence(
@@ -177,9 +179,7 @@ def test_a_row_that_was_forged_with_its_digests_is_found_by_flying_again(
         del row["digest"]
         journal.append([(row.pop("key"), row)])
     journal.close()
-    facts = json.loads((directory / FACTS).read_text())
-    sealed = {"lines": journal.seal.lines, "digest": journal.seal.digest}
-    (directory / FACTS).write_text(json.dumps(facts | {"journal": sealed}))
+    seal(directory)
     assert main([str(directory)]) == 0, "digests do not show who wrote it"
     (directory / "certificate.html").unlink()
     capsys.readouterr()
@@ -194,7 +194,7 @@ def test_flights_of_other_code_are_not_flown_again(
     directory, _ = small(tmp_path)
     facts = json.loads((directory / FACTS).read_text())
     facts["digests"]["packages"] = "0" * 32
-    (directory / FACTS).write_text(json.dumps(facts))
+    write_anew(directory, **facts)
     assert main([str(directory)]) == 0
     assert "was flown by other packages (00000000" in one_refusal(directory, capsys, "--refly=1")
 
@@ -250,7 +250,7 @@ def test_a_requirement_is_not_met_by_flights_that_prove_nothing(tmp_path: Path) 
     assert main([str(directory), "--require=margin>=0.01"]) == 0
 
 
-@pytest.mark.parametrize("text", ["p>0.1", "speed<3", "margin"])
+@pytest.mark.parametrize("text", ["p>0.1", "speed<3", "margin", "p<0.\u0661", "p<1e", "p<1@9.9.9%"])
 def test_what_is_no_requirement_is_refused(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -273,3 +273,111 @@ def test_a_changed_requirement_of_a_certificate_is_seen(
     assert "its digest is not that of its statement" in capsys.readouterr().out
     page.write_text(text.replace('"text":"p\\u003c0.01"', '"text":7'), encoding="utf-8")
     assert main([str(directory), "--verify", str(page)]) == 2
+
+
+@pytest.mark.parametrize(
+    ("shown", "forged"),
+    [
+        ("<b>0 of 4", "<b>NO VIOLATION IS POSSIBLE. 0 of 4"),
+        ("at most", "surely below"),
+        ("52.7 %", "0.01 %"),
+        ("<path fill=", "<path hidden fill="),
+        ("</style>", "ul { display: none }</style>"),
+        ("DIR --verify", "ELSEWHERE --verify"),
+        ("</html>\n", "</html>\n<script>document.body.textContent = 'SAFE'</script>\n"),
+    ],
+)
+def test_a_page_on_which_anything_was_changed_is_refused(
+    shown: str, forged: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, directory = required(tmp_path)
+    page = directory / "certificate.html"
+    assert main([str(directory), f"--verify={page}"]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert shown in text
+    page.write_text(text.replace(shown, forged), encoding="utf-8")
+    capsys.readouterr()
+    assert main([str(directory), f"--verify={page}"]) == 1
+    said = capsys.readouterr().out
+    assert "of the page is not as it is written for its statement" in said
+    assert "is what" not in said
+
+
+def test_a_page_is_the_same_without_a_drawing_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, directory = required(tmp_path)
+    page = directory / "certificate.html"
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == 1
+    assert "+100.0 mm" in text
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main([str(directory), f"--verify={page}"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "allowed"),
+    [
+        ("confidence", "high", "must be a number from 0.5 to 0.999999"),
+        ("confidence", 1, "must be a number from"),
+        ("confidence", 0.9999999, "must be a number from"),
+        ("refits", True, "must be a whole number from 1 to 100000"),
+        ("refits", 0, "must be a whole number from"),
+        ("required", 7, "must be an array of objects"),
+        ("required", [7], "must be an array of objects"),
+        ("required", [{"text": 7}], "must be an array of objects"),
+        ("required", {"a": 1}, "must be an array of objects"),
+        ("required", [{"text": "speed<3"}], "'speed<3' is no requirement; write p<0.01@95%"),
+        ("format", ["pandion-certificate-3"], "holds no certificate of this version"),
+    ],
+)
+def test_a_certificate_with_another_type_of_value_is_refused_in_a_sentence(
+    key: str, value: object, allowed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, directory = required(tmp_path)
+    stated = certificate(read(directory), directory, 0.95)
+    kept = tmp_path / "kept.json"
+    kept.write_text(json.dumps(stated | {key: value}))
+    assert allowed in one_refusal(directory, capsys, f"--verify={kept}")
+
+
+@pytest.mark.parametrize("value", [None, 7, "seven", [7], {"a": 7}])
+def test_a_value_of_any_type_in_any_other_place_is_a_difference(
+    value: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, directory = required(tmp_path)
+    stated = certificate(read(directory), directory, 0.95)
+    kept = tmp_path / "kept.json"
+    for key in sorted(stated.keys() - {"confidence", "refits", "format"}):
+        kept.write_text(json.dumps(stated | {key: value}))
+        capsys.readouterr()
+        assert main([str(directory), f"--verify={kept}"]) == 1
+        assert f"{key}" in capsys.readouterr().out
+
+
+def test_a_certificate_with_a_name_twice_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, directory = required(tmp_path)
+    kept = tmp_path / "kept.json"
+    assert main([str(directory), f"--json={kept}"]) == 0
+    text = kept.read_text()
+    kept.write_text(text.replace('"flights": 4,', '"flights": 6000, "flights": 4,', 1))
+    said = one_refusal(directory, capsys, f"--verify={kept}")
+    assert "it has 'flights' 2 times in one object: leave one" in said
+
+
+def test_the_version_that_flew_is_known_by_the_code_alone(tmp_path: Path) -> None:
+    _, directory = required(tmp_path)
+    write_anew(directory, version="9.9.9-certified-by-TUV")
+    stated = certificate(read(directory), directory, 0.95)
+    assert stated["versions"] == {"flown": version(), "certified": version()}
+    other = replace(read(directory), digests=replace(read(directory).digests, code="a" * 64))
+    stated = certificate(other, directory, 0.95)
+    assert stated["versions"]["flown"] == "not known: by other code"
+
+
+def test_a_certificate_says_the_same_of_a_directory_that_was_moved(tmp_path: Path) -> None:
+    _, directory = required(tmp_path)
+    moved = directory.rename(tmp_path / "moved")
+    assert main([str(moved), f"--verify={moved / 'certificate.html'}"]) == 0

@@ -101,6 +101,18 @@ def test_an_error_of_the_system_is_said_without_its_number(
     assert capsys.readouterr().err.startswith(f"pandion: {sentence}")
 
 
+def test_a_sentence_with_a_name_of_any_length_is_printed_short(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    print_error("pandion", f"unknown scenario {'k' * 1_000_000}; known: walls")
+    said = capsys.readouterr().err
+    assert said.startswith("pandion: unknown scenario kkk")
+    assert said.endswith("kkk; known: walls\n")
+    assert len(said) < 1100
+    print_error("pandion", "k" * 1000)
+    assert capsys.readouterr().err == f"pandion: {'k' * 1000}\n"
+
+
 def test_json_knows_no_nan() -> None:
     value = {"a": math.nan, "b": [math.inf, (-math.inf, 1.5)], "c": {"d": math.nan}, "e": "NaN"}
     assert json.loads(json_text(value)) == {

@@ -180,6 +180,7 @@ def test_what_is_no_reference_is_one_sentence(wrong: str) -> None:
 LINES: dict[str, tuple[str, str]] = {
     "no header": ("0,0,0,-1\n1,0,0,-1\n", "the first line must be"),
     "empty": ("", "the first line must be"),
+    "no plain digits": ("time_s,north_m,east_m,down_m\n0,0,0,1_0\n", "line 2: must be 4 finite"),
     "short": ("time_s,north_m,east_m,down_m\n0,0,0\n", "line 2: must be 4 finite numbers"),
     "text": ("time_s,north_m,east_m,down_m\n0,0,0,-1\n1,a,0,-1\n", "line 3"),
     "nan": ("time_s,north_m,east_m,down_m\n0,0,0,nan\n", "line 2"),

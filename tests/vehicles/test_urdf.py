@@ -118,6 +118,8 @@ def test_a_vehicle_is_the_same_when_its_text_has_been_read() -> None:
         ('mass value="1.5"', 'mass value="nan"', "value = 'nan': must be a number of at most"),
         ('mass value="1.5"', 'mass value="1e300"', "must be a number of at most 1e+06"),
         ('mass value="1.5"', 'mass value="-1"', 'link "base": mass = -1: must be 0 or more'),
+        ('mass value="1.5"', 'mass value="1_0.5"', "value = '1_0.5': must be a number of at most"),
+        ('xyz="0 0 -0.2"', 'xyz="0 0 \u0661"', "xyz = '0 0 \u0661': must be 3 numbers"),
         ('xyz="0 0 -0.2"', 'xyz="0 0"', "xyz = '0 0': must be 3 numbers of at most"),
         ('mass value="0.2"', 'mass value="0"', 'link "upper" has no mass'),
         ('axis xyz="0 1 0"', 'axis xyz="0 0 0"', "joints[1].axis"),
@@ -322,6 +324,7 @@ def test_px4s_parameters_are_rotors_with_px4s_defaults() -> None:
     ("line", "why"),
     [
         ("CA_ROTOR_COUNT nan", "must be a name of at most 16 characters and a number"),
+        ("CA_ROTOR_COUNT 0_4", "must be a name of at most 16 characters and a number"),
         ("CA_ROTOR_COUNT inf", "and a number from -1e"),
         ("CA_ROTOR_COUNT 4.7", "CA_ROTOR_COUNT = 4.7: must be 4 to 8"),
         (f"CA_ROTOR{'9' * 5000}_PX 1", "must be a name of at most 16 characters"),

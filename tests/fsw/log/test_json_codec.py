@@ -24,6 +24,11 @@ class Anything:
     perhaps: float | None
 
 
+@dataclasses.dataclass(frozen=True)
+class Repeated:
+    one: Anything
+
+
 @given(
     st.builds(
         Anything,
@@ -46,6 +51,12 @@ def test_what_is_written_is_read_to_the_bit_and_is_ascii(one: Anything) -> None:
 def test_finite_numbers_are_those_of_the_standard_library(numbers: tuple[float, ...]) -> None:
     text = JsonCodec(Anything).encode("numbers", numbers)
     assert repr(json.loads(text)) == repr(list(numbers))
+
+
+def test_a_name_that_is_there_twice_is_refused() -> None:
+    codec = JsonCodec(Repeated)
+    with pytest.raises(ValueError, match="input one cannot be read: has 'whole' 2 times"):
+        codec.decode("one", b'{"numbers":[],"whole":1,"whole":2,"text":"","perhaps":null}')
 
 
 @pytest.mark.parametrize("measured", [True, False], ids=["real time", "lockstep"])

@@ -17,7 +17,7 @@ from studies.campaign.flight import CampaignFlight, CampaignRow
 from studies.campaign.journal import Journal, JournalError, JournalInUseError
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import CampaignPlan, load_plan
-from studies.campaign.store import FACTS, JOURNAL, PLAN, begin, read, refuse_campaign
+from studies.campaign.store import FACTS, JOURNAL, PLAN, begin, read, refuse_campaign, sealed_facts
 from vehicles.vehicle_file import PACKAGED
 
 FILE = """\
@@ -52,9 +52,14 @@ def seal(directory: Path) -> None:
     """Write of the journal what a campaign does at its end, if the facts can be read."""
     journal = Journal(directory / JOURNAL)
     journal.close()
-    if text := (directory / FACTS).read_text():
-        facts = json.loads(text) | {"journal": asdict(journal.seal)}
-        (directory / FACTS).write_text(json.dumps(facts))
+    if (directory / FACTS).read_text():
+        write_anew(directory, journal=asdict(journal.seal))
+
+
+def write_anew(directory: Path, **changed: Any) -> None:
+    """Write other facts as a campaign itself would, with their seal."""
+    facts = json.loads((directory / FACTS).read_text())
+    (directory / FACTS).write_text(json.dumps(sealed_facts(facts | changed)))
 
 
 def begun(folder: Path, flights: int | None = None) -> tuple[Path, Path, CampaignPlan]:
@@ -126,8 +131,7 @@ def test_no_flight_is_left_out_because_fewer_are_asked_for(tmp_path: Path) -> No
     assert begin(directory, source, plan) == 6
     assert begin(directory, source, plan, 7) == 7
     # Nor because the number was lowered by hand.
-    facts = json.loads((directory / FACTS).read_text())
-    (directory / FACTS).write_text(json.dumps(facts | {"flights": 2}))
+    write_anew(directory, flights=2)
     found = read(directory)
     assert found.asked == len(found.rows) == 6
     with pytest.raises(CampaignError, match="a campaign of 6 flights"):
@@ -191,9 +195,30 @@ def test_facts_that_cannot_be_used_are_refused_in_a_sentence(tmp_path: Path, fac
     _, directory, _ = begun(tmp_path)
     kept = json.loads((directory / FACTS).read_text())
     if facts.startswith("{"):
-        facts = json.dumps(kept | json.loads(facts))
+        facts = json.dumps(sealed_facts(kept | json.loads(facts)))
     (directory / FACTS).write_text(facts)
     with pytest.raises(CampaignError, match=r"campaign\.json is not there, is damaged"):
+        read(directory)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"version": "9.9.9"},
+        {"name": "x\x1b[31m<script>"},
+        {"flights": 3},
+        {"journal": {"lines": 0, "digest": "0" * 64}},
+        {"seal": "0" * 64},
+        {"more": 1},
+    ],
+)
+def test_facts_that_were_changed_are_refused(tmp_path: Path, changed: dict[str, Any]) -> None:
+    _, directory, plan = begun(tmp_path)
+    put(directory, plan, range(4))
+    assert read(directory).complete
+    kept = json.loads((directory / FACTS).read_text())
+    (directory / FACTS).write_text(json.dumps(kept | changed))
+    with pytest.raises(CampaignError, match=r"campaign\.json .* was changed"):
         read(directory)
 
 

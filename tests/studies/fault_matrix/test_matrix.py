@@ -213,8 +213,8 @@ _MOTOR = '[[faults]]\nunits = ["motor"]\nkinds = ["weak"]\nthen = ["hold"]\n'
         (f"{_MOTOR}name = 5", "name = 5: must be a text"),
         (f'{_MOTOR}link = "no"', "link = 'no': must be true or false"),
         (f"{_MOTOR}why = 3", "why = 3: must be a text"),
-        (f"{_MOTOR}margin_mm = {'9' * 400}", "must be a length in mm, from -1e+06 to 1e+06"),
-        (f"{_MOTOR}told_within_s = {'9' * 400}", "must be a time above 0, in seconds, up to 86400"),
+        (f"{_MOTOR}margin_mm = {'9' * 19}", "must be a length in mm, from -1e+06 to 1e+06"),
+        (f"{_MOTOR}told_within_s = {'9' * 19}", "must be a time above 0, in seconds, up to 86400"),
         (
             '[[faults]]\nunits = ["vio"]\nkinds = ["wrong"]\nthen = ["hold"]',
             "vio-wrong: with perfect what a sensor says is believed, unless it is silent",

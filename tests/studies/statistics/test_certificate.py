@@ -20,7 +20,7 @@ from studies.campaign.store import FACTS, JOURNAL, begin, read
 from studies.statistics.binomial import bounds
 from studies.statistics.certificate import ANY, certificate, violates
 from studies.statistics.certificate_page import sentences, statement_in
-from tests.studies.campaign.test_store import seal
+from tests.studies.campaign.test_store import seal, write_anew
 
 FILE = """\
 flights = {flights}
@@ -217,8 +217,7 @@ def test_flights_without_a_row_are_not_left_out(tmp_path: Path) -> None:
 
 def test_fewer_flights_than_the_file_asks_for_are_not_certified(tmp_path: Path) -> None:
     directory = flown(tmp_path, {k: {"reason": "lost"} for k in range(3, 8)}, 8)
-    facts = json.loads((directory / FACTS).read_text())
-    (directory / FACTS).write_text(json.dumps(facts | {"flights": 3}))
+    write_anew(directory, flights=3)
     assert read(directory).complete
     with pytest.raises(CampaignError, match="5 of 8 flights have no row"):
         certificate(read(directory), directory, 0.95)
@@ -226,8 +225,7 @@ def test_fewer_flights_than_the_file_asks_for_are_not_certified(tmp_path: Path) 
 
 def test_facts_of_before_the_first_flight_hold_no_journal(tmp_path: Path) -> None:
     directory = flown(tmp_path, {}, 2)
-    facts = json.loads((directory / FACTS).read_text())
-    (directory / FACTS).write_text(json.dumps(facts | {"journal": asdict(Seal())}))
+    write_anew(directory, journal=asdict(Seal()))
     with pytest.raises(CampaignError, match=r"before the first of 2 flights.*finish with `pandion"):
         certificate(read(directory), directory, 0.95)
 
@@ -332,7 +330,7 @@ def test_a_campaign_of_other_code_is_not_taken_for_a_changed_file(tmp_path: Path
     directory = flown(tmp_path, {}, flights=2)
     facts = json.loads((directory / FACTS).read_text())
     facts["digests"] |= {"plan": "0" * 32, "code": "f" * 32}
-    (directory / FACTS).write_text(json.dumps(facts))
+    write_anew(directory, **facts)
     with pytest.raises(
         CampaignError, match=r"flown by other code \(ffffffff.*read it with Pandion"
     ):
