@@ -482,6 +482,16 @@ class Talkers:
             for action in wanted
         )
 
+    def _speak(self, time_s: float, share: float) -> None:
+        """Send what is due, and with a chance of ``share`` [1] something else."""
+        if time_s > 2.0 and self.chance.random() < share:
+            self.draw()
+        if self.later:
+            due = [action for at_s, action in self.later if at_s <= time_s]
+            self.later = [one for one in self.later if one[0] > time_s]
+            for action in due:
+                action()
+
     def _inputs(self, time_s: float, outputs: TickOutputs | None) -> TickInputs:
         """What the next tick is given."""
         sensors, samples = self.loop.observe()
@@ -508,13 +518,7 @@ class Talkers:
         share = rate * 1e-6 * STEP_US
         while simulation.ended is None and simulation.time_s < seconds:
             time_s = simulation.time_s
-            if time_s > 2.0 and self.chance.random() < share:
-                self.draw()
-            if self.later:
-                due = [action for at_s, action in self.later if at_s <= time_s]
-                self.later = [one for one in self.later if one[0] > time_s]
-                for action in due:
-                    action()
+            self._speak(time_s, share)
             inputs = self._inputs(time_s, outputs)
             outputs = loop.step(inputs)
             if inputs.tuning is not None:

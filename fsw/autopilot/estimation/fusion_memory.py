@@ -176,7 +176,7 @@ class FusionMemory:
 
 
 def copied(x: NDArray[Any]) -> NDArray[Any]:
-    """Another record (1,) with the same numbers; as bytes in a fortieth of the time of an array."""
+    """Another record ``x`` (1,) [SI] of the same numbers; as bytes, in half an array's time."""
     memory: Any = x.base
     return np.ndarray(1, x.dtype, bytearray(memory if type(memory) is bytearray else x.tobytes()))
 
