@@ -53,7 +53,9 @@ def test_velocity_and_acceleration_are_the_derivatives_and_kernels_see_the_same(
 ) -> None:
     curve = reference(CURVES[name])
     h, at = 1e-4, curve.at(t)
-    assert at.p == curve.place(t) == tuple(_compiled(np.array(curve.row), t))
+    assert at.p == curve.place(t)
+    # Of one sine in 500 the last bit differs.
+    np.testing.assert_allclose(_compiled(np.array(curve.row), t), at.p, rtol=0.0, atol=1e-14)
     knots = getattr(CURVES[name], "time_s", (0.0, 10.0, 30.0))
     if min(abs(t - knot) for knot in knots) < 2.0 * h:
         return
