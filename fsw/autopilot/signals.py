@@ -518,13 +518,13 @@ class MissionStep:
 
 @dataclass(frozen=True, slots=True)
 class MissionUpdate:
-    """What a ground station changed since the last tick; None where it did not."""
+    """What a ground station wants changed, all of it or nothing; None where it does not."""
 
     steps: tuple[MissionStep, ...] | None = None
     fence: SafeSet | None = None
     rally: tuple[Vec2, ...] | None = None  # m, north and east
     current: int | None = None  # the step to fly next
-    fence_source: MessageSource | None = None  # who uploaded the fence
+    source: MessageSource | None = None  # who uploaded it
 
 
 class MissionState(IntEnum):
@@ -1027,6 +1027,7 @@ class TickOutputs:
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = ()
     tuning_taken: bool | None = None  # whether the requested one is in use; None: none was
+    upload_taken: bool | None = None  # whether all of the mission update is; None: there was none
 
     @property
     def snapshot(self) -> FlightSnapshot:

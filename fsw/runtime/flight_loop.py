@@ -312,6 +312,8 @@ class FlightLoop(Generic[State]):
         self._happened.observe(cycle.inputs, outputs)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(outputs.tuning_taken)
+        if cycle.inputs.mission is not None:
+            self._missions.settle(outputs.upload_taken)
 
     def _request_plan(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

@@ -34,6 +34,7 @@ from fsw.autopilot.signals import (
     Place,
     SwitchMode,
     TakeOff,
+    TickInputs,
     TickOutputs,
     Vec3,
 )
@@ -132,8 +133,6 @@ class Talkers:
         self.missions = MissionStore(
             Site(
                 locate=partial(to_local, config.origin),
-                judge=lambda safe_set: self.flight.against(safe_set),
-                min_margin=self.flight.min_margin,
                 clearance=lambda: config.limits.fence_clearance,
             )
         )
@@ -474,7 +473,7 @@ class Talkers:
                 ground_station_heard=inputs.ground_station_heard or simulation.step % 500 == 0,
             )
             outputs = loop.step(inputs)
-            self.missions.observe(outputs.snapshot)
+            self._answer(inputs, outputs)
             outcome.modes[outputs.snapshot.mode.value] += 1
             outcome.texts.extend((round(time_s, 2), one.text) for one in outputs.texts)
             if simulation.step % 10 == 0:
@@ -490,6 +489,14 @@ class Talkers:
         elif end is not None:
             outcome.contact = f"ended: {end.sentence}"
         return outcome
+
+    def _answer(self, inputs: TickInputs, outputs: TickOutputs) -> None:
+        """Let those who uploaded something know what the tick made of it."""
+        self.missions.observe(outputs.snapshot)
+        if inputs.mission is not None:
+            self.missions.settle(outputs.upload_taken)
+        for service in self.services:
+            service.poll(inputs.sensors.t_us)
 
 
 def _ids(sender: MessageSource) -> tuple[int, int]:

@@ -149,7 +149,8 @@ class MissionMemory:
     fence: SafeSet = field(default_factory=SafeSet)
     owner: MessageSource | None = None  # of what is announced
     owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
-    fence_owner: MessageSource | None = None  # who uploaded the fence
+    fence_owner: MessageSource | None = None  # who uploaded the fence; None: there is none
+    upload_taken: bool = True  # the last one
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
     silent_zones: int = 0  # that moved, timed out, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
