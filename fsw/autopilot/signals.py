@@ -247,6 +247,12 @@ class SafeSet:
         return any(zone.touch is not None for zone in self.zones)
 
 
+Sender = tuple[int, int]
+"""MAVLink system and component."""
+# Who commands on the vehicle's own link: the scenario's pilot, and what follows PX4's modes.
+VEHICLE_PILOT: Sender = (1, 195)
+
+
 @dataclass(frozen=True, slots=True)
 class MessageSource:
     """Who sent a message, as far as its link can say."""
@@ -261,6 +267,11 @@ class MessageSource:
         """As an operator reads it."""
         where = self.link + (f" {self.address}" if self.address else "")
         return f"{self.system}/{self.component} ({where})"
+
+    @property
+    def sender(self) -> Sender:
+        """Its MAVLink ids."""
+        return self.system, self.component
 
     def is_same(self, other: MessageSource | None) -> bool:
         """Whether both are one sender: of the same address, unless signatures vouch for both."""
@@ -464,6 +475,11 @@ class CommandRequest:
     source_component: int
     confirmation: int = 0
     frame: int | None = None  # MAV_FRAME of a COMMAND_INT, None for a COMMAND_LONG
+
+    @property
+    def sender(self) -> Sender:
+        """Who sent it."""
+        return self.source_system, self.source_component
 
 
 @dataclass(frozen=True, slots=True)

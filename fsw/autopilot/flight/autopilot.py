@@ -38,6 +38,7 @@ from fsw.autopilot.flight.plan_exchange import (
     with_plan_state,
 )
 from fsw.autopilot.flight.restart import restarted
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
@@ -442,6 +443,7 @@ class Autopilot:
     ) -> FlightState:
         """Store targets, safe set and mission, as far as they are within bounds."""
         now_us, mission, update = inputs.sensors.t_us, state.mission, inputs.mission
+        limits = self.config.limits
         vehicle, target, news = state.vehicle, state.reference, list[StatusText]()
         if target is None and vehicle.flies and state.estimate is not None:
             mode = self._commander.mode(state)
@@ -454,7 +456,10 @@ class Autopilot:
             flies=vehicle.flies,
             armed=vehicle.armed,
             target=target,
+            against_rally=way_home.against_upload(vehicle, update, limits.safe_set_owner),
         )
+        if mission.rally != state.mission.rally:
+            state = replace(state, vehicle=way_home.uploaded(vehicle, update))
         believed, refused = self._targets.believed(inputs.targets, mission.safe_set, now_us)
         against = (*refused, *inputs.refused)
         texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)] + news

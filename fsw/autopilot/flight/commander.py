@@ -33,6 +33,7 @@ from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import current_problem, is_fresh
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.restart import rests
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.zone_room import within_room
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
@@ -47,12 +48,14 @@ from fsw.autopilot.signals import (
     ArmingReport,
     Command,
     CommandAck,
+    CommandRequest,
     CommandResult,
     Home,
     JointVector,
     MissionUpdate,
     Mode,
     MotionSetpoint,
+    Sender,
     Severity,
     StateEstimate,
     StatusText,
@@ -107,15 +110,23 @@ class Commander:
             if before is not None:
                 result = before.result
             else:
-                decision = judge(command, self.context(state, estimate), self._modes)
+                decision = judge(command, self._context_of(request, state, estimate), self._modes)
                 result = decision.result
                 texts += _reason(decision)
                 state = self._carry_out(state, decision, estimate, texts)
+                state = _with_home_owner(state, decision, request.sender)
                 now_answered, changes = state.vehicle.answered, decision.changes
                 memory = remember(now_answered, request, result, estimate.t_us, changes)
                 state = replace(state, vehicle=replace(state.vehicle, answered=memory))
             acks.append(acknowledgement(command, result))
         return state, acks
+
+    def _context_of(
+        self, request: CommandRequest, state: FlightState, estimate: StateEstimate
+    ) -> CommandContext:
+        chosen = self._config.limits.safe_set_owner
+        against = way_home.against_sender(state.vehicle, request.sender, chosen)
+        return replace(self.context(state, estimate), against_sender=against)
 
     def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
         """The state that a decision may depend on."""
@@ -138,6 +149,7 @@ class Commander:
             joints=asked or estimate.q_arm,
             home=vehicle.home,
             safe_set=state.mission.safe_set,
+            fence=state.mission.fence,
             body=self._body,
             now_us=estimate.t_us,
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),
@@ -440,6 +452,16 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
+
+
+def _with_home_owner(state: FlightState, decision: Decision, sender: Sender) -> FlightState:
+    """The state after a decision on a sender's command, with who may change where a return ends."""
+    vehicle = state.vehicle
+    if decision.arm:
+        vehicle = way_home.armed_by(vehicle, sender)
+    elif decision.home is not None:
+        vehicle = way_home.changed_by(vehicle, sender)
+    return state if vehicle is state.vehicle else replace(state, vehicle=vehicle)
 
 
 def _blocked(vehicle: VehicleMemory) -> str:

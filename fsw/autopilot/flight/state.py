@@ -39,6 +39,7 @@ from fsw.autopilot.signals import (
     SafeSet,
     SafeSetAnnouncement,
     SafetyCounters,
+    Sender,
     SolverStatus,
     StateEstimate,
     Vec2,
@@ -71,6 +72,7 @@ class VehicleMemory:
     conditions: tuple[Condition, ...] = ()  # that are active
     failsafe: FailsafeMemory = FailsafeMemory()  # what is being done about them
     home: Home | None = None
+    home_owner: Sender | None = None  # may change where a return ends while armed; None: the first
     gcs_heard_us: int = -1  # when a ground station was last heard; -1: never
     answered: tuple[AnsweredCommand, ...] = ()  # each sender's last command
     intended_mode: Mode = Mode.HOLD  # what arming leads to

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from fsw.autopilot.barriers.margins import Margins
 from fsw.autopilot.flight.commands.bounds import safe_set_problem, upload_problem
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.safe_set_change import (
     growth,
     held,
@@ -94,17 +95,23 @@ class SafeSetCheck:
         flies: bool,
         armed: bool | None = None,
         target: EndEffectorTarget | None = None,
+        against_rally: str = "",
     ) -> MissionMemory:
         """Take in what was uploaded and announced; in flight only what can be kept.
 
         A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
-        that follow the ``target`` if there is one. Of an upload all is taken or nothing.
+        that follow the ``target`` if there is one. Of an upload all is taken or nothing; rally
+        points are not where something speaks ``against_rally``.
         """
         armed = flies if armed is None else armed
         here = _Vehicle(estimate if armed else None, target)
         update = inputs.mission
         if update is not None:
-            mission = self._take_upload(mission, update, here, estimate, texts, flies=flies)
+            against = upload_problem(update) or _against_rally(mission, update, against_rally)
+            if against is None:
+                mission = self._take_upload(mission, update, here, estimate, texts, flies=flies)
+            else:
+                mission = _refused(mission, against, texts)
         for announcement in inputs.announced:
             now_us = inputs.sensors.t_us
             owns = self._owns(mission, announcement.source, now_us, armed=armed)
@@ -129,19 +136,19 @@ class SafeSetCheck:
         flies: bool,
     ) -> MissionMemory:
         """What was uploaded, unless something speaks against any part of it."""
-        against, wanted = upload_problem(update), mission
-        if against is None and update.fence is not None:
-            who = "fence" if update.source is None else f"fence of {update.source}"
+        wanted = mission
+        if update.fence is not None:
+            who = _of("fence", update.source)
             problem = self._against_fence(mission, update, here, estimate, flies=flies)
             if not problem:
                 wanted = self._with_fence(mission, update, who, texts, flies=flies)
                 problem = "the old safe set is kept" if wanted is mission else ""
-            against = f"{who} refused: {problem}" if problem else None
-        if against is not None:
-            texts.append(StatusText(Severity.CRITICAL, against))
-            count = mission.refused_count + 1
-            return replace(mission, refused_count=count, upload_taken=False)
+            if problem:
+                return _refused(mission, f"{who} refused: {problem}", texts)
         rally = mission.rally if update.rally is None else update.rally
+        if rally != mission.rally:
+            text = f"{_of('rally points', update.source)}: {way_home.told(rally)}"
+            texts.append(StatusText(Severity.INFO, text))
         return replace(wanted, rally=rally, upload_taken=True)
 
     def _against_fence(
@@ -413,6 +420,26 @@ class SafeSetCheck:
         """Margins and barrier values of the vehicle in the safe set in force."""
         report = self._margins.report(kept.source, estimate, target)
         return replace(report, added=kept.added, shortfall=kept.shortfall) if kept.added else report
+
+
+def _against_rally(mission: MissionMemory, update: MissionUpdate, against: str) -> str | None:
+    """Why other rally points are refused: what speaks ``against`` any, or one is outside."""
+    if update.rally is None or update.rally == mission.rally:
+        return None
+    fence = mission.fence if update.fence is None else update.fence
+    found = (way_home.outside(fence, place) for place in update.rally)
+    against = against or next(filter(None, found), "")
+    return f"{_of('rally points', update.source)} refused: {against}" if against else None
+
+
+def _of(what: str, source: MessageSource | None) -> str:
+    return what if source is None else f"{what} of {source}"
+
+
+def _refused(mission: MissionMemory, against: str, texts: list[StatusText]) -> MissionMemory:
+    """The memory without what was uploaded, and why."""
+    texts.append(StatusText(Severity.CRITICAL, against))
+    return replace(mission, refused_count=mission.refused_count + 1, upload_taken=False)
 
 
 def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:

@@ -54,13 +54,20 @@ def received(
 
 
 def uploaded(
-    memory: MissionMemory, source: MessageSource, *, flies: bool = True, **lists: object
+    memory: MissionMemory,
+    source: MessageSource,
+    against_rally: str = "",
+    *,
+    flies: bool = True,
+    **lists: object,
 ) -> tuple[MissionMemory, list[StatusText]]:
     """What becomes of lists that a source has uploaded."""
     texts: list[StatusText] = []
     update = MissionUpdate(source=source, **lists)  # type: ignore[arg-type]
     inputs = TickInputs(frame(1_000_000), mission=update)
-    return CHECK.update(memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies), texts
+    here = vehicle_at((0.0, 0.0, -1.0))
+    memory = CHECK.update(memory, inputs, here, texts, flies=flies, against_rally=against_rally)
+    return memory, texts
 
 
 def refused(texts: list[StatusText]) -> str:
@@ -92,7 +99,7 @@ def test_what_is_announced_and_the_fence_are_in_force_together() -> None:
     memory, _ = received(memory, SafeSet())
     assert memory.safe_set == SafeSet((SOUTH, TREE))
     memory, texts = received(memory, rally=((1.0, 2.0),))
-    assert texts == []
+    assert [text.text for text in texts] == ["rally points: 1.0 m north 2.0 m east"]
     assert memory.rally == ((1.0, 2.0),)
     assert memory.safe_set == SafeSet((SOUTH, TREE))
 
@@ -515,6 +522,23 @@ def test_of_an_upload_all_is_taken_or_nothing() -> None:
     assert (after.fence, after.rally) == (memory.fence, memory.rally)
     after, _ = uploaded(memory, OWNER, fence=SafeSet(), rally=((1e5, 0.0),))
     assert (after.fence, after.rally, after.upload_taken) == (memory.fence, memory.rally, False)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+def test_rally_points_are_told_and_are_their_owners_and_inside_the_fence() -> None:
+    places = tuple((float(north), 0.0) for north in range(4))
+    memory, texts = uploaded(MissionMemory(), OWNER, fence=walled(5.0, 5.0), rally=places)
+    assert memory.rally == places
+    told_of = f"rally points of {OWNER}: 0.0 m north 0.0 m east, 1.0 m north 0.0 m east"
+    assert texts[-1].text == f"{told_of}, 2.0 m north 0.0 m east, 1 more"
+    after, texts = uploaded(memory, OWNER, rally=((-9.0, 0.0),))
+    assert (after.rally, after.upload_taken) == (places, False)
+    assert "outside the fence, by 4.10 m at its zone 2" in refused(texts)
+    theirs, texts = uploaded(memory, STRANGER, "only 255/190", rally=(), fence=walled(1.0, 1.0))
+    assert (theirs.rally, theirs.fence) == (places, walled(5.0, 5.0))
+    assert f"rally points of {STRANGER} refused: only 255/190" in refused(texts)
+    same, texts = uploaded(memory, STRANGER, "only 255/190", rally=places)
+    assert (same.upload_taken, texts) == (True, [])
 
 
 def test_a_fence_that_both_safe_sets_together_rule_out_is_refused_with_a_text_each_time() -> None:
