@@ -38,7 +38,6 @@ from fsw.autopilot.flight.plan_exchange import (
     with_plan_state,
 )
 from fsw.autopilot.flight.restart import restarted
-from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
@@ -443,29 +442,22 @@ class Autopilot:
     ) -> FlightState:
         """Store targets, safe set and mission, as far as they are within bounds."""
         now_us, mission, update = inputs.sensors.t_us, state.mission, inputs.mission
-        limits = self.config.limits
-        vehicle, target, news = state.vehicle, state.reference, list[StatusText]()
-        if target is None and vehicle.flies and state.estimate is not None:
-            mode = self._commander.mode(state)
-            target = self._horizon.target(mode, state, state.estimate, now_us)
+        v, target, news = state.vehicle, state.reference, list[StatusText]()
+        if target is None and v.flies and state.estimate is not None:
+            target = self._horizon.target(
+                self._commander.mode(state), state, state.estimate, now_us
+            )
         mission = self._safe_sets.update(
-            mission,
-            inputs,
-            state.estimate,
-            news,
-            flies=vehicle.flies,
-            armed=vehicle.armed,
-            target=target,
-            against_rally=way_home.against_upload(vehicle, update, limits.safe_set_owner),
+            mission, inputs, state.estimate, news, flies=v.flies, armed=v.armed, target=target
         )
-        if mission.rally != state.mission.rally:
-            state = replace(state, vehicle=way_home.uploaded(vehicle, update))
         believed, refused = self._targets.believed(inputs.targets, mission.safe_set, now_us)
         against = (*refused, *inputs.refused)
         texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)] + news
-        stream = merge(mission.stream, believed, now_us)
-        refused_count = mission.refused_count + len(against)
-        mission = replace(mission, stream=stream, refused_count=refused_count)
+        stream, count = (
+            merge(mission.stream, believed, now_us),
+            mission.refused_count + len(against),
+        )
+        mission = replace(mission, stream=stream, refused_count=count)
         if mission.refused_count != state.mission.refused_count:
             counters = replace(state.safety.counters, refusals=mission.refused_count)
             state = replace(state, safety=replace(state.safety, counters=counters))

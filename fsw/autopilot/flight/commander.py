@@ -48,7 +48,6 @@ from fsw.autopilot.signals import (
     ArmingReport,
     Command,
     CommandAck,
-    CommandRequest,
     CommandResult,
     Home,
     JointVector,
@@ -110,26 +109,22 @@ class Commander:
             if before is not None:
                 result = before.result
             else:
-                decision = judge(command, self._context_of(request, state, estimate), self._modes)
+                context = self.context(state, estimate, request.sender)
+                decision = judge(command, context, self._modes)
                 result = decision.result
                 texts += _reason(decision)
                 state = self._carry_out(state, decision, estimate, texts)
-                state = _with_home_owner(state, decision, request.sender)
+                state = way_home.commanded(state, request.sender, decision.home, arms=decision.arm)
                 now_answered, changes = state.vehicle.answered, decision.changes
                 memory = remember(now_answered, request, result, estimate.t_us, changes)
                 state = replace(state, vehicle=replace(state.vehicle, answered=memory))
             acks.append(acknowledgement(command, result))
         return state, acks
 
-    def _context_of(
-        self, request: CommandRequest, state: FlightState, estimate: StateEstimate
+    def context(
+        self, state: FlightState, estimate: StateEstimate, sender: Sender | None = None
     ) -> CommandContext:
-        chosen = self._config.limits.safe_set_owner
-        against = way_home.against_sender(state.vehicle, request.sender, chosen)
-        return replace(self.context(state, estimate), against_sender=against)
-
-    def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
-        """The state that a decision may depend on."""
+        """The state that a decision on a command may depend on, and what its ``sender`` may not."""
         limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
         setpoint_limits, goal = self._config.steering, state.setpoint.goal
         asked = goal.joints if goal is not None else None
@@ -150,6 +145,9 @@ class Commander:
             home=vehicle.home,
             safe_set=state.mission.safe_set,
             fence=state.mission.fence,
+            against_sender=way_home.against(
+                state.mission, sender, limits.safe_set_owner, armed=vehicle.armed
+            ),
             body=self._body,
             now_us=estimate.t_us,
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),
@@ -452,16 +450,6 @@ def acknowledgement(command: Command, result: int) -> CommandAck:
     """The answer to its sender."""
     request = command.request
     return CommandAck(request.command, result, request.source_system, request.source_component)
-
-
-def _with_home_owner(state: FlightState, decision: Decision, sender: Sender) -> FlightState:
-    """The state after a decision on a sender's command, with who may change where a return ends."""
-    vehicle = state.vehicle
-    if decision.arm:
-        vehicle = way_home.armed_by(vehicle, sender)
-    elif decision.home is not None:
-        vehicle = way_home.changed_by(vehicle, sender)
-    return state if vehicle is state.vehicle else replace(state, vehicle=vehicle)
 
 
 def _blocked(vehicle: VehicleMemory) -> str:

@@ -72,7 +72,6 @@ class VehicleMemory:
     conditions: tuple[Condition, ...] = ()  # that are active
     failsafe: FailsafeMemory = FailsafeMemory()  # what is being done about them
     home: Home | None = None
-    home_owner: Sender | None = None  # may change where a return ends while armed; None: the first
     gcs_heard_us: int = -1  # when a ground station was last heard; -1: never
     answered: tuple[AnsweredCommand, ...] = ()  # each sender's last command
     intended_mode: Mode = Mode.HOLD  # what arming leads to
@@ -156,6 +155,7 @@ class MissionMemory:
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
     silent_zones: int = 0  # that moved, timed out, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
+    home_owner: Sender | None = None  # may change where a return ends while armed; None: the first
     flight: MissionFlight = field(default_factory=MissionFlight)
 
 

@@ -95,19 +95,17 @@ class SafeSetCheck:
         flies: bool,
         armed: bool | None = None,
         target: EndEffectorTarget | None = None,
-        against_rally: str = "",
     ) -> MissionMemory:
         """Take in what was uploaded and announced; in flight only what can be kept.
 
         A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
-        that follow the ``target`` if there is one. Of an upload all is taken or nothing; rally
-        points are not where something speaks ``against_rally``.
+        that follow the ``target`` if there is one. Of an upload all is taken or nothing.
         """
         armed = flies if armed is None else armed
         here = _Vehicle(estimate if armed else None, target)
         update = inputs.mission
         if update is not None:
-            against = upload_problem(update) or _against_rally(mission, update, against_rally)
+            against = upload_problem(update) or self._against_rally(mission, update, armed=armed)
             if against is None:
                 mission = self._take_upload(mission, update, here, estimate, texts, flies=flies)
             else:
@@ -138,18 +136,34 @@ class SafeSetCheck:
         """What was uploaded, unless something speaks against any part of it."""
         wanted = mission
         if update.fence is not None:
-            who = _of("fence", update.source)
+            who = "fence" if update.source is None else f"fence of {update.source}"
             problem = self._against_fence(mission, update, here, estimate, flies=flies)
             if not problem:
                 wanted = self._with_fence(mission, update, who, texts, flies=flies)
                 problem = "the old safe set is kept" if wanted is mission else ""
             if problem:
                 return _refused(mission, f"{who} refused: {problem}", texts)
-        rally = mission.rally if update.rally is None else update.rally
-        if rally != mission.rally:
-            text = f"{_of('rally points', update.source)}: {way_home.told(rally)}"
+        if update.rally not in (None, mission.rally):
+            wanted = replace(wanted, rally=update.rally)
+            text = f"rally points of {update.source}: {way_home.told(wanted.rally)}"
             texts.append(StatusText(Severity.INFO, text))
-        return replace(wanted, rally=rally, upload_taken=True)
+            if update.source is not None:
+                armed = here.estimate is not None
+                wanted = way_home.changed(wanted, update.source.sender, armed=armed)
+        return replace(wanted, upload_taken=True)
+
+    def _against_rally(
+        self, mission: MissionMemory, update: MissionUpdate, *, armed: bool
+    ) -> str | None:
+        """Why other rally points are refused."""
+        if update.rally is None or update.rally == mission.rally:
+            return None
+        source = None if update.source is None else update.source.sender
+        against = way_home.against(mission, source, self._chosen, armed=armed)
+        fence = mission.fence if update.fence is None else update.fence
+        found = (way_home.outside(fence, place) for place in update.rally)
+        against = against or next(filter(None, found), "")
+        return f"rally points of {update.source} refused: {against}" if against else None
 
     def _against_fence(
         self,
@@ -420,20 +434,6 @@ class SafeSetCheck:
         """Margins and barrier values of the vehicle in the safe set in force."""
         report = self._margins.report(kept.source, estimate, target)
         return replace(report, added=kept.added, shortfall=kept.shortfall) if kept.added else report
-
-
-def _against_rally(mission: MissionMemory, update: MissionUpdate, against: str) -> str | None:
-    """Why other rally points are refused: what speaks ``against`` any, or one is outside."""
-    if update.rally is None or update.rally == mission.rally:
-        return None
-    fence = mission.fence if update.fence is None else update.fence
-    found = (way_home.outside(fence, place) for place in update.rally)
-    against = against or next(filter(None, found), "")
-    return f"{_of('rally points', update.source)} refused: {against}" if against else None
-
-
-def _of(what: str, source: MessageSource | None) -> str:
-    return what if source is None else f"{what} of {source}"
 
 
 def _refused(mission: MissionMemory, against: str, texts: list[StatusText]) -> MissionMemory:

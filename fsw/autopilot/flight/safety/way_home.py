@@ -7,35 +7,40 @@ it until the vehicle is armed again: a scenario arms, or PX4.
 
 from __future__ import annotations
 
-from fsw.autopilot.flight.state import VehicleMemory
+from fsw.autopilot.flight.state import FlightState, MissionMemory
 from fsw.autopilot.shapes.zones import surfaces
-from fsw.autopilot.signals import VEHICLE_PILOT, MissionUpdate, SafeSet, Sender, Vec2
+from fsw.autopilot.signals import VEHICLE_PILOT, Home, SafeSet, Sender, Vec2
 from fsw.frozen import replace
 
 _NAMED = 3  # places; the others are counted
 
 
-def armed_by(vehicle: VehicleMemory, sender: Sender) -> VehicleMemory:
-    """The memory of a vehicle that a sender has armed."""
-    return replace(vehicle, home_owner=None if sender == VEHICLE_PILOT else sender)
+def commanded(state: FlightState, sender: Sender, home: Home | None, *, arms: bool) -> FlightState:
+    """The state after a command of a sender, which ``arms`` or sets ``home``, or neither."""
+    mission = state.mission
+    if arms:
+        mission = replace(mission, home_owner=None if sender == VEHICLE_PILOT else sender)
+    elif home is not None:
+        mission = changed(mission, sender, armed=state.vehicle.armed)
+    return state if mission is state.mission else replace(state, mission=mission)
 
 
-def changed_by(vehicle: VehicleMemory, sender: Sender) -> VehicleMemory:
+def changed(mission: MissionMemory, sender: Sender, *, armed: bool) -> MissionMemory:
     """The memory after a sender has changed where a return ends."""
-    if not vehicle.armed or vehicle.home_owner is not None:
-        return vehicle
-    return replace(vehicle, home_owner=sender)
+    if not armed or mission.home_owner is not None:
+        return mission
+    return replace(mission, home_owner=sender)
 
 
-def against_sender(vehicle: VehicleMemory, sender: Sender, chosen: int) -> str:
+def against(mission: MissionMemory, sender: Sender | None, chosen: int, *, armed: bool) -> str:
     """Why a sender may not change where a return ends; empty if it may.
 
     The ``chosen`` system always may; 0: none is.
     """
-    owner = vehicle.home_owner
-    if not vehicle.armed or sender == owner or (chosen and sender[0] == chosen):
+    owner = mission.home_owner
+    if not armed or sender is None or sender == owner:
         return ""
-    if owner is None and not chosen:
+    if sender[0] == chosen != 0 or (owner is None and not chosen):
         return ""
     whose = f"system {chosen}" if owner is None else f"{owner[0]}/{owner[1]}"
     return f"while armed only {whose} may change where a return ends"
@@ -50,20 +55,6 @@ def outside(fence: SafeSet, north_east: Vec2) -> str:
         if not at.distance > 0.0:
             return f"it is outside the fence, by {-at.distance:.2f} m at its zone {number}"
     return ""
-
-
-def against_upload(vehicle: VehicleMemory, update: MissionUpdate | None, chosen: int) -> str:
-    """Why who uploaded something may not change rally points; empty if it may."""
-    if update is None or update.source is None:
-        return ""
-    return against_sender(vehicle, update.source.sender, chosen)
-
-
-def uploaded(vehicle: VehicleMemory, update: MissionUpdate | None) -> VehicleMemory:
-    """The memory after other rally points were taken."""
-    if update is None or update.source is None:
-        return vehicle
-    return changed_by(vehicle, update.source.sender)
 
 
 def told(places: tuple[Vec2, ...]) -> str:

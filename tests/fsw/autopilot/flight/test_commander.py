@@ -39,8 +39,6 @@ from fsw.autopilot.signals import (
     GoTo,
     Home,
     LookAt,
-    MessageSource,
-    MissionUpdate,
     Mode,
     MotionSetpoint,
     MoveJoints,
@@ -374,28 +372,25 @@ def test_armed_who_armed_or_is_chosen_may_change_where_a_return_ends(
     armed_by: Sender, chosen: int, sender: Sender, may: bool
 ) -> None:
     """A stranger's home, 30 m away, was flown to without a word."""
-    state = flying()
-    owned = way_home.armed_by(state.vehicle, armed_by)
-    assert (way_home.against_sender(owned, sender, chosen) == "") is may
-    source = MessageSource(*sender, "gcs")
-    update = MissionUpdate(rally=((1.0, 2.0),), source=source)
-    assert (way_home.against_upload(owned, update, chosen) == "") is may
+    owned = way_home.commanded(flying(), armed_by, None, arms=True).mission
+    assert (way_home.against(owned, sender, chosen, armed=True) == "") is may
+    assert way_home.against(owned, sender, chosen, armed=False) == ""
 
 
 def test_where_nobody_is_known_to_have_armed_the_first_owns_where_a_return_ends() -> None:
-    vehicle = way_home.armed_by(flying().vehicle, VEHICLE_PILOT)
-    vehicle = way_home.changed_by(vehicle, (9, 1))
-    assert way_home.against_sender(vehicle, (66, 6), 0)
-    assert not way_home.against_sender(vehicle, (9, 1), 0)
-    disarmed = replace(vehicle, mode=Mode.DISARMED)
-    assert not way_home.against_sender(disarmed, (66, 6), 0)
-    assert way_home.changed_by(replace(disarmed, home_owner=None), (66, 6)).home_owner is None
+    state = way_home.commanded(flying(), VEHICLE_PILOT, None, arms=True)
+    home = Home(HERE, 0.0)
+    owned = way_home.commanded(state, (9, 1), home, arms=False).mission
+    assert way_home.against(owned, (66, 6), 0, armed=True)
+    assert not way_home.against(owned, (9, 1), 0, armed=True)
+    on_ground = way_home.commanded(DISARMED, (66, 6), home, arms=False)
+    assert on_ground.mission.home_owner is None
 
 
 @pytest.mark.requirement("REQ-SAFE-9")
 def test_a_stranger_cannot_set_home_in_flight_and_who_armed_can() -> None:
     armed = after(DISARMED, Arm(), estimate=STANDING)
-    assert armed.vehicle.home_owner == (255, 190)
+    assert armed.mission.home_owner == (255, 190)
     away, texts = SetHome(Place((-30.0, 0.0), 3.0)), list[StatusText]()
     theirs = Command(away, CommandRequest(179, (math.nan,) * 7, 66, 6))
     kept, (ack,) = COMMANDER.handle_commands(armed, HOVERING, (theirs,), texts)

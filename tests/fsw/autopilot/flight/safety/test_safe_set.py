@@ -54,20 +54,13 @@ def received(
 
 
 def uploaded(
-    memory: MissionMemory,
-    source: MessageSource,
-    against_rally: str = "",
-    *,
-    flies: bool = True,
-    **lists: object,
+    memory: MissionMemory, source: MessageSource, *, flies: bool = True, **lists: object
 ) -> tuple[MissionMemory, list[StatusText]]:
     """What becomes of lists that a source has uploaded."""
     texts: list[StatusText] = []
     update = MissionUpdate(source=source, **lists)  # type: ignore[arg-type]
     inputs = TickInputs(frame(1_000_000), mission=update)
-    here = vehicle_at((0.0, 0.0, -1.0))
-    memory = CHECK.update(memory, inputs, here, texts, flies=flies, against_rally=against_rally)
-    return memory, texts
+    return CHECK.update(memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies), texts
 
 
 def refused(texts: list[StatusText]) -> str:
@@ -99,7 +92,7 @@ def test_what_is_announced_and_the_fence_are_in_force_together() -> None:
     memory, _ = received(memory, SafeSet())
     assert memory.safe_set == SafeSet((SOUTH, TREE))
     memory, texts = received(memory, rally=((1.0, 2.0),))
-    assert [text.text for text in texts] == ["rally points: 1.0 m north 2.0 m east"]
+    assert [text.text for text in texts] == ["rally points of None: 1.0 m north 2.0 m east"]
     assert memory.rally == ((1.0, 2.0),)
     assert memory.safe_set == SafeSet((SOUTH, TREE))
 
@@ -534,10 +527,14 @@ def test_rally_points_are_told_and_are_their_owners_and_inside_the_fence() -> No
     after, texts = uploaded(memory, OWNER, rally=((-9.0, 0.0),))
     assert (after.rally, after.upload_taken) == (places, False)
     assert "outside the fence, by 4.10 m at its zone 2" in refused(texts)
-    theirs, texts = uploaded(memory, STRANGER, "only 255/190", rally=(), fence=walled(1.0, 1.0))
+    assert memory.home_owner == OWNER.sender, "the first, where it is not known who has armed"
+    other = replace(STRANGER, system=66)
+    theirs, texts = uploaded(memory, other, rally=(), fence=walled(1.0, 1.0))
     assert (theirs.rally, theirs.fence) == (places, walled(5.0, 5.0))
-    assert f"rally points of {STRANGER} refused: only 255/190" in refused(texts)
-    same, texts = uploaded(memory, STRANGER, "only 255/190", rally=places)
+    assert f"rally points of {other} refused: while armed only 1/195 may change" in refused(texts)
+    ground, _ = uploaded(memory, other, rally=(), flies=False)
+    assert ground.rally == ()
+    same, texts = uploaded(memory, other, rally=places)
     assert (same.upload_taken, texts) == (True, [])
 
 
