@@ -47,9 +47,9 @@ def against(mission: MissionMemory, sender: Sender | None, chosen: int, *, armed
 
 
 def outside(fence: SafeSet, north_east: Vec2) -> str:
-    """Why a place [m] cannot be where a return ends; a fence is the same always and everywhere up.
+    """Why a return cannot end at ``north_east`` [m, NED]: a fence is the same at every height.
 
-    But for a sphere around the target, which is no place.
+    A sphere that follows the target says nothing of places.
     """
     for number, at in enumerate(surfaces(fence, (*north_east, 0.0), 0), start=1):
         if not at.distance > 0.0:
@@ -58,7 +58,7 @@ def outside(fence: SafeSet, north_east: Vec2) -> str:
 
 
 def told(places: tuple[Vec2, ...]) -> str:
-    """Places [m] in words."""
+    """The ``places`` [m, NED] in words."""
     named = [f"{north:.1f} m north {east:.1f} m east" for north, east in places[:_NAMED]]
     more = [f"{len(places) - _NAMED} more"] if len(places) > _NAMED else []
     return ", ".join([*named, *more]) or "none"
