@@ -247,6 +247,12 @@ class SafeSet:
         return any(zone.touch is not None for zone in self.zones)
 
 
+Sender = tuple[int, int]
+"""MAVLink system and component."""
+# Who commands on the vehicle's own link: the scenario's pilot, and what follows PX4's modes.
+VEHICLE_PILOT: Sender = (1, 195)
+
+
 @dataclass(frozen=True, slots=True)
 class MessageSource:
     """Who sent a message, as far as its link can say."""
@@ -261,6 +267,11 @@ class MessageSource:
         """As an operator reads it."""
         where = self.link + (f" {self.address}" if self.address else "")
         return f"{self.system}/{self.component} ({where})"
+
+    @property
+    def sender(self) -> Sender:
+        """Its MAVLink ids."""
+        return self.system, self.component
 
     def is_same(self, other: MessageSource | None) -> bool:
         """Whether both are one sender: of the same address, unless signatures vouch for both."""
@@ -465,6 +476,11 @@ class CommandRequest:
     confirmation: int = 0
     frame: int | None = None  # MAV_FRAME of a COMMAND_INT, None for a COMMAND_LONG
 
+    @property
+    def sender(self) -> Sender:
+        """Who sent it."""
+        return self.source_system, self.source_component
+
 
 @dataclass(frozen=True, slots=True)
 class Command:
@@ -518,13 +534,13 @@ class MissionStep:
 
 @dataclass(frozen=True, slots=True)
 class MissionUpdate:
-    """What a ground station changed since the last tick; None where it did not."""
+    """What a ground station wants changed, all of it or nothing; None where it does not."""
 
     steps: tuple[MissionStep, ...] | None = None
     fence: SafeSet | None = None
     rally: tuple[Vec2, ...] | None = None  # m, north and east
     current: int | None = None  # the step to fly next
-    fence_source: MessageSource | None = None  # who uploaded the fence
+    source: MessageSource | None = None  # who uploaded it
 
 
 class MissionState(IntEnum):
@@ -1027,6 +1043,7 @@ class TickOutputs:
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = ()
     tuning_taken: bool | None = None  # whether the requested one is in use; None: none was
+    upload_taken: bool | None = None  # whether all of the mission update is; None: there was none
 
     @property
     def snapshot(self) -> FlightSnapshot:

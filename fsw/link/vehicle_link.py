@@ -7,7 +7,7 @@ members, opened in ``fsw.app``; neither the loop nor the autopilot knows which o
 from __future__ import annotations
 
 from enum import Enum
-from typing import Final, Protocol
+from typing import Protocol
 
 from fsw.autopilot.signals import (
     CommandAck,
@@ -16,10 +16,6 @@ from fsw.autopilot.signals import (
     StatusText,
     TickOutputs,
 )
-from messages.message_ids import PATH_PLANNER, SYSTEM_ID
-
-# Who commands on this link: the scenario's pilot, and what follows PX4's modes.
-VEHICLE_PILOT: Final = (SYSTEM_ID, PATH_PLANNER)
 
 
 class Pacing(Enum):

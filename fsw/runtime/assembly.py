@@ -50,10 +50,7 @@ def flight_software(
     missions = MissionStore(
         Site(
             locate=partial(to_local, config.origin),
-            judge=lambda safe_set: flight.against(safe_set),
-            min_margin=flight.min_margin,
             clearance=lambda: flight.config.limits.fence_clearance,
-            owner=lambda: int(flight.config.limits.safe_set_owner),
             ceiling=lambda: flight.config.steering.highest,
         )
     )

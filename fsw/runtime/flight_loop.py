@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.vibration import VibrationMeter
 from fsw.autopilot.parameters.registry import ACCEL_RANGE
 from fsw.autopilot.ports import Clock, LoopHealth, PlanService
 from fsw.autopilot.signals import (
+    VEHICLE_PILOT,
     Command,
     CommandAck,
     CommandRequest,
@@ -35,7 +36,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.vehicle_link import VEHICLE_PILOT, Pacing, VehicleLink
+from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.log.run_files import RunFiles
 from fsw.runtime.clock import unix_us
 from fsw.runtime.deadline_monitor import DeadlineMonitor
@@ -312,6 +313,8 @@ class FlightLoop(Generic[State]):
         self._happened.observe(cycle.inputs, outputs)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(outputs.tuning_taken)
+        if cycle.inputs.mission is not None:
+            self._missions.settle(outputs.upload_taken)
 
     def _request_plan(self, cycle: Cycle) -> None:
         request, applied = cycle.outputs.plan_request, cycle.outputs.snapshot.plan_input

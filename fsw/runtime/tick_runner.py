@@ -93,4 +93,5 @@ class TickRunner(Generic[State]):
             acks=(),
             texts=(StatusText(Severity.CRITICAL, text),),
             tuning_taken=None,
+            upload_taken=None,
         )

@@ -150,8 +150,6 @@ class Talkers:
         self.missions = MissionStore(
             Site(
                 locate=partial(to_local, config.origin),
-                judge=lambda safe_set: self.flight.against(safe_set),
-                min_margin=self.flight.min_margin,
                 clearance=lambda: config.limits.fence_clearance,
             )
         )
@@ -521,9 +519,7 @@ class Talkers:
             self._speak(time_s, share)
             inputs = self._inputs(time_s, outputs)
             outputs = loop.step(inputs)
-            if inputs.tuning is not None:
-                self.parameters.settle(outputs.tuning_taken)
-            self.missions.observe(outputs.snapshot)
+            self._answer(inputs, outputs)
             outcome.modes[outputs.snapshot.mode.value] += 1
             outcome.texts.extend((round(time_s, 2), one.text) for one in outputs.texts)
             if simulation.step % 10 == 0:
@@ -539,6 +535,16 @@ class Talkers:
         elif end is not None:
             outcome.contact = f"ended: {end.sentence}"
         return outcome
+
+    def _answer(self, inputs: TickInputs, outputs: TickOutputs) -> None:
+        """Let those who set or uploaded something know what the tick made of it."""
+        self.missions.observe(outputs.snapshot)
+        if inputs.tuning is not None:
+            self.parameters.settle(outputs.tuning_taken)
+        if inputs.mission is not None:
+            self.missions.settle(outputs.upload_taken)
+        for service in self.services:
+            service.poll(inputs.sensors.t_us)
 
 
 def _ids(sender: MessageSource) -> tuple[int, int]:

@@ -18,11 +18,15 @@ from fsw.autopilot.signals import (
     BatteryState,
     BatteryWarning,
     Command,
+    MessageSource,
     MissionUpdate,
     Mode,
     MotionSetpoint,
     SafeSet,
 )
+from fsw.link.services.mission_store import Kind, MissionStore, Site, Upload
+from fsw.link.wire.fence_items import CIRCLE_INCLUSION
+from fsw.link.wire.mission_items import DENIED as DENIED_MISSION
 from fsw.link.wire.mission_items import MissionItem, read_step
 from sitl.scenario_file import load_scenario
 from tests.closed_loop.harness import ARM, SET_MODE, TAKEOFF, Flight, command, hover, on_the_ground
@@ -356,3 +360,38 @@ def test_a_goto_beyond_an_exclusion_stops_before_it() -> None:
     assert min(flight.snapshot.constraints.margins) > 0.0
     flight.step(as_int(GOTO, 1, -1.0, 1.0, 0.0, NAN, 1.4, 0.0, -3.0))
     assert flight.results[-1] == (GOTO, DENIED), "above it is as much behind the fence as beside"
+
+
+def _through_the_store(
+    flight: Flight, store: MissionStore, radius: float, sender: MessageSource
+) -> Upload:
+    """A fence around the origin goes the way of an upload."""
+    circle = MissionItem(CIRCLE_INCLUSION, 1, (radius, 0.0, 0.0, 0.0), 0, 0, -1.2)
+    upload = store.offer({Kind.FENCE: ((circle,), (None,))}, sender)
+    flight.upload = store.take_update()
+    store.settle(flight.step().upload_taken)
+    return upload
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+def test_a_fence_that_is_not_in_force_is_neither_acknowledged_nor_owned() -> None:
+    """A stranger's fence, too close to stop before, kept the operator's out for the flight."""
+    stranger = MessageSource(66, 6, "gcs", "127.0.0.1:6666")
+    operator = MessageSource(255, 190, "gcs", "127.0.0.1:14550")
+    flight = hovering()
+    store = MissionStore(Site(lambda a, b, c: (a, b, c), lambda: 0.1))
+    flight.step(as_int(GOTO, 1, 1.5, 1.0, 0.0, NAN, -8.0, 0.0, -1.4))
+    flight.run(3.0)
+    ahead = math.hypot(*flight.sim.truth().p_WB[:2])
+    assert math.hypot(*flight.sim.truth().v_WB) > 1.0
+    theirs = _through_the_store(flight, store, ahead + 0.8, stranger)
+    assert theirs.result == DENIED_MISSION
+    refused = "fence of 66/6 (gcs 127.0.0.1:6666) refused: the vehicle could not stop before"
+    assert any(text.startswith(refused) for text in flight.texts)
+    assert (store.items[Kind.FENCE], store.ids[Kind.FENCE]) == ((), 0)
+    assert flight.state.mission.fence == SafeSet()
+    flight.run(5.0)
+    for radius in (12.0, 20.0):
+        assert _through_the_store(flight, store, radius, operator).result == 0
+        assert flight.state.mission.fence.zones
+        assert flight.state.mission.fence_owner == operator

@@ -124,6 +124,8 @@ class Connected:
         self.missions.observe(outputs.snapshot)
         if tuning is not None:
             self.parameters.settle(outputs.tuning_taken)
+        if inputs.mission is not None:
+            self.missions.settle(outputs.upload_taken)
         for ack in outputs.acks:
             self.links.acknowledge(sensors.t_us, ack)
         self.links.publish(outputs)
@@ -151,10 +153,7 @@ def connected(
     flight, inbox = Flight(scenario or on_the_ground(), config=config), Inbox()
     parameters = ParameterStore(config, lambda tuning: None)
     parameters.open(AtOnce(), lambda values: None)
-    site = Site(
-        partial(to_local, config.origin), flight.loop.against, lambda: 0.1, flight.loop.min_margin
-    )
-    missions = MissionStore(site)
+    missions = MissionStore(Site(partial(to_local, config.origin), lambda: 0.1))
     health = LoopHealth()
     facts = vehicle_facts(config)
     context = TelemetryContext(facts, health, origin=config.origin, plan_ids=missions.ids)

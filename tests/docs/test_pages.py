@@ -117,7 +117,7 @@ def test_the_failsafe_table_on_the_page_is_the_one_that_is_flown() -> None:
 def test_the_reference_of_messages_names_all_that_is_sent_and_heard() -> None:
     rows = {row.message_id: row for row in traffic()}
     assert {stream.message_id for stream in STREAMS} <= {i for i, r in rows.items() if r.component}
-    site = Site(lambda *_: (0.0, 0.0, 0.0), lambda _: (), lambda: 0.1, lambda *_: 0.0)
+    site = Site(lambda *_: (0.0, 0.0, 0.0), lambda: 0.1)
     assert MissionService(MissionStore(site)).message_ids == frozenset(OF_MISSIONS)
     assert {ids.COMMAND_LONG, ids.TIMESYNC, ids.PARAM_SET, *OF_MISSIONS} <= {
         i for i, row in rows.items() if row.heard

@@ -45,7 +45,7 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
 
 def load(options: FswOptions) -> FlightProgram[int]:
     parameters = ParameterStore(FlightConfig(), lambda tuning: None)
-    site = Site(lambda *place: (0.0, 0.0, 0.0), lambda safe_set: (), lambda: 0.1, lambda *_: 0.0)
+    site = Site(lambda *place: (0.0, 0.0, 0.0), lambda: 0.1)
     return FlightProgram(FACTS, 0, *parts_of(standing), NoPlanner(), parameters, MissionStore(site))
 
 

@@ -35,6 +35,7 @@ from fsw.autopilot.signals import (
     TickOutputs,
 )
 from fsw.link.inbox import Inbox
+from fsw.link.services.mission_store import EMPTY, Kind, MissionStore, Site, Upload
 from fsw.link.vehicle_link import Pacing
 from fsw.log.flight_log import FlightLog
 from fsw.runtime.flight_loop import Ending, FlightLoop, FlightRecord
@@ -192,7 +193,9 @@ class Bench:
         null: Any = Null()
         self.parameters = Parameters()
         parts = parts_of(tick)
-        program = FlightProgram(FACTS, first, *parts, null, cast(Any, self.parameters), null)
+        self.missions = MissionStore(Site(lambda *place: (0.0, 0.0, 0.0), lambda: 0.1))
+        stores = cast(Any, self.parameters), self.missions
+        program = FlightProgram(FACTS, first, *parts, null, *stores)
         self.loop = FlightLoop(
             program, cast(Any, self.sim), cast(Any, self.ground), self.inbox, self.record,
             self.time.clock, self.stop, cast(Any, self.files), self._sleep, self.time.clock,
@@ -257,6 +260,25 @@ def test_groups_run_at_their_rates_and_their_members_in_order() -> None:
     assert done.count("request") == pytest.approx(ticks / 50, abs=1)
     assert bench.timer(HOUSEKEEPING.name).ticks == pytest.approx(2, abs=1)
     assert (bench.timer(INNER.name).late, bench.timer(INNER.name).skipped) == (0, 0)
+
+
+@pytest.mark.parametrize(("taken", "result"), [(True, 0), (False, 14), (None, 1)])
+def test_who_uploaded_something_learns_what_the_tick_made_of_it(
+    taken: bool | None, result: int
+) -> None:
+    def judging(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
+        state, outputs = standing(state, inputs)
+        if inputs.mission is None:
+            return state, outputs
+        if taken is None:
+            raise ZeroDivisionError
+        return state, replace(outputs, upload_taken=taken)
+
+    bench, uploads = Bench(judging), list[Upload]()
+    offer = bench.missions.offer
+    bench.telemetry = lambda: uploads or uploads.append(offer({Kind.RALLY: EMPTY}))
+    bench.run(0.1)
+    assert [upload.result for upload in uploads] == [result]
 
 
 def test_a_tick_that_overruns_is_counted_and_reported_once() -> None:

@@ -20,7 +20,6 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.commands.bounds import bounded_update
 from fsw.autopilot.flight.descent import Descent
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
@@ -181,12 +180,6 @@ class Autopilot:
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
         return self._safe_sets.analyse(safe_set)
-
-    def min_margin(
-        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
-    ) -> float:
-        """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone."""
-        return self._safe_sets.min_margin(safe_set, estimate, target)
 
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Everything the vehicle does at one instant: the next state, and everything it says."""
@@ -448,27 +441,23 @@ class Autopilot:
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
     ) -> FlightState:
         """Store targets, safe set and mission, as far as they are within bounds."""
-        now_us, mission = inputs.sensors.t_us, state.mission
-        update, against = bounded_update(inputs.mission)
-        vehicle, target, news = state.vehicle, state.reference, list[StatusText]()
-        if target is None and vehicle.flies and state.estimate is not None:
-            mode = self._commander.mode(state)
-            target = self._horizon.target(mode, state, state.estimate, now_us)
+        now_us, mission, update = inputs.sensors.t_us, state.mission, inputs.mission
+        v, target, news = state.vehicle, state.reference, list[StatusText]()
+        if target is None and v.flies and state.estimate is not None:
+            target = self._horizon.target(
+                self._commander.mode(state), state, state.estimate, now_us
+            )
         mission = self._safe_sets.update(
-            mission,
-            inputs if update is inputs.mission else replace(inputs, mission=update),
-            state.estimate,
-            news,
-            flies=vehicle.flies,
-            armed=vehicle.armed,
-            target=target,
+            mission, inputs, state.estimate, news, flies=v.flies, armed=v.armed, target=target
         )
         believed, refused = self._targets.believed(inputs.targets, mission.safe_set, now_us)
-        against += (*refused, *inputs.refused)
+        against = (*refused, *inputs.refused)
         texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)] + news
-        stream = merge(mission.stream, believed, now_us)
-        refused_count = mission.refused_count + len(against)
-        mission = replace(mission, stream=stream, refused_count=refused_count)
+        stream, count = (
+            merge(mission.stream, believed, now_us),
+            mission.refused_count + len(against),
+        )
+        mission = replace(mission, stream=stream, refused_count=count)
         if mission.refused_count != state.mission.refused_count:
             counters = replace(state.safety.counters, refusals=mission.refused_count)
             state = replace(state, safety=replace(state.safety, counters=counters))
@@ -477,7 +466,7 @@ class Autopilot:
             state = replace(state, kept=state.kept.of(mission.safe_set))
             if state.estimate is not None:
                 state = self._with_room(state, state.estimate)
-        if update is not None:
+        if update is not None and mission.upload_taken:
             state = with_update(state, update, self.config, now_us)
         return state
 

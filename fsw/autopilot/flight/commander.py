@@ -33,6 +33,7 @@ from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import current_problem, is_fresh
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.restart import rests
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.zone_room import within_room
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
@@ -53,6 +54,7 @@ from fsw.autopilot.signals import (
     MissionUpdate,
     Mode,
     MotionSetpoint,
+    Sender,
     Severity,
     StateEstimate,
     StatusText,
@@ -107,18 +109,22 @@ class Commander:
             if before is not None:
                 result = before.result
             else:
-                decision = judge(command, self.context(state, estimate), self._modes)
+                context = self.context(state, estimate, request.sender)
+                decision = judge(command, context, self._modes)
                 result = decision.result
                 texts += _reason(decision)
                 state = self._carry_out(state, decision, estimate, texts)
+                state = way_home.commanded(state, request.sender, decision.home, arms=decision.arm)
                 now_answered, changes = state.vehicle.answered, decision.changes
                 memory = remember(now_answered, request, result, estimate.t_us, changes)
                 state = replace(state, vehicle=replace(state.vehicle, answered=memory))
             acks.append(acknowledgement(command, result))
         return state, acks
 
-    def context(self, state: FlightState, estimate: StateEstimate) -> CommandContext:
-        """The state that a decision may depend on."""
+    def context(
+        self, state: FlightState, estimate: StateEstimate, sender: Sender | None = None
+    ) -> CommandContext:
+        """The state that a decision on a command may depend on, and what its ``sender`` may not."""
         limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
         setpoint_limits, goal = self._config.steering, state.setpoint.goal
         asked = goal.joints if goal is not None else None
@@ -138,6 +144,10 @@ class Commander:
             joints=asked or estimate.q_arm,
             home=vehicle.home,
             safe_set=state.mission.safe_set,
+            fence=state.mission.fence,
+            against_sender=way_home.against(
+                state.mission, sender, limits.safe_set_owner, armed=vehicle.armed
+            ),
             body=self._body,
             now_us=estimate.t_us,
             climb_range=(limits.airborne_height, limits.takeoff_climb_most),

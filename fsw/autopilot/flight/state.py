@@ -39,6 +39,7 @@ from fsw.autopilot.signals import (
     SafeSet,
     SafeSetAnnouncement,
     SafetyCounters,
+    Sender,
     SolverStatus,
     StateEstimate,
     Vec2,
@@ -149,10 +150,12 @@ class MissionMemory:
     fence: SafeSet = field(default_factory=SafeSet)
     owner: MessageSource | None = None  # of what is announced
     owner_heard_us: int = -1  # when it was announced last; -1: not since the vehicle disarmed
-    fence_owner: MessageSource | None = None  # who uploaded the fence
+    fence_owner: MessageSource | None = None  # who uploaded the fence; None: there is none
+    upload_taken: bool = True  # the last one
     accepted: tuple[SafeSetAnnouncement, ...] = ()  # the last one of each source
     silent_zones: int = 0  # that moved, timed out, and are held where they were
     rally: tuple[Vec2, ...] = ()  # m, where a return may lead beside home
+    home_owner: Sender | None = None  # may change where a return ends while armed; None: the first
     flight: MissionFlight = field(default_factory=MissionFlight)
 
 

@@ -13,8 +13,6 @@ from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.signals import (
-    FlightSnapshot,
-    SafeSet,
     Severity,
     StatusText,
     TickInputs,
@@ -49,15 +47,6 @@ class TunedAutopilot:
         """What flies now."""
         return self._in_use[1].config
 
-    def against(self, safe_set: SafeSet) -> tuple[str, ...]:
-        """Why what flies now could not keep a safe set; nothing if it is to fly all the same."""
-        return () if self._config.soft else refusals(self._in_use[1].analyse(safe_set))
-
-    def min_margin(self, safe_set: SafeSet, snapshot: FlightSnapshot) -> float:
-        """The least margin [m] the whole vehicle would have in a safe set now."""
-        loop = self._in_use[1]
-        return loop.min_margin(safe_set, snapshot.estimate, snapshot.reference)
-
     def tick(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickOutputs]:
         """Both parts of a tick."""
         return self.conclude(self.control(state, inputs))
@@ -68,12 +57,19 @@ class TunedAutopilot:
         Raises:
             ValueError: The numbers of a tuning that was not prepared contradict each other.
         """
-        if inputs.tuning is None:
+        if inputs.tuning is None and inputs.mission is None:
             return self._loop(state.tuning).control(state, inputs)
-        state, taken, texts = self._retune(state, inputs.tuning)
+        taken: bool | None = None
+        texts: list[StatusText] = []
+        if inputs.tuning is not None:
+            state, taken, texts = self._retune(state, inputs.tuning)
         begun = self._loop(state.tuning).control(state, inputs)
-        so_far = begun.outputs
-        outputs = replace(so_far, texts=(*texts, *so_far.texts), tuning_taken=taken)
+        so_far, uploaded = begun.outputs, None
+        if inputs.mission is not None:
+            uploaded = begun.state.mission.upload_taken
+        outputs = replace(
+            so_far, texts=(*texts, *so_far.texts), tuning_taken=taken, upload_taken=uploaded
+        )
         return begun._replace(outputs=outputs)
 
     def conclude(self, controlled: Controlled) -> tuple[FlightState, TickOutputs]:

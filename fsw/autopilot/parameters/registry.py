@@ -85,9 +85,12 @@ class Parameter:
         return f"{self.name} is to be {self.least:g}..{self.most:g}, {value:g} is refused"
 
 
-# Who may let the vehicle go farther, what of it keeps clear, what makes it fall, and what promises
-# are made for, are chosen before it flies.
-_DISARMED: Final = frozenset({"SAFE_OWNER", "PLN_BODY", "CBRK_FLIGHTTERM"})
+# Who may let the vehicle go farther, what of it keeps clear, what makes it fall, what promises are
+# made for, and how high a return flies and whether it lands, are chosen before it flies.
+_DISARMED: Final = frozenset(
+    {"SAFE_OWNER", "PLN_BODY", "CBRK_FLIGHTTERM"}
+    | {"RTL_RETURN_ALT", "RTL_DESCEND_ALT", "RTL_LAND_DELAY"}
+)
 _ASSUMED: Final = "surroundings."
 _ENDS: Final = "Terminate"
 _Pid = tuple[float, float, float, float]  # P, I, D and the limit
@@ -348,11 +351,11 @@ _ROWS: Final[dict[str, list[Row]]] = {
         ("STR_LEASH", "steering.max_lead_distance", "m", 0.1, 0.6,
          "Maximum lead distance of the setpoint over the vehicle"),
         ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0,
-         "Return altitude above home"),
+         "Return altitude above home; changed while disarmed"),
         ("RTL_DESCEND_ALT", "limits.return_descent", "m", 0.5, 50.0,
-         "Return: altitude above home of the wait before landing"),
+         "Return: altitude above home of the wait before landing; changed while disarmed"),
         ("RTL_LAND_DELAY", "limits.return_wait", "s", -1.0, 300.0,
-         "Return: wait before landing; negative: hold there"),
+         "Return: wait before landing; negative: hold there; changed while disarmed"),
     ],
     "Failsafes": [
         ("COM_OF_LOSS_T", "limits.setpoint_timeout_us", "s", 0.1, 5.0,

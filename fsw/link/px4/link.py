@@ -15,6 +15,7 @@ from typing import Final, Protocol, cast
 
 from fsw.autopilot.ports import Clock, VehicleFacts
 from fsw.autopilot.signals import (
+    VEHICLE_PILOT,
     Arm,
     Command,
     CommandAck,
@@ -47,7 +48,7 @@ from fsw.link.px4.messages import (
     state_of,
 )
 from fsw.link.udp_endpoint import LinkError
-from fsw.link.vehicle_link import VEHICLE_PILOT, Pacing
+from fsw.link.vehicle_link import Pacing
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import battery_reading
 from messages import message_ids, status_text

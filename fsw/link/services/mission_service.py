@@ -2,22 +2,34 @@
 
 One transfer at a time a link; a second ground station, known by ids and address, is denied until it
 has ended. An upload is
-collected aside and takes the old one's place whole, or not at all. The vehicle asks again for an
-item that does not come; duplicates and items out of turn are passed over without an answer,
-because each answer would bring forth another duplicate.
+collected aside and takes the old one's place whole, or not at all; it is acknowledged once a tick
+has decided, whose text says why it is refused. The vehicle asks again for an item that does not
+come; duplicates and items out of turn are passed over without an answer, because each answer would
+bring forth another duplicate.
 
 Source: https://mavlink.io/en/services/mission.html
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
 from fsw.autopilot.signals import Severity, StatusText
-from fsw.link.services.mission_store import ALL_KINDS, ROOM, Kind, Meaning, MissionStore
+from fsw.link.services.mission_store import (
+    ACCEPTED,
+    ALL_KINDS,
+    EMPTY,
+    ERROR,
+    ROOM,
+    Kind,
+    Meaning,
+    MissionStore,
+    Upload,
+)
 from fsw.link.services.mission_wire import (
     Peer,
     current_values,
@@ -36,8 +48,6 @@ from messages.frames import Frame
 _ReadItem = Callable[[Numbers], MissionItem]
 
 # MAV_MISSION_RESULT
-ACCEPTED: Final = 0
-ERROR: Final = 1
 NO_SPACE: Final = 4
 INVALID_SEQUENCE: Final = 13
 CANCELLED: Final = 15
@@ -50,8 +60,8 @@ SILENCE_US: Final = 5_000_000  # ends a download that is not asked on
 
 
 @dataclass(slots=True)
-class _Upload:
-    """Items on their way in."""
+class _Incoming:
+    """Items on their way in, until the tick has decided on them."""
 
     peer: Peer
     address: str  # two ground stations may have the same ids: QGroundControl's are always 255/190
@@ -61,6 +71,15 @@ class _Upload:
     meanings: list[Meaning] = field(default_factory=list)
     asked_us: int = 0
     tries: int = 0
+
+
+class _Asked(NamedTuple):
+    """An upload that the tick has yet to decide on, and who waits for its acknowledgement."""
+
+    upload: Upload
+    number: int  # MAV_MISSION_TYPE
+    peer: Peer
+    incoming: _Incoming | None  # None: lists were to be cleared
 
 
 @dataclass(slots=True)
@@ -79,9 +98,10 @@ class MissionService(LinkService):
 
     def __init__(self, store: MissionStore) -> None:
         self._store = store
-        self._upload: _Upload | None = None
+        self._upload: _Incoming | None = None
         self._download: _Download | None = None
-        self._done: _Upload | None = None  # the last one
+        self._done: _Incoming | None = None  # the last one
+        self._asked: deque[_Asked] = deque()
         self._shown = store.progress
         self._show_again = False
         self._repeats = 0  # of MISSION_ITEM_REACHED that are still to be sent
@@ -115,8 +135,12 @@ class MissionService(LinkService):
             replies += self._show_progress(t_us)
         elif self._repeats and t_us >= self._repeat_us:
             replies.append(self._reached(t_us))
+        while self._asked and self._asked[0].upload.result is not None:
+            replies += self._decided(self._asked.popleft())
         upload = self._upload
-        if upload is not None and t_us - upload.asked_us >= ASK_AGAIN_US:
+        if upload is None or len(upload.items) == upload.count:
+            return replies
+        if t_us - upload.asked_us >= ASK_AGAIN_US:
             if upload.tries < TRIES:
                 replies.append(self._ask(upload, t_us))
             else:
@@ -158,7 +182,7 @@ class MissionService(LinkService):
         if count > ROOM[kind]:
             reason = f"{count} items of {kind.name.lower()}; the limit is {ROOM[kind]}"
             return self._refuse(BadItem(NO_SPACE, reason), kind, peer)
-        self._upload = _Upload(peer, self._address, kind, count)
+        self._upload = _Incoming(peer, self._address, kind, count)
         if count == 0:
             return self._finish(self._upload)
         return (self._ask(self._upload, t_us),)
@@ -198,25 +222,40 @@ class MissionService(LinkService):
             return ()
         return (encode_ack(DENIED if self._upload else ERROR, number, peer),)
 
-    def _ask(self, upload: _Upload, t_us: int) -> Outgoing:
+    def _ask(self, upload: _Incoming, t_us: int) -> Outgoing:
         upload.asked_us = t_us
         upload.tries += 1
         return Outgoing(ids.MISSION_REQUEST_INT, (len(upload.items), *upload.peer, upload.kind))
 
-    def _finish(self, upload: _Upload) -> Sequence[ServiceOutput]:
-        kind, peer = upload.kind, upload.peer
+    def _finish(self, incoming: _Incoming) -> Sequence[ServiceOutput]:
+        """Offer a whole list to the tick."""
+        kind, peer = incoming.kind, incoming.peer
+        lists = {kind: (tuple(incoming.items), tuple(incoming.meanings))}
         try:
-            items, meanings = tuple(upload.items), tuple(upload.meanings)
-            remarks = self._store.keep(kind, items, meanings, self.source)
+            upload = self._store.offer(lists, self.source)
         except BadItem as refused:
             return self._refuse(refused, kind, peer)
-        self._upload = None
-        self._done = upload
-        text = f"{kind.name.lower()} of {upload.count} items received"
+        self._asked.append(_Asked(upload, kind, peer, incoming))
+        return ()
+
+    def _decided(self, asked: _Asked) -> Sequence[ServiceOutput]:
+        """The acknowledgement of what the tick has decided on; it has said itself why not."""
+        upload, number, peer, incoming = asked
+        assert upload.result is not None
+        ack = encode_ack(upload.result, number, peer, 0)
+        if self._upload is incoming:
+            self._upload = None
+        if upload.result != ACCEPTED:
+            return (ack,)
+        ack = encode_ack(ACCEPTED, number, peer, upload.identity(number))
+        if incoming is None:
+            return (ack,)
+        self._done = incoming
+        text = f"{incoming.kind.name.lower()} of {incoming.count} items received"
         return (
-            encode_ack(ACCEPTED, kind, peer, self._store.ids[kind]),
+            ack,
             StatusText(Severity.INFO, text),
-            *(StatusText(Severity.WARNING, remark) for remark in remarks),
+            *(StatusText(Severity.WARNING, remark) for remark in upload.remarks),
         )
 
     # ------------------------------------------------------------ download
@@ -268,14 +307,12 @@ class MissionService(LinkService):
             return refused
         self._upload = self._download = None
         try:
-            self._store.clear(tuple(map(Kind, kinds)), self.source)
+            upload = self._store.offer({Kind(kind): EMPTY for kind in kinds}, self.source)
         except BadItem as wrong:
-            text = f"nothing cleared: fence refused: {wrong.reason}"
-            return (
-                encode_ack(wrong.result, number, peer),
-                StatusText(Severity.WARNING, text),
-            )
-        return (encode_ack(ACCEPTED, number, peer),)
+            text = f"nothing cleared: {wrong.reason}"
+            return encode_ack(wrong.result, number, peer), StatusText(Severity.WARNING, text)
+        self._asked.append(_Asked(upload, number, peer, None))
+        return ()
 
     def _set_current(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         seq = int(values[0])
@@ -308,7 +345,7 @@ class MissionService(LinkService):
         """Where the frame that is handled now came from."""
         return "" if self.source is None else self.source.address
 
-    def _is_of(self, transfer: _Upload | _Download | None, peer: Peer) -> bool:
+    def _is_of(self, transfer: _Incoming | _Download | None, peer: Peer) -> bool:
         """Whether a transfer is of the client whose frame is handled now."""
         if transfer is None:
             return False

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import SafeSet, Vec3
+from fsw.autopilot.signals import Vec3
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
@@ -150,7 +150,7 @@ def whole_vehicle(folder: Path) -> Iterator[Ground]:
     logs = FlightLogs(run)
     services = (
         ParameterService(ParameterStore(FlightConfig(), lambda tuning: None)),
-        MissionService(MissionStore(Site(_nowhere, _as_it_is, lambda: 0.1, lambda *_: 0.0))),
+        MissionService(MissionStore(Site(_nowhere, lambda: 0.1))),
         LogService(logs),
         LogStreamService(logs),
         FtpService(vehicle_files(logs)),
@@ -163,7 +163,3 @@ def whole_vehicle(folder: Path) -> Iterator[Ground]:
 
 def _nowhere(latitude: float, longitude: float, altitude: float) -> Vec3:
     return latitude, longitude, -altitude
-
-
-def _as_it_is(safe_set: SafeSet) -> tuple[str, ...]:
-    return ()

@@ -28,7 +28,8 @@ class Raising:
         self.calls += 1
         if self.calls in self._failing:
             raise ZeroDivisionError("division by zero")
-        return state + 1, outputs_at(state, acks=(CommandAck(400, 0, 1, 195),))
+        acks = (CommandAck(400, 0, 1, 195),)
+        return state + 1, outputs_at(state, acks=acks, tuning_taken=True, upload_taken=True)
 
 
 @pytest.mark.requirement("REQ-TIME-7")
@@ -38,6 +39,7 @@ def test_a_tick_that_fails_repeats_the_last_command_and_says_so() -> None:
     failed = tick(INPUTS)
     assert failed.actuators == ACTUATORS
     assert failed.acks == ()
+    assert (failed.tuning_taken, failed.upload_taken) == (None, None)
     assert "ZeroDivisionError" in failed.texts[0].text
     # The state is the one before the failure: it goes on from there.
     assert tick(INPUTS).snapshot.t_us == 1

@@ -23,7 +23,6 @@ from fsw.autopilot.signals import (
     Vec3,
     Zone,
 )
-from fsw.frozen import replace
 
 MAX_CLEARANCE: Final = 10.0  # m; what needs more is a larger shape
 MAX_FORCE: Final = 200.0  # N, on a surface
@@ -171,19 +170,14 @@ def place_problem(place: Vec3) -> str | None:
     return f"the place is more than {MAX_DISTANCE:g} m from the origin"
 
 
-def bounded_update(update: MissionUpdate | None) -> tuple[MissionUpdate | None, list[str]]:
-    """An upload without what is out of bounds, the same object where all is within; and why."""
-    if update is None:
-        return None, []
-    kept, against = update, []
+def upload_problem(update: MissionUpdate) -> str | None:
+    """Why an upload is refused, whole, whatever the vehicle does."""
     wrong = mission_problem(update.steps or ())
     if wrong is not None:
-        kept = replace(kept, steps=None, current=None)
-        against.append(f"mission refused: step {wrong[0]}: {wrong[1]}")
+        return f"mission refused: item {wrong[0]}: {wrong[1]}"
     if not all(_within(math.hypot(*place), MAX_DISTANCE) for place in update.rally or ()):
-        kept = replace(kept, rally=None)
-        against.append(f"rally points refused: one is more than {MAX_DISTANCE:g} m away")
-    return kept, against
+        return f"rally points refused: one is more than {MAX_DISTANCE:g} m away"
+    return None
 
 
 def mission_problem(steps: tuple[MissionStep, ...]) -> tuple[int, str] | None:

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from fsw.autopilot.signals import CommandRequest, CommandResult
+from fsw.autopilot.signals import CommandRequest, CommandResult, Sender
 
 _AT_ONCE_US = 500_000  # the same words within this are the same command
 _RESENT_US = 3_000_000  # a command that says it is a repetition: four sends half a second apart
@@ -27,7 +27,7 @@ Words = tuple[int, int | None, tuple[float | None, ...]]
 class AnsweredCommand:
     """The last command of one sender."""
 
-    sender: tuple[int, int]  # system, component
+    sender: Sender
     words: Words
     result: int  # CommandResult
     t_us: int
@@ -39,7 +39,7 @@ def answered_before(
 ) -> AnsweredCommand | None:
     """The recent result of the same command of the same sender."""
     for last in memory:
-        if last.sender == _sender(request):
+        if last.sender == request.sender:
             patience = _RESENT_US if request.confirmation > 0 else _AT_ONCE_US
             if last.result != CommandResult.ACCEPTED and request.confirmation == 0:
                 return None  # nothing was done; by now it may be possible
@@ -74,14 +74,10 @@ def remember(
     changed: frozenset[str] = frozenset(),
 ) -> tuple[AnsweredCommand, ...]:
     """The memory with this command, and what it ``changed``, as its sender's last."""
-    sender = _sender(request)
+    sender = request.sender
     others = [last for last in memory if last.sender != sender]
     answered = AnsweredCommand(sender, _words(request), result, t_us, changed)
     return (answered, *others[: _SENDERS - 1])
-
-
-def _sender(request: CommandRequest) -> tuple[int, int]:
-    return request.source_system, request.source_component
 
 
 def _words(request: CommandRequest) -> Words:

@@ -12,6 +12,7 @@ from fsw.autopilot.flight.commands.bounds import GRIPPER_OF_PX4, motion_refusal,
 from fsw.autopilot.flight.commands.dedup import COURSE
 from fsw.autopilot.flight.modes.base import CommandContext, FlightMode
 from fsw.autopilot.flight.restart import RESTARTED
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
@@ -101,11 +102,10 @@ def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
     """Accept a command with its effects, or refuse it with a reason."""
     handler = COMMAND_HANDLERS[type(command.action)]
     decision: Decision = handler(command.action, context, modes)
-    if decision.alarming:
-        request = command.request
-        sender = f"{request.source_system}/{request.source_component}"
-        return replace(decision, reason=decision.reason.replace("{sender}", sender))
-    return decision
+    if "{sender}" not in decision.reason:
+        return decision
+    sender = "{}/{}".format(*command.request.sender)
+    return replace(decision, reason=decision.reason.replace("{sender}", sender))
 
 
 def decide_without_estimate(command: Command, context: CommandContext, modes: Modes) -> Decision:
@@ -288,10 +288,16 @@ def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decisio
     if not context.estimate_valid:
         return Decision(LATER, "home not set: the estimate is invalid")
     place = context.position if action.place is None else _place(action.place, context)
-    far = place_problem(place)
-    if far is not None:
-        return Decision(DENIED, f"home not set: {far}")
-    return Decision(ACCEPTED, home=Home(place, context.yaw))
+    north, east, height = *place[:2], -place[2]
+    against = context.against_sender or place_problem(place)
+    if not against and not height <= context.highest:
+        most = f"the maximum is {context.highest:g} m"
+        against = f"{height:.1f} m above the origin is too high; {most}"
+    against = against or way_home.outside(context.fence, (north, east))
+    if against:
+        return Decision(DENIED, f"home not set by {{sender}}: {against}")
+    where = f"{way_home.told(((north, east),))}, {height:.1f} m above the origin"
+    return Decision(ACCEPTED, f"home set by {{sender}}: {where}", home=Home(place, context.yaw))
 
 
 def _start_mission(action: StartMission, context: CommandContext, modes: Modes) -> Decision:

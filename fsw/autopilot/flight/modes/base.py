@@ -7,7 +7,7 @@ A flight mode is one file in this folder: a subclass of ``FlightMode`` and a nam
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from fsw.autopilot.flight.commands.arming_health import ArmingHealth
@@ -80,6 +80,8 @@ class CommandContext:
     above_px4: bool = False  # PX4 flies: what is disarmed here is given back to it
     rests: bool = True  # it lies or stands still
     highest: float = math.inf  # m above the origin, of the base
+    fence: SafeSet = field(default_factory=SafeSet)  # the part of the safe set that was uploaded
+    against_sender: str = ""  # why it may not change where a return ends; empty: it may
 
 
 @dataclass(frozen=True, slots=True)

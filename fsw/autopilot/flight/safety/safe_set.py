@@ -1,6 +1,7 @@
 """Which safe set is in force: the announced one and the fence together, if they can be kept.
 
-One source owns what is announced, the first or the configured one, and one the fence. In flight any
+One source owns what is announced, the first or the configured one, and one the fence that is in
+force; nobody owns what never was. In flight any
 source may shrink either, and only its owner may grow it (``safe_set_change.growth``) or announce a
 zone that comes so close that the vehicle must give way: it could push it into others. Every change
 and every refusal is a text that says who and what. Disarmed, another source may become the
@@ -15,7 +16,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fsw.autopilot.barriers.margins import Margins
-from fsw.autopilot.flight.commands.bounds import safe_set_problem
+from fsw.autopilot.flight.commands.bounds import safe_set_problem, upload_problem
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.safety.safe_set_change import (
     growth,
     held,
@@ -97,16 +99,17 @@ class SafeSetCheck:
         """Take in what was uploaded and announced; in flight only what can be kept.
 
         A vehicle that is ``armed``, by default one that flies, must be inside of it, with the zones
-        that follow the ``target`` if there is one.
+        that follow the ``target`` if there is one. Of an upload all is taken or nothing.
         """
         armed = flies if armed is None else armed
         here = _Vehicle(estimate if armed else None, target)
         update = inputs.mission
         if update is not None:
-            if update.rally is not None:
-                mission = replace(mission, rally=update.rally)
-            if update.fence is not None:
-                mission = self._take_fence(mission, update, here, texts, flies=flies)
+            against = upload_problem(update) or self._against_rally(mission, update, armed=armed)
+            if against is None:
+                mission = self._take_upload(mission, update, here, estimate, texts, flies=flies)
+            else:
+                mission = _refused(mission, against, texts)
         for announcement in inputs.announced:
             now_us = inputs.sensors.t_us
             owns = self._owns(mission, announcement.source, now_us, armed=armed)
@@ -120,34 +123,100 @@ class SafeSetCheck:
             )
         return mission
 
-    def _take_fence(
+    def _take_upload(
         self,
         mission: MissionMemory,
         update: MissionUpdate,
         here: _Vehicle,
+        estimate: StateEstimate | None,
         texts: list[StatusText],
         *,
         flies: bool,
     ) -> MissionMemory:
-        """A fence that was uploaded; in flight only its owner may grow it."""
-        fence, source = update.fence or SafeSet(), update.fence_source
-        entitled = not flies or may_grow_fence(mission.fence_owner, source, self._chosen)
-        against = safe_set_problem(fence, self._config.surroundings.zone_speed) or ""
-        if not (against or entitled):
+        """What was uploaded, unless something speaks against any part of it."""
+        wanted = mission
+        if update.fence is not None:
+            who = "fence" if update.source is None else f"fence of {update.source}"
+            problem = self._against_fence(mission, update, here, estimate, flies=flies)
+            if not problem:
+                wanted = self._with_fence(mission, update, who, texts, flies=flies)
+                problem = "the old safe set is kept" if wanted is mission else ""
+            if problem:
+                return _refused(mission, f"{who} refused: {problem}", texts)
+        if update.rally not in (None, mission.rally):
+            wanted = replace(wanted, rally=update.rally)
+            text = f"rally points of {update.source}: {way_home.told(wanted.rally)}"
+            texts.append(StatusText(Severity.INFO, text))
+            if update.source is not None:
+                armed = here.estimate is not None
+                wanted = way_home.changed(wanted, update.source.sender, armed=armed)
+        return replace(wanted, upload_taken=True)
+
+    def _against_rally(
+        self, mission: MissionMemory, update: MissionUpdate, *, armed: bool
+    ) -> str | None:
+        """Why other rally points are refused."""
+        if update.rally is None or update.rally == mission.rally:
+            return None
+        source = None if update.source is None else update.source.sender
+        against = way_home.against(mission, source, self._chosen, armed=armed)
+        fence = mission.fence if update.fence is None else update.fence
+        found = (way_home.outside(fence, place) for place in update.rally)
+        against = against or next(filter(None, found), "")
+        return f"rally points of {update.source} refused: {against}" if against else None
+
+    def _against_fence(
+        self,
+        mission: MissionMemory,
+        update: MissionUpdate,
+        here: _Vehicle,
+        estimate: StateEstimate | None,
+        *,
+        flies: bool,
+    ) -> str:
+        """Why a fence cannot be in force; in flight only its owner may grow it."""
+        fence = update.fence or SafeSet()
+        problem = safe_set_problem(fence, self._config.surroundings.zone_speed)
+        if problem is not None:
+            return problem
+        if not self._may_grow(mission, update, flies=flies):
             grown = growth(mission.fence, fence)
-            against = f"{grown}, which {mission.fence_owner} owns" if grown else ""
-        against = against or self._outside(mission, mission.fence, fence, here)
-        if against:
-            text = f"fence of {source} refused: {against}"
-            texts.append(StatusText(Severity.CRITICAL, text))
-            return replace(mission, refused_count=mission.refused_count + 1)
-        wanted = replace(
-            mission, fence=fence, fence_owner=source if entitled else mission.fence_owner
-        )
+            if grown:
+                return f"{grown}, which {mission.fence_owner} owns"
+        unkept = () if self._config.soft else refusals(self.analyse(fence))
+        if unkept:
+            return f"it cannot be kept: {'; '.join(unkept)}"
+        if here.estimate is None:
+            return "" if estimate is None else _excluded(fence, estimate)
+        return self._outside(mission, mission.fence, fence, here)
+
+    def _with_fence(
+        self,
+        mission: MissionMemory,
+        update: MissionUpdate,
+        who: str,
+        texts: list[StatusText],
+        *,
+        flies: bool,
+    ) -> MissionMemory:
+        """The memory with a fence; the same one where both safe sets together cannot be kept."""
+        fence, owner = update.fence or SafeSet(), mission.fence_owner
+        if self._may_grow(mission, update, flies=flies):
+            owner = update.source
+        wanted = replace(mission, fence=fence, fence_owner=owner if fence.zones else None)
         if fence == mission.fence:
             return wanted
-        who = "fence" if source is None else f"fence of {source}"
         return self._kept(mission, wanted, f"{who}: {summary(fence)}", texts, flies=flies)
+
+    def _may_grow(self, mission: MissionMemory, update: MissionUpdate, *, flies: bool) -> bool:
+        """Whether an upload may put any other fence in place.
+
+        The owner is the source that uploaded the one in force, or all of a chosen system.
+        """
+        source, owner, chosen = update.source, mission.fence_owner, self._chosen
+        if not flies or source is None or (owner is None and not chosen):
+            return True
+        return source.system == chosen if chosen else source.is_same(owner)
 
     def _take(
         self,
@@ -359,25 +428,18 @@ class SafeSetCheck:
         surfaces(walled, estimate.p_WB, estimate.t_us)
         self._margins.report(walled, estimate, still_at(estimate.p_WB))
 
-    def min_margin(
-        self, safe_set: SafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
-    ) -> float:
-        """The least margin [m] the whole vehicle would have in a safe set; inf: it has no zone.
-
-        Below 0 the failsafe of a breach would be active at once. Without a target, zones that
-        follow it are left out.
-        """
-        if target is None:
-            zones = [one for one in safe_set.zones if not kind_of(one.shape).follows_target]
-            safe_set = SafeSet(tuple(zones))
-        return least(self._margins.report(safe_set, estimate, target).margins)
-
     def margins(
         self, kept: InflatedSafeSet, estimate: StateEstimate, target: EndEffectorTarget | None
     ) -> ConstraintReport:
         """Margins and barrier values of the vehicle in the safe set in force."""
         report = self._margins.report(kept.source, estimate, target)
         return replace(report, added=kept.added, shortfall=kept.shortfall) if kept.added else report
+
+
+def _refused(mission: MissionMemory, against: str, texts: list[StatusText]) -> MissionMemory:
+    """The memory without what was uploaded, and why."""
+    texts.append(StatusText(Severity.CRITICAL, against))
+    return replace(mission, refused_count=mission.refused_count + 1, upload_taken=False)
 
 
 def _is_repeated(announcement: SafeSetAnnouncement, refused: SafeSetAnnouncement | None) -> bool:
@@ -395,14 +457,16 @@ def _follows(old: SafeSet, new: SafeSet) -> str:
     return ""
 
 
-def may_grow_fence(owner: MessageSource | None, source: MessageSource | None, chosen: int) -> bool:
-    """Whether a source may put any other fence in place in flight.
+def _excluded(fence: SafeSet, estimate: StateEstimate) -> str:
+    """Why a fence does not contain the place of a disarmed vehicle.
 
-    The owner is the source that uploaded the one in force, or all of a ``chosen`` system.
+    No failsafe acts there, so its base is enough; arming asks for all of it.
     """
-    if source is None or (owner is None and not chosen):
-        return True
-    return source.system == chosen if chosen else source.is_same(owner)
+    for number, at in enumerate(surfaces(fence, estimate.p_WB, estimate.t_us)):
+        if not at.distance > 0.0:
+            which = f"zone {number + 1} ({fence.zones[number].shape.kind})"
+            return f"the vehicle is not inside {which}, by {-at.distance:.2f} m"
+    return ""
 
 
 def joined(announced: SafeSet, fence: SafeSet) -> SafeSet:

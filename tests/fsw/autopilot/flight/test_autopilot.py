@@ -365,12 +365,12 @@ def test_what_is_refused_is_told_and_counted_whoever_refuses_it() -> None:
     )
     state, outputs = loop.tick(state, inputs)
     assert [(text.severity, text.text) for text in outputs.texts if "refused" in text.text] == [
-        (
-            Severity.CRITICAL,
-            "mission refused: step 0: the place is more than 1000 m from the origin",
-        ),
         (Severity.CRITICAL, "target refused: position out of range: 2000 m, at most 1000 m"),
         (Severity.CRITICAL, "ball refused: it is too large"),
+        (
+            Severity.CRITICAL,
+            "mission refused: item 0: the place is more than 1000 m from the origin",
+        ),
     ]
     assert outputs.snapshot.safety.refusals == 3
     assert state.mission.stream == (near,)

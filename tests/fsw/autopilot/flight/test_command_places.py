@@ -143,7 +143,8 @@ def test_a_goto_too_close_to_a_point_is_refused() -> None:
 
 def test_home_is_set_here_or_at_a_place() -> None:
     here = decided(NAN, NAN, NAN, None, 1.0, command=SET_HOME)
-    assert here == Decision(ACCEPTED, home=Home(HERE, 0.0))
+    told = "home set by 255/190: 1.0 m north 2.0 m east, 5.0 m above the origin"
+    assert here == Decision(ACCEPTED, told, home=Home(HERE, 0.0))
     latitude, longitude, altitude = to_global(ORIGIN, (5.0, 6.0, -1.0))
     home = decided(latitude, longitude, altitude, 5, 0.0, command=SET_HOME).home
     assert home is not None

@@ -13,6 +13,7 @@ from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.commands.arming import CHECKS, Subject
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.modes.land import Land
+from fsw.autopilot.flight.safety import way_home
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
 from fsw.autopilot.flight.state import (
     FlightState,
@@ -24,6 +25,7 @@ from fsw.autopilot.flight.state import (
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.signals import (
+    VEHICLE_PILOT,
     Arm,
     ArmingReport,
     BatteryState,
@@ -42,6 +44,7 @@ from fsw.autopilot.signals import (
     MoveJoints,
     Place,
     PlannerCounters,
+    Sender,
     SetHome,
     Severity,
     StateEstimate,
@@ -215,7 +218,8 @@ def test_a_repeated_command_acts_again_where_another_sender_has_undone_it(
 ) -> None:
     """It was acknowledged from memory, and what the other sender had set stayed."""
     mine, other = UNDONE[name]
-    first = asked(flying(), mine, 1, sender=255)
+    # In flight, home is for one of both alone.
+    first = asked(DISARMED if name == "home" else flying(), mine, 1, sender=255)
     second = asked(first, other, 2, sender=7)
     assert getattr(second.vehicle, name) != getattr(first.vehicle, name)
     third = asked(second, mine, 1, 255, again)
@@ -339,9 +343,63 @@ def test_a_mode_chosen_before_arming_whose_need_is_gone_leaves_hold_and_says_why
 
 
 def test_home_is_set_and_the_rest_stays() -> None:
-    state = after(flying(), SetHome(None))
+    state, texts = carried_out(flying(), SetHome(None))
     assert state.vehicle.home == Home(HERE, 0.5)
     assert state.vehicle.mode is Mode.HOLD
+    assert [text.text for text in texts] == [
+        "home set by 255/190: 1.0 m north 2.0 m east, 3.0 m above the origin"
+    ]
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+@pytest.mark.parametrize(
+    ("armed_by", "chosen", "sender", "may"),
+    [
+        ((255, 190), 0, (255, 190), True),
+        ((255, 190), 0, (66, 6), False),
+        ((255, 190), 0, (255, 191), False),
+        ((255, 190), 9, (255, 190), True),
+        ((255, 190), 9, (9, 1), True),
+        ((255, 190), 9, (66, 6), False),
+        (VEHICLE_PILOT, 0, (66, 6), True),
+        (VEHICLE_PILOT, 0, (0, 0), True),
+        (VEHICLE_PILOT, 9, (66, 6), False),
+        (VEHICLE_PILOT, 9, (9, 1), True),
+        ((255, 190), 0, (0, 0), False),
+    ],
+)
+def test_armed_who_armed_or_is_chosen_may_change_where_a_return_ends(
+    armed_by: Sender, chosen: int, sender: Sender, may: bool
+) -> None:
+    """A stranger's home, 30 m away, was flown to without a word."""
+    owned = way_home.commanded(flying(), armed_by, None, arms=True).mission
+    assert (way_home.against(owned, sender, chosen, armed=True) == "") is may
+    assert way_home.against(owned, sender, chosen, armed=False) == ""
+
+
+def test_where_nobody_is_known_to_have_armed_the_first_owns_where_a_return_ends() -> None:
+    state = way_home.commanded(flying(), VEHICLE_PILOT, None, arms=True)
+    home = Home(HERE, 0.0)
+    owned = way_home.commanded(state, (9, 1), home, arms=False).mission
+    assert way_home.against(owned, (66, 6), 0, armed=True)
+    assert not way_home.against(owned, (9, 1), 0, armed=True)
+    on_ground = way_home.commanded(DISARMED, (66, 6), home, arms=False)
+    assert on_ground.mission.home_owner is None
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+def test_a_stranger_cannot_set_home_in_flight_and_who_armed_can() -> None:
+    armed = after(DISARMED, Arm(), estimate=STANDING)
+    assert armed.mission.home_owner == (255, 190)
+    away, texts = SetHome(Place((-30.0, 0.0), 3.0)), list[StatusText]()
+    theirs = Command(away, CommandRequest(179, (math.nan,) * 7, 66, 6))
+    kept, (ack,) = COMMANDER.handle_commands(armed, HOVERING, (theirs,), texts)
+    assert (kept.vehicle.home, ack.result) == (armed.vehicle.home, CommandResult.DENIED)
+    only = "while armed only 255/190 may change where a return ends"
+    assert texts[-1].text == f"home not set by 66/6: {only}"
+    moved = after(armed, away)
+    assert moved.vehicle.home is not None
+    assert moved.vehicle.home.p == (-30.0, 0.0, -3.0)
 
 
 def test_a_speed_is_kept_for_places_and_for_the_mission() -> None:

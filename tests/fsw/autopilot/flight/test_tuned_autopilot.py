@@ -9,11 +9,12 @@ import pytest
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, first_state
 from fsw.autopilot.flight.tuned_autopilot import TunedAutopilot
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import (
+    MissionUpdate,
     Mode,
     SafeSet,
     SensorFrame,
@@ -24,6 +25,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.autopilot.tuning import Tuning, tuned
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying, vehicle_at
+from tests.fsw.autopilot.flight.test_autopilot import frame as frame_at
 from tests.fsw.records import with_record
 
 STILL: Vec3 = (0.0, 0.0, 0.0)
@@ -179,11 +181,21 @@ def test_what_was_made_ready_is_flown_without_being_made_again(
 
 def test_a_safe_set_that_cannot_be_kept_is_flown_softly_alone() -> None:
     loop = TunedAutopilot(CONFIG)
-    assert loop.against(WALLED) == ()
+    assert _fence_refused(loop) == ""
     soft = TunedAutopilot(tuned(SOFT, UNSAFE))
     hard = TunedAutopilot(tuned(CONFIG, UNSAFE))
-    assert soft.against(WALLED) == ()
-    assert hard.against(WALLED) != ()
+    assert _fence_refused(soft) == ""
+    assert "it cannot be kept" in _fence_refused(hard)
+
+
+def _fence_refused(loop: TunedAutopilot) -> str:
+    """What the tick says against a fence that is uploaded on the ground."""
+    inputs = TickInputs(frame_at(1_000_000), mission=MissionUpdate(fence=WALLED))
+    state, outputs = loop.tick(first_state(CONFIG.airframe), inputs)
+    told = [text.text for text in outputs.texts if "refused" in text.text]
+    assert outputs.upload_taken is not bool(told)
+    assert state.mission.fence == (SafeSet() if told else WALLED)
+    return "".join(told)
 
 
 def test_the_loop_of_another_tuning_is_made_without_asking_for_types_or_gains_again(

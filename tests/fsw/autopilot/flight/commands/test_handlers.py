@@ -565,6 +565,25 @@ def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
     assert (lost.result, lost.home) == (TEMPORARILY_REJECTED, None)
 
 
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({}, ""),
+        ({"highest": 4.0}, "5.0 m above the origin is too high; the maximum is 4 m"),
+        ({"fence": SafeSet((wall((-1.0, 0.0, 0.0), -8.0, 0.1),))}, "outside the fence, by 1.10 m"),
+        ({"against_sender": "while armed only 255/190"}, "while armed only 255/190"),
+    ],
+)
+def test_home_is_below_the_ceiling_inside_the_fence_and_its_owners(
+    changes: dict[str, object], why: str
+) -> None:
+    decision = decided(SetHome(Place((9.0, 0.0), 5.0)), replace(HIGH, **changes))  # type: ignore[arg-type]
+    assert (decision.home is None) is bool(why)
+    assert why in decision.reason
+    assert decision.result == (DENIED if why else ACCEPTED)
+    assert decision.reason.startswith("home not set by" if why else "home set by")
+
+
 @pytest.mark.requirement("REQ-ARM-9")
 @pytest.mark.parametrize("situation", [STANDING, HIGH])
 def test_a_failure_is_injected_only_where_the_parameter_allows_it(

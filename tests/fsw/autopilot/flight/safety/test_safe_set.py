@@ -46,11 +46,21 @@ def received(
     at: Vec3 = (0.0, 0.0, -1.0), **update: object,
 ) -> tuple[MissionMemory, list[StatusText]]:  # fmt: skip
     texts: list[StatusText] = []
-    uploaded = MissionUpdate(**update) if update else None  # type: ignore[arg-type]
+    lists = MissionUpdate(**update) if update else None  # type: ignore[arg-type]
     heard = () if announced is None else (SafeSetAnnouncement(source, announced),)
     sensors = frame(round(1e6 * t_s))
-    inputs = TickInputs(sensors, announced=heard, mission=uploaded)
+    inputs = TickInputs(sensors, announced=heard, mission=lists)
     return check.update(memory, inputs, vehicle_at(at), texts, flies=flies), texts
+
+
+def uploaded(
+    memory: MissionMemory, source: MessageSource, *, flies: bool = True, **lists: object
+) -> tuple[MissionMemory, list[StatusText]]:
+    """What becomes of lists that a source has uploaded."""
+    texts: list[StatusText] = []
+    update = MissionUpdate(source=source, **lists)  # type: ignore[arg-type]
+    inputs = TickInputs(frame(1_000_000), mission=update)
+    return CHECK.update(memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies), texts
 
 
 def refused(texts: list[StatusText]) -> str:
@@ -82,7 +92,7 @@ def test_what_is_announced_and_the_fence_are_in_force_together() -> None:
     memory, _ = received(memory, SafeSet())
     assert memory.safe_set == SafeSet((SOUTH, TREE))
     memory, texts = received(memory, rally=((1.0, 2.0),))
-    assert texts == []
+    assert [text.text for text in texts] == ["rally points of None: 1.0 m north 2.0 m east"]
     assert memory.rally == ((1.0, 2.0),)
     assert memory.safe_set == SafeSet((SOUTH, TREE))
 
@@ -470,17 +480,78 @@ def test_one_sender_has_one_address_unless_signatures_vouch_for_it() -> None:
 
 @pytest.mark.requirement("REQ-SAFE-9")
 def test_in_flight_a_fence_is_grown_by_its_uploader_only() -> None:
-    theirs = {"source": OWNER, "fence_source": STRANGER}
-    memory, _ = received(MissionMemory(), fence=walled(5.0, 5.0), fence_source=OWNER)
-    after, texts = received(memory, fence=SafeSet(), **theirs)
-    assert after.fence == walled(5.0, 5.0)
+    memory, _ = uploaded(MissionMemory(), OWNER, fence=walled(5.0, 5.0))
+    after, texts = uploaded(memory, STRANGER, fence=SafeSet())
+    assert (after.fence, after.upload_taken) == (walled(5.0, 5.0), False)
     assert f"fence of {STRANGER} refused" in refused(texts)
-    after, _ = received(memory, fence=walled(4.0, 5.0), **theirs)
+    after, _ = uploaded(memory, STRANGER, fence=walled(4.0, 5.0))
     assert (after.fence, after.fence_owner) == (walled(4.0, 5.0), OWNER)
-    after, _ = received(after, fence=SafeSet(), fence_source=OWNER)
+    after, _ = uploaded(after, OWNER, fence=SafeSet())
     assert after.safe_set == SafeSet()
-    ground, _ = received(memory, fence=SafeSet(), flies=False, **theirs)
-    assert (ground.fence, ground.fence_owner) == (SafeSet(), STRANGER)
+    ground, _ = uploaded(memory, STRANGER, fence=walled(9.0, 9.0), flies=False)
+    assert (ground.fence, ground.fence_owner) == (walled(9.0, 9.0), STRANGER)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+def test_nobody_owns_a_fence_that_is_not_in_force() -> None:
+    """One that was refused, and one that its owner has cleared."""
+    through = walled(-0.5, 5.0)
+    memory, texts = uploaded(MissionMemory(), STRANGER, fence=through)
+    assert "the vehicle is not inside zone 1" in refused(texts)
+    assert (memory.fence_owner, memory.upload_taken) == (None, False)
+    memory, _ = uploaded(memory, STRANGER, fence=walled(5.0, 5.0))
+    memory, _ = uploaded(memory, STRANGER, fence=SafeSet())
+    assert memory.fence_owner is None
+    memory, _ = uploaded(memory, OWNER, fence=walled(5.0, 5.0))
+    assert (memory.fence, memory.fence_owner) == (walled(5.0, 5.0), OWNER)
+    memory, _ = uploaded(memory, OWNER, fence=walled(6.0, 6.0))
+    assert memory.fence == walled(6.0, 6.0)
+
+
+def test_of_an_upload_all_is_taken_or_nothing() -> None:
+    memory, _ = uploaded(MissionMemory(), OWNER, fence=walled(5.0, 5.0), rally=((1.0, 0.0),))
+    assert (memory.rally, memory.upload_taken) == (((1.0, 0.0),), True)
+    after, _ = uploaded(memory, STRANGER, fence=SafeSet(), rally=())
+    assert (after.fence, after.rally) == (memory.fence, memory.rally)
+    after, _ = uploaded(memory, OWNER, fence=SafeSet(), rally=((1e5, 0.0),))
+    assert (after.fence, after.rally, after.upload_taken) == (memory.fence, memory.rally, False)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+def test_rally_points_are_told_and_are_their_owners_and_inside_the_fence() -> None:
+    places = tuple((float(north), 0.0) for north in range(4))
+    memory, texts = uploaded(MissionMemory(), OWNER, fence=walled(5.0, 5.0), rally=places)
+    assert memory.rally == places
+    told_of = f"rally points of {OWNER}: 0.0 m north 0.0 m east, 1.0 m north 0.0 m east"
+    assert texts[-1].text == f"{told_of}, 2.0 m north 0.0 m east, 1 more"
+    after, texts = uploaded(memory, OWNER, rally=((-9.0, 0.0),))
+    assert (after.rally, after.upload_taken) == (places, False)
+    assert "outside the fence, by 4.10 m at its zone 2" in refused(texts)
+    assert memory.home_owner == OWNER.sender, "the first, where it is not known who has armed"
+    other = replace(STRANGER, system=66)
+    theirs, texts = uploaded(memory, other, rally=(), fence=walled(1.0, 1.0))
+    assert (theirs.rally, theirs.fence) == (places, walled(5.0, 5.0))
+    assert f"rally points of {other} refused: while armed only 1/195 may change" in refused(texts)
+    ground, _ = uploaded(memory, other, rally=(), flies=False)
+    assert ground.rally == ()
+    same, texts = uploaded(memory, other, rally=places)
+    assert (same.upload_taken, texts) == (True, [])
+
+
+def test_a_fence_that_both_safe_sets_together_rule_out_is_refused_with_a_text_each_time() -> None:
+    memory, _ = received(MissionMemory(), TINY, flies=False)
+    for _ in range(2):
+        memory, texts = uploaded(memory, OWNER, fence=SafeSet((SOUTH,)))
+        assert (memory.fence, memory.upload_taken) == (SafeSet(), False)
+        assert f"fence of {OWNER} refused: the old safe set is kept" in texts[-1].text
+
+
+def test_where_a_disarmed_vehicle_stands_is_inside_the_fence_with_its_base() -> None:
+    beside, _ = uploaded(MissionMemory(), OWNER, fence=walled(0.15, 5.0), flies=False)
+    assert beside.upload_taken
+    memory, texts = uploaded(MissionMemory(), OWNER, fence=walled(-1.0, 5.0), flies=False)
+    assert "the vehicle is not inside zone 1 (half-space), by 1.10 m" in refused(texts)
+    assert not memory.upload_taken
 
 
 @pytest.mark.requirement("REQ-SAFE-9")

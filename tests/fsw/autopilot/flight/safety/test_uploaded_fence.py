@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -13,11 +12,17 @@ from scipy.spatial.transform import Rotation
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
-from fsw.autopilot.flight.state import SafetyMemory
-from fsw.autopilot.parameters.control_choice import ControlChoice
+from fsw.autopilot.flight.state import MissionMemory, SafetyMemory
 from fsw.autopilot.parameters.flight_config import flight_config
-from fsw.autopilot.signals import EndEffectorTarget, StateEstimate, Vec2
-from fsw.link.services.mission_store import Kind, MissionStore
+from fsw.autopilot.signals import (
+    EndEffectorTarget,
+    MissionUpdate,
+    SafeSet,
+    StateEstimate,
+    StatusText,
+    TickInputs,
+    Vec2,
+)
 from fsw.link.wire.fence_items import (
     CIRCLE_EXCLUSION,
     CIRCLE_INCLUSION,
@@ -25,15 +30,14 @@ from fsw.link.wire.fence_items import (
     POLYGON_INCLUSION,
     read_fence,
 )
-from fsw.link.wire.mission_items import LOCAL_OFFSET_NED, BadItem, MissionItem
-from fsw.runtime.assembly import flight_software
+from fsw.link.wire.mission_items import LOCAL_OFFSET_NED, MissionItem
+from tests.fsw.autopilot.flight.test_autopilot import frame
 from tests.fsw.link.snapshots import SNAPSHOT
 from tests.fsw.random_states import estimate_of
 
 CONFIG = flight_config()
 CHECK = SafeSetCheck(CONFIG)
 WATCH = SafetyWatch(CONFIG, CHECK.loop_tube)
-MISSIONS = flight_software(ControlChoice(), to_plan=False).missions
 AT = (1.0, 2.0, -3.0)
 NEAR = st.floats(0.0, 1.5)
 
@@ -77,24 +81,33 @@ def poses(draw: st.DrawFn) -> StateEstimate:
     return estimate_of(turned, p_WB=AT)._replace(q_arm=arm, t_us=SNAPSHOT.t_us)
 
 
+def _fence(items: tuple[MissionItem, ...]) -> SafeSet:
+    return read_fence(items, lambda *_: (0.0, 0.0, 0.0), CONFIG.limits.fence_clearance)
+
+
 def _accepts(
-    store: MissionStore, items: tuple[MissionItem, ...], estimate: StateEstimate, **seen: object
+    items: tuple[MissionItem, ...],
+    estimate: StateEstimate,
+    target: EndEffectorTarget | None = None,
+    *,
+    armed: bool = True,
 ) -> bool:
-    store.observe(replace(SNAPSHOT, **{"estimate": estimate, "reference": None, **seen}))  # type: ignore[arg-type]
-    try:
-        store.keep(Kind.FENCE, items, ())
-    except BadItem as refused:
-        # What the analysis refuses is refused wherever the vehicle is.
-        return pytest.fail(refused.reason) if "cannot be kept" in refused.reason else False
-    return True
+    texts: list[StatusText] = []
+    inputs = TickInputs(frame(estimate.t_us), mission=MissionUpdate(fence=_fence(items)))
+    memory = CHECK.update(
+        MissionMemory(), inputs, estimate, texts, flies=armed, armed=armed, target=target
+    )
+    # What the analysis refuses is refused wherever the vehicle is.
+    assert "cannot be kept" not in "".join(one.text for one in texts)
+    assert memory.upload_taken is (memory.fence.zones != ())
+    return memory.upload_taken
 
 
 def _breaches(
     items: tuple[MissionItem, ...], estimate: StateEstimate, target: EndEffectorTarget | None = None
 ) -> bool:
     """Whether the failsafe "outside the fence" would be active in the next tick."""
-    fence = read_fence(items, lambda *_: (0.0, 0.0, 0.0), CONFIG.limits.fence_clearance)
-    report = CHECK.margins(InflatedSafeSet().of(fence), estimate, target)
+    report = CHECK.margins(InflatedSafeSet().of(_fence(items)), estimate, target)
     return WATCH.breach(SafetyMemory(), estimate, report, 0, flies=True).fence_us >= 0
 
 
@@ -104,7 +117,7 @@ def _breaches(
 def test_in_flight_a_fence_is_accepted_exactly_where_its_failsafe_would_not_act(
     items: tuple[MissionItem, ...], estimate: StateEstimate
 ) -> None:
-    assert _accepts(MISSIONS, items, estimate) is not _breaches(items, estimate)
+    assert _accepts(items, estimate) is not _breaches(items, estimate)
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
@@ -121,9 +134,9 @@ def test_a_wall_or_cylinder_in_front_of_the_base_is_measured_from_the_rotors(
     else:
         corners = _around(away, 5.0, 5.0, 5.0)
         items = tuple(_item(POLYGON_INCLUSION, 4.0, corner) for corner in corners)
-    assert _accepts(MISSIONS, items, estimate) is accepted
+    assert _accepts(items, estimate) is accepted
     assert _breaches(items, estimate) is not accepted
-    assert _accepts(MISSIONS, items, estimate, armed=False)
+    assert _accepts(items, estimate, armed=False)
 
 
 @pytest.mark.requirement("REQ-SAFE-4")
@@ -132,7 +145,7 @@ def test_a_sphere_is_judged_at_the_target_that_it_rides_with(off: float, accepte
     estimate = estimate_of(Rotation.identity(), p_WB=AT)._replace(t_us=SNAPSHOT.t_us)
     target = EndEffectorTarget(0, (AT[0] + off, AT[1], AT[2] + 0.225), (0.0,) * 3, (0.0,) * 3)
     items = (_item(CIRCLE_INCLUSION, 0.075, (0.0, 0.0), LOCAL_OFFSET_NED),)
-    assert _accepts(MISSIONS, items, estimate, reference=target) is accepted
+    assert _accepts(items, estimate, target) is accepted
     assert _breaches(items, estimate, target) is not accepted
 
 
@@ -140,4 +153,4 @@ def test_walls_beside_a_sphere_are_judged_without_a_target_too() -> None:
     estimate = estimate_of(Rotation.identity(), p_WB=AT)._replace(t_us=SNAPSHOT.t_us)
     sphere = _item(CIRCLE_INCLUSION, 0.075, (0.0, 0.0), LOCAL_OFFSET_NED)
     walls = [_item(POLYGON_INCLUSION, 4.0, corner) for corner in _around(0.15, 5.0, 5.0, 5.0)]
-    assert not _accepts(MISSIONS, (*walls, sphere), estimate)
+    assert not _accepts((*walls, sphere), estimate)
