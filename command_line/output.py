@@ -11,6 +11,7 @@ import shlex
 import shutil
 import sys
 import unicodedata
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, TextIO
 
@@ -60,6 +61,12 @@ def say(sentence: str, stream: TextIO | None = None) -> None:
     """Print one line that may hold text from outside; on standard output unless told otherwise."""
     # In one piece: a thread may print as well.
     print(printable(sentence) + "\n", end="", file=stream or sys.stdout, flush=True)
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Names after each other, at most so many, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def print_error(program: str, sentence: object) -> None:

@@ -153,7 +153,7 @@ class _Session:
         result["inbox_refused"] = inbox.refused
         result["links"] = {link.name: link.as_json() for link in ground.links}
         result["files"] = files.as_json()
-        lost = try_write(directory / "fsw.json", json_text(result, 2) + "\n")
+        lost = files.lost + try_write(directory / "fsw.json", json_text(result, 2) + "\n")
         sentence = f"fsw: {end.sentence}"
         self._events.report("ended", sentence, ending=end.ending.value, result=result)
         for what in lost:

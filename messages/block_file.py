@@ -49,6 +49,11 @@ class BlockFile:
         self._thread: threading.Thread | None = None
         self._closed = False
 
+    @property
+    def lost(self) -> list[str]:
+        """What could not be written, and why, as ``try_write`` says it; empty: all of it was."""
+        return [] if self.failure is None else [f"{self.path}: {self.failure}"]
+
     def start_thread(self) -> None:
         """From here on write in a thread of its own."""
         self._thread = threading.Thread(target=self._work, name=self.path.name, daemon=True)

@@ -26,6 +26,7 @@ AMONG_DATA: Final = frozenset(
     (SUBSCRIPTION, DATA, TEXT, TAGGED, SYNC, DROPOUT, INFO, PARAMETER)
     + (MULTI_INFO, DEFAULT_PARAMETER, REMOVAL)
 )
+TICKS: Final = "ticks"  # information behind the last tick of a flight log of ours: how many it has
 PADDING: Final = "_padding"  # how names of fields begin that hold nothing
 
 _CODES: Final = {

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from struct import Struct, unpack_from
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from command_line.bounded_file import open_regular
 from messages import ulog
@@ -59,6 +59,7 @@ class UlogFile:
     size: int = 0
     at: int = 0  # bytes read so far
     whole: bool = True  # False once the end turned out to be cut
+    kinds: set[bytes] = field(default_factory=set)  # of the messages read so far
     unknown: dict[str, int] = field(default_factory=dict)  # kinds passed over, and how often
     _declared: dict[str, tuple[Field, ...]] = field(default_factory=dict)  # as they stand there
     _flattened: dict[str, tuple[Field, ...]] = field(default_factory=dict)  # without nested types
@@ -78,8 +79,22 @@ class UlogFile:
         """Whether this project wrote the log; the topics of others may have our names."""
         return self.system.startswith(_SYSTEM)
 
+    @property
+    def _says_it_is_ours(self) -> bool:
+        return self.is_ours and "sys_name" in self.information
+
+    @property
+    def cut(self) -> str:
+        """What a log that was read lacks at its end, behind "the log"; empty: nothing."""
+        if not self.whole:
+            return "was cut"
+        # Ours says at its end how long it is, which a whole block before it does not.
+        if self.is_ours and "inputs" in self.information and ulog.TICKS not in self.information:
+            return "does not say that it ends there: it was cut, or an older version wrote it"
+        return ""
+
     def records(self) -> Iterator[Record]:
-        """Every message behind the definitions, in file order.
+        """Every message behind the definitions that is no information, in file order.
 
         Raises:
             UlogError: A message cannot be what was written. A file that was cut is read up to
@@ -95,6 +110,8 @@ class UlogFile:
                     number = unpack_from("<H", body)[0]
                     self.topics.pop(number, None)
                     self._lengths.pop(number, None)
+                elif kind in (ulog.INFO, ulog.PARAMETER):
+                    self._note(kind, body)
                 elif self._is_passed_over(kind):
                     self._pass_over(kind)
                 else:
@@ -113,7 +130,7 @@ class UlogFile:
 
     def _is_passed_over(self, kind: bytes) -> bool:
         """In what says that it is ours such a kind is damage: a replay needs every record."""
-        return self._is_new(kind) and not (self.is_ours and "sys_name" in self.information)
+        return self._is_new(kind) and not self._says_it_is_ours
 
     def _pass_over(self, kind: bytes) -> None:
         self.unknown[kind.decode()] = self.unknown.get(kind.decode(), 0) + 1
@@ -242,14 +259,13 @@ class UlogFile:
         size = body[0]
         declared = _field(body[1 : 1 + size].decode("ascii"))
         rest = body[1 + size :]
+        kept: dict[str, Any] = self.parameters if kind == ulog.PARAMETER else self.information
+        if self._says_it_is_ours and declared.name in kept:
+            raise ValueError(f"{declared.name} is there twice")  # tools would show either
         if declared.type == "char":
             self.information[declared.name] = rest.decode("utf-8", "replace")
         elif declared.is_own:
-            value = unpack_from("<" + declared.code, rest)[0]
-            if kind == ulog.PARAMETER:
-                self.parameters[declared.name] = value
-            else:
-                self.information[declared.name] = value
+            kept[declared.name] = unpack_from("<" + declared.code, rest)[0]
 
     def _messages(self) -> Iterator[tuple[bytes, bytes]]:
         with open_regular(self.path) as file:
@@ -266,6 +282,7 @@ class UlogFile:
                 if end > self.size or len(body := file.read(length)) < length:
                     break
                 self.at = end
+                self.kinds.add(kind)
                 yield kind, body
             self.whole = self.at == self.size
 

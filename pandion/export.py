@@ -76,7 +76,8 @@ def main(argv: list[str]) -> int:
 
 def _left_out(log: UlogFile) -> str:
     """What of a log is not among its records."""
-    told = "" if log.whole else f"; the log is cut, and its last {log.size - log.at} bytes left out"
+    told = f"; the log {log.cut}" if log.cut else ""
+    told += "" if log.whole else f", and its last {log.size - log.at} bytes are left out"
     for kind, count in sorted(log.unknown.items()):
         told += f"; {count} messages of the unknown kind {kind} are left out"
     return told

@@ -46,6 +46,11 @@ class Replayed:
     difference: Difference | None
     lost_ms: int  # missing in the log behind these ticks; what follows cannot be fed
 
+    @property
+    def same(self) -> bool:
+        """Whether all of the log was compared, and nothing was different."""
+        return self.difference is None and not self.lost_ms
+
 
 def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Replayed:
     """Compare a log with the outputs of a program for its inputs, up to the first difference.

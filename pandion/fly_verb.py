@@ -239,6 +239,7 @@ def _judge(flight: PlannedFlight, display: Display, flown: Flown) -> int:
         fsw=flown.fsw,
         failure=flown.cause,
         aftermath="; ".join(flown.aftermath) or None,
+        unwritten=tuple(flown.unwritten),
         logs={
             key: out / name
             for key, name in names.items()

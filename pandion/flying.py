@@ -211,6 +211,7 @@ class _Recording:
         self._truth = TruthLog(folder / "truth.ulg", scenario, job.seed, lambda _: None)
         self._folder, self._begun = folder, False
         self.outputs: TickOutputs | None = None  # of the last tick
+        self.lost: tuple[str, ...] = ()  # what could not be written, and why
 
     def add(self, simulation: Simulation, inputs: TickInputs, outputs: TickOutputs) -> None:
         """Log a tick and the true state at its beginning."""
@@ -226,6 +227,7 @@ class _Recording:
         self._flight.close()
         self._truth.close()
         file = self._flight.file
+        self.lost = (*file.lost, *self._truth.file.lost)
         join_truth(self._folder, {"files": {file.path.name: {"failure": file.failure}}})
 
 
@@ -242,7 +244,7 @@ def _in_this_process(job: Job, parts: OwnParts, *, log: bool) -> Result:
     finally:
         recording.close()
     reports = _reports(job, result, recording.outputs, time.perf_counter() - began_s)
-    metrics = as_json(reports)
+    metrics = as_json(replace(reports, unwritten=recording.lost))
     beside = {"sitl": reports.sitl or {}, "fsw": reports.fsw or {}}
     write_json(Path(folder.name), result=metrics, **beside)
     return Result(_verdict(job, result, metrics), folder)

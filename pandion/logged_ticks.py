@@ -107,6 +107,18 @@ def ticks(log: UlogFile) -> Iterator[LoggedTick | Gap]:
         raise UlogError(f"{log.path} holds no whole tick")
 
 
+def not_of_ticks(log: UlogFile) -> list[str]:
+    """What a log that was read holds that no tick makes, and so no replay."""
+    found = [
+        topic.name
+        for number, topic in log.topics.items()
+        if number >= len(topics.TOPICS) or number in _OF_THE_LOOP
+    ]
+    found += ["tagged texts"] if ulog.TAGGED in log.kinds else []
+    foreign = log.kinds & {ulog.MULTI_INFO, ulog.DEFAULT_PARAMETER, ulog.REMOVAL}
+    return found + [f"messages of kind {kind.decode()}" for kind in sorted(foreign)]
+
+
 def _of_a_tick(record: Record) -> bool:
     """Whether the encoder writes it: timing is the loop's, truth the simulator's."""
     if record.kind == ulog.DATA:

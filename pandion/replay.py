@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from command_line.options import json_file, option, read, switch
-from command_line.output import console_beside, json_text, print_error, say, write_text
+from command_line.output import console_beside, json_text, listed, print_error, say, write_text
 from command_line.parser import COULD_NOT_START
 from fsw.autopilot.signals import Origin
 from pandion.display import Display
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 SAME, DIFFERS = 0, 1  # exit codes
 
 _NOTES_SHOWN = 5
+_NAMED = 20  # that are not compared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,23 +55,33 @@ def main(argv: list[str]) -> int:
 
 def _verify(options: ReplayOptions, log: UlogFile) -> int:
     from pandion.flight_replay import other_numbers, replay
+    from pandion.replayed_definitions import compare_definitions
 
     console = console_beside(options.json)
     program = _program(log)
-    notes = other_numbers(log, program)
-    for note in notes[:_NOTES_SHOWN]:
-        say(f"note: {note}", console)
-    if len(notes) > _NOTES_SHOWN:
-        print(f"note: {len(notes) - _NOTES_SHOWN} more numbers differ", file=console)
+    numbers = other_numbers(log, program)
+    _note(numbers, "numbers", console)
     display = Display(console, lines=0)
     with display.progress():
         found = replay(log, program, partial(display.share, "replaying"))
-    same = found.difference is None and not found.lost_ms
+    definitions, unmade = compare_definitions(log, program, found)
+    _note(definitions, "definitions", console)
+    if found.same:
+        say(f"note: not compared, for no tick makes it: {listed(unmade, _NAMED)}", console)
     say(_sentence(found, log), console)
-    figures = {"log": str(log.path), "same": same, **dataclasses.asdict(found)}
-    figures |= {"whole": log.whole, "other_numbers": list(notes)}
+    figures = {"log": str(log.path), "same": found.same, **dataclasses.asdict(found)}
+    whole = not log.cut if found.same else log.whole  # the end was not read
+    figures |= {"whole": whole, "other_numbers": list(numbers)}
+    figures |= {"other_definitions": list(definitions), "not_compared": list(unmade)}
     write_text(options.json, json_text(figures, 2) + "\n")
-    return SAME if same else DIFFERS
+    return SAME if found.same else DIFFERS
+
+
+def _note(notes: Sequence[str], what: str, console: TextIO) -> None:
+    for note in notes[:_NOTES_SHOWN]:
+        say(f"note: {note}", console)
+    if len(notes) > _NOTES_SHOWN:
+        say(f"note: {len(notes) - _NOTES_SHOWN} more {what} differ", console)
 
 
 def _program(log: UlogFile) -> FlightProgram[Any]:
@@ -111,8 +123,9 @@ def _sentence(found: Replayed, log: UlogFile) -> str:
             f"no difference in {found.ticks} ticks; then {found.lost_ms} ms are missing "
             "in the log, and later ticks cannot be replayed"
         )
-    cut = "" if log.whole else "; the log was cut there, and an incomplete tick is not compared"
-    return f"no difference in {found.ticks} ticks{cut}"
+    cut = f"; the log {log.cut}" if log.cut else ""
+    rest = "" if log.whole else " there, and an incomplete tick is not compared"
+    return f"no difference in {found.ticks} ticks{cut}{rest}"
 
 
 def _summarise(options: ReplayOptions, log: UlogFile) -> int:

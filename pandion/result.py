@@ -35,6 +35,7 @@ class FlightReports:
     failure: str | None  # what a process reported as an error
     logs: dict[str, Path]
     aftermath: str | None = None  # what went wrong after the flight
+    unwritten: tuple[str, ...] = ()  # what both processes could not write, and why
 
 
 def as_json(reports: FlightReports) -> dict[str, Any]:
@@ -69,6 +70,7 @@ def as_json(reports: FlightReports) -> dict[str, Any]:
         "inner": {key: inner.get(key) for key in _INNER_KEYS},
         "real_time_factor": truth.get("real_time_factor", 0.0),
         "logs": {name: str(path) for name, path in reports.logs.items()},
+        "unwritten": list(reports.unwritten),
     }
 
 

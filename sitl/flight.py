@@ -69,6 +69,7 @@ class Flight:
         if cache().folder is None or cache().is_due(_KERNELS):
             cache().announce("sitl", events)
         self._simulation = Simulation(scenario, options.seed, origin=options.origin)
+        self._lost: list[str] = []  # of the log, and why
         rehearse(Simulation(scenario, options.seed))
         cache().note(_KERNELS)
 
@@ -86,7 +87,7 @@ class Flight:
         described = self._as_json(result, timing, counts)
         text = json_text(described, 2) + "\n"
         in_directory = None if options.out is None else options.out / "sitl.json"
-        lost = [*try_write(options.json, text), *try_write(in_directory, text)]
+        lost = self._lost + try_write(options.json, text) + try_write(in_directory, text)
         sentence = f"sitl: {_summary(result, timing)}"
         self._events.report("ended", sentence, result=described, vehicle_silent=flown.silent)
         for what in lost:
@@ -111,8 +112,14 @@ class Flight:
             log = TruthLog(path, scenario, options.seed, self._warn)
         except OSError as error:
             self._warn(f"no truth.ulg: {error.strerror}")
+            self._lost.append(f"{path}: {error.strerror}")
             return lambda _: None
-        return files.enter_context(contextlib.closing(log)).add
+        files.callback(self._close, log)
+        return log.add
+
+    def _close(self, log: TruthLog) -> None:
+        log.close()
+        self._lost += log.file.lost
 
     def _warn(self, sentence: str) -> None:
         self._events.report("warning", f"sitl: {sentence}")
@@ -158,6 +165,7 @@ class Flight:
             "missed_steps": counts.missed,
             "pauses": counts.pauses,
             "paused_s": counts.paused_s,
+            "unwritten": self._lost,
         }
 
 

@@ -53,8 +53,8 @@ class TruthLog:
             OSError: The file cannot be created.
         """
         path.unlink(missing_ok=True)
-        self._file = BlockFile(path)
-        self._warn = warn
+        self.file = BlockFile(path)
+        self._warn, self._warned = warn, False
         vehicle = vehicle_of(scenario)
         state = state_topic(len(vehicle.rotors), len(vehicle.joints))
         self._state_head = ulog.data_head(FIRST_NUMBER, state)
@@ -81,15 +81,16 @@ class TruthLog:
 
     def close(self) -> None:
         """Write what is left and close the file."""
+        self.file.look()  # a closed file no longer tells that it was deleted
         self._flush()
-        self._file.close()
+        self.file.close()
 
     def _flush(self) -> None:
-        failed_before = self._file.failure is not None
-        self._file.put(self._records)
+        self.file.put(self._records)
         self._records = bytearray()
-        if self._file.failure is not None and not failed_before:
-            self._warn(f"truth.ulg ends early: {self._file.failure}")
+        if self.file.failure is not None and not self._warned:
+            self._warned = True
+            self._warn(f"truth.ulg ends early: {self.file.failure}")
 
 
 def contact(simulation: Simulation) -> tuple[float, ...]:

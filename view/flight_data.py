@@ -101,7 +101,7 @@ class FlightData:
     texts: tuple[Text, ...]
     inputs: tuple[InputChange, ...]  # see :meth:`decoded`
     lost_ms: int  # of data, where the disk was too slow
-    whole: bool  # False where the end is cut
+    cut: str  # what is missing at its end, behind "the log"; empty: nothing
     beside: Mapping[str, Any] = field(default_factory=dict)
     """``result.json``, ``sitl.json`` and ``fsw.json`` beside it, by stem, where there are."""
     unusable: tuple[str, ...] = ()  # a sentence about each of these that cannot be used
@@ -172,7 +172,7 @@ def read_flight(path: Path) -> FlightData:
         texts=tuple(texts),
         inputs=inputs,
         lost_ms=lost_ms,
-        whole=log.whole,
+        cut=log.cut,
         beside=beside,
         unusable=unusable,
     )

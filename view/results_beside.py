@@ -11,7 +11,13 @@ from command_line.bounded_json import JsonError, read_json
 _MAX_BYTES: Final = 16 * 1024 * 1024  # of a file
 _NUMBER: Final = (int, float)
 _MAYBE_NUMBER: Final = (int, float, type(None))
-_WORDS: Final = {str: "a text", int: "a number", float: "a number", bool: "true or false"}
+_WORDS: Final = {
+    str: "a text",
+    int: "a number",
+    float: "a number",
+    bool: "true or false",
+    list: "a list",
+}
 
 
 class _Each(NamedTuple):
@@ -65,6 +71,7 @@ _SHAPES: Final[Mapping[str, Mapping[str, Any]]] = {
         "mpc": {**_TIMES, "missed_deadlines": _COUNT, "fallbacks": _COUNT},
         "inner": _INNER,
         "real_time_factor": _NUMBER,
+        "unwritten": (list,),
     },
     "sitl": {
         "min_margin_m": _MAYBE_NUMBER,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from command_line.bounded_file import read_bounded
+from command_line.output import listed
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import Vec3
@@ -32,6 +33,7 @@ _MAX_BYTES: Final = 128 * 1024 * 1024  # an hour of a vehicle's telemetry has 40
 _MAX_SCENES: Final = 360_000
 _MAX_EVENTS: Final = 5_000
 _OF_VEHICLES: Final = frozenset({ATTITUDE, LOCAL_POSITION_NED})  # messages of no other component
+_NAMED: Final = 10  # of a kind, in a sentence
 _BETWEEN_S: Final = 1.0  # from one flight to the next, as it is shown
 
 
@@ -49,7 +51,8 @@ class _Recording:
         self._path = path
         self._frames = frames
         self._shift = 0.0  # s, from the vehicle's clock to the one that is shown
-        self._begins: list[float] = []  # s, shown, of the flights after the first
+        self._restarts = 0
+        self._begins: list[str] = []  # when the first of them are shown
         for at, frame in frames:
             self._take(frame, at)
 
@@ -59,7 +62,9 @@ class _Recording:
         if telemetry.t < before - RESTARTED_S and self.scenes:
             begin = self.scenes[-1].t + _BETWEEN_S
             self._shift = begin - telemetry.t
-            self._begins.append(begin)
+            self._restarts += 1
+            if len(self._begins) < _NAMED:
+                self._begins.append(f"{begin:.0f} s")
         while telemetry.events:
             event = telemetry.events.popleft()
             self.events.append(event._replace(t=event.t + self._shift))
@@ -75,17 +80,18 @@ class _Recording:
     def remarks(self) -> tuple[str, ...]:
         """What of the log is shown otherwise than it stands there, a sentence each."""
         told = []
-        if self._begins:
-            times = ", ".join(f"{begin:.0f} s" for begin in self._begins)
-            told.append(f"{len(self._begins) + 1} flights, one after another: new ones at {times}")
+        if self._restarts:
+            more = self._restarts - len(self._begins)
+            times = ", ".join(self._begins) + (f" and {more} more" if more else "")
+            told.append(f"{self._restarts + 1} flights, one after another: new ones at {times}")
         if self._frames.skipped:
             told.append(f"{self._frames.skipped} bytes are no frames, and are skipped")
         if self._frames.unread:
             told.append(f"the last {self._frames.unread} bytes follow too much that is no frame")
         others = {system for system, _, message in self.telemetry.heard if message in _OF_VEHICLES}
         if others - {SYSTEM_ID}:
-            listed = ", ".join(map(str, sorted(others - {SYSTEM_ID})))
-            told.append(f"of several vehicles system {SYSTEM_ID} is shown, not {listed}")
+            names = listed([*map(str, sorted(others - {SYSTEM_ID}))], _NAMED)
+            told.append(f"of several vehicles system {SYSTEM_ID} is shown, not {names}")
         return tuple(told)
 
     def missing(self) -> str:
@@ -93,7 +99,7 @@ class _Recording:
         systems = sorted({one.system for one in self.telemetry.heard.values()})
         if not systems:
             return "is no telemetry log with positions of a vehicle: it has no MAVLink frame"
-        heard = ", ".join(map(str, systems))
+        heard = listed([*map(str, systems)], _NAMED)
         return (
             "is no telemetry log with positions of a vehicle: LOCAL_POSITION_NED and ATTITUDE of "
             f"system {SYSTEM_ID} are needed; it has messages of system {heard}"

@@ -27,6 +27,7 @@ from fsw.log.topics import TOPICS
 from messages import ulog
 from messages.block_file import BlockFile
 from messages.ground_truth import TRUTH_TOPICS
+from messages.ulog import Topic
 from vehicles.description import Vehicle
 from vehicles.vehicle_file import vehicle_text
 
@@ -56,7 +57,11 @@ def vehicle_facts(vehicle: Vehicle) -> dict[str, str | int]:
 
 
 class FlightLog:
-    """One flight's ULog file; a sync message follows each block, so that a cut end is seen."""
+    """One flight's ULog file.
+
+    A sync message follows each block, and the number of ticks the last one, so that a cut end is
+    seen.
+    """
 
     def __init__(self, path: Path, subject: LogSubject) -> None:
         """Create the file; nothing is in it before :meth:`begin`.
@@ -74,6 +79,7 @@ class FlightLog:
         self._block_us = 0  # time of the first record that is not yet with the disk
         self._last_us = 0  # time of the last tick
         self._unmarked_us = 0  # lost, and not yet marked as lost
+        self._ticks = 0  # with records
 
     def begin(self, t_us: int, lockstep: bool) -> None:
         """Write what stands before the data of the first tick, that of ``t_us``.
@@ -99,6 +105,7 @@ class FlightLog:
         records, begin = self._records, len(self._records)
         try:
             self._encoder.add(inputs, outputs, records)
+            self._ticks += 1
         except (struct.error, ValueError, TypeError):
             # A number that fits no field must not end the flight it describes.
             del records[begin:]
@@ -120,8 +127,10 @@ class FlightLog:
         self._records += ulog.tagged_text(notice.severity & 7, _OF_THE_LOOP, t_us, notice.text)
 
     def close(self) -> None:
-        """Write what is left and close the file; safe to call twice."""
-        if self._records:
+        """Write what is left and the end, and close the file; safe to call twice."""
+        if self._encoder is not None:
+            self._encoder = None
+            self._records += ulog.information(ulog.TICKS, self._ticks)
             self._flush(self._last_us)
         self.file.close()
 
@@ -143,13 +152,17 @@ def _memory() -> float:
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (pages * size)
 
 
-def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
-    """Everything before the first record, with the shape of the inputs, to read them back."""
-    exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
+def parameters(subject: LogSubject) -> dict[str, Number]:
+    """The parameters of a log, which have 32 bits there."""
     # Those that only state what is so are for PX4's tools: Flight Review shows MAV_TYPE.
     stated = {fact.name: fact.read({}, subject.airframe) for fact in FACTS if not fact.repeats}
-    named = {**stated, **subject.numbers, **subject.parameters}
-    facts: dict[str, str | int] = {
+    return {**stated, **subject.numbers, **subject.parameters}
+
+
+def information(subject: LogSubject, pacing: str, schema: str) -> dict[str, str | int]:
+    """The information of a log, with the shape of the inputs, to read them back."""
+    exact = json.dumps(dict(subject.numbers), separators=(",", ":"))
+    return {
         "sys_name": "Pandion",
         "ver_data_format": 2,  # of PX4's topics: degrees and metres of vehicle_gps_position
         **subject.facts,
@@ -158,13 +171,21 @@ def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> byt
         "numbers": exact,  # as doubles; the format's own parameters are 32-bit
         "inputs": schema,
     }
+
+
+def formats(airframe: Airframe) -> list[Topic]:
+    """The topics that a log of such a vehicle declares: ours, and then the simulator's."""
+    counts = {"rotor": airframe.rotors, "joint": airframe.bodies.joints}
+    return [topic.sized(**counts) for topic in (*TOPICS, *TRUTH_TOPICS)]
+
+
+def definitions(t_us: int, subject: LogSubject, pacing: str, schema: str) -> bytes:
+    """Everything before the first record."""
+    facts, topics = information(subject, pacing, schema), formats(subject.airframe)
     parts = [ulog.opening(t_us)]
     parts += [ulog.information(key, value) for key, value in facts.items()]
-    counts = {"rotor": subject.airframe.rotors, "joint": subject.airframe.bodies.joints}
-    ours = [topic.sized(**counts) for topic in TOPICS]
-    parts += [
-        ulog.format_of(one) for one in (*ours, *(one.sized(**counts) for one in TRUTH_TOPICS))
-    ]
-    parts += [ulog.parameter(name, value) for name, value in named.items()]
-    parts += [ulog.subscription(number, topic) for number, topic in enumerate(ours)]
+    parts += [ulog.format_of(one) for one in topics]
+    parts += [ulog.parameter(name, value) for name, value in parameters(subject).items()]
+    ours = enumerate(topics[: len(TOPICS)])
+    parts += [ulog.subscription(number, topic) for number, topic in ours]
     return b"".join(parts)

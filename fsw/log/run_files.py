@@ -50,6 +50,11 @@ class RunFiles:
         return "the log has gaps: the disk does not keep up" if self._dropped > before else ""
 
     @property
+    def lost(self) -> list[str]:
+        """Files that end early, and why."""
+        return [one for file in self._files() for one in file.lost]
+
+    @property
     def size(self) -> int:
         """Bytes written of both files."""
         return sum(file.size for file in self._files())

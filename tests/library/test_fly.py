@@ -21,6 +21,7 @@ from sitl.scenario_file import load_scenario
 from sitl.scenario_text import scenario_text
 from studies.campaign.plan import load_plan
 from studies.flight.closed_loop import simulate
+from tests.cli.test_full_disk import no_file_longer_than
 from tests.library.conftest import BRIEF_S
 from vehicles.vehicle_file import PACKAGED
 
@@ -65,6 +66,14 @@ def test_without_its_log_it_is_the_same_flight(flown: Flown) -> None:
     assert quick.truth == flown("perfect").truth
     with pytest.raises(FileNotFoundError, match="log=True"):
         _ = quick.topics
+
+
+def test_a_log_that_ends_early_is_told_with_the_result() -> None:
+    with no_file_longer_than(150_000):
+        result = pandion.fly("walls", seed=3, sensors="perfect", duration_s=BRIEF_S)
+    names = [one.rpartition("/")[2] for one in result.metrics["unwritten"]]
+    assert "flight.ulg: File too large" in names
+    assert result.completed
 
 
 @pytest.mark.long

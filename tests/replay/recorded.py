@@ -9,6 +9,7 @@ from pathlib import Path
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.parameters.flight_config import flight_config
+from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import Command, TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
@@ -46,7 +47,9 @@ def flight(seconds: float) -> list[tuple[TickInputs, TickOutputs]]:
 def written(path: Path, ticks: list[tuple[TickInputs, TickOutputs]], lockstep: bool = True) -> Path:
     """The log of these ticks."""
     facts = {**CHOICE.facts(), **vehicle_facts(load_vehicle("paper"))}
-    log = FlightLog(path, LogSubject(facts, flat(flight_config(body="points")), {}, AIRFRAME))
+    config = flight_config(body="points")
+    values = {one.name: one.read(config) for one in PARAMETERS}
+    log = FlightLog(path, LogSubject(facts, flat(config), values, AIRFRAME))
     log.begin(ticks[0][0].sensors.t_us, lockstep)
     for inputs, outputs in ticks:
         log.add(inputs, outputs)

@@ -7,13 +7,16 @@ import math
 import struct
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pyulog import ULog
 
 from fsw.autopilot.flight.autopilot import Autopilot
 from fsw.autopilot.flight.state import first_state
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
+from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import TickInputs, TickOutputs
 from fsw.autopilot.tuning import flat
 from fsw.log import topics
@@ -26,7 +29,9 @@ from messages.ulog_reader import UlogError
 from pandion.flight_replay import Replayed, other_numbers, replay
 from pandion.logged_ticks import open_flight
 from pandion.replay import main
+from pandion.replayed_definitions import compare_definitions
 from tests.replay.recorded import CHOICE, flight, written
+from view.flight_data import read_flight
 
 SECONDS = 0.8
 
@@ -182,6 +187,157 @@ def test_what_is_no_number_is_told_as_text_for_json_has_none(
     found = replayed(path).difference
     assert found is not None
     assert (found.field, found.logged) == ("actuator_command.rotor_thrust[0]", "nan")
+
+
+def verified(
+    path: Path, content: bytes, capsys: pytest.CaptureFixture[str]
+) -> tuple[str, dict[str, Any]]:
+    """What a comparison prints of a log of these bytes, and its result; nothing differs."""
+    path.write_bytes(content)
+    assert main([str(path), "--verify", "--json", str(path.parent / "found.json")]) == 0
+    found: dict[str, Any] = json.loads((path.parent / "found.json").read_text())
+    return capsys.readouterr().out, found
+
+
+@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "realtime"])
+def test_what_stands_around_the_ticks_is_compared_or_named(
+    lockstep: bool,
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown, lockstep)
+    said, found = verified(path, path.read_bytes(), capsys)
+    assert (found["other_numbers"], found["other_definitions"]) == ([], [])
+    assert (found["whole"], found["not_compared"]) == (True, ["vehicle", "loop_timing", "cpuload"])
+    assert said.splitlines() == [
+        "note: not compared, for no tick makes it: vehicle, loop_timing, cpuload",
+        f"no difference in {len(flown)} ticks",
+    ]
+
+
+def test_a_parameter_of_the_first_tick_is_no_difference(
+    flown: list[tuple[TickInputs, TickOutputs]], tmp_path: Path
+) -> None:
+    """A vehicle whose parameters are not the default tells its first tick."""
+    gain = BY_NAME["TRK_DIST_TAU"]
+    tuning = ((gain.path, 2.0 * gain.default * gain.scale),)
+    inputs, outputs = flown[0]
+    path = written(tmp_path / "flight.ulg", [(replace(inputs, tuning=tuning), outputs)])
+    was = ulog.parameter(gain.name, gain.default)
+    path.write_bytes(path.read_bytes().replace(was, ulog.parameter(gain.name, 2.0 * gain.default)))
+    program, log = flight_software(CHOICE, to_plan=False), open_flight(path)
+    found = replay(log, program, lambda done, total: None)
+    assert compare_definitions(log, program, found)[0] == ()
+
+
+LAMBDA = "planner.walls.lambda_"
+FORMAT = b"vehicle_local_position:uint64_t timestamp;float x;float y;"
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "told"),
+    [
+        (
+            ulog.parameter(LAMBDA, flat(flight_config(body="points"))[LAMBDA]),
+            ulog.parameter(LAMBDA, 9.9),
+            f"parameter {LAMBDA} is 0.35 here and was 9.9",
+        ),
+        (
+            ulog.parameter("MAV_TYPE", 2),
+            ulog.parameter("MAV_TYPE", 1),
+            "parameter MAV_TYPE is 2 here and was 1",
+        ),
+        (
+            ulog.parameter("MAV_SYS_ID", 1),
+            b"",
+            "parameter MAV_SYS_ID is 1 here and was unknown",
+        ),
+        (
+            ulog.parameter("MAV_SYS_ID", 1),
+            ulog.parameter("MAV_SYS_ID", 1) + ulog.parameter("OF_NO_USE", 1),
+            "parameter OF_NO_USE is unknown here and was 1",
+        ),
+        (
+            ulog.information("ver_data_format", 2),
+            ulog.information("ver_data_format", 1),
+            "information ver_data_format is 2 here and was 1",
+        ),
+        (FORMAT, FORMAT.replace(b"x;float y", b"y;float x"),
+         "the fields of vehicle_local_position are named otherwise here"),
+        (ulog.opening(1_000_000), ulog.opening(7),
+         "the first tick was at 1000000 us, and the log says 7 us"),
+    ],
+    ids=["number", "fact", "missing", "more", "information", "fields", "begin"],
+)  # fmt: skip
+def test_what_other_tools_show_is_compared_too(
+    was: bytes,
+    becomes: bytes,
+    told: str,
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    content = path.read_bytes()
+    assert content.count(was) == 1
+    said, found = verified(path, content.replace(was, becomes), capsys)
+    assert f"note: {told}\n" in said
+    assert found["other_definitions"] == [told]
+
+
+@pytest.mark.parametrize(
+    "again",
+    [ulog.information("controller", "hc"), ulog.parameter(LAMBDA, 9.9)],
+    ids=["information", "parameter"],
+)
+def test_a_fact_that_is_there_twice_is_damage_for_tools_show_either(
+    again: bytes,
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    path.write_bytes(path.read_bytes() + again)
+    assert main([str(path), "--verify"]) == 2
+    assert "is there twice" in capsys.readouterr().err
+
+
+def test_messages_that_no_flight_writes_are_named_as_not_compared(
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    default = ulog.message(ulog.DEFAULT_PARAMETER, b"\x01" + ulog.parameter(LAMBDA, 9.9)[3:])
+    _, found = verified(path, path.read_bytes() + default, capsys)
+    assert found["not_compared"][-1] == "messages of kind Q"
+
+
+def test_a_log_cut_behind_any_block_does_not_reach_the_end_of_the_flight(
+    flown: list[tuple[TickInputs, TickOutputs]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = written(tmp_path / "flight.ulg", flown)
+    whole, marks, at = path.read_bytes(), list[int](), 0
+    while (at := whole.find(ulog.sync(), at)) >= 0:
+        at += len(ulog.sync())
+        marks.append(at)
+    assert marks[-1] == len(whole)
+    assert len(marks) > 2
+    assert ULog(str(path)).msg_info_dict["ticks"] == len(flown)
+    for end in marks[:-1]:
+        said, found = verified(path, whole[:end], capsys)
+        assert not found["whole"]
+        assert found["ticks"] < len(flown)
+        assert "; the log does not say that it ends there: it was cut, or an older" in said
+        assert main([str(path)]) == 0
+        assert "remark          the log does not say that it ends" in capsys.readouterr().out
+        assert read_flight(path).cut
+    # And with an end that is not its own.
+    said, found = verified(path, whole[: marks[0]] + ulog.information("ticks", 7), capsys)
+    assert f"note: information ticks is {found['ticks']} here and was 7" in said
 
 
 def head_of(topic: Topic) -> bytes:

@@ -219,7 +219,7 @@ def test_of_many_events_the_axes_show_the_failsafes_first() -> None:
     begin = 1e-6 * flights.BEGIN_US
     found = [FlightEvent(begin + k + 1.0, EventKind.WARNING, "windy") for k in range(200)]
     found += [FlightEvent(begin + 500.0, EventKind.FAULT, "no plan")]
-    data = FlightData(Path(), {}, {}, {"any": Table("any", np.array([begin]), {})}, (), (), 0, True)
+    data = FlightData(Path(), {}, {}, {"any": Table("any", np.array([begin]), {})}, (), (), 0, "")
     marks = event_marks(
         Reported(label="", data=data, margins=None, events=tuple(found), numbers={})
     )
@@ -234,14 +234,14 @@ def test_the_force_on_the_tool_is_drawn_with_its_bound() -> None:
         "tool_contact": Table("tool_contact", t, own),
         "sim_contact": Table("sim_contact", t, {"normal": 2.0 * t}),
     }
-    data = FlightData(Path(), {}, {}, tables, (), (), 0, True)
+    data = FlightData(Path(), {}, {}, tables, (), (), 0, "")
     chart = force([Reported(label="", data=data, margins=None, events=(), numbers={})])
     assert chart is not None
     figure = {"data": chart.data}
     np.testing.assert_allclose(trace(figure, "true")["y"], 2.0 * t, rtol=1e-4)
     np.testing.assert_allclose(trace(figure, "observed")["y"], t, rtol=1e-4)
     assert {shape["y0"] for shape in chart.layout["shapes"] if "y0" in shape} >= {10.0}
-    bare = FlightData(Path(), {}, {}, {"any": Table("any", t, {})}, (), (), 0, True)
+    bare = FlightData(Path(), {}, {}, {"any": Table("any", t, {})}, (), (), 0, "")
     assert force([Reported(label="", data=bare, margins=None, events=(), numbers={})]) is None
 
 

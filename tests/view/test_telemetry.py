@@ -317,6 +317,15 @@ def test_flights_of_one_log_are_shown_one_after_another_and_told(
     assert times == sorted(times)
 
 
+def test_of_many_restarts_the_first_are_told_and_how_many_more(tmp_path: Path) -> None:
+    log = b"".join(a_flight(1000 + 10 * k, 6, 1.0) for k in range(40))
+    flight, _ = places(tmp_path / "many.tlog", log)
+    (told,) = flight.unusable
+    assert told.startswith("40 flights, one after another: new ones at ")
+    assert told.endswith(" s and 29 more")
+    assert len(told) < 150
+
+
 @pytest.mark.parametrize(
     "junk", [b"\0" * 5, b"\xfd" * 40, b"\xfe\xff\xfd\x05junk", bytes(range(256))]
 )

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from command_line.html_page import document, table
-from command_line.output import json_text
+from command_line.output import json_text, listed
 from view.report.chart import Chart
 from view.report.charts import charts, worst_sentence
 from view.report.provenance import provenance
@@ -25,6 +25,7 @@ _POLICY: Final = (
     "img-src data: blob:"
 )
 _PAIR: Final = 2  # flights of which the second is compared with the first
+_NAMED: Final = 10  # files that could not be written
 # A number with its unit, and perhaps the limit that both flights share, or the part that it is of.
 _NUMBER: Final = re.compile(
     r"(?P<number>-?\d+(?:\.(?P<digits>\d+))?)(?: of -?[\d.]+)?(?P<unit>(?: [^\d,]*)?|%)"
@@ -84,10 +85,12 @@ def _verdict(flight: Reported, *, alone: bool) -> str:
     words = {True: ("PASS", "pass"), False: ("FAIL", "fail"), None: ("NO RESULT", "unknown")}
     word, kind = words[flight.result.get("completed")]
     reason = flight.result.get("end_reason") or "no result.json beside the log"
-    cut = "" if flight.data.whole else " The log was cut."
+    cut = f" The log {flight.data.cut}." if flight.data.cut else ""
+    missing = listed([*map(str, flight.result.get("unwritten", ()))], _NAMED)
+    unwritten = f" Not written: {missing}." if missing else ""
     lost = f" {flight.data.lost_ms} ms are missing in the log." if flight.data.lost_ms else ""
     named = "" if alone else f"<strong>{html.escape(flight.label)}</strong>"
-    sentence = f"{reason[:1].upper()}{reason[1:]}. {worst_sentence(flight)}{cut}{lost}"
+    sentence = f"{reason[:1].upper()}{reason[1:]}. {worst_sentence(flight)}{cut}{lost}{unwritten}"
     return (
         f'<p class="verdict"><span class="badge {kind}">{word}</span>{named}'
         f"<span>{html.escape(sentence)}</span></p>"

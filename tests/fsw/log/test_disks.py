@@ -73,6 +73,10 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
         "flight.tlog ends early: File too large",
         "flight.ulg ends early: File too large",
     ]
+    assert sorted(files.lost) == [
+        f"{tmp_path / 'flight.tlog'}: File too large",
+        f"{tmp_path / 'flight.ulg'}: File too large",
+    ]
     reported = files.as_json()
     assert reported["flight.ulg"] == {
         "bytes": (tmp_path / "flight.ulg").stat().st_size,
@@ -83,6 +87,7 @@ def test_a_full_disk_ends_the_files_and_is_told_once_a_file(
     log = open_flight(tmp_path / "flight.ulg")
     assert sum(isinstance(tick, LoggedTick) for tick in ticks(log)) > 10
     assert log.whole
+    assert "cut" in log.cut
 
 
 @pytest.mark.long
