@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.faults.residuals import MIN_WALKS
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.faults.verdict import Verdict
+from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.measurements import (
     AidingSample,
     GnssSample,
@@ -48,6 +49,7 @@ class Reset(NamedTuple):
     position: Vec3 = _REST  # m, NED, new minus old
     velocity: Vec3 = _REST  # m/s, NED, new minus old
     turn: Vec4 = NO_TURN  # new attitude times the inverse of the old one, NED
+    expected: bool = True  # within what the filter doubted; else no other sensor says so
 
 
 TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4, Vec3]
@@ -92,6 +94,7 @@ class FusionMemory:
     field: Vec3 | None = None  # Gauss, body, the last one
     frame: FrameDrift = FrameDrift()  # of poses that drift
     reset: Reset = Reset()
+    unproven: Vec3 = _REST  # m, NED, by which jumps have moved the estimate that none expected
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
     sample_rates: tuple[SampleRate, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
@@ -166,13 +169,24 @@ class FusionMemory:
         return [one for one in self.health if one.sensor is not sensor]
 
     def jumped(
-        self, position: Vec3 = _REST, velocity: Vec3 = _REST, turn: Vec4 = NO_TURN
+        self,
+        position: Vec3 = _REST,
+        velocity: Vec3 = _REST,
+        turn: Vec4 = NO_TURN,
+        *,
+        expected: bool = False,
     ) -> FusionMemory:
         """The memory after the estimate's ``position`` [m, NED] and all else have jumped.
 
-        ``velocity`` [m/s, NED] and ``turn`` [1] as in ``Reset``.
+        ``velocity`` [m/s, NED], ``turn`` [1] and ``expected`` as in ``Reset``.
         """
-        return replace(self, reset=Reset(self.reset.number + 1, position, velocity, turn))
+        reset = Reset(self.reset.number + 1, position, velocity, turn, expected)
+        memory = replace(self, reset=reset)
+        return memory if expected else memory.led(position)
+
+    def led(self, by: Vec3) -> FusionMemory:
+        """The memory after the estimate was moved ``by`` [m, NED], and none but a place says so."""
+        return replace(self, unproven=add_scaled(self.unproven, by, 1.0))
 
 
 def copied(x: NDArray[Any]) -> NDArray[Any]:

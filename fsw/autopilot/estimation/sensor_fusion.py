@@ -57,7 +57,7 @@ from fsw.autopilot.estimation.kernels import (
     Asked,
 )
 from fsw.autopilot.estimation.sensors import SENSORS
-from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of, chi_square
+from fsw.autopilot.estimation.sensors.base import CREEPS, AidingSensor, attitude_of, chi_square
 from fsw.autopilot.estimation.sensors.pose import Pose, is_attitude_stuck
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
@@ -91,6 +91,7 @@ _SMALL_TURN: Final = 0.1  # rad
 _LEVEL: Final = 0.05  # rad
 _SIGMAS: Final = 3.0
 _JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
+_SOON: Final = 0.25  # s, in which what an inertial unit does wrong shows by little
 _REST: Vec3 = (0.0, 0.0, 0.0)
 UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
 UNPUSHED: Final[Vec3] = (0.0, 0.0, 0.0)  # by what the tool touches
@@ -414,8 +415,11 @@ class SensorFusion:
         """Whether a pose whose last one was refused is used without a run that says the same.
 
         One is that is off by little, or by no more than noise makes it in what ``passes`` the gate
-        of a filter that doubts; unless none has been used for so long that noise is not known.
+        of a filter that doubts; unless none has been used for so long that noise is not known. What
+        has stepped is used as a step once it is believed: it is none of the vehicle's motion.
         """
+        if any(one.goes_on(sample, innovation) for one in memory.runs):
+            return False
         if _is_small(sample, innovation):
             return True
         used = memory.of(Sensor.POSE).fused
@@ -460,9 +464,11 @@ class SensorFusion:
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)
             parts = [1.0 < r < math.inf for r in ratio]
-            if little and not announced and run.is_no_noise(parts):
+            if little and not (announced or run.stepped) and run.is_no_noise(parts):
+                before = memory.numbers[0].copy()
                 fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN, max(ratio) < math.inf)
                 ratio = sensor.fuse(memory, sample, one.half)
+                memory = memory.led(_jump(before, memory.numbers[0])[0])
         fused = health.fused or (now,) * len(ratio)
         fused = tuple([now if r <= 1.0 else before for r, before in zip(ratio, fused, strict=True)])
         shown = innovation if len(ratio) > 1 else innovation[:1]
@@ -471,22 +477,22 @@ class SensorFusion:
         believed = (
             run is not None
             and run.is_believable(
-                self.tuning.reset_time, announced=announced, jumped=memory.reset.position
+                self.tuning.reset_time, announced=announced, jumped=memory.unproven
             )
             and not _tilts(memory, sample, innovation, now)
         )
         if announced and run is not None and not believed:
             memory = replace(memory, reset_counter=counter)
-        if believed and any(1.0 < r < math.inf for r in ratio):
+        if run is not None and believed and any(1.0 < r < math.inf for r in ratio):
             memory = sensor.take(memory, sample, one.time, ratio)
-            if not announced and isinstance(sample, PoseSample):
+            if not (announced or run.stepped) and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
                 fusion.doubt(memory.numbers, 0.0, 0.0, max(ratio) < math.inf)
             taken = zip(fused, ratio, strict=True)
             fused = tuple([now if r < math.inf else before for before, r in taken])
             memory = memory.noting(health._replace(fused=fused))
         elif previous is not None and not refused:
-            memory = memory.jumped(*_jump(previous, memory.numbers[0]))
+            memory = memory.jumped(*_jump(previous, memory.numbers[0]), expected=True)
         return memory
 
     def _run(
@@ -499,9 +505,28 @@ class SensorFusion:
         """The run of refused samples that this one goes on with, or begins."""
         scales = memory.numbers["noise_scale"][0, sensor.noise_scales].tolist()
         rooms = partial(sensor.rooms, sample, tuple([max(scale, 1.0) for scale in scales]))
-        new = Run(type(sample), sample.time, sample.time, innovation)
+        stepped = isinstance(sample, PoseSample) and self._stepped(memory, sample, innovation)
+        new = Run(type(sample), sample.time, sample.time, innovation, stepped=stepped)
         seldom = memory.of(sensor.sensor).apart >= 0.25
         return extended(memory.runs, new, rooms, seldom=seldom)
+
+    def _stepped(
+        self, memory: FusionMemory, sample: PoseSample, innovation: tuple[float, ...]
+    ) -> bool:
+        """Whether a place is off at once by what it was not off by one pose before.
+
+        A filter that an inertial unit leads astray is off by more and more, unless that says what
+        none can say.
+        """
+        last, before = memory.pose, memory.of(Sensor.POSE).innovation
+        if memory.now - memory.fault_at(Sensor.IMU) < self.tuning.reset_time:
+            return False
+        if last is None or len(before) < 3 or not 0.0 < sample.time - last.time < _SOON:
+            return False
+        sigma = self._pose.deviations(memory, self._pose.noise(memory, sample))[0]
+        noise = self.tuning.pose.gate * math.sqrt(2.0) * sigma
+        room = noise + CREEPS * (sample.time - last.time)
+        return math.dist(innovation[:3], before[:3]) > room
 
     def _with_frame(
         self, memory: FusionMemory, sample: PoseSample, announced: bool

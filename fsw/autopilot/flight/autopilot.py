@@ -23,7 +23,7 @@ from fsw.autopilot.flight.commander import Commander
 from fsw.autopilot.flight.descent import Descent
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
-from fsw.autopilot.flight.estimate.jump import moved_along
+from fsw.autopilot.flight.estimate.jump import all_along
 from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.land_detector import is_light, with_range
@@ -215,8 +215,7 @@ class Autopilot:
         state = self._commander.check_mode_completion(state, estimate, texts)
 
         ticks = looped = self._elapsed_ticks(state, now_us)
-        vehicle = state.vehicle
-        armed = vehicle.armed
+        vehicle, armed = state.vehicle, state.vehicle.armed
         flown = vehicle.flies and vehicle.unloaded is None and bool(state.record.has_plan)
         if flown and now_us - state.t_us > self._max_us:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
@@ -277,7 +276,7 @@ class Autopilot:
             fusion, found, reset, said = caught
             texts = (*texts, *said) if said else texts
             if reset is not None:
-                r = moved_along(r, reset)
+                r, state, plan = all_along(r, state, plan, reset)
             if found is not None and found is not estimate:
                 r.state_estimate = found
             estimate = found
@@ -561,8 +560,8 @@ class Autopilot:
         self, state: FlightState, estimate: StateEstimate, pose: Array | None
     ) -> FlightState:
         """The state with clearances that have grown by what the estimate is uncertain about now."""
-        wind, whole = self._wind_room(state.record), state.kept.whole
-        kept = self._clearance.keep(whole, state.mission.safe_set, estimate, pose, wind)
+        whole, wind, moved = state.kept.whole, self._wind_room(state.record), state.aiding.unproven
+        kept = self._clearance.keep(whole, state.mission.safe_set, estimate, pose, wind, moved)
         return self._with_room(replace(state, kept=kept), estimate)
 
     def _with_room(self, state: FlightState, estimate: StateEstimate) -> FlightState:

@@ -244,6 +244,7 @@ class Aiding(NamedTuple):
     pose_fault: SensorFault = SensorFault.STALE
     position_sigma: float = 0.0  # m, of the worst axis, without what lasts of a sensor's error
     elsewhere: float = 0.0  # m, how far away positions say it is that are refused meanwhile
+    unproven: Vec3 = _NOWHERE  # m, NED, by which jumps that none expected moved the estimate
     velocity_sigma: float = 0.0  # m/s, as of the position
     attitude_sigma: float = 0.0  # rad, of roll and pitch
     height_sigma: float = 0.0  # m, with what lasts of a sensor's error

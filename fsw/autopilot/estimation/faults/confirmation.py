@@ -3,8 +3,9 @@
 What is refused in flight is compared by its innovation, which knows how the vehicle has moved: a
 run of refused samples goes on where value and direction nearly stay, of which noise makes no long
 one, and until a pose is used. How long a run must be until it is believed grows with how far it
-would move the estimate, from where it is or from where it was before it last jumped: what was
-believed wrongly is soon undone.
+would move the estimate, from where it is or from where it was before it jumped: what was believed
+wrongly is soon undone. One that began with a step of the place is used as that, or not at all: it
+is no motion of the vehicle.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
-from fsw.autopilot.measurements import GnssSample, PoseSample
+from fsw.autopilot.measurements import AidingSample, GnssSample, PoseSample
 from fsw.autopilot.signals import Vec3
 
 # By which share of itself an innovation changes besides, because an inertial unit that is wrong
@@ -41,6 +42,7 @@ class Run(NamedTuple):
     samples: int = 1
     # Of the last two times: how far each part's innovation was from the one before [SI].
     steps: tuple[tuple[float, ...], ...] = ()
+    stepped: bool = False  # a place changed at once by what no inertial unit leads a filter astray
 
     @property
     def is_confirmed(self) -> bool:
@@ -59,6 +61,12 @@ class Run(NamedTuple):
             max(steps) < _STAYS * math.hypot(*part) for one, part, *steps in parts if one
         )
 
+    def goes_on(self, sample: AidingSample, innovation: tuple[float, ...]) -> bool:
+        """Whether a ``sample`` with its ``innovation`` [SI] is still where this run has stepped."""
+        if not self.stepped or self.kind is not type(sample) or sample.time - self.last > _APART:
+            return False
+        return math.hypot(*innovation[:3]) > _STAYS * math.hypot(*self.place)
+
     @property
     def place(self) -> tuple[float, ...]:
         """By how much [m, NED] it would move the estimate; empty: it says nothing of that."""
@@ -70,7 +78,7 @@ class Run(NamedTuple):
         """Whether it has lasted for ``least`` [s], and for as long as its size asks for.
 
         Where the sensor has ``announced`` that it jumps, by little, two samples are enough. By
-        ``jumped`` [m, NED] the estimate was moved last: what takes that back moves it by the rest.
+        ``jumped`` [m, NED] runs have moved the estimate: what takes that back moves it by the rest.
         """
         place = self.place
         turn = self.innovation[3:] if self.kind is PoseSample else ()
@@ -115,5 +123,10 @@ def extended(
         parts = zip(step, (a[:3], a[3:]), rooms(apart), strict=False)
         if all(off <= room + _GROWS * math.hypot(*before) for off, before, room in parts):
             steps = (*one.steps[-1:], step)
-            return new._replace(since=one.since, samples=one.samples + 1, steps=steps)
+            return new._replace(
+                since=one.since,
+                samples=one.samples + 1,
+                steps=steps,
+                stepped=one.stepped or new.stepped,
+            )
     return new

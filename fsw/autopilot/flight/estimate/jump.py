@@ -1,4 +1,8 @@
-"""The estimate jumps, and plan and observer jump along: what is flown does not change by it."""
+"""The estimate jumps, and plan and observer jump along: what is flown does not change by it.
+
+So does the place that is held, where nothing says that the estimate was wrong before: PX4 shifts
+its setpoints alike. What is asked for by others stays in their frame. Source: docs/decisions/0041.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ from typing import Final
 
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.fusion_memory import Reset
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.state import FlightState, PlanMemory
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
 from fsw.autopilot.geometry.rotation import (
     matrix_from_quaternion,
@@ -37,16 +41,61 @@ def difference(found: StateEstimate, expected: StateEstimate, number: int = 1) -
 
 def told(reset: Reset) -> str:
     """What the operator reads."""
-    yaw = yaw_of(matrix_from_quaternion(reset.turn))
+    yaw = _yaw(reset)
     place = 1e3 * norm(reset.position)
     return f"estimate moved by {place:.0f} mm, {abs(yaw):.3f} rad: the plan moves along"
+
+
+def all_along(
+    r: Tick, state: FlightState, plan: PlanMemory, reset: Reset
+) -> tuple[Tick, FlightState, PlanMemory]:
+    """All that is of the frame before the jump, moved along: record, place that is held, plan."""
+    return moved_along(r, reset), held_along(state, reset), without_answer(plan, reset)
+
+
+def held_along(state: FlightState, reset: Reset) -> FlightState:
+    """The state with the place that the vehicle keeps moved along, and its setpoint.
+
+    Where a jump was expected the estimate had drifted, and the vehicle with it: it goes back. Where
+    a goal says so it goes there anyway, as slowly as from any other place.
+    """
+    if reset.expected:
+        return state
+    yaw, vehicle, setpoint = _yaw(reset), state.vehicle, state.setpoint
+    vehicle = replace(
+        vehicle,
+        mode_origin=add_scaled(vehicle.mode_origin, reset.position, 1.0),
+        mode_yaw=wrap_angle(vehicle.mode_yaw + yaw),
+    )
+    ahead = setpoint.reference
+    if ahead is not None:
+        p, turned = add_scaled(ahead.p, reset.position, 1.0), wrap_angle(ahead.yaw + yaw)
+        setpoint = replace(setpoint, reference=replace(ahead, p=p, yaw=turned))
+    return replace(state, vehicle=vehicle, setpoint=setpoint)
+
+
+def without_answer(plan: PlanMemory, reset: Reset) -> PlanMemory:
+    """The memory of a planner whose next answer would lead back to where the vehicle was."""
+    if plan.awaited_id < 0 or not is_far(reset):
+        return plan
+    return replace(plan, awaited_id=-1, awaited_missed=False)
+
+
+def is_far(reset: Reset) -> bool:
+    """Whether the estimate jumped so far that the operator reads about it."""
+    return max(map(abs, reset.position)) > _TOLD
+
+
+def _yaw(reset: Reset) -> float:
+    """By how much the heading jumped [rad]."""
+    return yaw_of(matrix_from_quaternion(reset.turn))
 
 
 def moved_along(r: Tick, reset: Reset) -> Tick:
     """The record with the plan's state and the observer's velocity moved along."""
     r, nominal = r.copy(), r.plan_state
     if nominal is not None:
-        yaw = yaw_of(matrix_from_quaternion(reset.turn))
+        yaw = _yaw(reset)
         r.plan_state = nominal._replace(
             p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
         )
@@ -61,7 +110,7 @@ def on_return(found: StateEstimate, before: StateEstimate) -> tuple[Reset, list[
     """
     expected = moved_on(before, 1e-6 * (found.t_us - before.t_us))
     reset = difference(found, expected)
-    if max(map(abs, reset.position)) > _TOLD:
+    if is_far(reset):
         return reset, [StatusText(Severity.WARNING, told(reset))]
     return reset, []
 
@@ -75,4 +124,5 @@ def returned(
     """
     reset, said = on_return(found, before)
     texts += said
-    return replace(state, record=moved_along(state.record, reset))
+    plan = without_answer(state.plan, reset)
+    return replace(state, record=moved_along(state.record, reset), plan=plan)

@@ -64,6 +64,7 @@ _INERTIAL = Source.GYRO | Source.ACCELEROMETER
 _LATELY = 0.02  # s, in which a fault is one of now
 _HALF = 0.5  # s for which of poses that are used no attitude is
 _AWAY = 0.1  # s that a position is overdue, after which its return is a jump
+_NOT_MOVED = (0.0, 0.0, 0.0)
 _ANEW = "estimate is not a number, or its variance negative: the filter starts anew"
 
 
@@ -211,6 +212,8 @@ class SensedState:
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """See ``SensorFusion.catch_up``, of a vehicle in a ``state``."""
         now = memory.now
+        if not state.vehicle.flies and memory.unproven != _NOT_MOVED:
+            memory = replace(memory, unproven=_NOT_MOVED)  # it stands where it says
         return self._fusion.catch_up(
             memory,
             samples,
@@ -377,6 +380,7 @@ def _aiding(
         pose_fault=aid.fault if now - aid.fault_at < _recently(aid) else SensorFault.STALE,
         position_sigma=drifted,
         elsewhere=_elsewhere(memory),
+        unproven=memory.unproven,
         velocity_sigma=math.sqrt(max(V[0], V[6], V[11], 0.0)),
         attitude_sigma=math.sqrt(max(pose[15], pose[18], 0.0)),
         height_sigma=math.sqrt(max(pose[11], 0.0)),

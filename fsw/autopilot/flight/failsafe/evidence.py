@@ -174,10 +174,11 @@ def position_is_off(context: FailsafeContext, most: float) -> bool:
 
 
 def position_is_disputed(context: FailsafeContext) -> bool:
-    """Positions are missing; the estimate is off, or those refused say so, by COM_POS_LOW_EPH."""
-    aiding = context.state.aiding
-    off = max(aiding.position_sigma, aiding.elsewhere)
-    return is_unaided(context) and not off <= context.limits.position_low
+    """The estimate is off by COM_POS_LOW_EPH, or positions say so: refused, or by their jumps."""
+    aiding, most = context.state.aiding, context.limits.position_low
+    if math.hypot(*aiding.unproven) > most and context.state.vehicle.flies:
+        return True
+    return is_unaided(context) and not max(aiding.position_sigma, aiding.elsewhere) <= most
 
 
 def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:

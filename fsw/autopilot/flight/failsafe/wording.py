@@ -9,6 +9,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import sentence
 from fsw.autopilot.flight.failsafe.evidence import (
     FailsafeContext,
     force_on_tool,
+    is_unaided,
     lost_sensors,
     plan_age_us,
     way_home_s,
@@ -20,6 +21,8 @@ from fsw.autopilot.signals import SolverStatus
 def uncertain(context: FailsafeContext) -> str:
     """By how much the position is, and why it is not measured."""
     aiding = context.state.aiding
+    if not is_unaided(context):
+        return f" by {1e3 * math.hypot(*aiding.unproven):.0f} mm: it has jumped"
     return f" by {1e3 * max(aiding.position_sigma, aiding.elsewhere):.0f} mm{unaided(context)}"
 
 

@@ -27,13 +27,14 @@ import numpy as np
 from fsw.autopilot.barriers.safe_approach import BarrierTuning, stand_off
 from fsw.autopilot.estimation.error_state import ERRORS, TH, Array, P
 from fsw.autopilot.estimation.turned_covariance import SAME_AXES, Vec6, turned_covariance
+from fsw.autopilot.geometry.vectors import dot, norm
 from fsw.autopilot.model.body import Body
 from fsw.autopilot.model.kinematics import frame_of, position
 from fsw.autopilot.model.multibody import Bodies
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.kind import ShapeKind
 from fsw.autopilot.shapes.zones import all_planes
-from fsw.autopilot.signals import SafeSet, StateEstimate, Vec2
+from fsw.autopilot.signals import SafeSet, StateEstimate, Vec2, Vec3
 from fsw.compiled import kernel
 from fsw.frozen import replace
 
@@ -56,6 +57,8 @@ _PASSES: Final = 60  # over all planes; in a corner they have to settle
 _LOST: Final = np.eye(6)  # m^2, rad^2
 _SURE: Final = np.zeros((6, 6))
 _NO_NORMALS: Final = np.empty((0, 3))
+_LEVEL: Final[Vec2] = (0.0, 0.0)
+_STAYS: Final[Vec3] = (0.0, 0.0, 0.0)
 _NOTHING: Final[Vec6] = (0.0,) * 6
 
 
@@ -70,6 +73,7 @@ class InflatedSafeSet(NamedTuple):
     spread: tuple[float, ...] = ()  # m, k sigma at each zone
     t_us: int = 0  # at that time
     given: tuple[float, ...] = ()  # m, that each clearance is less for want of room; empty: nothing
+    moved: tuple[float, ...] = ()  # m, of each growth, for jumps that nothing explains
 
     @property
     def whole(self) -> InflatedSafeSet:
@@ -135,22 +139,28 @@ class UncertainClearance:
         safe_set: SafeSet,
         estimate: StateEstimate,
         pose: Array | None,
-        wind: Vec2 = (0.0, 0.0),
+        wind: Vec2 = _LEVEL,
+        unproven: Vec3 = _STAYS,
     ) -> InflatedSafeSet:
         """The safe set to keep from now on.
 
         ``pose`` (6, 6) [m, rad, NED] is the covariance of the estimate's position and attitude;
         None where states are exact. ``wind`` [m, NED] is what the memory of wind can add to the
         tube; what there is no room for of that is not ``lacking``: the analysis says it before.
+        By ``unproven`` [m, NED] the estimate has jumped, and nothing says that it was wrong before:
+        zones are kept where they are by it, and where they were.
         """
         sure = pose is None or not self._sigmas > 0.0
-        if (sure and wind == (0.0, 0.0)) or not safe_set.zones:
+        if (sure and wind == _LEVEL and unproven == _STAYS) or not safe_set.zones:
             return before if before.safe_set is safe_set else InflatedSafeSet(safe_set, safe_set)
         pose = _SURE if sure or pose is None else _finite(pose)
         spread, levers = self._spread(safe_set, estimate, pose)
         turned = _turned(safe_set, wind)
         spread = tuple(map(float.__add__, spread, turned))
+        moved = _moved(safe_set, unproven)
         wanted = self._ahead(before, spread, estimate.t_us)
+        # At once: by as much the estimate says that the zone is farther away.
+        wanted = tuple(map(float.__add__, wanted, moved))
         granted = self._granted(safe_set, estimate, levers, wanted)
         short = [
             max(more - there - gust, 0.0)
@@ -163,7 +173,8 @@ class UncertainClearance:
         t_us, lacks = estimate.t_us, shortfall > SHORTFALL and before.sufficient_us >= 0
         sufficient_us = before.sufficient_us if lacks else t_us
         return InflatedSafeSet(
-            kept.source, kept.safe_set, kept.added, shortfall, sufficient_us, spread, t_us
+            *(kept.source, kept.safe_set, kept.added, shortfall, sufficient_us, spread, t_us),
+            moved=moved,
         )
 
     def deviation(self, estimate: StateEstimate, pose: Array) -> float:
@@ -197,11 +208,13 @@ class UncertainClearance:
         stepped = [min(_stepped(more), _MOST) for more in wanted]
         if len(before.added) == len(stepped):
             rise = _RISE * elapsed if elapsed > 0.0 else 0.0
+            own = before.added
+            if before.moved:
+                own = tuple([max(a - b, 0.0) for a, b in zip(own, before.moved, strict=True)])
             bounded = [
-                min(more, _stepped(old + rise))
-                for more, old in zip(stepped, before.added, strict=True)
+                min(more, _stepped(old + rise)) for more, old in zip(stepped, own, strict=True)
             ]
-            return tuple(map(_settled, bounded, before.added))
+            return tuple(map(_settled, bounded, own))
         return tuple(stepped)
 
     def _spread(
@@ -265,6 +278,21 @@ def _turned(safe_set: SafeSet, wind: Vec2) -> tuple[float, ...]:
             for n in (zone.shape.numbers,)
         ]
     )
+
+
+def _moved(safe_set: SafeSet, by: Vec3) -> tuple[float, ...]:
+    """How much farther away a jump ``by`` [m, NED] makes each zone [m], in steps.
+
+    A round one is at most as much. What rides on the target comes along.
+    """
+    if by == _STAYS:
+        return (0.0,) * len(safe_set.zones)
+    found = []
+    for zone in safe_set.zones:
+        kind, (x, y, z) = kind_of(zone.shape), zone.shape.numbers[:3]
+        farther = dot((x, y, z), by) if kind.flat else norm(by)
+        found.append(0.0 if kind.follows_target else _stepped(max(farther, 0.0)))
+    return tuple(found)
 
 
 def _grown(safe_set: SafeSet, added: tuple[float, ...]) -> InflatedSafeSet:

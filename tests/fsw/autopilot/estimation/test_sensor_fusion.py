@@ -427,6 +427,28 @@ def test_a_pose_that_has_moved_for_good_is_taken_and_the_jump_reported() -> None
     np.testing.assert_allclose(flown.error()[:3], (0.3, 0.0, 0.0), atol=5e-3)
 
 
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize("suite", [MOCAP, VIO], ids=["mocap", "vio"])
+@pytest.mark.parametrize("step", [0.06, 0.15])
+def test_jumps_add_up_and_are_no_motion_of_the_vehicle(suite: Suite, step: float) -> None:
+    """Half of a staircase had become a velocity, and a vehicle in Hold flew against it."""
+
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, PoseSample) and sample.time > START + 1.0:
+            x, y, z = sample.position
+            return replace(sample, position=(x - step * (int(sample.time - START)), y, z))
+        return sample
+
+    flown, sound = Flown(run(suite, 8, 4.9), change), Flown(run(suite, 8, 4.9))
+    assert flown.memory.unproven == pytest.approx((-4.0 * step, 0.0, 0.0), abs=0.05)
+    assert sound.memory.unproven == (0.0, 0.0, 0.0)
+    assert not flown.memory.reset.expected
+    np.testing.assert_allclose(flown.error()[:3], (4.0 * step, 0.0, 0.0), atol=0.05)
+    np.testing.assert_allclose(flown.error()[3:6], sound.error()[3:6], atol=0.01)
+    bias, of_sound = [one.memory.numbers[0]["accel_bias"] for one in (flown, sound)]
+    np.testing.assert_allclose(bias, of_sound, atol=0.05)
+
+
 def test_a_jump_that_was_believed_and_was_none_is_undone_after_half_a_second() -> None:
     """A metre away, it would take a second again."""
 
@@ -440,6 +462,7 @@ def test_a_jump_that_was_believed_and_was_none_is_undone_after_half_a_second() -
     reset = flown.memory.reset
     assert reset.number == 2
     np.testing.assert_allclose(reset.position, (0.0, 1.07, 0.0), atol=0.1)
+    np.testing.assert_allclose(flown.memory.unproven, 0.0, atol=0.15)  # what it drifted meanwhile
     np.testing.assert_allclose(flown.error()[:3], 0.0, atol=0.05)
 
 

@@ -10,12 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from fsw.autopilot.control.cascade import in_hover
 from fsw.autopilot.estimation.dead_reckoning import moved_on
-from fsw.autopilot.flight.estimate.jump import returned
+from fsw.autopilot.estimation.fusion_memory import Reset
+from fsw.autopilot.flight.estimate.jump import held_along, returned, without_answer
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest, with_plan_state
-from fsw.autopilot.flight.state import FlightState
+from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState
+from fsw.autopilot.flight.state import FlightState, PlanMemory, SetpointMemory
 from fsw.autopilot.geometry.rotation import wrap_angle, yaw_of
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.signals import StateEstimate, StatusText
+from fsw.autopilot.signals import MotionSetpoint, StateEstimate, StatusText
 from tests.fsw.autopilot.flight.in_flight import flying
 from tests.fsw.random_states import estimate_of
 
@@ -83,3 +85,37 @@ def test_a_jump_of_more_than_20_mm_is_reported(place: float, texts: int) -> None
     assert [text.text for text in said] == [
         "estimate moved by 21 mm, 0.000 rad: the plan moves along"
     ] * texts
+
+
+@pytest.mark.requirement("REQ-EST-10")
+def test_the_place_that_is_kept_comes_along_with_a_jump_that_nobody_expected() -> None:
+    """The vehicle has not moved; where a goal leads it, it goes from where it is."""
+    state, _ = moving(np.random.default_rng(2))
+    goal = PositionGoal(MotionSetpoint(False, (4.0, 5.0, -6.0)))
+    ahead = ReferenceState(False, (1.0, 2.0, -3.0), (0.1, 0.0, 0.0), 3.0)
+    state = replace(state, setpoint=SetpointMemory(ahead, goal))
+    half = np.pi / 12.0
+    jump = Reset(1, (-1.0, 0.5, 0.25), turn=(np.cos(half), 0.0, 0.0, np.sin(half)), expected=False)
+    after = held_along(state, jump)
+    assert np.subtract(after.vehicle.mode_origin, state.vehicle.mode_origin) == pytest.approx(
+        jump.position
+    )
+    assert after.vehicle.mode_yaw - state.vehicle.mode_yaw == pytest.approx(np.pi / 6.0)
+    moved = after.setpoint.reference
+    assert moved is not None
+    assert moved.p == pytest.approx((0.0, 2.5, -2.75))
+    assert moved.yaw == pytest.approx(3.0 + np.pi / 6.0 - 2.0 * np.pi)
+    assert (moved.v, after.setpoint.goal) == (ahead.v, goal)
+    assert held_along(state, jump._replace(expected=True)) is state, "it had drifted, and goes back"
+
+
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize(("place", "waits"), [(0.019, True), (0.021, False)])
+def test_a_plan_that_began_where_the_vehicle_was_thought_to_be_is_not_flown(
+    place: float, waits: bool
+) -> None:
+    """It led back by the whole jump, 14 ms after it."""
+    asked = PlanMemory(awaited_id=7, awaited_us=1_000_000, next_id=8)
+    after = without_answer(asked, Reset(1, (0.0, 0.0, -place)))
+    assert after.awaited_id == (7 if waits else -1)
+    assert after.next_id == 8

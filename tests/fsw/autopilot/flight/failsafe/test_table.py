@@ -636,6 +636,13 @@ def test_it_holds_where_refused_positions_say_that_it_is_elsewhere(
     assert lost_rows(aided) == {}
 
 
+@pytest.mark.requirement("REQ-EST-4", "REQ-EST-10")
+@pytest.mark.parametrize(("unproven", "holds"), [(0.1, False), (0.11, True), (5.0, True)])
+def test_it_holds_where_jumps_have_added_up(unproven: float, holds: bool) -> None:
+    trajectory = replace(FINE, mode=Mode.TRAJECTORY, aiding=Aiding(unproven=(0.0, -unproven, 0.0)))
+    assert lost_rows(trajectory) == ({Condition.POSITION_LOW: Action.HOLD} if holds else {})
+
+
 @pytest.mark.requirement("REQ-EST-4", "REQ-EST-6")
 @pytest.mark.parametrize(
     ("number", "expected"), [(1, Action.WARN), (2, Action.HOLD), (5, Action.LAND)]
@@ -662,6 +669,10 @@ def test_a_text_names_the_sensor_and_since_when() -> None:
         (
             Aiding(400_000, Sensor.POSE, SensorFault.JUMP, elsewhere=1.05),
             "failsafe: position uncertain by 1050 mm: pose jump rejected, for 0.40 s, holding",
+        ),
+        (
+            Aiding(unproven=(0.0, 0.36, -0.27)),
+            "failsafe: position uncertain by 450 mm: it has jumped, holding",
         ),
         (
             Aiding(400_000, Sensor.POSE, SensorFault.NOT_FINITE, attitude_sigma=0.8),

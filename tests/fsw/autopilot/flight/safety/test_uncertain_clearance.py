@@ -315,3 +315,25 @@ def test_a_sphere_without_room_for_wind_lacks_nothing_by_it() -> None:
     kept = clearance().keep(InflatedSafeSet(), set_, vehicle(), None, (0.03, 0.0))
     assert kept.added[0] < 2e-3
     assert not kept.shortfall > SHORTFALL
+
+
+@pytest.mark.requirement("REQ-EST-10")
+def test_a_zone_is_kept_where_it_was_before_a_jump_as_well() -> None:
+    """By as much as the jump says that it is farther away, at once."""
+    round_ = Zone(ball((0.0, 9.0, 0.0), 1.0), 0.1)
+    every = SafeSet((NORTH, EAST, round_, target_sphere((0.0, 0.0, -0.3), 3.0)))
+    keep = clearance().keep
+    before = keep(InflatedSafeSet(), every, vehicle(), certain(x=0.01, y=0.01))
+    after = keep(
+        *(before, every, vehicle(1_100_000), certain(x=0.01, y=0.01)), unproven=(-0.7, 0.5, 0.0)
+    )
+    growth = np.subtract(after.added, before.added)
+    assert growth == pytest.approx((0.7, 0.0, np.hypot(0.7, 0.5), 0.0), abs=2 * STEP)
+    same = keep(
+        *(after, every, vehicle(1_200_000), certain(x=0.01, y=0.01)), unproven=(-0.7, 0.5, 0.0)
+    )
+    assert same.added == pytest.approx(after.added, abs=STEP)
+    back = keep(same, every, vehicle(1_300_000), certain(x=0.01, y=0.01))
+    assert back.added == pytest.approx(before.added, abs=5 * STEP)
+    exact = keep(InflatedSafeSet(), BOTH, vehicle(), None, unproven=(-0.7, 0.0, 0.0))
+    assert exact.added == pytest.approx((0.7, 0.0), abs=STEP), "whatever SAFE_SIGMAS says"
