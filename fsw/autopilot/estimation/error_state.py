@@ -87,7 +87,7 @@ FILTER: Final = np.dtype(
         ("noise_scale", float, (4,)),
         ("innovated_last", float, (4, ROWS)),
         # By what share of its variance one differs from the next, up to 1; those that lean one way,
-        # each over its deviation; and when they did so plainly [s].
+        # each over its deviation; and when they did so plainly [s], 0: never.
         ("scatter", float, (4,)),
         ("leaning", float, (4, ROWS)),
         ("leant_at", float),

@@ -189,5 +189,5 @@ def at_start(joints: int, turns: Sequence[float] = (1.0,) * 4) -> FusionMemory:
     """
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
     x["joint_count"], x["turns"] = joints, turns
-    x["model_walk"], x["leant_at"], x["scatter"] = MIN_WALKS, -math.inf, 1.0
+    x["model_walk"], x["scatter"] = MIN_WALKS, 1.0
     return FusionMemory(x)

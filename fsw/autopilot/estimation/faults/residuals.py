@@ -294,7 +294,7 @@ def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> No
     is known of it no better than when the filter began is no evidence, and neither is a force's
     that was found because measurements leant one way: it may be a tilt's.
     """
-    if not half and x.time - x.leant_at < _LEANT:
+    if not half and x.leant_at > 0.0 and x.time - x.leant_at < _LEANT:
         return
     bias = vec3(x.gyro_bias if half else x.accel_bias, 0)
     if x.lost & (1 << half):
