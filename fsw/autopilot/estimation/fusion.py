@@ -115,8 +115,9 @@ def _leans(x: Any, rows: int, scaled: int) -> bool:
 
     Noise does not. One that is far off begins anew: it has jumped, and not grown.
     """
-    # Satellites' places wander; of a pose's attitude the law for who is wrong tells soon enough.
-    if scaled not in (POSE, GNSS + 1):
+    # Satellites' places wander. What is wrong beside a pose that does not drift, or an attitude,
+    # the law for who is wrong finds soon enough, and a pose's delay leans as well.
+    if not (scaled == GNSS + 1 or (scaled == POSE and x.drifts)):
         return False
     squared, leaning, most = 0.0, x.leaning[scaled], _LEANS
     if scaled != POSE:
