@@ -86,6 +86,11 @@ FILTER: Final = np.dtype(
         # innovations (fusion.py).
         ("noise_scale", float, (4,)),
         ("innovated_last", float, (4, ROWS)),
+        # By what share of its variance one differs from the next, up to 1; those that lean one way,
+        # each over its deviation; and when they did so plainly [s], 0: never.
+        ("scatter", float, (4,)),
+        ("leaning", float, (4, ROWS)),
+        ("leant_at", float),
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle

@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
+    NOTHING,
     TH,
     Filter,
     P,
@@ -24,7 +25,9 @@ from fsw.autopilot.estimation.error_state import (
     correct,
     distance,
     reset_covariance,
+    vec4,
 )
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
 from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
@@ -38,6 +41,17 @@ _MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
+# Innovations in a row, each over its deviation, lean one way from so large a sum on that keeps so
+# much of itself from one to the next; a single one counts by at most a share of that.
+_KEEPS = 0.8
+_LEANS = 8.0
+_COUNTS = 0.55
+_LEAPS = 9.0  # deviations, that no growth makes
+_LEAST_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
+# What is not known of a force then, for how long it has been so, and how well that is known.
+_LEANT_FORCE = 3.0  # m/s^2
+_LEANT_FOR = 0.2  # s
+_LEANT_ABOUT = 0.1  # s
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
 
@@ -75,18 +89,77 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
 
     The variance of what is ``scaled`` grows where innovations say that it is larger than stated.
     They say so by how they differ from one to the next: noise is what does not stay. What stays is
-    somebody's error, and no reason to believe a measurement less.
+    somebody's error, and no reason to believe a measurement less. Of what stays and grows the force
+    is doubted that predicts.
     """
     for k in range(rows):
         x.innovation[part, k] = x.residual[k]
         if scaled >= 0:
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     ratio = distance(x, rows) / gate
+    if scaled >= 0 and _leans(x, rows, scaled) and not x.suspect & NOTHING:
+        _doubt_force(x)
+        for k in range(rows):
+            x.residual[k] = x.innovation[part, k]
+        ratio = distance(x, rows) / gate
     if ratio <= 1.0:
         correct(x, rows)
     if scaled >= 0:
         _follow_noise(x, rows, part, scaled)
     return ratio
+
+
+@compilable
+def _leans(x: Any, rows: int, scaled: int) -> bool:
+    """Whether innovations of a kind that is ``scaled`` [1] lean one way, by a leaky sum of them.
+
+    Noise does not. One that is far off begins anew: it has jumped, and not grown.
+    """
+    # Satellites' places wander. What is wrong beside a pose that does not drift, or an attitude,
+    # the law for who is wrong finds soon enough, and a pose's delay leans as well.
+    if not (scaled == GNSS + 1 or (scaled == POSE and x.drifts)):
+        return False
+    squared, leaning, most = 0.0, x.leaning[scaled], _LEANS
+    if scaled != POSE:
+        most *= math.sqrt(max(x.scatter[scaled], _LEAST_SCATTER))
+    for k in range(rows):
+        squared += x.residual[k] * x.residual[k]
+    share = 1.0 if squared < _LEAPS * _LEAPS else 0.0
+    share /= max(math.sqrt(squared) / (_COUNTS * most), 1.0)
+    squared = 0.0
+    for k in range(rows):
+        leaning[k] = (_KEEPS * leaning[k] + x.residual[k] * share) if share > 0.0 else 0.0
+        squared += leaning[k] * leaning[k]
+    if squared < most * most:
+        return False
+    x.leant_at = x.time
+    for k in range(rows):
+        leaning[k] = 0.0
+    return True
+
+
+@compilable
+def _doubt_force(x: Any) -> None:
+    """Know little of the accelerometer's bias, and of what it has made of velocity and place.
+
+    One cause, so that the next measurement tells all of it: what grows is known too late to wait
+    until velocities have been seen.
+    """
+    M, R, variance = x.covariance, matrix_from_quaternion(vec4(x.q)), _LEANT_FORCE * _LEANT_FORCE
+    fast, far = _LEANT_FOR, 0.5 * _LEANT_FOR * _LEANT_FOR
+    for i in range(3):
+        M[P + i, P + i] += far * far * variance
+        M[V + i, V + i] += (fast * fast + _LEANT_ABOUT * _LEANT_ABOUT) * variance
+        M[BA + i, BA + i] += variance
+        both = far * fast * variance
+        M[P + i, V + i] += both
+        M[V + i, P + i] += both
+        for j in range(3):
+            turned = R[3 * i + j] * variance
+            M[P + i, BA + j] -= far * turned
+            M[BA + j, P + i] -= far * turned
+            M[V + i, BA + j] -= fast * turned
+            M[BA + j, V + i] -= fast * turned
 
 
 @compilable
@@ -100,6 +173,7 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
             total -= L[k, j] * y[j]
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
+    x.scatter[scaled] += _RATE * (min(0.5 * squared / rows, 1.0) - x.scatter[scaled])
     scale = followed(x.noise_scale[scaled], squared / rows, _SCALE_FROM)
     x.noise_scale[scaled] = min(scale, _SCALE_LIMIT)
 

@@ -203,5 +203,5 @@ def at_start(joints: int, turns: Sequence[float] = (1.0,) * 4) -> FusionMemory:
     """
     x = np.ndarray(1, FILTER, bytearray(FILTER.itemsize))
     x["joint_count"], x["turns"] = joints, turns
-    x["model_walk"] = MIN_WALKS
+    x["model_walk"], x["scatter"] = MIN_WALKS, 1.0
     return FusionMemory(x)

@@ -17,6 +17,7 @@ import numpy as np
 from fsw.autopilot.estimation.error_state import (
     BA,
     BG,
+    ERRORS,
     IMU_CAPACITY,
     LOST,
     MODELLED,
@@ -25,6 +26,7 @@ from fsw.autopilot.estimation.error_state import (
     NOTHING,
     ON_TRIAL,
     TH,
+    P,
     V,
     watch_biases,
 )
@@ -36,8 +38,10 @@ from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail, copied
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
-from fsw.autopilot.estimation.sensors.base import AidingSensor
+from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion
 from fsw.autopilot.measurements import Sensor
+from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import StateEstimate
 from fsw.frozen import replace
 
@@ -46,6 +50,9 @@ _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter c
 # it that residuals show. Places show a force late: half of it where windows are half full.
 _MOST: Final = (10.0, 0.5)  # m/s^2 and rad/s
 _FOR: Final = (0.1, 0.06)
+# The same of a gyro where no pose has held the attitude: it takes a long window until it is found.
+_TURNED: Final = 0.6  # s
+_SEEN_OF_TURN: Final = 1.0 / 3.0
 _SEEN: Final = (0.5, 1.0)
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
@@ -184,7 +191,7 @@ class Arbitration:
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL
-            verdict = _widened(x.view(np.recarray)[0], verdict, bool(self._aided(memory, now)))
+            verdict = _widened(x.view(np.recarray)[0], verdict, self._aided(memory, now))
             memory = replace(memory, verdict=verdict)
         # What the rotors explain, nobody else was wrong about.
         acquits = verdict.explained and not before.explained and any(before.unknown)
@@ -296,7 +303,7 @@ def _stuck(memory: FusionMemory) -> Source:
     return found
 
 
-def _widened(x: Any, verdict: Verdict, aided: bool) -> Verdict:
+def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
     """The ``verdict`` with a filter ``x`` that takes the biases of suspects for unknown.
 
     By as much as residuals with them show, and so what that has led to. A bias that may walk alone
@@ -308,16 +315,36 @@ def _widened(x: Any, verdict: Verdict, aided: bool) -> Verdict:
         if not source & verdict.suspects:
             continue
         seen = residuals.size_of(verdict.evidence, source)
-        size = min(seen / _SEEN[half], _MOST[half])
+        turned = state == TH and Source.ATTITUDE not in aided
+        size = min(seen / (_SEEN_OF_TURN if turned else _SEEN[half]), _MOST[half])
         x["model_walk"][half] = min(x["model_walk"][half], size)
         grown = size**2 - unknown[half] ** 2
         if aided and grown > 0.0:
             if not unknown[half]:
                 _doubt(x, half)
             unknown[half] = size
+            if turned:
+                _doubt_turn(x, grown)
+                continue
             M[bias + k, bias + k] += grown
             M[state + k, state + k] += _FOR[half] ** 2 * grown
     return verdict._replace(unknown=(unknown[0], unknown[1]))
+
+
+def _doubt_turn(x: Any, grown: float) -> None:
+    """Know less of the gyro's bias, by a variance ``grown`` [rad^2/s^2], and of what it has made.
+
+    The tilt that it has made has made a velocity and a place. One cause, so that the next velocity
+    tells the tilt, which nothing else does here; else the filter would level the vehicle wrongly.
+    """
+    R = np.reshape(matrix_from_quaternion(attitude_of(x)), (3, 3))
+    fx, fy, fz = R.T @ (x["acceleration"] - (0.0, 0.0, GRAVITY))
+    sideways = R @ ((0.0, -fz, fy), (fz, 0.0, -fx), (-fy, fx, 0.0))
+    made = np.zeros((ERRORS, 3))
+    made[BG : BG + 3], made[TH : TH + 3] = np.eye(3), -_TURNED * np.eye(3)
+    made[V : V + 3] = _TURNED**2 / 2.0 * sideways
+    made[P : P + 3] = _TURNED**3 / 6.0 * sideways
+    x["covariance"] += grown * made @ made.T
 
 
 def _doubt(x: Any, half: int) -> None:

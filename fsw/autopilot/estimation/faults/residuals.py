@@ -100,6 +100,7 @@ _SPEED_OFF: Final = 0.08  # m/s
 _ACCEL_BIAS: Final = 0.8  # m/s^2
 _GYRO_BIAS: Final = 0.1  # rad/s
 _KNOWN: Final = 0.4  # of that
+_LEANT: Final = 3.0  # s
 # How a vehicle moves between two measurements, of which one may be an outlier: beside the velocity
 # that the last two of them show, or with any where there are none.
 _GAINS: Final = 15.0  # m/s^2, half of it
@@ -290,8 +291,11 @@ def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> No
     """Keep how far the bias of a half is beyond the ``most`` [SI] that its kind has.
 
     By the square, because it is no noise. Of one that is in doubt, it is the one from before. What
-    is known of it no better than when the filter began is no evidence.
+    is known of it no better than when the filter began is no evidence, and neither is a force's
+    that was found because measurements leant one way: it may be a tilt's.
     """
+    if not half and x.leant_at > 0.0 and x.time - x.leant_at < _LEANT:
+        return
     bias = vec3(x.gyro_bias if half else x.accel_bias, 0)
     if x.lost & (1 << half):
         bias = vec3(x.kept_bias, 3 * half)

@@ -51,6 +51,8 @@ _SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
 _SHOWS: Final = 1.5
 _SURE: Final = 3.0  # sum of leads
 _QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
+_STAYS: Final = 0.7  # of its threshold, down to which what has fired has not ended
+_NEARLY: Final = 0.4  # of its threshold, from which on an attitude may explain what is felt
 _AGREES: Final = 5.0  # s of agreement, until what was named is believed again
 UNDECIDED: Final = 2.0  # s, after which suspects are not told apart any more
 
@@ -61,6 +63,7 @@ class Verdict(NamedTuple):
     evidence: Evidence | None = None
     since: float = -1.0  # of the trial that is on; -1: none
     fired: float = -math.inf  # when a residual did last
+    shown: frozenset[int] = frozenset()  # which have in this trial
     suspects: Source = NOBODY
     # By how much the biases of accelerometer [m/s^2] and gyro [rad/s] were unknown in this trial.
     unknown: Vec2 = (0.0, 0.0)
@@ -81,6 +84,7 @@ class Verdict(NamedTuple):
         """The verdict after the trial is over."""
         return self._replace(
             since=-1.0,
+            shown=frozenset(),
             suspects=NOBODY,
             unknown=(0.0, 0.0),
             explained=False,
@@ -132,7 +136,9 @@ def judged(
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:
-        if verdict.is_on and now - verdict.fired > _QUIET:
+        if any(ratios[k] > _STAYS for k in verdict.shown.intersection(used)):
+            verdict = verdict._replace(fired=now)
+        elif verdict.is_on and now - verdict.fired > _QUIET:
             return verdict.acquitted()
         return verdict._replace(leader=NOBODY, sum=0.0, named=NOBODY)
     gone, young = verdict.wrong | lost, not verdict.is_on or now - verdict.since < _SHOWS
@@ -160,6 +166,7 @@ def judged(
     verdict = verdict._replace(
         since=verdict.since if verdict.is_on else now,
         fired=now,
+        shown=verdict.shown.union(fires),
         suspects=M if explained and not beside else suspects,
         explained=explained,
         leader=leader,
@@ -204,7 +211,8 @@ def _costs(
         cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in left)
         cost[one] -= _DISTURBED if one is B else 0.0
         cost[one] += _not_shown(one, ratios, sizes, used) if young else 0.0
-    if not any(ratios[k] > 1.0 for k in used if of[k] & Q):
+    # A pose that tilts slowly shows by what is felt first, and its place need not be lost for that.
+    if not any(ratios[k] > _NEARLY for k in used if of[k] & Q):
         cost.pop(Q, None)
     if P in cost and cost.get(Q, math.inf) - cost[P] < _LEAD:
         del cost[P]  # nothing contradicts its place

@@ -382,6 +382,30 @@ def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a
     assert verdict.wrong == Source.POSE, "its attitude agrees"
 
 
+@pytest.mark.requirement("REQ-EST-13")
+def test_what_comes_and_goes_about_its_threshold_is_one_contradiction() -> None:
+    """A frame that tilted slowly was acquitted every half second, and the vehicle never landed."""
+    verdict = Verdict()
+    for look_ in range(round((UNDECIDED + 1.0) / EVERY)):
+        ratios = [0.0] * sources.COUNT
+        ratios[sources.GP] = 1.05 if look_ % 40 < 10 else 0.9
+        now = 10.0 + EVERY * look_
+        verdict = judged(verdict, tuple(ratios), now, holds_attitude=True)
+    assert now - verdict.since > UNDECIDED
+    assert verdict.contradicts
+    for look_ in range(20):
+        verdict = judged(verdict, (0.6,) * sources.COUNT, now + EVERY * look_, holds_attitude=True)
+    assert not verdict.is_on
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_place_is_not_lost_for_what_a_slow_tilt_explains() -> None:
+    ratios, sizes = {sources.GP: 0.6, sources.AP: 1.4}, {sources.AP: 0.6}
+    verdict = looked_at(ratios, sizes, holds_attitude=True)
+    assert not (verdict.wrong | verdict.suspects) & Source.POSE
+    assert verdict.suspects & Source.ATTITUDE
+
+
 def looked_at(ratios: dict[int, float], sizes: dict[int, float], **known: Any) -> Verdict:
     """The verdict after ten looks at the same residuals: ``ratios`` [1] and ``sizes`` [SI]."""
     shown = tuple([ratios.get(k, 0.0) for k in range(sources.COUNT)])
