@@ -32,7 +32,8 @@ from fsw.autopilot.signals import (
 )
 from fsw.autopilot.tuning import Tuning
 from fsw.link.wire.decode_commands import command as read_command
-from sitl.scenario import Hold, Pilot, Push, Scenario, Start
+from sitl.disturbances.sequence import Played
+from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.mission import announced
@@ -107,7 +108,7 @@ class Flight:
     late_ticks: Callable[[int], int] = on_time
     announces: bool = True  # the safe set
     upload: MissionUpdate | None = None  # told to the next tick
-    pushes: tuple[Push, ...] = ()  # beside the scenario's own
+    pushes: tuple[Played, ...] = ()  # beside the scenario's own
     state: FlightState = field(init=False)
     texts: list[str] = field(default_factory=list)
     results: list[tuple[int, int]] = field(default_factory=list)  # command, MAV_RESULT

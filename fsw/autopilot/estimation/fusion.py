@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
+    LAGS,
     TH,
     Filter,
     P,
@@ -38,6 +39,11 @@ _MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
+# Noise that is alike from one measurement to the next differs from one ``LAGS`` before, and goes
+# back as far. A scale of that is more by chance than this one is used.
+_LAG_RATE = 0.12
+_LAG_FROM = 1.2  # less than of the last one: what is alike after the lag is still missing
+_SURELY = 4.0
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
 
@@ -91,7 +97,7 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
 
 @compilable
 def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
-    """Let a scale of variances follow how far the newest innovation is from the last one."""
+    """Let a scale of variances follow how innovations differ, from the last and from before it."""
     L, y, squared = x.factor, x.innovated, 0.0
     for k in range(rows):
         total = x.innovation[part, k] - x.innovated_last[scaled, k]
@@ -100,8 +106,34 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
             total -= L[k, j] * y[j]
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
-    scale = followed(x.noise_scale[scaled], squared / rows, _SCALE_FROM)
-    x.noise_scale[scaled] = min(scale, _SCALE_LIMIT)
+    own = x.noise_by_lag[scaled]
+    own[0] = min(followed(own[0], squared / rows, _SCALE_FROM), _SCALE_LIMIT)
+    largest, count = own[0], x.innovations[scaled]
+    for lag in range(len(LAGS)):
+        if count % LAGS[lag] == 0:
+            _look_back(x, rows, part, scaled, lag)
+        largest = max(largest, own[1 + lag] / _SURELY)
+    x.innovations[scaled] = count + 1
+    x.noise_scale[scaled] = largest
+
+
+@compilable
+def _look_back(x: Any, rows: int, part: int, scaled: int, lag: int) -> None:
+    """Let the scale of a ``lag`` [1] follow how far the innovation has gone back since.
+
+    Of two differences in a row noise makes one against the other, as far as it is another noise
+    after the lag. What grows, somebody's error, makes both alike, and counts for nothing.
+    """
+    before, returned = x.innovated_before[scaled, lag], 0.0
+    for k in range(rows):
+        gone, variance = x.innovation[part, k] - before[0, k], 0.0
+        for j in range(k + 1):
+            variance += x.factor[k, j] * x.factor[k, j]
+        returned -= gone * before[1, k] / variance
+        before[0, k], before[1, k] = x.innovation[part, k], gone
+    surprise = min(max(returned / rows, -_MOST), _MOST) - _LAG_FROM
+    grown = max(x.noise_by_lag[scaled, 1 + lag], 1.0) * math.exp(_LAG_RATE * surprise)
+    x.noise_by_lag[scaled, 1 + lag] = min(grown, _SURELY * _SCALE_LIMIT)
 
 
 @compilable
