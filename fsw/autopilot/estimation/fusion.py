@@ -43,7 +43,7 @@ _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noi
 # back as far. A scale of that is more by chance than this one is used.
 _LAG_RATE = 0.12
 _LAG_MOST = 12.0  # as quickly as over the last one: until noise is known, a pose contradicts others
-_SURELY = 4.0
+_SURELY = 12.0
 _LAG_FROM = 1.2  # from then on, and less than before: what is alike after the lag is missing
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
