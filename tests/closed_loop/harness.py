@@ -32,6 +32,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.autopilot.tuning import Tuning
 from fsw.link.wire.decode_commands import command as read_command
+from sitl.disturbances.sequence import Played
 from sitl.scenario import Hold, Pilot, Scenario, Start
 from sitl.simulation import STEP_US, Simulation
 from studies.flight.closed_loop import ClosedLoop, InlinePlanner
@@ -107,6 +108,7 @@ class Flight:
     late_ticks: Callable[[int], int] = on_time
     announces: bool = True  # the safe set
     upload: MissionUpdate | None = None  # told to the next tick
+    pushes: tuple[Played, ...] = ()  # beside the scenario's own
     state: FlightState = field(init=False)
     texts: list[str] = field(default_factory=list)
     results: list[tuple[int, int]] = field(default_factory=list)  # command, MAV_RESULT
@@ -116,7 +118,7 @@ class Flight:
     sent: list[ActuatorCommand] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.sim = Simulation(self.scenario, self.seed)
+        self.sim = Simulation(self.scenario, self.seed, self.pushes)
         # A scenario says what keeps clear, as for `pandion fly`.
         planner = replace(self.config.planner, body=self.scenario.body)
         self.config = replace(self.config, planner=planner)

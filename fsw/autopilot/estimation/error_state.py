@@ -49,6 +49,7 @@ FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' mod
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 29  # integrals: see faults/residuals.py
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
+LAGS: Final = (4, 8, 16)  # measurements, over which noise is looked for that is no white one
 
 FILTER: Final = np.dtype(
     [
@@ -82,10 +83,14 @@ FILTER: Final = np.dtype(
         ("witness", float, (WITNESS,)),
         ("baseline", float, (9,)),  # SI: biases, and what is felt beside the model
         ("model_walk", float, (2,)),
-        # By how much more than it states a pose's and a receiver's variance is, and their last
-        # innovations (fusion.py).
+        # By how much more than it states a pose's and a receiver's variance is, by lag and the
+        # largest, and their last innovations: of each lag the last of which it took notice, and
+        # by what that differed from the one before (fusion.py).
         ("noise_scale", float, (4,)),
+        ("noise_by_lag", float, (4, 1 + len(LAGS))),
         ("innovated_last", float, (4, ROWS)),
+        ("innovated_before", float, (4, len(LAGS), 2, ROWS)),
+        ("innovations", np.int64, (4,)),  # how many there have been
         # By what share of its variance one differs from the next, up to 1; those that lean one way,
         # each over its deviation; and when they did so plainly [s], 0: never.
         ("scatter", float, (4,)),

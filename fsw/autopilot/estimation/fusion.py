@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.error_state import (
     BG,
     DELAY,
     ERRORS,
+    LAGS,
     NOTHING,
     TH,
     Filter,
@@ -52,6 +53,12 @@ _LEAST_SCATTER = 0.14  # a receiver knows its velocity better than it is believe
 _LEANT_FORCE = 3.0  # m/s^2
 _LEANT_FOR = 0.2  # s
 _LEANT_ABOUT = 0.1  # s
+# Noise that is alike from one measurement to the next differs from one ``LAGS`` before, and goes
+# back as far. A scale of that is more by chance than this one is used.
+_LAG_RATE = 0.12
+_LAG_MOST = 12.0  # as quickly as over the last one: until noise is known, a pose contradicts others
+_SURELY = 12.0
+_LAG_FROM = 1.2  # from then on, and less than before: what is alike after the lag is missing
 # Of what variances are scaled: place and attitude of a pose, place and velocity of satellites.
 POSE, GNSS = 0, 2
 
@@ -164,7 +171,7 @@ def _doubt_force(x: Any) -> None:
 
 @compilable
 def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
-    """Let a scale of variances follow how far the newest innovation is from the last one."""
+    """Let a scale of variances follow how innovations differ, from the last and from before it."""
     L, y, squared = x.factor, x.innovated, 0.0
     for k in range(rows):
         total = x.innovation[part, k] - x.innovated_last[scaled, k]
@@ -176,6 +183,35 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
     x.scatter[scaled] += _RATE * (min(0.5 * squared / rows, 1.0) - x.scatter[scaled])
     scale = followed(x.noise_scale[scaled], squared / rows, _SCALE_FROM)
     x.noise_scale[scaled] = min(scale, _SCALE_LIMIT)
+    own = x.noise_by_lag[scaled]
+    own[0] = min(followed(own[0], squared / rows, _SCALE_FROM), _SCALE_LIMIT)
+    largest, count = own[0], x.innovations[scaled]
+    for lag in range(len(LAGS) if scaled in (POSE, GNSS) else 0):  # of places
+        if count % LAGS[lag] == 0:
+            _look_back(x, rows, part, scaled, lag)
+        largest = max(largest, own[1 + lag] / _SURELY)
+    x.innovations[scaled] = count + 1
+    x.noise_scale[scaled] = largest
+
+
+@compilable
+def _look_back(x: Any, rows: int, part: int, scaled: int, lag: int) -> None:
+    """Let the scale of a ``lag`` [1] follow how far the innovation has gone back since.
+
+    Of two differences in a row noise makes one against the other, as far as it is another noise
+    after the lag. What grows, somebody's error, makes both alike, and counts for nothing.
+    """
+    before, returned = x.innovated_before[scaled, lag], 0.0
+    for k in range(rows):
+        gone, variance = x.innovation[part, k] - before[0, k], 0.0
+        for j in range(k + 1):
+            variance += x.factor[k, j] * x.factor[k, j]
+        returned -= gone * before[1, k] / variance
+        before[0, k], before[1, k] = x.innovation[part, k], gone
+    scale = max(x.noise_by_lag[scaled, 1 + lag], 1.0)
+    start = _LAG_FROM if scale > _SURELY else _SCALE_FROM
+    grown = scale * math.exp(_LAG_RATE * (min(max(returned / rows, -_MOST), _LAG_MOST) - start))
+    x.noise_by_lag[scaled, 1 + lag] = min(grown, _SURELY * _SCALE_LIMIT)
 
 
 @compilable

@@ -206,6 +206,7 @@ def begin(
     M[DELAY, DELAY] = t.pose.delay_sigma * t.pose.delay_sigma
     s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose.delay, 0
     s.noise_scale[fusion.POSE] = t.pose.noise_at_start * t.pose.noise_at_start
+    s.noise_by_lag[fusion.POSE, 0] = s.noise_scale[fusion.POSE]
     s.time = time - t.pose.delay
     while s.first < s.end - 1 and s.imu[s.first % IMU_CAPACITY, TIME] <= s.time:
         s.first += 1

@@ -87,8 +87,9 @@ _TURN_OFF_AIDED: Final = 0.15  # rad/s
 # centre of mass. So many deviations of a walk of pushes of up to 0.8 m/s^2, each for 0.1 s.
 _AGILE: Final = 35.0  # rad/s^2
 _PUSHES: Final = 5.0 * 0.8 * math.sqrt(0.1 / 3.0)  # m/s^1.5
-_FORCE_OFF: Final = (2.5, 1.8, 1.5, 1.3)  # m/s^2
+_FORCE_OFF: Final = (2.5, 1.8, 1.5, 1.5)  # m/s^2
 _FORCE_OFF_AIDED: Final = 0.9  # m/s^2
+_PUSH: Final = 1.3  # m/s^2, of a disturbance (``SUR_DISTURB``) and wind (``TRK_WIND_MAX``) together
 _GYRO_OFF: Final = 0.012  # rad/s: scale, axes and bias
 _GYRO_OFF_LONG: Final = 0.004  # rad/s: bias, and what scale and axes make of turning to and fro
 _GYRO_AXES: Final = 0.011  # rad: by how much they are off for each radian that the vehicle turns on
@@ -487,7 +488,21 @@ def _unit_and_model(s: Any, now: float, k: int, lasting: Vec3, learns: bool) -> 
     spun = _difference(b, a, 1 + SPUN2, last)
     r = _turned_beside(turn, turn0, spun, spun0)
     _note_model(s, now, GM, k, r, s.turns[k] * _TURN_OFF, 0.0, learns)
-    _note_model(s, now, AM, k, subtract(force, lasting), _FORCE_OFF[k], 0.0, learns)
+    _note_model(s, now, AM, k, _beside(force, lasting), _FORCE_OFF[k], 0.0, learns)
+
+
+@compilable
+def _beside(force: Vec3, lasting: Vec3) -> Vec3:
+    """A ``force`` [m/s^2, FRD] beside rotors, less of a ``lasting`` one [m/s^2, FRD] what is in it.
+
+    Wind may end at any moment, and turn: across, all that is no more than it was is no news.
+    """
+    x, y, z = lasting
+    size = x * x + y * y
+    share = (x * force[0] + y * force[1]) / max(size, 1e-9)
+    most = min(1.0, _PUSH / math.sqrt(max(size, 1e-9)))
+    share = 1.0 if share > 1.0 else max(share, -most)
+    return force[0] - share * x, force[1] - share * y, force[2] - z
 
 
 @compilable

@@ -27,8 +27,10 @@ from fsw.autopilot.estimation.faults.sources import (
     GB,
     GM,
     GP,
+    MB,
     MN,
     MP_FORCE,
+    MP_TURN,
     NOBODY,
     OF,
     A,
@@ -49,6 +51,9 @@ _TILTED: Final = 1.5  # m/s^2, that a pose shows whose attitude is off by 0.15 r
 # What is off shows at once in the first, while the trial is this young [s], and in others later.
 _SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
 _SHOWS: Final = 1.5
+# What contradicts rotors in the first contradicts the inertial unit in the second as much, over the
+# same time and with the same noise: unless it does, it is the rotors that are off, by a push.
+_SHOWN_TOO: Final = ((MP_FORCE, AP), (MN, AN), (MP_TURN, GP), (MB, GB))
 _SURE: Final = 3.0  # sum of leads
 _QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
 _STAYS: Final = 0.7  # of its threshold, down to which what has fired has not ended
@@ -211,6 +216,7 @@ def _costs(
         cost[one] = sum(min(ratios[k] ** 2, _MOST) for k in left)
         cost[one] -= _DISTURBED if one is B else 0.0
         cost[one] += _not_shown(one, ratios, sizes, used) if young else 0.0
+        cost[one] += _of_rotors_alone(one, ratios, of, used)
     # A pose that tilts slowly shows by what is felt first, and its place need not be lost for that.
     if not any(ratios[k] > _NEARLY for k in used if of[k] & Q):
         cost.pop(Q, None)
@@ -230,6 +236,18 @@ def _not_shown(
     threshold = sizes[at_once] / ratios[at_once]
     unseen = max(max(fired) - sizes[at_once], 0.0)
     return min((unseen / threshold) ** 2, _MOST)
+
+
+def _of_rotors_alone(
+    one: Source, ratios: tuple[float, ...], of: tuple[Source, ...], used: list[int]
+) -> float:
+    """What it costs that what contradicts rotors agrees with the inertial unit."""
+    cost = 0.0
+    for k, other in _SHOWN_TOO:
+        alone = k in used and other in used and ratios[k] > 1.0 >= ratios[other] > 0.0
+        if alone and one is not M:
+            cost += _SURE * (1.0 - ratios[other]) + (ratios[k] ** 2 if of[k] & one else 0.0)
+    return cost
 
 
 def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:

@@ -34,7 +34,11 @@ class SafetyWatch:
     def __init__(self, config: FlightConfig, loop: Tube) -> None:
         self._config = config
         follows_state = config.follows_plan
-        reach = base_reach(loop, config.surroundings.disturbance) + NOISE_ROOM
+        # Wind that begins or turns pushes beside the disturbance, up to what its memory can take.
+        # A plan that begins anew where the vehicle is has given up what pulls it back: in the same
+        # push it goes as far once more, and the next time again, until it meets a wall.
+        wind = loop.base_wind / loop.wind if loop.wind > 0.0 else 0.0  # m/s^2
+        reach = base_reach(loop, config.surroundings.disturbance + wind) + NOISE_ROOM
         # The other loop follows no state: only an upset takes it off its plan.
         self.radius = max(reach, _MIN_TUBE) if follows_state else config.upset_distance
         self._back = _BACK * self.radius

@@ -560,6 +560,52 @@ def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
     assert START + 2.5 - fused[0] > 0.2
 
 
+@pytest.mark.requirement("REQ-EST-1")
+@pytest.mark.parametrize("alike", [0.0, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("seed", [8, 9])
+def test_noise_of_places_is_found_however_alike_one_is_to_the_next(alike: float, seed: int) -> None:
+    """Differences from one to the next hold 1 - alike of its variance, and the rest was a fault."""
+    random, sigma, noise = np.random.default_rng(seed), 3.5e-3, np.zeros(3)
+
+    def change(now: float, sample: Sample) -> Sample:
+        if not isinstance(sample, PoseSample) or sample.time < START + 1.0:
+            return sample
+        noise[:] = alike * noise + math.sqrt(1.0 - alike**2) * random.normal(0.0, sigma, 3)
+        x, y, z = (np.array(sample.position) + noise).tolist()
+        return replace(sample, position=(x, y, z))
+
+    flown = Flown(run(MOCAP, seed, 4.0), change)
+    pose = MOCAP.pose
+    assert pose is not None
+    found = math.sqrt(flown.memory.numbers[0]["noise_scale"][0]) * pose.position
+    assert 0.3 * sigma < found < 1.5 * sigma
+    assert not flown.found
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    "place",
+    [
+        lambda t: 0.05 * t,
+        lambda t: 1.0 * t,
+        lambda t: 0.15 * t * t,
+        lambda t: 1.5 * t * t,
+        lambda t: 0.1 * math.sin(2.0 * t),
+        lambda t: 0.03 * math.sin(12.0 * t),
+    ],
+    ids=["drifts", "drifts fast", "gains speed", "gains it fast", "sways", "sways fast"],
+)
+def test_what_grows_is_no_noise(place: Callable[[float], float]) -> None:
+    def change(now: float, sample: Sample) -> Sample:
+        if not isinstance(sample, PoseSample) or sample.time < START + 1.0:
+            return sample
+        x, y, z = sample.position
+        return replace(sample, position=(x + place(sample.time - START - 1.0), y, z))
+
+    # The last one goes back within the longest lag, and some of it counts.
+    assert Flown(run(MOCAP, 8, 3.0), change).memory.numbers[0]["noise_scale"][0] < 4.0
+
+
 @pytest.mark.drawn(1)
 @pytest.mark.requirement("REQ-EST-1")
 @pytest.mark.parametrize("sigma", [0.046, 0.07])

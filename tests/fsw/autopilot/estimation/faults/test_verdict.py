@@ -37,6 +37,7 @@ class Wrong(NamedTuple):
     gyro: Vec3 = NONE  # rad/s
     accelerometer: Vec3 = NONE  # m/s^2
     push: Vec3 = NONE  # m/s^2, NED, that the model does not know
+    turns: bool = False  # the push lasted, and turns
     blow: Vec3 = NONE  # rad/s, at once, that the model does not know
     turning: Vec3 = NONE  # rad/s, of the pose's attitude
     gaining: Vec3 = NONE  # m/s^2, of the measured place
@@ -86,7 +87,8 @@ def flown(
         spun = w
         q = turned(q, *(TICK * rates))
         R = matrix_from_quaternion(q)
-        gust = 0.4 * random.uniform(-1.0, 1.0, 3) + (np.array(wrong.push) if late else 0.0)
+        pushed = 1.0 if late else -1.0 if wrong.turns else 0.0
+        gust = 0.4 * random.uniform(-1.0, 1.0, 3) + pushed * np.array(wrong.push)
         thrust = G + 0.3 * math.sin(now)
         a = np.array(rotate(R, (0.0, 0.0, -thrust))) + (0.0, 0.0, G) + gust
         p, v = p + TICK * v, v + TICK * a
@@ -237,6 +239,14 @@ def test_an_accelerometer_that_is_off_is_named_whatever_its_size(
 def test_a_gust_is_no_sensor_s_fault(suite: str, size: float, seed: int) -> None:
     verdicts = flown(Wrong(push=(size, 0.0, 0.0)), suite, 3.0, seed)
     assert named(verdicts) == Source.MODEL
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("suite", ["pose", "satellites"])
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_push_that_is_allowed_puts_no_sensor_in_doubt(suite: str, turns: bool) -> None:
+    verdicts = flown(Wrong(push=(0.9, 0.7, 0.0), turns=turns), suite, 3.0, 3)
+    assert suspected(verdicts) in (Source(0), Source.MODEL)
 
 
 @pytest.mark.requirement("REQ-EST-7")
