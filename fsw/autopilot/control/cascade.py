@@ -451,7 +451,9 @@ def _expected(laws: NDArray[Any], records: NDArray[Any]) -> tuple[ExpectedMotion
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)
     turning = motion.turning
-    model = turning[0], turning[1], turning[2], motion.thrust / r.mass
+    # Not by the mass that is flown: it goes by the accelerometer, which this is to bear witness of.
+    lift = motion.thrust / (airframe.mass + r.payload.mass)
+    model = turning[0], turning[1], turning[2], lift
     return model, three(r.observed.known, 0)
 
 

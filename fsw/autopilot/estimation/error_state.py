@@ -44,6 +44,7 @@ IMU_CAPACITY: Final = 256  # readings since the filter's time
 TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
+CONTRADICTED = 32  # by more than what rotors that are off explain
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
 FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
@@ -77,10 +78,11 @@ FILTER: Final = np.dtype(
         # and how quickly a force [m/s^3/sqrt(Hz)] and a rate [rad/s^2/sqrt(Hz)] may be off that
         # the rotors' model gives, or is compared with.
         ("out", np.int64),
-        ("suspect", np.int64),  # and ON_TRIAL where sensors contradict each other
+        ("suspect", np.int64),  # and ON_TRIAL where anything fires, CONTRADICTED
         ("believed", np.int64),  # halves whose jumps are the truth
         ("witness", float, (WITNESS,)),
-        ("baseline", float, (9,)),  # SI: biases, and what is felt beside the model
+        # SI: biases, what is felt beside the model, and the share of thrust that it does not know.
+        ("baseline", float, (10,)),
         ("model_walk", float, (2,)),
         # By how much more than it states a pose's and a receiver's variance is, and their last
         # innovations (fusion.py).

@@ -17,6 +17,7 @@ import numpy as np
 from fsw.autopilot.estimation.error_state import (
     BA,
     BG,
+    CONTRADICTED,
     IMU_CAPACITY,
     LOST,
     MODELLED,
@@ -183,7 +184,7 @@ class Arbitration:
         believes = believes or (jumped and verdict.explained and not before.explained)
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
-            x["suspect"] |= ON_TRIAL
+            x["suspect"] |= ON_TRIAL | (CONTRADICTED if verdict.contradicts else 0)
             verdict = _widened(x.view(np.recarray)[0], verdict, bool(self._aided(memory, now)))
             memory = replace(memory, verdict=verdict)
         # What the rotors explain, nobody else was wrong about.

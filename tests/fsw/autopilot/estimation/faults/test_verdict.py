@@ -12,7 +12,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation.error_state import FILTER
+from fsw.autopilot.estimation.error_state import CONTRADICTED, FILTER, NO_FORCE, ON_TRIAL
 from fsw.autopilot.estimation.faults import residuals, sources
 from fsw.autopilot.estimation.faults.residuals import EVERY, NO_AID, Aid, look
 from fsw.autopilot.estimation.faults.sources import Source
@@ -526,3 +526,32 @@ def test_what_a_surface_pushes_is_the_rotors_model_s_as_well() -> None:
         residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), (-1.5, 0.0, 0.0))
     np.testing.assert_allclose(x.witness[residuals.MADE :][:3], (-0.3, 0.0, 0.0), atol=1e-9)
     np.testing.assert_allclose(x.witness[residuals.BESIDE :][:3], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("suspect", "out", "learns"),
+    [
+        (0, 0, True),
+        (ON_TRIAL, 0, True),  # nobody but the rotors is in doubt: a payload, a weak rotor
+        (ON_TRIAL | CONTRADICTED, 0, False),
+        (ON_TRIAL | CONTRADICTED | NO_FORCE, 0, False),
+        (0, NO_FORCE, False),
+    ],
+)
+def test_rotors_do_not_learn_their_lift_from_what_they_witness_against(
+    suspect: int, out: int, learns: bool
+) -> None:
+    """They did within a second, bore out a wrong accelerometer, and the pose was named."""
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    x.newest[:3] = (0.0, 0.0, -1.1 * G)
+    for _ in range(round(2.0 / TICK)):
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), NONE)
+    assert x.baseline[9] == pytest.approx(0.1), "at first at once: of another mass"
+    x.newest[:3], x.suspect, x.out = (0.0, 0.0, -0.8 * G), suspect, out
+    for _ in range(round(5.0 / TICK)):
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), NONE)
+    assert bool(x.baseline[9] < -0.05) is learns
+    assert x.baseline[9] > -0.15, "slowly"
+    if not learns:
+        assert x.baseline[9] == pytest.approx(0.1)
