@@ -134,3 +134,21 @@ def test_an_accelerometer_that_is_wrong_along_z_is_not_borne_out_by_the_rotors(
     assert flight.away_m is not None
     assert flight.away_m < 2.0
     assert not any("pose inconsistent" in said.text for said in flight.warnings)
+
+
+@pytest.mark.long
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("size", "seed"), [(0.0, 30), (0.0, 31), (0.25, 6), (0.25, 18), (0.5, 7), (0.5, 32), (1.0, 33)]
+)
+def test_a_descent_without_a_height_goes_down_whatever_the_accelerometer_says(
+    size: float, seed: int
+) -> None:
+    """It said that the vehicle sinks; that climbed for ever, 60 to 150 m in 17 s."""
+    wrong = Fault("accel", "wrong", axis=3.0, size=size, start_s=0.3)
+    lost = Fault("vio", "off", start_s=0.4)
+    flight = fly("hold", (wrong, lost) if size else (lost,), "mocap", seed)
+    assert flight.away_m is not None
+    assert flight.away_m < 4.0, "carried off by a second or two of the wrong force"
+    told = any("IMU inconsistent" in said.text for said in flight.warnings)
+    assert told is (size > 0.0)

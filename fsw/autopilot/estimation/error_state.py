@@ -49,11 +49,13 @@ MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of th
 FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 29  # integrals: see faults/residuals.py
+HEIGHT_LASTS: Final = 0.15  # s, for which a height counts as measured after it was
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 
 FILTER: Final = np.dtype(
     [
         ("time", float),  # s, of the state
+        ("height_time", float),  # s, at which a height was used last
         ("p", float, (3,)),  # m, NED
         ("v", float, (3,)),  # m/s, NED
         ("q", float, (4,)),  # body to NED

@@ -19,7 +19,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation.error_state import BA, CONTRADICTED, NO_FORCE, WITNESS, vec3
+from fsw.autopilot.estimation.error_state import (
+    BA,
+    CONTRADICTED,
+    HEIGHT_LASTS,
+    NO_FORCE,
+    WITNESS,
+    vec3,
+)
 from fsw.autopilot.estimation.faults.sources import (
     AA,
     AM,
@@ -227,7 +234,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
             b[i] += known * (x.accel_bias[i] - b[i])
             b[3 + i] += known * (x.gyro_bias[i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
-    if not (x.suspect & CONTRADICTED or x.out & NO_FORCE):
+    unseen = x.time - x.height_time > HEIGHT_LASTS
+    if not (unseen or x.suspect & CONTRADICTED or x.out & NO_FORCE):
         _weigh(b, own[2] - f[2] + b[2], model[3], dt / min(W[LASTS], _BASELINE))
 
 
@@ -237,8 +245,8 @@ def _weigh(b: Array, felt: float, thrust: float, share: float) -> None:
 
     ``felt`` [m/s^2, along -z] is what they lift it by, ``thrust`` [m/s^2] what the model says.
     The mass that is flown follows the accelerometer within a second: by that, rotors would
-    bear out one that is wrong. This one does so as slowly as biases, and not while anybody but
-    the rotors may be wrong.
+    bear out one that is wrong. This one does so as slowly as biases, and neither while anybody but
+    the rotors may be wrong nor while nothing measures the height.
     """
     if thrust > _LIFTS and felt > _LIFTS:
         b[9] += share * (felt / thrust - 1.0 - b[9])
