@@ -83,8 +83,6 @@ def estimate_mass(
     within 30 % of the believed mass. ``mass`` [kg] is the last estimate, ``rotors`` [N] the thrust
     of each, ``specific_force`` [m/s^2] along -z of the body, ``seconds`` [s] the time since.
     A surface that the tool presses on gives a ``lift`` [N] along -z besides.
-
-    So quick a mass is no witness of an accelerometer: ``faults/residuals.py`` has its own.
     """
     force, _ = rotor_wrench(airframe, rotors)
     thrust = lift - force[2]
