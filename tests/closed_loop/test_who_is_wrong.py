@@ -111,3 +111,44 @@ def test_flights_that_hit_a_wall_once_do_not(
 ) -> None:
     flight = fly(mode, tuple(faults), suite, seed)
     assert flight.contact == "", flight.ended
+
+
+@pytest.mark.long
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("mode", "suite", "fault", "seed"),
+    [
+        ("hold", "vio", Fault("accel", "wrong", axis=3.0, size=1.135, start_s=0.26), 102),
+        ("hold", "vio", Fault("accel", "wrong", axis=3.0, size=1.135, start_s=0.26), 103),
+        ("hold", "vio", Fault("accel", "wrong", axis=3.0, size=-1.2, start_s=0.3), 202),
+        ("land", "vio", Fault("accel", "wrong", axis=3.0, size=1.135, start_s=0.26), 104),
+        ("hold", "rtk", Fault("accel", "drifting", axis=3.0, size=1.5, start_s=0.2), 52),
+    ],
+)
+def test_an_accelerometer_that_is_wrong_along_z_is_not_borne_out_by_the_rotors(
+    mode: str, suite: str, fault: Fault, seed: int
+) -> None:
+    """The mass followed it within a second, a sound pose was named, and vehicles flew away."""
+    flight = fly(mode, (fault,), suite, seed)
+    assert flight.contact == "", flight.ended
+    assert flight.away_m is not None
+    assert flight.away_m < 2.0
+    assert not any("pose inconsistent" in said.text for said in flight.warnings)
+
+
+@pytest.mark.long
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(
+    ("size", "seed"), [(0.0, 30), (0.0, 31), (0.25, 6), (0.25, 18), (0.5, 7), (0.5, 32), (1.0, 33)]
+)
+def test_a_descent_without_a_height_goes_down_whatever_the_accelerometer_says(
+    size: float, seed: int
+) -> None:
+    """It said that the vehicle sinks; that climbed for ever, 60 to 150 m in 17 s."""
+    wrong = Fault("accel", "wrong", axis=3.0, size=size, start_s=0.3)
+    lost = Fault("vio", "off", start_s=0.4)
+    flight = fly("hold", (wrong, lost) if size else (lost,), "mocap", seed)
+    assert flight.away_m is not None
+    assert flight.away_m < 4.0, "carried off by a second or two of the wrong force"
+    told = any("IMU inconsistent" in said.text for said in flight.warnings)
+    assert told is (size > 0.0)

@@ -450,9 +450,9 @@ def _expected(laws: NDArray[Any], records: NDArray[Any]) -> tuple[ExpectedMotion
     # The accelerometer knows of gusts, and of the ground.
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)
-    turning = motion.turning
-    model = turning[0], turning[1], turning[2], motion.thrust / r.mass
-    return model, three(r.observed.known, 0)
+    # Not by the mass that is flown: it goes by the accelerometer, which this is a witness against.
+    (x, y, z), lift = motion.turning, motion.thrust / (airframe.mass + r.payload.mass)
+    return (x, y, z, lift), three(r.observed.known, 0)
 
 
 @kernel

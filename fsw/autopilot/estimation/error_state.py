@@ -44,16 +44,19 @@ IMU_CAPACITY: Final = 256  # readings since the filter's time
 TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
+CONTRADICTED = 32  # by more than what rotors that are off explain
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
 FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 29  # integrals: see faults/residuals.py
+HEIGHT_LASTS: Final = 0.15  # s, for which a height counts as measured after it was
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
 LAGS: Final = (4, 8, 16)  # measurements, over which noise is looked for that is no white one
 
 FILTER: Final = np.dtype(
     [
         ("time", float),  # s, of the state
+        ("height_time", float),  # s, at which a height was used last
         ("p", float, (3,)),  # m, NED
         ("v", float, (3,)),  # m/s, NED
         ("q", float, (4,)),  # body to NED
@@ -78,10 +81,11 @@ FILTER: Final = np.dtype(
         # and how quickly a force [m/s^3/sqrt(Hz)] and a rate [rad/s^2/sqrt(Hz)] may be off that
         # the rotors' model gives, or is compared with.
         ("out", np.int64),
-        ("suspect", np.int64),  # and ON_TRIAL where sensors contradict each other
+        ("suspect", np.int64),  # and ON_TRIAL where anything fires, CONTRADICTED
         ("believed", np.int64),  # halves whose jumps are the truth
         ("witness", float, (WITNESS,)),
-        ("baseline", float, (9,)),  # SI: biases, and what is felt beside the model
+        # SI: biases, what is felt beside the model, and the share of thrust that it does not know.
+        ("baseline", float, (10,)),
         ("model_walk", float, (2,)),
         # By how much more than it states a pose's and a receiver's variance is, by lag and the
         # largest, and their last innovations: of each lag the last of which it took notice, and

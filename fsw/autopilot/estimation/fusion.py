@@ -111,6 +111,8 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
         ratio = distance(x, rows) / gate
     if ratio <= 1.0:
         correct(x, rows)
+        if x.H[rows - 1, P + 2] != 0.0:
+            x.height_time = x.time
     if scaled >= 0:
         _follow_noise(x, rows, part, scaled)
     return ratio
@@ -244,6 +246,7 @@ def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
     for i in range(3):
         s.p[i] += jump[i]
     forget(s, P, variance)
+    s.height_time = s.time
     return jump
 
 

@@ -104,12 +104,13 @@ def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> 
     """What rotors make of the reading before, in place of those halves that are ``lost``.
 
     With the force across that has lately been felt beside theirs: wind, and the accelerometer's
-    bias. Along z the mass knows it, which goes by the force: another one would change it for ever.
+    bias. Along z their lift knows it.
     """
     if lost & NO_FORCE:
         kept = x.kept_bias[2] if x.lost & NO_FORCE else x.accel_bias[2]
         for i in range(3):
-            row[FORCE + i] = kept - model[3] if i == 2 else x.baseline[6 + i]
+            lift = (1.0 + x.baseline[9]) * model[3]
+            row[FORCE + i] = kept - lift if i == 2 else x.baseline[6 + i]
     if lost & NO_RATE:
         dt = row[TIME] - last[TIME]
         for i in range(3):

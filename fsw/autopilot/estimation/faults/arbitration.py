@@ -17,7 +17,9 @@ import numpy as np
 from fsw.autopilot.estimation.error_state import (
     BA,
     BG,
+    CONTRADICTED,
     ERRORS,
+    HEIGHT_LASTS,
     IMU_CAPACITY,
     LOST,
     MODELLED,
@@ -31,10 +33,10 @@ from fsw.autopilot.estimation.error_state import (
     watch_biases,
 )
 from fsw.autopilot.estimation.faults import residuals
-from fsw.autopilot.estimation.faults.residuals import NO_AID
+from fsw.autopilot.estimation.faults.residuals import LASTS, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source
-from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged
+from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged, lifted
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail, copied
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
@@ -42,7 +44,7 @@ from fsw.autopilot.estimation.sensors.base import AidingSensor, attitude_of
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.signals import StateEstimate
+from fsw.autopilot.signals import StateEstimate, Vec2
 from fsw.frozen import replace
 
 _TRAIL: Final = 0.75  # s, of each of two trails: so far, or twice, the filter can go back
@@ -56,6 +58,8 @@ _SEEN_OF_TURN: Final = 1.0 / 3.0
 _SEEN: Final = (0.5, 1.0)
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
+_LASTED: Final = 0.05  # s, of integrals
+_BOTH: Final = Source.ACCELEROMETER | Source.MODEL
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
 _PARTS: Final = {
     Sensor.POSE: (Source.POSE, Source.ATTITUDE),
@@ -106,6 +110,14 @@ class Arbitration:
             return begun(memory), found
         if now - evidence["looked"][0] < residuals.EVERY - _ROUNDING:
             return memory, found
+        before = memory.verdict
+        memory = _lifted(memory, now, found, flies=flies, known=damaged or touches)
+        if memory.verdict.wrong is not before.wrong:
+            oldest = memory.trail_before or memory.trail
+            memory, state = self._convicted(memory, before, now, found)
+            if state is None or (oldest and oldest.began <= before.measured):
+                return memory, state
+            return _as_made(memory, before, now, state)
         if not aloft():
             # What is in doubt is so until the rotors stand, on the ground too: else its bias would
             # be the one of before.
@@ -113,7 +125,8 @@ class Arbitration:
                 return memory, found
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)
-            return (_on_ground(memory, now) if memory.verdict.wrong else memory), found
+            on_ground = memory.verdict.wrong and not (flies and _is_unseen(memory))
+            return (_on_ground(memory, now) if on_ground else memory), found
         return self._look(memory, now, found, damaged=damaged, touches=touches)
 
     def _look(
@@ -190,7 +203,7 @@ class Arbitration:
         believes = believes or (jumped and verdict.explained and not before.explained)
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
-            x["suspect"] |= ON_TRIAL
+            x["suspect"] |= ON_TRIAL | (CONTRADICTED if verdict.contradicts else 0)
             verdict = _widened(x.view(np.recarray)[0], verdict, self._aided(memory, now))
             memory = replace(memory, verdict=verdict)
         # What the rotors explain, nobody else was wrong about.
@@ -280,6 +293,54 @@ def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
             return memory
     start = replace(memory, trail=None, trail_before=None)
     return replace(memory, trail_before=newest, trail=Trail(start, now))
+
+
+def _is_unseen(memory: FusionMemory) -> bool:
+    """Whether nothing measures the height of a vehicle that flies, for a while."""
+    x = memory.numbers[0]
+    W, unseen = x["witness"], x["time"] - x["height_time"] > HEIGHT_LASTS
+    return bool(unseen and W[residuals.SAID : residuals.SAID + 4].any() and W[LASTS] > _LASTED)
+
+
+def _lifted(
+    memory: FusionMemory, now: float, found: StateEstimate, *, flies: bool, known: bool
+) -> FusionMemory:
+    """The memory with a verdict on what climbs, or not, while nothing measures the height.
+
+    That rotors are off is ``known`` of a vehicle that is damaged or touches something.
+    """
+    v, p = _made_down(memory)
+    verdict = lifted(
+        memory.verdict,
+        (found.v_WB[2] - v, found.p_WB[2] - p),
+        now,
+        measured=not (flies and _is_unseen(memory)),
+        told=known or bool(_silent(memory, now) & _BOTH),
+    )
+    return replace(memory, verdict=verdict)
+
+
+def _made_down(memory: FusionMemory) -> Vec2:
+    """Integrals of what the rotors make down: velocity [m/s] and place [m]."""
+    W = memory.numbers["witness"][0]
+    return float(W[residuals.MADE + 2]), float(W[residuals.MADE2 + 2])
+
+
+def _as_made(
+    memory: FusionMemory, before: Verdict, now: float, state: StateEstimate
+) -> tuple[FusionMemory, StateEstimate]:
+    """The memory and the ``state`` at ``now`` [s], as rotors have moved it since it was measured.
+
+    Down, of which the verdict ``before`` tells: no trail of the filter goes back so far.
+    """
+    (v, p), (faster, lower) = _made_down(memory), before.seen_down
+    (x, y, z), (vx, vy, vz) = state.p_WB, state.v_WB
+    p += lower + faster * (now - before.measured)
+    numbers = memory.numbers.copy()
+    numbers["p"][0, 2] += p - z
+    numbers["v"][0, 2] += v + faster - vz
+    state = state._replace(p_WB=(x, y, p), v_WB=(vx, vy, v + faster))
+    return replace(memory, numbers=numbers), state
 
 
 def _silent(memory: FusionMemory, now: float) -> Source:

@@ -19,7 +19,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation.error_state import BA, WITNESS, vec3
+from fsw.autopilot.estimation.error_state import (
+    BA,
+    CONTRADICTED,
+    HEIGHT_LASTS,
+    NO_FORCE,
+    WITNESS,
+    vec3,
+)
 from fsw.autopilot.estimation.faults.sources import (
     AA,
     AM,
@@ -44,7 +51,7 @@ from fsw.autopilot.estimation.faults.sources import (
 )
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
-from fsw.autopilot.geometry.vectors import add_scaled, norm, subtract
+from fsw.autopilot.geometry.vectors import add_scaled, clamp, norm, subtract
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
@@ -72,6 +79,8 @@ _MEASURED: Final = 1  # column of what is measured, after the time: place and at
 _AT: Final = 8  # column of the integrals at its time
 _SETTLING: Final = 1.0  # s in flight until residuals are looked at
 _BASELINE: Final = 5.0  # s, of the mean of biases and of what is felt beside the model
+_LIFTS: Final = 5.0  # m/s^2: with less lift the vehicle hardly flies
+_LIFT_OFF: Final = 0.3  # by which share the mass, or the rotors, may be off
 _LATEST: Final = 0.3  # s, for which a measurement counts after it came
 # Of forces [m/s^3/sqrt(Hz)] and rates [rad/s^2/sqrt(Hz)] of the rotors' model: gusts and errors.
 MIN_WALKS: Final = (3.0, 0.15)
@@ -205,7 +214,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
     b = x.baseline
     felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
     own = rotate_back(R, pushed)
-    made = rotate(R, (own[0], own[1], own[2] - model[3]))
+    lift = (1.0 + b[9]) * model[3]
+    made = rotate(R, (own[0], own[1], own[2] - lift))
     # Biases are as the filter finds them until residuals are looked at, and means from then on: of
     # a mean that begins with nothing known, half would be missing for long.
     W[LASTS] += dt
@@ -219,13 +229,30 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
         W[MADE2 + i] += dt * W[MADE + i]
         W[SPUN + i] += dt * model[i]
         W[SPUN2 + i] += dt * W[SPUN + i]
-        beside = f[i] + (model[3] if i == 2 else 0.0) - own[i]
+        beside = f[i] + (lift if i == 2 else 0.0) - own[i]
         W[BESIDE + i] += dt * beside
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):
             b[i] += known * (x.accel_bias[i] - b[i])
             b[3 + i] += known * (x.gyro_bias[i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
+    unseen = x.time - x.height_time > HEIGHT_LASTS
+    if not (unseen or x.suspect & CONTRADICTED or x.out & NO_FORCE):
+        _weigh(b, own[2] - f[2] + b[2], model[3], dt / min(W[LASTS], _BASELINE))
+
+
+@compilable
+def _weigh(b: Array, felt: float, thrust: float, share: float) -> None:
+    """Learn by which share of itself the rotors lift the vehicle more than the model says.
+
+    ``felt`` [m/s^2, along -z] is what they lift it by, ``thrust`` [m/s^2] what the model says.
+    The mass that is flown follows the accelerometer within a second: by that, rotors would
+    bear out one that is wrong. This one does so as slowly as biases, and neither while anybody but
+    the rotors may be wrong nor while nothing measures the height.
+    """
+    if thrust > _LIFTS and felt > _LIFTS:
+        b[9] += share * (felt / thrust - 1.0 - b[9])
+        b[9] = clamp(b[9], -_LIFT_OFF, _LIFT_OFF)
 
 
 @machine_code

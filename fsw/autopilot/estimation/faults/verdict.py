@@ -59,6 +59,9 @@ _QUIET: Final = 0.3  # s without a residual that fires, until a trial is over
 _STAYS: Final = 0.7  # of its threshold, down to which what has fired has not ended
 _NEARLY: Final = 0.4  # of its threshold, from which on an attitude may explain what is felt
 _AGREES: Final = 5.0  # s of agreement, until what was named is believed again
+# By so much faster down the vehicle may go than the rotors make it: at once, and in each second.
+_GAINED: Final = 0.4  # m/s
+_MODEL_OFF: Final = 0.1  # m/s^2
 UNDECIDED: Final = 2.0  # s, after which suspects are not told apart any more
 
 
@@ -79,6 +82,10 @@ class Verdict(NamedTuple):
     agreed: tuple[float, ...] = (-math.inf,) * len(Source)  # since when each of them agrees again
     named: Source = NOBODY  # by the last look
     seen: tuple[object, ...] = (None, None, None)  # the last samples of pose, satellites, compass
+    # When something measured the height last, and what the estimate's velocity [m/s] and place [m]
+    # down were then, less the integrals of what the rotors make.
+    measured: float = -1.0
+    seen_down: Vec2 = (0.0, 0.0)
 
     @property
     def is_on(self) -> bool:
@@ -179,6 +186,21 @@ def judged(
         named=named,
     )
     return verdict if not named or named is M else _convicted(verdict, named)
+
+
+def lifted(verdict: Verdict, down: Vec2, now: float, *, measured: bool, told: bool) -> Verdict:
+    """The verdict at ``now`` [s] on an accelerometer that says that the vehicle sinks.
+
+    Who believes one that is wrong climbs for ever, and one that is right lands all the same: while
+    nothing has ``measured`` the height, rotors that say otherwise are right. The other way round
+    the ground may carry the vehicle. The estimate's velocity [m/s] and place [m] are ``down`` from
+    the integrals of what the rotors make. Nothing follows where one of both is ``told`` to be off.
+    """
+    told = told or verdict.explained or bool(verdict.wrong & A)
+    if measured or told or verdict.measured < 0.0:
+        return verdict._replace(seen_down=down, measured=now)
+    gained, since = down[0] - verdict.seen_down[0], now - verdict.measured
+    return _convicted(verdict, A) if gained > _GAINED + _MODEL_OFF * since else verdict
 
 
 def _convicted(verdict: Verdict, named: Source) -> Verdict:

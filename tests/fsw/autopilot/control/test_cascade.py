@@ -207,6 +207,16 @@ def test_missed_ticks_are_made_up_for_by_rotor_model_and_observer(ticks: int) ->
     )
 
 
+def test_what_is_expected_of_the_rotors_knows_payloads_but_no_mass_from_an_accelerometer() -> None:
+    cascade, r = Cascade(AIRFRAME, TUNING, "tracking", DT), in_hover(AIRFRAME, turned(0.0))
+    r.mass = 1.25 * AIRFRAME.mass
+    _, model, _ = cascade.expected(r)
+    assert model[3] == pytest.approx(9.81)
+    r.payload.mass = 0.25 * AIRFRAME.mass
+    _, model, _ = cascade.expected(r)
+    assert model[3] == pytest.approx(9.81 / 1.25)
+
+
 def test_the_servos_hold_the_arm_in_the_field_that_the_thrust_makes() -> None:
     q_arm = (0.5, -0.9)
     (m1, m2), l1 = AIRFRAME.bodies.mass[:2], LENGTHS[0]

@@ -158,7 +158,7 @@ FLIES: Vec4 = (0.0, 0.0, 0.0, 9.81)
 def test_a_modelled_force_is_what_the_rotors_give_and_leaves_the_mass_as_it_is(known: bool) -> None:
     """The mass goes by the force: with what was felt beside the rotors it ran away, blind."""
     unit = Unit()
-    unit.x.baseline[6:] = 0.3, -0.2, 0.15
+    unit.x.baseline[6:9] = 0.3, -0.2, 0.15
     unit.x.accel_bias[:] = 0.05, -0.04, 0.02
     if known:  # the filter has come to the loss, and what it calls a bias is the model's error
         unit.x.kept_bias[:3], unit.x.lost = unit.x.accel_bias, NO_FORCE

@@ -12,11 +12,17 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation.error_state import FILTER
+from fsw.autopilot.estimation.error_state import (
+    CONTRADICTED,
+    FILTER,
+    HEIGHT_LASTS,
+    NO_FORCE,
+    ON_TRIAL,
+)
 from fsw.autopilot.estimation.faults import residuals, sources
 from fsw.autopilot.estimation.faults.residuals import EVERY, NO_AID, Aid, look
 from fsw.autopilot.estimation.faults.sources import Source
-from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged
+from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged, lifted
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
 from fsw.autopilot.signals import Vec3, Vec4
@@ -69,7 +75,13 @@ def flown(
     x: Any = np.zeros(1, FILTER)
     evidence, verdict, found = residuals.at_start(), Verdict(), []
     evidence["began"], x["turns"] = -1.0, residuals.scale_of_turns(1.0, swing)
-    s: Any = SimpleNamespace(**{name: x[name][0] for name in WITNESSED}, suspect=False, out=0)
+    s: Any = SimpleNamespace(
+        **{name: x[name][0] for name in WITNESSED},
+        suspect=0,
+        out=0,
+        time=0.0,
+        height_time=0.0,
+    )
     blown, torque = np.zeros(3), np.zeros(3)
     p, v, q, spun = np.array([0.0, 0.0, -1.2]), np.zeros(3), (1.0, 0.0, 0.0, 0.0), np.zeros(3)
     place_off, turn_off, field_off = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -103,7 +115,8 @@ def flown(
             place_off += TICK * speed_off
         s.newest[:3], s.newest[3:] = felt, said
         s.gyro_bias[:] = (1.0 - math.exp(-now / 0.3)) * np.array(bias)
-        s.suspect = verdict.is_on or bool(verdict.wrong)
+        s.suspect = ON_TRIAL if verdict.is_on or verdict.wrong else 0
+        s.suspect |= CONTRADICTED if verdict.contradicts else 0
         residuals.witness(s, R, TICK, (*alpha.tolist(), thrust), NONE)  # type: ignore[arg-type]
         if tick % round(EVERY / TICK):
             continue
@@ -560,3 +573,62 @@ def test_what_a_surface_pushes_is_the_rotors_model_s_as_well() -> None:
         residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), (-1.5, 0.0, 0.0))
     np.testing.assert_allclose(x.witness[residuals.MADE :][:3], (-0.3, 0.0, 0.0), atol=1e-9)
     np.testing.assert_allclose(x.witness[residuals.BESIDE :][:3], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("suspect", "out", "learns"),
+    [
+        (0, 0, True),
+        (ON_TRIAL, 0, True),  # nobody but the rotors is in doubt: a payload, a weak rotor
+        (ON_TRIAL | CONTRADICTED, 0, False),
+        (ON_TRIAL | CONTRADICTED | NO_FORCE, 0, False),
+        (0, NO_FORCE, False),
+    ],
+)
+def test_rotors_do_not_learn_their_lift_from_what_they_witness_against(
+    suspect: int, out: int, learns: bool
+) -> None:
+    """They did within a second, bore out a wrong accelerometer, and the pose was named."""
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    x.newest[:3] = (0.0, 0.0, -1.1 * G)
+    for _ in range(round(2.0 / TICK)):
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), NONE)
+    assert x.baseline[9] == pytest.approx(0.1), "at first at once: of another mass"
+    x.newest[:3], x.suspect, x.out = (0.0, 0.0, -0.8 * G), suspect, out
+    for _ in range(round(5.0 / TICK)):
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), NONE)
+    assert bool(x.baseline[9] < -0.05) is learns
+    assert x.baseline[9] > -0.15, "slowly"
+    if not learns:
+        assert x.baseline[9] == pytest.approx(0.1)
+
+
+def test_rotors_do_not_learn_their_lift_while_nothing_measures_the_height() -> None:
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    x.newest[:3] = (0.0, 0.0, -0.8 * G)
+    x.time = x.height_time + 1.1 * HEIGHT_LASTS
+    for _ in range(round(2.0 / TICK)):
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), NONE)
+    assert x.baseline[9] == 0.0
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_while_no_height_is_measured_rotors_are_right_that_the_vehicle_does_not_sink() -> None:
+    """An accelerometer that said so lifted it, in a descent that never ended."""
+
+    def after(gained: float, **known: Any) -> Source:
+        said = {"measured": False, "told": False} | known
+        return lifted(seen, (0.3 + gained, 0.0), 3.0, **said).wrong  # type: ignore[arg-type]
+
+    seen = lifted(Verdict(), (0.3, 0.1), 2.0, measured=True, told=False)
+    assert not seen.wrong
+    assert seen.seen_down == (0.3, 0.1)
+    assert not after(0.45), "rotors may be off"
+    assert after(0.6) is Source.ACCELEROMETER
+    assert not after(-5.0), "the ground may carry it"
+    assert not after(0.6, measured=True)
+    assert not after(0.6, told=True)
+    seen = seen._replace(explained=True)
+    assert not after(0.6), "rotors are what is wrong"
