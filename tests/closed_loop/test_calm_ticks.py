@@ -203,7 +203,7 @@ FRAMES: dict[str, Callable[[SensorFrame], SensorFrame]] = {
     "a place that is none": lambda f: with_fields(f, p_WB=(np.nan, 0.0, -1.0)),
     "a place beyond all range": lambda f: with_fields(f, p_WB=(0.0, 1e6, -1.0)),
     "a rate that is none": lambda f: with_fields(f, gyro_B=(np.inf, 0.0, 0.0)),
-    "off the plan": lambda f: with_fields(f, p_WB=(*f.p_WB[:2], f.p_WB[2] + 0.09)),
+    "off the plan": lambda f: with_fields(f, p_WB=(*f.p_WB[:2], f.p_WB[2] + 0.2)),
     "on its back": lambda f: with_fields(f, q_WB=(0.0, 1.0, 0.0, 0.0)),
     "a joint rate out of range": lambda f: with_fields(f, qd_arm=(200.0, 0.0)),
 }

@@ -48,7 +48,7 @@ _KEEPS = 0.8
 _LEANS = 8.0
 _COUNTS = 0.55
 _LEAPS = 9.0  # deviations, that no growth makes
-_LEAST_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
+_MIN_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
 # What is not known of a force then, for how long it has been so, and how well that is known.
 _LEANT_FORCE = 3.0  # m/s^2
 _LEANT_FOR = 0.2  # s
@@ -130,7 +130,7 @@ def _leans(x: Any, rows: int, scaled: int) -> bool:
         return False
     squared, leaning, most = 0.0, x.leaning[scaled], _LEANS
     if scaled != POSE:
-        most *= math.sqrt(max(x.scatter[scaled], _LEAST_SCATTER))
+        most *= math.sqrt(max(x.scatter[scaled], _MIN_SCATTER))
     for k in range(rows):
         squared += x.residual[k] * x.residual[k]
     share = 1.0 if squared < _LEAPS * _LEAPS else 0.0
@@ -183,8 +183,6 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
     x.scatter[scaled] += _RATE * (min(0.5 * squared / rows, 1.0) - x.scatter[scaled])
-    scale = followed(x.noise_scale[scaled], squared / rows, _SCALE_FROM)
-    x.noise_scale[scaled] = min(scale, _SCALE_LIMIT)
     own = x.noise_by_lag[scaled]
     own[0] = min(followed(own[0], squared / rows, _SCALE_FROM), _SCALE_LIMIT)
     largest, count = own[0], x.innovations[scaled]

@@ -460,6 +460,8 @@ class SensorFusion:
         if refused:
             run = self._run(memory, sensor, sample, innovation)
             runs = (*[other for other in runs if other.kind is not run.kind], run)
+            if run.stepped:  # which is no force's: that would grow
+                memory.numbers["leaning"][0] = 0.0
             little = _is_small(sample, innovation)
             if announced or long_refused or not little:
                 health = health.with_fault(SensorFault.JUMP, now)

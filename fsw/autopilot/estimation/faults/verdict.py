@@ -193,8 +193,8 @@ def lifted(verdict: Verdict, down: Vec2, now: float, *, measured: bool, told: bo
 
     Who believes one that is wrong climbs for ever, and one that is right lands all the same: while
     nothing has ``measured`` the height, rotors that say otherwise are right. The other way round
-    the ground may carry the vehicle. The estimate's velocity [m/s] and place [m] are ``down`` from
-    the integrals of what the rotors make. Nothing follows where one of both is ``told`` to be off.
+    the ground may carry the vehicle. Velocity and place of the estimate are ``down`` [m/s, m, NED]
+    of the integrals of what rotors make. Nothing follows where one of both is ``told`` to be off.
     """
     told = told or verdict.explained or bool(verdict.wrong & A)
     if measured or told or verdict.measured < 0.0:
