@@ -16,7 +16,6 @@ import random
 import struct
 from collections import Counter, deque
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -57,6 +56,7 @@ from studies.flight.closed_loop import ClosedLoop, InlinePlanner
 from studies.flight.collector import collector_off
 from studies.flight.result import processor_time_us
 from tests.fsw.link.test_any_payload import frame as any_payload
+from tests.fsw.storage.threads import AtOnce
 
 SENDERS: Final = (
     MessageSource(1, 195, "simulator"),
@@ -108,19 +108,6 @@ _STREAM_S: Final = 0.1
 _QUIET_S: Final = 2.0  # of a message's follow-ups
 
 
-class _AtOnce(Executor):
-    """Does what it is handed before it returns."""
-
-    def submit(self, job: Callable[..., Any], /, *about: Any, **more: Any) -> Future[Any]:
-        """See ``Executor``."""
-        done: Future[Any] = Future()
-        try:
-            done.set_result(job(*about, **more))
-        except ValueError as error:
-            done.set_exception(error)
-        return done
-
-
 @dataclass
 class Outcome:
     """What a flight came to."""
@@ -154,7 +141,7 @@ class Talkers:
             )
         )
         self.parameters = ParameterStore(config, self.flight.prepare)
-        self.parameters.open(_AtOnce(), save=lambda values: None)
+        self.parameters.open(AtOnce(), save=lambda values: None)
         self.services: list[LinkService] = [
             MissionService(self.missions), ParameterService(self.parameters)
         ]  # fmt: skip

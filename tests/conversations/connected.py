@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import socket
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -40,23 +39,12 @@ from messages import dialect
 from messages.frames import as_version_1
 from sitl.scenario import Scenario
 from tests.closed_loop.harness import Flight, on_the_ground
+from tests.fsw.storage.threads import AtOnce
 
 Message = Any
 TICK_S = 0.002
 
 PARAMETER_FILE = Path("/var/vehicle.params")  # of the vehicle; the earlier flight was its too
-
-
-class AtOnce(Executor):
-    """Does what it is given at once."""
-
-    def submit(self, call: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        done: Future[Any] = Future()
-        try:
-            done.set_result(call(*args, **kwargs))
-        except Exception as error:
-            done.set_exception(error)
-        return done
 
 
 @dataclass

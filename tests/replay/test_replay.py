@@ -167,10 +167,9 @@ def test_a_letter_is_found_and_told_as_text_in_json_too(
     path = written(tmp_path / "flight.ulg", flown)
     data = path.read_bytes()
     at = data.index(was, data.index(head_of(topics.SENSOR_FRAME)))
-    path.write_bytes(data[:at] + becomes + data[at + len(was) :])
-    assert main([str(path), "--verify", "--json", str(tmp_path / "found.json")]) == 1
-    assert f": {field} was '" in capsys.readouterr().out
-    found = json.loads((tmp_path / "found.json").read_text())["difference"]
+    said, result = verified(path, data[:at] + becomes + data[at + len(was) :], capsys, code=1)
+    assert f": {field} was '" in said
+    found = result["difference"]
     assert found["field"] == field
     assert becomes.rstrip(b"\0").decode() in found["logged"]
     assert was.rstrip(b"\0").decode() in found["replayed"]
@@ -190,11 +189,11 @@ def test_what_is_no_number_is_told_as_text_for_json_has_none(
 
 
 def verified(
-    path: Path, content: bytes, capsys: pytest.CaptureFixture[str]
+    path: Path, content: bytes, capsys: pytest.CaptureFixture[str], code: int = 0
 ) -> tuple[str, dict[str, Any]]:
-    """What a comparison prints of a log of these bytes, and its result; nothing differs."""
+    """What a comparison prints of a log of these bytes, and its result, with this exit code."""
     path.write_bytes(content)
-    assert main([str(path), "--verify", "--json", str(path.parent / "found.json")]) == 0
+    assert main([str(path), "--verify", "--json", str(path.parent / "found.json")]) == code
     found: dict[str, Any] = json.loads((path.parent / "found.json").read_text())
     return capsys.readouterr().out, found
 

@@ -443,20 +443,17 @@ class Autopilot:
         now_us, mission, update = inputs.sensors.t_us, state.mission, inputs.mission
         v, target, news = state.vehicle, state.reference, list[StatusText]()
         if target is None and v.flies and state.estimate is not None:
-            target = self._horizon.target(
-                self._commander.mode(state), state, state.estimate, now_us
-            )
+            mode = self._commander.mode(state)
+            target = self._horizon.target(mode, state, state.estimate, now_us)
         mission = self._safe_sets.update(
             mission, inputs, state.estimate, news, flies=v.flies, armed=v.armed, target=target
         )
         believed, refused = self._targets.believed(inputs.targets, mission.safe_set, now_us)
         against = (*refused, *inputs.refused)
         texts += [StatusText(Severity.CRITICAL, text) for text in dict.fromkeys(against)] + news
-        stream, count = (
-            merge(mission.stream, believed, now_us),
-            mission.refused_count + len(against),
-        )
-        mission = replace(mission, stream=stream, refused_count=count)
+        stream = merge(mission.stream, believed, now_us)
+        refused_count = mission.refused_count + len(against)
+        mission = replace(mission, stream=stream, refused_count=refused_count)
         if mission.refused_count != state.mission.refused_count:
             counters = replace(state.safety.counters, refusals=mission.refused_count)
             state = replace(state, safety=replace(state.safety, counters=counters))

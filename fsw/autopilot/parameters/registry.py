@@ -69,7 +69,7 @@ class Parameter:
     def waits_for_disarming(self, config: FlightConfig) -> bool:
         """Whether its value in a ``config`` may not come while armed: anybody may send it."""
         chosen = dict(self.choices).get(int(self.read(config)))
-        return self.name in _DISARMED or self.path.startswith(_ASSUMED) or chosen == _ENDS
+        return _is_for_disarmed(self.name, self.path) or chosen == _ENDS
 
     def refusal(self, value: float) -> str | None:
         """Why it cannot have a ``value`` [its unit]; None if the range allows it."""
@@ -93,6 +93,13 @@ _DISARMED: Final = frozenset(
 )
 _ASSUMED: Final = "surroundings."
 _ENDS: Final = "Terminate"
+
+
+def _is_for_disarmed(name: str, path: str) -> bool:
+    """Whether no value of the parameter may come while armed."""
+    return name in _DISARMED or path.startswith(_ASSUMED)
+
+
 _Pid = tuple[float, float, float, float]  # P, I, D and the limit
 _NIL: Final[_Pid] = (0.0, 0.0, 0.0, 0.01)
 
@@ -258,7 +265,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Margin of a plan to the joint limits"),
         ("PLN_JNT_SLACK", "planner.joint_slack", "", 0.0, 1e5, "Joint limit slack penalty"),
         ("PLN_BODY", "planner.body", "", 0.0, 1.0,
-         "What keeps clear of obstacles; changed while disarmed"),
+         "What keeps clear of obstacles"),
         ("PLN_UPS_DIST", "upset_distance", "m", 0.02, 1.0,
          "Position error above which planning restarts from the measured state"),
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0,
@@ -351,11 +358,11 @@ _ROWS: Final[dict[str, list[Row]]] = {
         ("STR_LEASH", "steering.max_lead_distance", "m", 0.1, 0.6,
          "Maximum lead distance of the setpoint over the vehicle"),
         ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0,
-         "Return altitude above home; changed while disarmed"),
+         "Return altitude above home"),
         ("RTL_DESCEND_ALT", "limits.return_descent", "m", 0.5, 50.0,
-         "Return: altitude above home of the wait before landing; changed while disarmed"),
+         "Return: altitude above home of the wait before landing"),
         ("RTL_LAND_DELAY", "limits.return_wait", "s", -1.0, 300.0,
-         "Return: wait before landing; negative: hold there; changed while disarmed"),
+         "Return: wait before landing; negative: hold there"),
     ],
     "Failsafes": [
         ("COM_OF_LOSS_T", "limits.setpoint_timeout_us", "s", 0.1, 5.0,
@@ -437,8 +444,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
     ],
     "Safe set": [
         ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
-         "MAVLink system that owns the safe set and may grow it in flight; 0: the first one; "
-         "changed while disarmed"),
+         "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
         ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
          "Action when the vehicle is outside its safe set"),
         ("GF_ACTION", "limits.fence_action", "", 0.0, 6.0,
@@ -555,7 +561,7 @@ def _parameter(group: str, row: Row) -> Parameter:
         unit=unit,
         least=least,
         most=most,
-        meaning=meaning,
+        meaning=meaning + ("; changed while disarmed" if _is_for_disarmed(name, path) else ""),
         group=group,
         scale=scale,
         integer=counts or name in _WHOLE,

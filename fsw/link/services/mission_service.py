@@ -1,11 +1,10 @@
 """Missions, fences and rally points over MAVLink's mission protocol.
 
 One transfer at a time a link; a second ground station, known by ids and address, is denied until it
-has ended. An upload is
-collected aside and takes the old one's place whole, or not at all; it is acknowledged once a tick
-has decided, whose text says why it is refused. The vehicle asks again for an item that does not
-come; duplicates and items out of turn are passed over without an answer, because each answer would
-bring forth another duplicate.
+has ended. An upload is collected aside and takes the old one's place whole, or not at all; it is
+acknowledged once a tick has decided, whose text says why it is refused. The vehicle asks again for
+an item that does not come; duplicates and items out of turn are passed over without an answer,
+because each answer would bring forth another duplicate.
 
 Source: https://mavlink.io/en/services/mission.html
 """

@@ -1,9 +1,9 @@
 """Which safe set is in force: the announced one and the fence together, if they can be kept.
 
 One source owns what is announced, the first or the configured one, and one the fence that is in
-force; nobody owns what never was. In flight any
-source may shrink either, and only its owner may grow it (``safe_set_change.growth``) or announce a
-zone that comes so close that the vehicle must give way: it could push it into others. Every change
+force; nobody owns what never was. In flight any source may shrink either, and only its owner may
+grow it (``safe_set_change.growth``) or announce a zone that comes so close that the vehicle must
+give way: it could push it into others. Every change
 and every refusal is a text that says who and what. Disarmed, another source may become the
 owner once the old one has been silent for a while, or the vehicle has disarmed. From arming on
 nobody, owner or first comer, may announce a set that is out of bounds or leaves the vehicle, or the

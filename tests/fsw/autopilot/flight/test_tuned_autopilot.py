@@ -144,6 +144,7 @@ def test_what_would_let_anybody_end_the_flight_waits_for_disarming(
         ("tuning.tracking.jerk_limit", 2.0),
         ("tuning.tracking.acceleration_limit", 0.5),
         ("planner.walls.lambda_", 0.1),
+        ("tuning.tracking.input_weight", 1.3e-7),  # uses 106 % of a limit: a warning on the ground
     ],
 )
 def test_while_armed_no_promise_becomes_weaker(path: str, value: float, mode: Mode) -> None:
