@@ -35,35 +35,23 @@ def cache() -> KernelCache:
     return _CACHE
 
 
-def compiled(kernel: Callable[P, R]) -> Callable[P, R]:
-    """Compile a kernel with numba, cached on disk, without the GIL.
-
-    ``fastmath`` stays off: results must not depend on how a compiler reorders sums.
-    """
-    return _jit(kernel, nogil=True)
-
-
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a kernel that makes no array, without counting references to those it is handed.
+    """Compile a kernel with numba, cached on disk; it makes no array.
 
-    The caller holds them. Counting took half of the time of kernels of some ten operations. Those
-    are too short to let go of the GIL, which takes as long as another ten.
+    Its caller holds those that it works on, so references to them need not be counted, which took
+    half of the time of kernels of some ten operations. Those are too short to let go of the GIL,
+    which takes as long as another ten. ``fastmath`` stays off: results must not depend on how a
+    compiler reorders sums.
     """
-    return _jit(function, nogil=False, _nrt=False)
-
-
-def _jit(kernel: Callable[P, R], **more: bool) -> Callable[P, R]:
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_CACHE.folder)
-    kept = _CACHE.folder is not None
     try:
-        compile_it = numba.njit(
-            cache=kept,
+        dispatcher = numba.njit(
+            cache=_CACHE.folder is not None,
             fastmath=False,
             error_model="numpy",
             no_cfunc_wrapper=True,  # nothing in C calls a kernel
-            **more,
-        )
-        dispatcher = compile_it(kernel)
+            _nrt=False,  # numba's own switch for its runtime, undocumented
+        )(function)
     finally:
         numba.config.CACHE_DIR = before
     compile_for_types(dispatcher, numba.types.unliteral)

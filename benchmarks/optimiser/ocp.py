@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.optimiser.instances import INPUTS, STATES
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.model.kinematics import body_axes
+from fsw.autopilot.model.kinematics import body_axes, turning_of
 from fsw.autopilot.model.prediction import (
     Q_ARM,
     QD_ARM,
@@ -164,10 +164,8 @@ def _node(
 
 def _points(airframe: Airframe, x: Any) -> list[tuple[Any, Any]]:
     """Position and velocity of base, joint 2 and end-effector."""
-    axes = np.zeros((4, 3), dtype=object)
-    plain = body_axes.py_func  # type: ignore[attr-defined]  # the equations, not compiled
-    plain(np.array(ca.vertsplit(x), dtype=object), axes)
-    b1, b3, d1, d3 = (ca.vertcat(*axis) for axis in axes)
+    turning = turning_of(np.array(ca.vertsplit(x), dtype=object))
+    b1, b3, d1, d3 = (ca.vertcat(*axis) for axis in body_axes(turning))
     p, v = x[P : P + 3], x[V : V + 3]
     points = [(p, v)]
     angle, rate = 0.0, 0.0

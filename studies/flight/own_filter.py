@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.cascade import Cascade
-from fsw.autopilot.control.safety_filter import filtered
+from fsw.autopilot.control.safety_filter import FilterProbes, filtered
 from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.rotors import motion_state
 from fsw.autopilot.signals import ActuatorCommand
 from fsw.autopilot.tick_record import Tick
-from fsw.compiled import compiled
+from fsw.compiled import kernel
 
 
 def passes(cascade: Cascade, r: Tick, zones: NDArray[np.float64], command: ActuatorCommand) -> bool:
@@ -28,12 +28,12 @@ def passes(cascade: Cascade, r: Tick, zones: NDArray[np.float64], command: Actua
     return bool(_passes(cascade.packed, r.array, zones, cascade.probes, thrust))
 
 
-@compiled
+@kernel
 def _passes(
     laws: NDArray[Any],
     ticks: NDArray[Any],
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
     thrust: float,
 ) -> bool:
     """The filter's answer to the acceleration of a total ``thrust`` [N], as the vehicle leans."""

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.barriers.zone_rows import ZoneRows
+from fsw.autopilot.geometry.vectors import dot, subtract, three
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Array, P
 from fsw.autopilot.mpc.costs import Quadratic, add_square
 from fsw.autopilot.mpc.planner_config import SoftWeights
 from fsw.autopilot.signals import Zone
-from fsw.compiled import compiled
+from fsw.compiled import kernel
 
 _MIN_GAP = 0.02  # m; from here on eq 29 goes on as a parabola
 
@@ -67,7 +68,7 @@ class SphereCost:
         )
 
 
-@compiled
+@kernel
 def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float]:
     """Eq 29 of a ``gap`` [m] and ``weight`` [1/m^2]: value, slope (< 0) and curvature (> 0)."""
     d = max(gap, _MIN_GAP)
@@ -78,7 +79,7 @@ def one_sided_reciprocal(gap: float, weight: float) -> tuple[float, float, float
     return value / weight, slope / weight, curvature / weight
 
 
-@compiled
+@kernel
 def _add_gaps(
     weight: float,
     terminal: float,
@@ -99,7 +100,7 @@ def _add_gaps(
     return cost
 
 
-@compiled
+@kernel
 def _add_sphere(
     centre: Array,
     from_radius: float,
@@ -113,8 +114,8 @@ def _add_sphere(
     n = position.shape[0] - 1
     cost = 0.0
     for i in range(1, n + 1):
-        e = position[i] - centre[i]
-        square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
+        e = subtract(three(position[i], 0), three(centre[i], 0))
+        square = dot(e, e)
         if math.sqrt(square) < from_radius:
             continue
         w = terminal if i == n else weight

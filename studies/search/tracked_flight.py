@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.cascade import CascadeLaw, close_loops
+from fsw.autopilot.control.safety_filter import FilterProbes
 from fsw.autopilot.estimation.estimator import READINGS, read_into
 from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.model.prediction import Array
@@ -134,7 +135,7 @@ def _compiled(function: Callable[..., int]) -> Callable[..., int]:
 def _track(
     plants: NDArray[Any],
     laws: NDArray[Any],
-    probes: Array,
+    probes: FilterProbes,
     x: Array,
     ticks: NDArray[Any],
     plans: NDArray[Any],

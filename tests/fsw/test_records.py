@@ -130,12 +130,12 @@ def test_a_longer_record_is_refused_where_a_shorter_one_was_compiled() -> None:
 _INTERLEAVED = """
 import sys
 import numpy as np
-from {door}.compiled import compiled
+from {door}.compiled import kernel
 
 A = np.dtype([("x", float), ("y", float)])
 B = np.dtype([("y", float), ("x", float)])
 
-@compiled
+@kernel
 def inner(record):
     total = 0.0
     for k in range(40):  # too long to be taken into its caller
@@ -144,7 +144,7 @@ def inner(record):
         total = total * 1.0 + np.sin(record.y) * 0.0
     return total
 
-@compiled
+@kernel
 def outer(records):
     return inner(records[0]) + records[0].x
 

@@ -26,10 +26,6 @@ def forget_bitcode() -> None:
     pass
 
 
-def compiled(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    return kernel
-
-
 def compilable(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 

@@ -27,12 +27,12 @@ _AXIAL = 0.7  # cosine between a disc's axis and a normal from which all of its 
 
 @kernel
 def nearest_place(
-    zones: Array, zone: int, which: int, shift: Array, probes: Array, probe: int, frame: Array
+    zones: Array, zone: int, which: int, shift: Vec3, probes: Array, probe: int, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
     """The place of a probe that counts against a plane of a zone, and that plane.
 
     ``zones`` (zones, 23 or more) [SI], ``probes`` (probes, 12) [SI] and ``frame`` (FRAME,) [SI] are
-    as in ``barriers.zone_rows.fill_starts``, the zones moved by ``shift`` (zones, 3) [m, NED];
+    as in ``barriers.zone_rows.fill_starts``, the zone moved by ``shift`` [m, NED];
     ``which`` [1] of the planes. The place is given where it is on its part [m]. False: this probe
     says nothing that another does not say.
     """
@@ -48,7 +48,7 @@ def nearest_place(
 
 @kernel
 def _nearest_on_capsule(
-    zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
+    zones: Array, zone: int, which: int, shift: Vec3, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
     begin = (probe[BEGIN], probe[BEGIN + 1], probe[BEGIN + 2])
     end = (probe[END], probe[END + 1], probe[END + 2])
@@ -69,7 +69,7 @@ def _nearest_on_capsule(
 
 @kernel
 def _nearest_between(
-    zones: Array, zone: int, shift: Array, first: Vec3, last: Vec3
+    zones: Array, zone: int, shift: Vec3, first: Vec3, last: Vec3
 ) -> tuple[float, Surface]:
     """Where between two places of the world a zone to keep out of is nearest, as a share.
 
@@ -102,7 +102,7 @@ def _nearest_between(
 
 @kernel
 def _nearest_on_disc(
-    zones: Array, zone: int, which: int, shift: Array, probe: Array, frame: Array
+    zones: Array, zone: int, which: int, shift: Vec3, probe: Array, frame: Array
 ) -> tuple[Vec3, Surface, bool]:
     begin, rim = (probe[BEGIN], probe[BEGIN + 1], probe[BEGIN + 2]), probe[RIM]
     on, at_rim = int(probe[ON]), zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0
@@ -146,8 +146,6 @@ def _nearest_on_disc(
 
 
 @kernel
-def _seen(zones: Array, zone: int, which: int, shift: Array, x: Vec3) -> Surface:
+def _seen(zones: Array, zone: int, which: int, shift: Vec3, x: Vec3) -> Surface:
     """The plane of a zone near a place in the world."""
-    return surface_at(
-        zones, zone, which, x[0] - shift[zone, 0], x[1] - shift[zone, 1], x[2] - shift[zone, 2]
-    )
+    return surface_at(zones, zone, which, x[0] - shift[0], x[1] - shift[1], x[2] - shift[2])

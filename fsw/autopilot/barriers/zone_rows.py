@@ -30,11 +30,10 @@ from fsw.autopilot.barriers.barrier_function import barrier_value, cbf_lower_bou
 from fsw.autopilot.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
-from fsw.autopilot.geometry.vectors import dot
+from fsw.autopilot.geometry.vectors import dot, three
 from fsw.autopilot.model.body import FORM, ON, OTHER, PART, RADIUS, SPHERE, TOOL, Body, reaches
 from fsw.autopilot.model.kinematics import position, velocity
 from fsw.autopilot.model.linearisation import (
-    TURNED,
     Horizon,
     Linearisation,
     chain,
@@ -123,7 +122,6 @@ class ZoneRows:
         per_zone = self._zones[:, PLANES] * np.where(following, 1, len(self._probes))
         skipped = tunings[0].skipped_nodes if skipped_nodes is None else skipped_nodes
         first_node = 1 + skipped
-        self._work = (np.empty((TURNED, 3)), np.zeros((2, model.states)))
         self._settings = settings(
             tunings,
             model.period,
@@ -163,7 +161,6 @@ class ZoneRows:
             horizon.horizon,
             self._settings,
             self._rows,
-            self._work,
         )
 
 
@@ -199,23 +196,22 @@ def _fill(
     horizon: Horizon,
     settings: Array,
     rows: Rows,
-    work: tuple[Array, Array],
 ) -> None:
     """All rows; ``moves`` are shift and velocity of the zones at the nodes (n + 1, zones, 3)."""
     distances = settings[_DISTANCES] > 0.0
     frames, impulse, (shifts, speeds) = horizon.frames, horizon.impulse, moves
     gradients, values, least_values = rows.gradient, rows.value, rows.lower_bound
-    turned, slopes = work
+    turned, slopes = horizon.turned, horizon.slopes
     start = frames[0]
     fill_starts(zones, shifts[0], speeds[0], probes, start, settings, distances, rows.start)
     row = 0
     for i in range(int(settings[_FIRST]), len(frames)):
-        frame, shift = frames[i], shifts[i]
+        frame = frames[i]
         reach = _reach(horizon, i, settings)
         approach = 0.0 if distances else reach[1]
         turned_for = (0.0, 0.0, 0.0)
         for k in range(len(zones)):
-            follows = zones[k, FOLLOWS] > 0.0
+            follows, shift = zones[k, FOLLOWS] > 0.0, three(shifts[i, k], 0)
             for b in range(1 if follows else len(probes)):
                 touches = zones[k, FORCE_MAX] > 0.0 and probes[b, TOOL] > 0.0
                 tuning = _tuning(settings, follows, touches)
@@ -344,7 +340,7 @@ def fill_starts(
     first = 0
     for k in range(len(zones)):
         follows = zones[k, FOLLOWS] > 0.0
-        tuning = _tuning(settings, follows, False)
+        tuning, moved = _tuning(settings, follows, False), three(shift[k], 0)
         tried = 1 if follows else len(probes)
         # Of the sphere the paper's pair h2a and h2b: towards the nearest place, and away from it.
         planes = 2 if follows else int(zones[k, PLANES])
@@ -355,7 +351,7 @@ def fill_starts(
             number = int(probes[b, OTHER if touched else PART])
             at_part, count = first + number, number + 1
             for which in range(planes):
-                local, at, _ = nearest_place(zones, k, which, shift, probes, b, frame)
+                local, at, _ = nearest_place(zones, k, which, moved, probes, b, frame)
                 value = at.distance - (0.0 if follows else probes[b, RADIUS])
                 if not distances:
                     n, v = (at.nx, at.ny, at.nz), velocity(frame, int(probes[b, ON]), local)

@@ -28,6 +28,7 @@ from fsw.autopilot.control.pid import height_pid
 from fsw.autopilot.control.press import look_for_surface, weigh_tool
 from fsw.autopilot.control.safety_filter import (
     FilterLaw,
+    FilterProbes,
     FilterTuning,
     filter_law,
     filter_probes,
@@ -73,7 +74,7 @@ from fsw.autopilot.tick_record import (
     Tick,
     new_tick,
 )
-from fsw.compiled import compilable, compiled, kernel, machine_code, packed
+from fsw.compiled import compilable, kernel, machine_code, packed
 
 Inner = Literal["tracking", "pid", "px4"]
 ExpectedMotion = Vec4
@@ -224,13 +225,13 @@ def close_loops(
     law: CascadeLaw,
     ticks: int,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
 ) -> None:
     """One tick, or several at once where some were missed: from estimate and plan to a command.
 
     Each law writes what those after it read; ``sent`` is the last command until the end, where the
-    new one takes its place, not yet gated. The safety filter keeps the ``probes`` (probes, 12) [SI]
-    of ``filter_probes`` off the ``zones`` (zones, k) [SI] of ``moving_zones``.
+    new one takes its place, not yet gated. The safety filter keeps the ``probes`` off the ``zones``
+    (zones, k) [SI] of ``moving_zones``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     estimate = r.estimate
@@ -276,11 +277,11 @@ def keep_off_zones(
     law: CascadeLaw,
     motion: MotionState,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
 ) -> None:
     """What is flown: plan and input such that the loops ask for a filtered acceleration.
 
-    ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as of ``close_loops``. Reads
+    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``. Reads
     estimate, plan, u, observed; writes flown, flown_u, margin, flags.
     """
     r.flown, r.flown_u = r.plan, r.u
@@ -309,14 +310,14 @@ def filter_asked(
     r: Tick,
     law: CascadeLaw,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
     a: Vec3,
     asked: Vec3,
 ) -> tuple[Vec3, bool]:
     """The filtered acceleration, and whether it is another than ``asked`` [m/s^2, NED].
 
     The base accelerates by ``a`` [m/s^2, NED] now; ``zones`` (zones, k) [SI] and ``probes``
-    (probes, 12) [SI] as of ``close_loops``. Reads estimate, observed; writes margin, flags.
+    as of ``close_loops``. Reads estimate, observed; writes margin, flags.
     """
     safe, changed, margin = filtered(
         law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, asked
@@ -426,13 +427,13 @@ def _joints_are_sound(r: Tick, airframe: Airframe) -> bool:
     return sound
 
 
-@compiled
+@kernel
 def _close_loops(
     law: NDArray[Any],
     records: NDArray[Any],
     ticks: int,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
     tube: TubeAround,
 ) -> None:
     close_loops(records[0], law[0], ticks, zones, probes)

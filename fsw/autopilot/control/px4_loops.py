@@ -38,7 +38,7 @@ from fsw.autopilot.control.cascade import (
     settle_rotors,
 )
 from fsw.autopilot.control.gains import LoopGains, TrackingGains
-from fsw.autopilot.control.safety_filter import filter_probes
+from fsw.autopilot.control.safety_filter import FilterProbes, filter_probes
 from fsw.autopilot.control.tracking import TrackingLaw, observe
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
@@ -50,7 +50,7 @@ from fsw.autopilot.model.rotors import MotionState, motion_state
 from fsw.autopilot.shapes.zones import NO_ZONES
 from fsw.autopilot.signals import Setpoint, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
-from fsw.compiled import compilable, compiled, machine_code, packed
+from fsw.compiled import compilable, kernel, machine_code, packed
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +148,11 @@ def ask_px4(
     px4: Px4Tuning,
     ticks: int,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
 ) -> None:
     """One tick: from estimate and plan to what PX4 is asked for, in ``flown`` and ``flown_u``.
 
-    ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as of ``close_loops``.
+    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``.
     """
     airframe, dt = law.airframe, law.dt
     settle_rotors(r, law, ticks)
@@ -184,11 +184,11 @@ def keep_off_zones(
     px4: Px4Tuning,
     motion: MotionState,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
 ) -> None:
     """Add what the safety filter pushes beyond what PX4 will ask its attitude loop for.
 
-    ``zones`` (zones, k) [SI] and ``probes`` (probes, 12) [SI] as of ``close_loops``.
+    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``.
     """
     a = add_scaled(motion.a, r.observed.d, 1.0)
     asked = asked_by_px4(r, px4, a)
@@ -222,14 +222,14 @@ def _asked_along(r: Tick, axis: int, gains: Vec2) -> float:
     return asked
 
 
-@compiled
+@kernel
 def _ask_px4(
     laws: NDArray[Any],
     models: NDArray[Any],
     records: NDArray[Any],
     ticks: int,
     zones: NDArray[np.float64],
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
     tube: TubeAround,
 ) -> None:
     ask_px4(records[0], laws[0], models[0], ticks, zones, probes)

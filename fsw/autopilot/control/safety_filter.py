@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,18 +121,24 @@ def filter_law(
     )
 
 
-def filter_probes(body: Body) -> NDArray[np.float64]:
-    """The probes of a body (probes, 12) [SI]; a disc has one, where it is nearest."""
+class FilterProbes(NamedTuple):
+    """What the filter keeps off zones."""
+
+    rows: NDArray[np.float64]  # (probes, 12) of a body; a disc has one, where it is nearest
+    frame: NDArray[np.float64]  # (FRAME,) to work in
+
+
+def filter_probes(body: Body) -> FilterProbes:
+    """The probes of a body."""
     probes = body.probes
-    nearest: NDArray[np.float64] = probes[probes[:, TURN] == 0.0]
-    return nearest
+    return FilterProbes(probes[probes[:, TURN] == 0.0], np.zeros(FRAME))
 
 
 @compilable
 def filtered(
     law: FilterLaw,
     bodies: Bodies,
-    probes: NDArray[np.float64],
+    probes: FilterProbes,
     zones: NDArray[np.float64],
     estimate: StateEstimate | Estimate,
     v: Vec3 | Floats,
@@ -140,27 +147,22 @@ def filtered(
 ) -> tuple[Vec3, bool, float]:
     """The acceleration nearest to the ``wanted`` [m/s^2, NED] one that keeps the condition.
 
-    ``probes`` (probes, 12) [SI] are those of ``filter_probes``, ``zones`` (zones, k) [SI] those of
-    ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED] the body's own now, disturbance
-    included. Also says whether the wanted one was changed, and the least margin [m] of all parts,
-    infinite where no zone is near.
+    ``zones`` (zones, k) [SI] are those of ``moving_zones``, ``v`` [m/s, NED] and ``a``
+    [m/s^2, NED] the body's own now, disturbance included. Also says whether the wanted one was
+    changed, and the least margin [m] of all parts, infinite where no zone is near.
     """
-    frame, shift = np.empty(FRAME), np.empty((zones.shape[0], 3))
-    put_base(frame, estimate.p_WB, estimate.v_WB, estimate.R_WB, estimate.w_WB_B)
-    put_links(frame, bodies, estimate.q_arm, estimate.qd_arm)
-    for k in range(zones.shape[0]):
-        moved = moved_by(zones, k, estimate.t_us)
-        for axis in range(3):
-            shift[k, axis] = moved[axis]
+    put_base(probes.frame, estimate.p_WB, estimate.v_WB, estimate.R_WB, estimate.w_WB_B)
+    put_links(probes.frame, bodies, estimate.q_arm, estimate.qd_arm)
     changed, margin = False, math.inf
     for _ in range(_PASSES):
         again = False
         for k in range(zones.shape[0]):
-            x, y, z = subtract(estimate.p_WB, (shift[k, 0], shift[k, 1], shift[k, 2]))
+            shift = moved_by(zones, k, estimate.t_us)
+            x, y, z = subtract(estimate.p_WB, shift)
             for which in range(int(zones[k, PLANES])):
                 if surface_at(zones, k, which, x, y, z).distance <= law.near:
                     wanted, lacked, least = _kept_off(
-                        law, probes, zones, k, which, shift, estimate.t_us, frame, v, a, wanted
+                        law, probes, zones, k, which, shift, estimate.t_us, v, a, wanted
                     )
                     again, margin = again or lacked, min(margin, least)
         changed = changed or again
@@ -172,18 +174,18 @@ def filtered(
 @compilable
 def _kept_off(
     law: FilterLaw,
-    probes: NDArray[np.float64],
+    all_probes: FilterProbes,
     zones: NDArray[np.float64],
     zone: int,
     which: int,
-    shift: NDArray[np.float64],
+    shift: Vec3,
     t_us: int,
-    frame: NDArray[np.float64],
     v: Vec3 | Floats,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
     """``filtered`` for one plane of one zone, once."""
+    probes, frame = all_probes
     relative = subtract(v, velocity_of(zones, zone, t_us))
     acceleration, follows = acceleration_of(zones, zone), zones[zone, FOLLOWS] > 0.0
     lacked, margin = False, math.inf

@@ -29,7 +29,7 @@ from fsw.autopilot.model.multibody import Bodies, next_axes
 from fsw.autopilot.model.parts import ON_BASE
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, YAW, YAW_RATE, A, Array, J, P, V
 from fsw.autopilot.signals import JointVector, Mat3, StateEstimate, Vec3
-from fsw.compiled import compilable, compiled, kernel, machine_code, packed
+from fsw.compiled import compilable, kernel, machine_code, packed
 from fsw.record import JOINTS, Floats
 
 # What a frame holds, in this order; matrices row by row. One array, because compiled code counts
@@ -40,7 +40,6 @@ AT_D_R, AT_D_TURNING = 24, 60  # derivatives of the last two in each of four tur
 AT_LINKS, AT_AXIS, AT_AXIS_RATE = 96, 24, 27
 LINK: Final = 30
 FRAME: Final = AT_LINKS + LINK * JOINTS
-_AXES: Final = 4  # b1, b3 and their rates
 
 _REST: Final[Vec3] = (0.0, 0.0, 0.0)
 
@@ -61,19 +60,18 @@ def fill_frame(state: Array, b: Bodies, frame: Array) -> None:
     put_links(frame, b, state[Q_ARM::2], state[QD_ARM::2])
 
 
-@compiled
+@compilable
 def _fill_base(state: Array, frame: Array) -> None:
-    axes = np.empty((_AXES, 3))
-    body_axes(state, axes)
+    b1, b3, d1, d3 = body_axes(turning_of(state))
     for k in range(3):
         frame[AT_P + k], frame[AT_V + k] = state[P + k], state[V + k]
-    put_matrix(frame, AT_R, axes[0], axes[1])
-    put_rate(frame, AT_TURNING, axes[0], axes[1], axes[2], axes[3])
+    put_matrix(frame, AT_R, b1, b3)
+    put_rate(frame, AT_TURNING, b1, b3, d1, d3)
 
 
-@compiled
-def put_matrix(frame: Array, at: int, b1: Array, b3: Array) -> None:
-    """The axes b1, b2 and b3 as columns, of ``b1`` (3,) [1, NED] and ``b3`` (3,) [1, NED].
+@compilable
+def put_matrix(frame: Array, at: int, b1: Vec3, b3: Vec3) -> None:
+    """The axes b1, b2 and b3 as columns, of ``b1`` [1, NED] and ``b3`` [1, NED].
 
     Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on.
     """
@@ -83,12 +81,12 @@ def put_matrix(frame: Array, at: int, b1: Array, b3: Array) -> None:
         frame[at + 3 * row + 2] = b3[row]
 
 
-@compiled
-def put_rate(frame: Array, at: int, b1: Array, b3: Array, d1: Array, d3: Array) -> None:
+@compilable
+def put_rate(frame: Array, at: int, b1: Vec3, b3: Vec3, d1: Vec3, d3: Vec3) -> None:
     """The change of ``put_matrix`` by the product rule, for any change of its axes.
 
-    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on: ``b1`` (3,) [1, NED] changes by
-    ``d1`` (3,) [any, NED] and ``b3`` (3,) [1, NED] by ``d3`` (3,) [any, NED].
+    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on: ``b1`` [1, NED] changes by ``d1`` [any, NED]
+    and ``b3`` [1, NED] by ``d3`` [any, NED].
     """
     a, b = cross(d3, b1), cross(b3, d1)
     for row in range(3):
@@ -250,7 +248,6 @@ def end_effector_when_level(bodies: Bodies, q_arm: JointVector, yaw: float) -> V
     return position(level_frame(bodies, q_arm, yaw), bodies.joints, bodies.tip)
 
 
-@compilable
 def predicted_end_effector(b: Bodies, state: Array) -> tuple[Vec3, Vec3]:
     """Its position [m, NED] and velocity [m/s, NED] in a prediction ``state`` (states,) [SI]."""
     frame, tip = np.zeros(FRAME), (b.tip[0], b.tip[1], b.tip[2])
@@ -258,26 +255,32 @@ def predicted_end_effector(b: Bodies, state: Array) -> tuple[Vec3, Vec3]:
     return position(frame, int(b.joints), tip), velocity(frame, int(b.joints), tip)
 
 
-@compiled
-def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
+@compilable
+def turning_of(x: Any) -> Any:
+    """What turns the body in a prediction state ``x`` (states,) [SI], for ``body_axes``."""
+    return x[A], x[A + 1], x[A + 2], x[YAW], x[J], x[J + 1], x[YAW_RATE]
+
+
+@compilable
+def body_axes(turning: Any) -> Any:
     """The body's x and z axes of a prediction state, and how fast they turn.
 
-    Written without trigonometry of the tilt and without absolute values, so that it accepts a
-    complex state ``x`` (states,) [SI]: the derivative is then exact (complex step). Into
-    ``out`` (4, 3) [1, 1/s] go b1, b3 and their rates, in NED.
+    Written without trigonometry of the tilt and without absolute values, so that what is
+    ``turning`` [m/s^2, rad, m/s^3, rad/s, NED] may be complex: the derivative is then exact
+    (complex step). Of ``turning_of`` a state; b1, b3 [1, NED] and their rates [1/s, NED].
     """
+    ax, ay, az, yaw, jx, jy, w = turning
     # Thrust along f = g e3 - a; its derivative needs the horizontal jerk only: a vertical
     # jerk changes the length of f, hardly its direction.
-    fx, fy, fz = -x[A], -x[A + 1], GRAVITY - x[A + 2]
-    dfx, dfy = -x[J], -x[J + 1]
+    fx, fy, fz = -ax, -ay, GRAVITY - az
+    dfx, dfy = -jx, -jy
     f = np.sqrt(fx * fx + fy * fy + fz * fz)
     b3x, b3y, b3z = fx / f, fy / f, fz / f
     along = (b3x * dfx + b3y * dfy) / f
     d3x, d3y, d3z = dfx / f - b3x * along, dfy / f - b3y * along, -b3z * along
 
     # b1 = (heading's left-right axis) x b3, normalised: the ZYX attitude of this yaw.
-    c, s = np.cos(x[YAW]), np.sin(x[YAW])
-    w = x[YAW_RATE]
+    c, s = np.cos(yaw), np.sin(yaw)
     nx, ny, nz = c * b3z, s * b3z, -s * b3y - c * b3x
     dnx = -s * w * b3z + c * d3z
     dny = c * w * b3z + s * d3z
@@ -285,9 +288,5 @@ def body_axes(x: NDArray[np.generic], out: NDArray[np.generic]) -> None:
     n = np.sqrt(nx * nx + ny * ny + nz * nz)
     b1x, b1y, b1z = nx / n, ny / n, nz / n
     along = (b1x * dnx + b1y * dny + b1z * dnz) / n
-    out[0, 0], out[0, 1], out[0, 2] = b1x, b1y, b1z
-    out[1, 0], out[1, 1], out[1, 2] = b3x, b3y, b3z
-    out[2, 0] = dnx / n - b1x * along
-    out[2, 1] = dny / n - b1y * along
-    out[2, 2] = dnz / n - b1z * along
-    out[3, 0], out[3, 1], out[3, 2] = d3x, d3y, d3z
+    d1 = dnx / n - b1x * along, dny / n - b1y * along, dnz / n - b1z * along
+    return (b1x, b1y, b1z), (b3x, b3y, b3z), d1, (d3x, d3y, d3z)

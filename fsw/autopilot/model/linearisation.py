@@ -32,6 +32,7 @@ from fsw.autopilot.model.kinematics import (
     place_of,
     position,
     put_rate,
+    turning_of,
     velocity,
 )
 from fsw.autopilot.model.multibody import Bodies
@@ -51,12 +52,13 @@ from fsw.autopilot.model.prediction import (
     inputs_of,
 )
 from fsw.autopilot.signals import Vec3
-from fsw.compiled import compiled, kernel, machine_code
+from fsw.compiled import compilable, kernel, machine_code
 
 # Prediction states that turn the body: the accelerations, by the tilt they take, and yaw.
 _TURNING = np.array([A, A + 1, A + 2, YAW])
 _STEP = 1e-30  # complex step: no subtraction, hence no rounding
 TURNED = 10  # matrices of the base in a frame
+COMPARED = 9  # of a node: position and velocity of the end-effector, centre of mass, yaw
 
 
 class Horizon(NamedTuple):
@@ -66,6 +68,8 @@ class Horizon(NamedTuple):
     frames: Array  # (n + 1, FRAME)
     impulse: Array  # (n, 11) see ``impulses``
     inputs: Array  # (inputs n,) of the guess
+    turned: Array  # (10, 3) to work in, of one direction
+    slopes: Array  # (2, states) the same, of one place along it
 
 
 def impulses(model: CondensedModel) -> Array:
@@ -98,6 +102,7 @@ class Tracked(NamedTuple):
     d_position: Array  # (n + 1, 3, inputs n)
     d_velocity: Array  # (n + 1, 3, inputs n)
     d_arm_com: Array  # (n + 1, 2, inputs n)
+    gradients: Array  # (9, inputs n) to work in, of all that is compared at a node
 
 
 class Linearisation:
@@ -111,6 +116,8 @@ class Linearisation:
             frames=np.zeros((nodes, FRAME)),
             impulse=impulses(model),
             inputs=np.zeros(unknowns),
+            turned=np.empty((TURNED, 3)),
+            slopes=np.zeros((2, model.states)),
         )
         self.tracked = Tracked(
             yaw=self.states[:, YAW : YAW_RATE + 1],
@@ -121,6 +128,7 @@ class Linearisation:
             d_position=np.zeros((nodes, 3, unknowns)),
             d_velocity=np.zeros((nodes, 3, unknowns)),
             d_arm_com=np.zeros((nodes, 2, unknowns)),
+            gradients=np.zeros((COMPARED, unknowns)),
         )
 
     def refill(self, start: Array, inputs: Array, pushes: Array | None = None) -> None:
@@ -141,10 +149,9 @@ class Linearisation:
         _refill(self.horizon, self.tracked, packed_bodies(self.model.airframe.bodies))
 
 
-@compiled
+@kernel
 def _refilled(horizon: Horizon, tracked: Tracked, bodies: NDArray[Any]) -> None:
-    b = bodies[0]
-    turned, slopes = np.empty((TURNED, 3)), np.zeros((2, horizon.states.shape[1]))
+    b, turned, slopes = bodies[0], horizon.turned, horizon.slopes
     tip, last = (b.tip[0], b.tip[1], b.tip[2]), int(b.joints)
     for i in range(horizon.states.shape[0]):
         frame = horizon.frames[i]
@@ -163,25 +170,37 @@ def _refilled(horizon: Horizon, tracked: Tracked, bodies: NDArray[Any]) -> None:
         _fill_arm_com(horizon, i, b, tracked)
 
 
-@compiled
+@kernel
 def _differentiate(state: Array, frame: Array) -> None:
     """Derivatives of rotation and its rate in the turning states, by complex steps."""
-    axes, stepped = np.empty((4, 3)), np.zeros((4, 3), dtype=np.complex128)
-    body_axes(state, axes)
-    x = state.astype(np.complex128)
+    ax, ay, az, yaw, jx, jy, w = turning_of(state)
+    b1, b3, d1, d3 = body_axes((ax, ay, az, yaw, jx, jy, w))
     for turned in range(len(_TURNING)):
-        k = _TURNING[turned]
-        x[k] = complex(state[k], _STEP)
-        body_axes(x, stepped)
-        x[k] = state[k]
-        e = stepped.imag / _STEP
-        put_rate(frame, AT_D_R + 9 * turned, axes[0], axes[1], e[0], e[1])
-        put_rate(frame, AT_D_TURNING + 9 * turned, axes[0], axes[1], e[2], e[3])
-        # The rate of b2 = b3 x b1 is a product itself: what is left of its derivative.
+        e1, e3, de1, de3 = body_axes(
+            (
+                complex(ax, _STEP if turned == 0 else 0.0),
+                complex(ay, _STEP if turned == 1 else 0.0),
+                complex(az, _STEP if turned == 2 else 0.0),
+                complex(yaw, _STEP if turned == 3 else 0.0),
+                complex(jx, 0.0),
+                complex(jy, 0.0),
+                complex(w, 0.0),
+            )
+        )
+        f1, f3 = _stepped(e1), _stepped(e3)
         at = AT_D_TURNING + 9 * turned
-        b, c = cross(axes[3], e[0]), cross(e[1], axes[2])
+        put_rate(frame, AT_D_R + 9 * turned, b1, b3, f1, f3)
+        put_rate(frame, at, b1, b3, _stepped(de1), _stepped(de3))
+        # The rate of b2 = b3 x b1 is a product itself: what is left of its derivative.
+        b, c = cross(d3, f1), cross(f3, d1)
         for row in range(3):
             frame[at + 3 * row + 1] += b[row] + c[row]
+
+
+@compilable
+def _stepped(e: Any) -> Vec3:
+    """The derivative that a complex step has made of three numbers."""
+    return e[0].imag / _STEP, e[1].imag / _STEP, e[2].imag / _STEP
 
 
 @kernel
@@ -259,7 +278,7 @@ def chain(impulse: Array, node: int, slope: Array, gradient: Array) -> None:
             gradient[at + QDD_ARM + joint] = of_q * g[9] + of_qd * g[10]
 
 
-@compiled
+@kernel
 def _fill_arm_com(horizon: Horizon, i: int, b: Bodies, tracked: Tracked) -> None:
     """The arm's centre of mass in the body: each joint turns all that comes after it."""
     frame, joints = horizon.frames[i], int(b.joints)

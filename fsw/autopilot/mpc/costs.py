@@ -26,7 +26,9 @@ from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.linearisation import Linearisation, Tracked
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array
 from fsw.autopilot.signals import Vec4
-from fsw.compiled import compiled, machine_code
+from fsw.compiled import compilable, kernel, machine_code
+
+Vec8 = tuple[float, float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,11 +158,11 @@ class PostureCost:
             wanted = self._home.repeat(len(horizon.states), axis=0)
         return _add_posture(
             weight, lead, horizon.model.inputs, horizon.states, horizon.model.gamma, wanted,
-            quadratic,
+            horizon.tracked.gradients[0], quadratic,
         )  # fmt: skip
 
 
-@compiled
+@kernel
 def _add_posture(
     weight: float,
     lead: float,
@@ -168,6 +170,7 @@ def _add_posture(
     states: Array,
     gamma: Array,
     targets: Array,
+    row: Array,
     quadratic: Quadratic,
 ) -> float:
     cost = 0.0
@@ -176,12 +179,13 @@ def _add_posture(
             q, qd = Q_ARM + 2 * joint, QD_ARM + 2 * joint
             value = states[i, q] - targets[i, joint] + lead * states[i, qd]
             cost += weight * value * value
-            row = gamma[i, q] + lead * gamma[i, qd]
+            for k in range(inputs * i):
+                row[k] = gamma[i, q, k] + lead * gamma[i, qd, k]
             add_square(weight, value, row, inputs * i, quadratic)
     return cost
 
 
-@compiled
+@kernel
 def add_square(weight: float, value: float, row: Array, columns: int, quadratic: Quadratic) -> None:
     """Add ``weight`` [1 / unit of value^2] times ``(value + row (U - guess))^2``.
 
@@ -200,72 +204,94 @@ def add_square(weight: float, value: float, row: Array, columns: int, quadratic:
                 hessian[k, m] += scaled * row[m]
 
 
-_RESIDUALS = 8  # of a node: position and velocity of the end-effector, centre of mass
-
-
-@compiled
+@kernel
 def _add_tracking(
     weights: _TrackingWeights, tracked: Tracked, target: _Target, quadratic: Quadratic
 ) -> float:
-    guess, hessian = quadratic.guess, quadratic.hessian
+    guess, hessian, rows = quadratic.guess, quadratic.hessian, tracked.gradients
     n = tracked.position.shape[0] - 1
     inputs = len(guess) // n
     cost = 0.0
     for k in range(len(guess)):
         hessian[k, k] += 2.0 * weights.inputs
         cost += weights.inputs * guess[k] * guess[k]
-    rows, of_yaw = np.zeros((_RESIDUALS, len(guess))), np.zeros(len(guess))
-    values, weight = np.zeros(_RESIDUALS), np.zeros(_RESIDUALS)
     for i in range(1, n + 1):
         w = weights.node[1 if i == n else 0]
         # Entry by entry: for a slice numba compiles a text that says which shapes do not fit.
-        for axis in range(3):
-            weight[axis], weight[3 + axis] = w[0], w[1]
-            values[axis] = tracked.position[i, axis] - target.position[i, axis]
-            v_target = weights.target_velocity * target.velocity[i, axis]
-            values[3 + axis] = tracked.velocity[i, axis] - v_target
-            for k in range(inputs * i):
+        for k in range(inputs * i):
+            for axis in range(3):
                 rows[axis, k] = tracked.d_position[i, axis, k]
                 rows[3 + axis, k] = tracked.d_velocity[i, axis, k]
-        for axis in range(2):
-            weight[6 + axis], values[6 + axis] = w[2], tracked.arm_com[i, axis]
-            for k in range(inputs * i):
+            for axis in range(2):
                 rows[6 + axis, k] = tracked.d_arm_com[i, axis, k]
+            rows[8, k] = tracked.d_yaw[i, 0, k] + weights.yaw_lead * tracked.d_yaw[i, 1, k]
+        weight = (w[0], w[0], w[0], w[1], w[1], w[1], w[2], w[2])
+        values = _compared(weights, tracked, target, i)
         _add_squares(weight, values, rows, inputs * i, quadratic)
-        for residual in range(_RESIDUALS):
+        for residual in range(len(weight)):
             cost += weight[residual] * values[residual] * values[residual]
         # The short way round: a target half a turn away must not unwind whole turns.
         turn = (tracked.yaw[i, 0] - target.yaw[i] + math.pi) % (2.0 * math.pi) - math.pi
         turn += weights.yaw_lead * tracked.yaw[i, 1]
         cost += weights.yaw * turn * turn
-        for k in range(inputs * i):
-            of_yaw[k] = tracked.d_yaw[i, 0, k] + weights.yaw_lead * tracked.d_yaw[i, 1, k]
-        add_square(weights.yaw, turn, of_yaw, inputs * i, quadratic)
+        add_square(weights.yaw, turn, rows[8], inputs * i, quadratic)
     return cost
 
 
-@compiled
+@compilable
+def _compared(weights: _TrackingWeights, tracked: Tracked, target: _Target, i: int) -> Vec8:
+    """How far a node's end-effector, its velocity and the centre of mass are from what is asked."""
+    p, v, com, share = tracked.position, tracked.velocity, tracked.arm_com, weights.target_velocity
+    return (
+        p[i, 0] - target.position[i, 0],
+        p[i, 1] - target.position[i, 1],
+        p[i, 2] - target.position[i, 2],
+        v[i, 0] - share * target.velocity[i, 0],
+        v[i, 1] - share * target.velocity[i, 1],
+        v[i, 2] - share * target.velocity[i, 2],
+        com[i, 0],
+        com[i, 1],
+    )
+
+
+@compilable
 def _add_squares(
-    weight: Array, value: Array, rows: Array, columns: int, quadratic: Quadratic
+    weight: Vec8, value: Vec8, rows: Array, columns: int, quadratic: Quadratic
 ) -> None:
     """``add_square`` for all residuals of a node at once: the Hessian is walked through once."""
     guess, hessian, gradient = quadratic
-    at_zero = np.empty((_RESIDUALS, 1))
-    for residual in range(_RESIDUALS):
-        at_zero[residual, 0] = value[residual]
-        for k in range(columns):
-            at_zero[residual, 0] -= rows[residual, k] * guess[k]
+    at_zero = (
+        _at_zero(value, rows, 0, columns, guess),
+        _at_zero(value, rows, 1, columns, guess),
+        _at_zero(value, rows, 2, columns, guess),
+        _at_zero(value, rows, 3, columns, guess),
+    )
+    others = (
+        _at_zero(value, rows, 4, columns, guess),
+        _at_zero(value, rows, 5, columns, guess),
+        _at_zero(value, rows, 6, columns, guess),
+        _at_zero(value, rows, 7, columns, guess),
+    )
     for k in range(columns):
         a, b = _scaled(weight, rows, 0, k), _scaled(weight, rows, 4, k)
-        gradient[k] += _sum4(a, at_zero, 0, 0) + _sum4(b, at_zero, 4, 0)
+        gradient[k] += _sum4(a, at_zero) + _sum4(b, others)
         h = hessian[k]
         for m in range(k, columns):
             # Two sums of four, which a processor computes side by side.
-            h[m] += _sum4(a, rows, 0, m) + _sum4(b, rows, 4, m)
+            h[m] += _sum4(a, _column(rows, 0, m)) + _sum4(b, _column(rows, 4, m))
 
 
-@compiled
-def _scaled(weight: Array, rows: Array, r: int, k: int) -> Vec4:
+@compilable
+def _at_zero(value: Vec8, rows: Array, r: int, columns: int, guess: Array) -> float:
+    """A residual where all inputs are 0, by its gradient."""
+    total = value[r]
+    for k in range(columns):
+        total -= rows[r, k] * guess[k]
+    return total
+
+
+@compilable
+def _scaled(weight: Vec8, rows: Array, r: int, k: int) -> Vec4:
     """Twice the weighted derivative of four residuals in one input."""
     return (
         2.0 * weight[r] * rows[r, k],
@@ -275,8 +301,11 @@ def _scaled(weight: Array, rows: Array, r: int, k: int) -> Vec4:
     )
 
 
-@compiled
-def _sum4(a: Vec4, rows: Array, r: int, k: int) -> float:
-    return float(
-        a[0] * rows[r, k] + a[1] * rows[r + 1, k] + a[2] * rows[r + 2, k] + a[3] * rows[r + 3, k]
-    )
+@compilable
+def _column(rows: Array, r: int, k: int) -> Vec4:
+    return rows[r, k], rows[r + 1, k], rows[r + 2, k], rows[r + 3, k]
+
+
+@compilable
+def _sum4(a: Vec4, b: Vec4) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]

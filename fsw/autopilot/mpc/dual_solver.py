@@ -32,7 +32,6 @@ from fsw.autopilot.mpc.clarabel_solver import ClarabelSolver
 from fsw.autopilot.mpc.qp_data import CONE, HARD, QpData, QuadraticProgram
 from fsw.autopilot.mpc.solution import Solution
 from fsw.autopilot.signals import SolverStatus
-from fsw.compiled import compiled
 
 # Residual at the guess (m/s, rad, m/s^2) below which a row starts in the working set: the first
 # always, the second if the optimum without any row violates it. Only speed depends on them.
@@ -120,12 +119,11 @@ class DualSolver:
         return found
 
 
-@compiled
 def _distances(residual: Array, first_cone: int) -> Array:
     """``residual`` (rows,) [SI], where the three rows of a tilt cone have its distance."""
     distances = residual.copy()
-    for row in range(first_cone, len(residual), CONE):
-        distances[row : row + CONE] = residual[row] - np.hypot(residual[row + 1], residual[row + 2])
+    cones = distances[first_cone:].reshape(-1, CONE)
+    cones[:] = (cones[:, 0] - np.hypot(cones[:, 1], cones[:, 2]))[:, None]
     return distances
 
 

@@ -88,7 +88,7 @@ def test_rows_are_h_of_the_nearest_place_and_their_slopes_its_differences(
     for b, of_probe in enumerate(at_node):
         on, radius = int(probes[b, ON]), probes[b, RADIUS]
         for which, row in enumerate(of_probe):
-            local, at, binds = nearest_place(zones, 0, which, shift, probes, b, frame)
+            local, at, binds = nearest_place(zones, 0, which, tuple(shift[0]), probes, b, frame)
             value, gradient = rows.rows.value[row], rows.rows.gradient[row]
             assert bool(value < 900.0) is binds
             if not binds:

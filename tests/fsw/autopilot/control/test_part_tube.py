@@ -46,11 +46,8 @@ SHARE = 1e-4  # of a push: a small tilt, where turning is linear
 
 def turned(a: float) -> Array:
     """The rotation of a vehicle that tilts for an acceleration ``a`` along x."""
-    axes = np.empty((4, 3))
-    state = np.zeros(19)
-    state[6] = a
-    body_axes(state, axes)
-    return np.stack((axes[0], np.cross(axes[1], axes[0]), axes[1]), axis=1)
+    b1, b3, _, _ = body_axes((a, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return np.stack((b1, np.cross(b3, b1), b3), axis=1)
 
 
 @cache

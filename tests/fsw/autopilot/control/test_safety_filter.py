@@ -207,7 +207,7 @@ def test_every_wall_of_a_room_keeps_the_vehicle_in() -> None:
         for sign in (1.0, -1.0):
             p = [0.0, 0.0, 0.0]
             p[axis] = sign * (half - 0.05)
-            parts = POINTS[:1]  # the base alone
+            parts = POINTS._replace(rows=POINTS.rows[:1])  # the base alone
             result, changed, margin = filtered(
                 LAW,
                 AIRFRAME.bodies,
