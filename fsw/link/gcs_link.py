@@ -5,7 +5,7 @@ Received data never raises, and only valid frames change the state of the link.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -42,6 +42,7 @@ RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
 
 _MIN_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
+_FRAME_COST: Final = 32  # bytes more for each frame: a small one may ask for as much as a large one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
 _MEASURED_S: Final = 3  # calls of ``news``, one a second
@@ -103,6 +104,8 @@ class GcsLink:
         handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
         self._handled = frozenset[int]().union(*handled)
         self._read = 0  # datagrams
+        self._frames: Iterator[tuple[Frame, bytes]] | None = None  # the rest of the newest
+        self._sender: Address = ("", 0)  # of the newest
         self._endpoint, peer = open_endpoint(
             setup.target, clock, setup.local_port, remote=setup.remote
         )
@@ -161,24 +164,38 @@ class GcsLink:
         """Whether a component has spoken on this link, lately where many have."""
         return (system, component) in self._speakers
 
-    def read(self, t_us: int, budget: int) -> int:
-        """Read datagrams that are there, and answer them; returns what is left of the budget.
+    @property
+    def has_frames(self) -> bool:
+        """Whether a datagram has been read whose frames have not all been taken yet."""
+        return self._frames is not None
 
-        What lies beyond the budget [bytes] waits in the kernel, and is lost there if it becomes too
-        much.
+    def read(self, t_us: int, budget: int) -> int:
+        """Take frames that are there, and answer them; returns what is left of the budget.
+
+        What lies beyond the budget [bytes] waits: frames of one datagram here, and datagrams in the
+        kernel, where they are lost if they become too many. A small frame may ask for as much as a
+        large one, so each costs something, and what is answered as much as what asks.
         """
         while budget > 0:
-            received = self._endpoint.receive_waiting()
-            if received is None:
-                break
-            datagram, sender = received
-            self._read += 1
-            budget -= max(len(datagram), _MIN_COST)
-            for frame, raw in self._endpoint.cut(datagram, self.losses):
-                if frame.system_id == SYSTEM_ID and raw in self._sent:
-                    self.echoes += 1
-                else:
-                    self._take(t_us, frame, raw, sender)
+            if self._frames is None:
+                received = self._endpoint.receive_waiting()
+                if received is None:
+                    break
+                datagram, self._sender = received
+                self._read += 1
+                self._frames = iter(self._endpoint.cut(datagram, self.losses))
+                budget -= max(len(datagram), _MIN_COST)
+            found = next(self._frames, None)
+            if found is None:
+                self._frames = None
+                continue
+            frame, raw = found
+            waiting = self.outbox.bytes
+            if frame.system_id == SYSTEM_ID and raw in self._sent:
+                self.echoes += 1
+            else:
+                self._take(t_us, frame, raw, self._sender)
+            budget -= _FRAME_COST + self.outbox.bytes - waiting
         if self.outbox.waiting:
             self._send(t_us)
         return budget
