@@ -5,7 +5,7 @@ Received data never raises, and only valid frames change the state of the link.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -18,6 +18,7 @@ from fsw.autopilot.signals import (
     StatusText,
     TickOutputs,
 )
+from fsw.link.arrivals import Arrivals
 from fsw.link.bounded_memory import renew
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
@@ -41,8 +42,7 @@ from messages.message_ids import AUTOPILOT, SYSTEM_ID
 RecordFrame = Callable[[int, bytes], None]
 """Takes the sensor time [us] and one frame, for the log."""
 
-_MIN_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
-_FRAME_COST: Final = 32  # bytes more for each frame: a small one may ask for as much as a large one
+_FRAME_COST: Final = 32  # bytes for each frame: a small one may ask for as much as a large one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
 _MEASURED_S: Final = 3  # calls of ``news``, one a second
@@ -103,12 +103,10 @@ class GcsLink:
         self._sent = SentFrames() if sent is None else sent
         handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
         self._handled = frozenset[int]().union(*handled)
-        self._read = 0  # datagrams
-        self._frames: Iterator[tuple[Frame, bytes]] | None = None  # the rest of the newest
-        self._sender: Address = ("", 0)  # of the newest
         self._endpoint, peer = open_endpoint(
             setup.target, clock, setup.local_port, remote=setup.remote
         )
+        self._arrivals = Arrivals(self._endpoint, self.losses)
         carried = self._endpoint.bytes_per_s
         self._line = None if carried is None else LineBudget(carried, clock)
         self.rates = StreamRates(
@@ -138,13 +136,14 @@ class GcsLink:
 
     @property
     def dropped(self) -> int | None:
-        """Datagrams that were not read in time and that the kernel dropped; None: not known."""
-        return self._endpoint.dropped
+        """Datagrams that were not read in time and were dropped; None: the kernel's not known."""
+        kernel = self._endpoint.dropped
+        return None if kernel is None else kernel + self._arrivals.dropped
 
     @property
     def received(self) -> int:
-        """Datagrams that came since the start, those that the kernel dropped too."""
-        return self._read + (self.dropped or 0)
+        """Datagrams that came since the start, those that were dropped too."""
+        return self._arrivals.read + (self._endpoint.dropped or 0)
 
     @property
     def peers(self) -> tuple[Address, ...]:
@@ -166,35 +165,31 @@ class GcsLink:
 
     @property
     def has_frames(self) -> bool:
-        """Whether a datagram has been read whose frames have not all been taken yet."""
-        return self._frames is not None
+        """Whether something has been read whose frames have not all been taken yet."""
+        return self._arrivals.waits
 
     def read(self, t_us: int, budget: int) -> int:
         """Take frames that are there, and answer them; returns what is left of the budget.
 
-        What lies beyond the budget [bytes] waits: frames of one datagram here, and datagrams in the
-        kernel, where they are lost if they become too many. A small frame may ask for as much as a
-        large one, so each costs something, and what is answered as much as what asks.
+        What lies beyond the budget [bytes] waits until its sender's turn, and is lost if it becomes
+        too much. A small frame may ask for as much as a large one, so each costs something, and
+        what is answered as much as what asks.
         """
         while budget > 0:
-            if self._frames is None:
-                received = self._endpoint.receive_waiting()
-                if received is None:
-                    break
-                datagram, self._sender = received
-                self._read += 1
-                self._frames = iter(self._endpoint.cut(datagram, self.losses))
-                budget -= max(len(datagram), _MIN_COST)
-            found = next(self._frames, None)
+            self._arrivals.fetch(self._peers.all)
+            begun = self._arrivals.begin()
+            if begun is None:
+                break
+            budget -= begun
+            found = self._arrivals.take()
             if found is None:
-                self._frames = None
                 continue
             frame, raw = found
             waiting = self.outbox.bytes
             if frame.system_id == SYSTEM_ID and raw in self._sent:
                 self.echoes += 1
             else:
-                self._take(t_us, frame, raw, self._sender)
+                self._take(t_us, frame, raw, self._arrivals.sender)
             budget -= _FRAME_COST + self.outbox.bytes - waiting
         if self.outbox.waiting:
             self._send(t_us)

@@ -9,6 +9,7 @@ import socket
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -226,6 +227,37 @@ def test_peers_are_bounded_and_the_configured_one_stays(ground: Ground) -> None:
         other.close()
 
 
+def test_a_peer_that_speaks_is_not_pushed_out_by_newcomers(ground: Ground) -> None:
+    """A stranger with a few ports took all telemetry from a station that was not configured."""
+    first, *others = [station_socket() for _ in range(12)]
+    heartbeat = FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT)
+    for other in others:
+        ground.polled(heartbeat, first)
+        ground.polled(heartbeat, other)
+    assert first.getsockname() in ground.link.peers
+    assert others[-1].getsockname() in ground.link.peers, "the newest is answered too"
+    for one in (first, *others):
+        one.close()
+
+
+def test_each_sender_has_its_turn(ground: Ground) -> None:
+    """A stranger's full datagrams delayed a ground station's commands by a second."""
+    heartbeat = FrameWriter(66, 66).frame(ids.HEARTBEAT, *HEARTBEAT)
+    owner = FrameWriter(255, 190)
+    ground.polled(owner.frame(ids.HEARTBEAT, *HEARTBEAT))
+    with closing(station_socket()) as stranger:
+        for _ in range(40):
+            stranger.sendto(heartbeat * 60, ("127.0.0.1", ground.link.port))
+        command = (*(0.0,) * 7, 511, 1, 1, 0)
+        ground.station.sendto(
+            owner.frame(ids.COMMAND_LONG, *command), ("127.0.0.1", ground.link.port)
+        )
+        ground.heard()
+        for _ in range(3):
+            ground.poll()
+        assert ids.COMMAND_ACK in [frame.message_id for frame in ground.heard()]
+
+
 def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
     other = station_socket()
     writer = FrameWriter(255, 190)
@@ -334,10 +366,10 @@ def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
     sent = 2_000
     for _ in range(sent):
         ground.station.sendto(heartbeat, ("127.0.0.1", ground.link.port))
-    dropped = ground.link.dropped
-    assert dropped is not None
+    assert ground.link.dropped
     for _ in range(sent):
         ground.poll()
+    dropped = ground.link.dropped
     assert dropped == sent - (ground.link.accepted - 1) > 1_000
     assert ground.link.received == ground.links.received == sent + 1, "read or dropped"
     ground.links.close()
