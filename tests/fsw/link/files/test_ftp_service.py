@@ -294,6 +294,18 @@ def test_sessions_are_few_and_come_back_when_their_client_has_gone(client: Clien
     assert client.open("/top")[0] == 1
 
 
+def test_one_client_cannot_hold_all_sessions(client: Client) -> None:
+    for _ in range(8):
+        client.open("/top")
+    client.t_us += SECOND_US
+    client.ask(Opcode.READ_FILE, session=0, size=1)
+    other = Client(client.service, component=1, t_us=client.t_us)
+    other.open("/top")
+    assert client.ask(Opcode.READ_FILE, session=0, size=1).opcode == Opcode.ACK
+    gone = client.ask(Opcode.READ_FILE, session=1, size=1)
+    assert gone.refusal == Refusal.INVALID_SESSION, "the one that was used longest ago"
+
+
 def test_a_client_may_choose_the_number_of_its_session(client: Client) -> None:
     (chosen,) = client.send(Opcode.OPEN_FILE_RO, b"/top", session=231)
     (again,) = client.send(Opcode.OPEN_FILE_RO, b"/files/b", session=231)
