@@ -242,6 +242,7 @@ class GcsLink:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
             self.outbox.add_overdue_texts(snapshot.t_us)
             self._peers.expire(self._clock())
+            self.rates.heard_by(self._peers.heard_of)
             self.talks = self._unheard or self._peers.any_heard
             if self._line is not None:
                 self.rates.fit()
@@ -315,7 +316,7 @@ class GcsLink:
         source = MessageSource(
             frame.system_id, frame.component_id, self.name, f"{host}:{port}", self.signing.active
         )
-        answer = self._commands.handle(frame, t_us, self._snapshot)
+        answer = self._commands.handle(frame, t_us, self._snapshot, sender)
         if answer is None:
             put_off = self._inbox.accept(frame, source)
             if put_off is not None:

@@ -25,6 +25,11 @@ class Peers:
         self._heard_us: dict[Address, int] = {}  # in the order in which they came
 
     @property
+    def heard_of(self) -> frozenset[Address]:
+        """Those that speak to us."""
+        return frozenset(self._heard_us)
+
+    @property
     def any_heard(self) -> bool:
         """Whether anybody speaks to us."""
         return bool(self._heard_us)

@@ -130,10 +130,11 @@ class FtpService(LinkService):
             except StopIteration:
                 continue
             self._jobs[key] = running
-            if reply is not None:
-                running.sequence += 1
-                answers.append(_outgoing(reply, running.request, running.sequence, running.client))
-                ready.append(key)
+            if reply is None:
+                break  # it has worked, or waits: the others at the next tick, in their turn
+            running.sequence += 1
+            answers.append(_outgoing(reply, running.request, running.sequence, running.client))
+            ready.append(key)
         return answers
 
     def _answer(self, request: Request, client: Client, t_us: int) -> Reply | None:

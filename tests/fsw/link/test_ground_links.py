@@ -7,7 +7,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from fsw.link.udp_endpoint import LinkError, OpenEndpoint
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split
-from tests.fsw.link.ground import Ground, ground_station
+from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import outputs_at
 
 HEARTBEAT = (0, 6, 8, 0, 4, 3)
@@ -71,6 +71,30 @@ def test_a_rate_is_one_links_own(both: tuple[Ground, Ground, GroundLinks]) -> No
     frames = gcs.fly(1000)
     assert abs(sum(f.message_id == ids.ATTITUDE for f in frames) - 100) <= 1
     assert abs(sum(f.message_id == ids.ATTITUDE for f in api.heard()) - 4) <= 1
+
+
+def test_nobody_loses_telemetry_to_the_wish_of_another_on_its_link() -> None:
+    """A stranger turned HEARTBEAT and all else off for the owner."""
+    writer = FrameWriter(66, 66)
+
+    def wish(message_id: int, interval_us: float) -> bytes:
+        command = (float(message_id), interval_us, *(0.0,) * 5, 511, 1, 1, 0)
+        return writer.frame(ids.COMMAND_LONG, *command)
+
+    with ground_station() as gcs, closing(station_socket()) as stranger:
+        speak(gcs)
+        for message_id in (ids.HEARTBEAT, ids.ATTITUDE):
+            gcs.polled(wish(message_id, -1.0), stranger)
+        gcs.fly(600)  # 1.2 s
+        counts = Counter(frame.message_id for frame in gcs.fly(1000))
+        assert abs(counts[ids.ATTITUDE] - 100) <= 1
+        assert counts[ids.HEARTBEAT] == 2
+        gcs.polled(wish(ids.ATTITUDE, 10_000.0), stranger)
+        assert abs(Counter(f.message_id for f in gcs.fly(1000))[ids.ATTITUDE] - 200) <= 2
+        gcs.polled(wish(ids.ATTITUDE, -1.0))
+        gcs.polled(wish(ids.ATTITUDE, -1.0), stranger)
+        gcs.heard()
+        assert Counter(f.message_id for f in gcs.fly(1000))[ids.ATTITUDE] == 0, "nobody wants it"
 
 
 def test_an_answer_goes_to_the_link_the_command_came_from(
