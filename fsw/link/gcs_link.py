@@ -5,7 +5,7 @@ Received data never raises, and only valid frames change the state of the link.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -20,6 +20,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.arrivals import Arrivals
 from fsw.link.bounded_memory import renew
+from fsw.link.bounded_record import BoundedRecord, RecordFrame
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.line_budget import TELEMETRY, LineBudget
@@ -38,9 +39,6 @@ from messages import dialect, message_ids
 from messages.addresses import Address, LinkAddress
 from messages.frames import Frame, Losses, as_version_1, is_version_1
 from messages.message_ids import AUTOPILOT, SYSTEM_ID
-
-RecordFrame = Callable[[int, bytes], None]
-"""Takes the sensor time [us] and one frame, for the log."""
 
 _FRAME_COST: Final = 32  # bytes for each frame: a small one may ask for as much as a large one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
@@ -123,7 +121,7 @@ class GcsLink:
         self._inbox = inbox
         self._context = context
         self._clock = clock
-        self._record = record
+        self._received, self._told = BoundedRecord(record), BoundedRecord(record)
         self._commands = LinkCommands(self.rates, context, services)
         self._snapshot: FlightSnapshot | None = None
         self._speakers: dict[tuple[int, int], None] = {}  # the one heard last is the last
@@ -277,6 +275,7 @@ class GcsLink:
             "unhandled": {_message_name(id_): count for id_, count in self.unhandled.items()},
             "refused": asdict(self.signing.counters),
             "signed": self.signing.active,
+            "unrecorded": self._received.left_out + self._told.left_out,
             "peers": len(self.peers),
             "encode_failures": self.outbox.encode_failures,
             "service_failures": self.dispatch.failures,
@@ -301,8 +300,7 @@ class GcsLink:
         if trust is FrameTrust.REFUSED:
             return
         self.accepted += 1
-        if self._record is not None:
-            self._record(t_us, raw)
+        self._received.add(t_us, raw)
         if trust is FrameTrust.EXEMPT:
             return  # no sign of life either: anybody could start or stop a failsafe with it
         self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
@@ -361,10 +359,9 @@ class GcsLink:
 
     def _send(self, t_us: int) -> None:
         frames, asked_for = self.outbox.take()
-        if self._record is not None:
-            for frame in frames:
-                if frame[_MESSAGE_ID] not in _FILE_DATA:
-                    self._record(t_us, frame)
+        for frame in frames:
+            if frame[_MESSAGE_ID] not in _FILE_DATA:
+                self._told.add(t_us, frame)
         old = self._peers.version_1
         self._send_to([peer for peer in self._peers.all if peer not in old], frames)
         if old and not self.signing.active:

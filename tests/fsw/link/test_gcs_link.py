@@ -356,6 +356,22 @@ def test_a_flood_is_read_within_a_budget(ground: Ground) -> None:
     assert 0 < len(ground.recorded) < 400
 
 
+def test_a_flood_does_not_fill_the_disk(ground: Ground) -> None:
+    """A stranger's frames made the telemetry log grow by 1.2 MB/s."""
+    writer = FrameWriter(66, 66)
+    flood = b"".join(writer.frame(ids.PING, 1, k, 0, 0) for k in range(60))
+    for _ in range(300):
+        ground.t_us += 2_000
+        ground.polled(flood)
+    received = sum(len(frame) for _, frame in ground.recorded if frame[5] == 66)
+    assert 128_000 <= received + 100 < 1.7 * 128_000  # in 0.6 s, after one without any
+    assert counts(ground)["unrecorded"] > 1_000
+    ground.t_us += 1_000_000
+    before = len(ground.recorded)
+    ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT))
+    assert len(ground.recorded) == before + 1
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts them")
 def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
     ground: Ground,
