@@ -205,8 +205,8 @@ class FtpService(LinkService):
         False: nobody has more than the ``client`` would have.
         """
         held = Counter(holder for holder, _ in self._sessions)
-        ((holder, count),) = held.most_common(1)
-        if count <= held[client] + 1:
+        holder = max(held, key=held.__getitem__)
+        if held[holder] <= held[client] + 1:
             return False
         of_holder = [key for key in self._sessions if key[0] == holder]
         self._close(min(of_holder, key=lambda key: self._sessions[key].used_us))
