@@ -7,6 +7,7 @@ from typing import Final
 from fsw.link.udp_endpoint import Address
 
 EXPIRY_US: Final = 30_000_000  # of silence: ten times what clients call a lost link
+_QUIET_US: Final = 2_000_000  # of silence: twice the period of heartbeats
 _MAX_LEARNT: Final = 4
 
 
@@ -14,8 +15,9 @@ class Peers:
     """The configured peer and the few others that came first, and the newest.
 
     Bounded, so that a flood of forged sources cannot turn the vehicle into an amplifier, and who
-    speaks keeps its place: where there is none left, a newcomer has that of the newest. Silent
-    peers are removed. Times are wall time [us], because peers live in it.
+    speaks keeps its place: where there is none left, a newcomer has that of the one that has been
+    silent longest, or where all speak that of the newest. Silent peers are removed. Times are
+    wall time [us], because peers live in it.
     """
 
     def __init__(self, configured: Address) -> None:
@@ -44,7 +46,9 @@ class Peers:
             return
         learnt = [other for other in self._heard_us if other != self._configured]
         if len(learnt) > _MAX_LEARNT:
-            del self._heard_us[learnt[-2]]
+            quiet = min(learnt[:-1], key=self._heard_us.__getitem__)
+            is_silent = now_us - self._heard_us[quiet] > _QUIET_US
+            del self._heard_us[quiet if is_silent else learnt[-2]]
         self._list()
 
     def expire(self, now_us: int) -> None:

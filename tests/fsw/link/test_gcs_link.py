@@ -236,6 +236,11 @@ def test_a_peer_that_speaks_is_not_pushed_out_by_newcomers(ground: Ground) -> No
         ground.polled(heartbeat, other)
     assert first.getsockname() in ground.link.peers
     assert others[-1].getsockname() in ground.link.peers, "the newest is answered too"
+    ground.clock.pass_s(2.5)
+    for speaker in (others[-1], others[1], others[-1], first):
+        ground.polled(heartbeat, speaker)
+    kept = {others[-1].getsockname(), others[1].getsockname(), first.getsockname()}
+    assert kept <= set(ground.link.peers), "those that are silent go first"
     for one in (first, *others):
         one.close()
 
