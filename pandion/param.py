@@ -131,6 +131,8 @@ def main(argv: list[str]) -> int:
 
     try:
         if options.file is not None:
+            if act not in (_set, _import):  # which may begin a file
+                options.file.stat()
             return act(options, FileValues(options.file))
         with ParameterClient(parse_link_address(options.vehicle)) as vehicle:
             return act(options, vehicle)

@@ -7,7 +7,8 @@ from typing import Final
 
 from command_line.folders import NoHomeError, state_folder
 from fsw.autopilot.ports import Clock
-from fsw.link.gcs_link import GcsLink, LinkSetup, RecordFrame
+from fsw.link.bounded_record import RecordFrame
+from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice, addresses

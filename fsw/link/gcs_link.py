@@ -5,7 +5,7 @@ Received data never raises, and only valid frames change the state of the link.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -18,7 +18,9 @@ from fsw.autopilot.signals import (
     StatusText,
     TickOutputs,
 )
+from fsw.link.arrivals import Arrivals
 from fsw.link.bounded_memory import renew
+from fsw.link.bounded_record import BoundedRecord, RecordFrame
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.line_budget import TELEMETRY, LineBudget
@@ -38,10 +40,7 @@ from messages.addresses import Address, LinkAddress
 from messages.frames import Frame, Losses, as_version_1, is_version_1
 from messages.message_ids import AUTOPILOT, SYSTEM_ID
 
-RecordFrame = Callable[[int, bytes], None]
-"""Takes the sensor time [us] and one frame, for the log."""
-
-_MIN_COST: Final = 64  # bytes: an empty datagram costs as much as a small one
+_FRAME_COST: Final = 32  # bytes for each frame: a small one may ask for as much as a large one
 _MAX_UNHANDLED: Final = 64  # kinds of messages, counted one by one
 _MAX_SPEAKERS: Final = 32  # twice the commands of a tick, which are answered after it
 _MEASURED_S: Final = 3  # calls of ``news``, one a second
@@ -102,10 +101,10 @@ class GcsLink:
         self._sent = SentFrames() if sent is None else sent
         handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
         self._handled = frozenset[int]().union(*handled)
-        self._read = 0  # datagrams
         self._endpoint, peer = open_endpoint(
             setup.target, clock, setup.local_port, remote=setup.remote
         )
+        self._arrivals = Arrivals(self._endpoint, self.losses)
         carried = self._endpoint.bytes_per_s
         self._line = None if carried is None else LineBudget(carried, clock)
         self.rates = StreamRates(
@@ -122,7 +121,7 @@ class GcsLink:
         self._inbox = inbox
         self._context = context
         self._clock = clock
-        self._record = record
+        self._received, self._told = BoundedRecord(record), BoundedRecord(record)
         self._commands = LinkCommands(self.rates, context, services)
         self._snapshot: FlightSnapshot | None = None
         self._speakers: dict[tuple[int, int], None] = {}  # the one heard last is the last
@@ -135,13 +134,14 @@ class GcsLink:
 
     @property
     def dropped(self) -> int | None:
-        """Datagrams that were not read in time and that the kernel dropped; None: not known."""
-        return self._endpoint.dropped
+        """Datagrams that were not read in time and were dropped; None: the kernel's not known."""
+        kernel = self._endpoint.dropped
+        return None if kernel is None else kernel + self._arrivals.dropped
 
     @property
     def received(self) -> int:
-        """Datagrams that came since the start, those that the kernel dropped too."""
-        return self._read + (self.dropped or 0)
+        """Datagrams that came since the start, those that were dropped too."""
+        return self._arrivals.read + (self._endpoint.dropped or 0)
 
     @property
     def peers(self) -> tuple[Address, ...]:
@@ -161,24 +161,34 @@ class GcsLink:
         """Whether a component has spoken on this link, lately where many have."""
         return (system, component) in self._speakers
 
-    def read(self, t_us: int, budget: int) -> int:
-        """Read datagrams that are there, and answer them; returns what is left of the budget.
+    @property
+    def has_frames(self) -> bool:
+        """Whether something has been read whose frames have not all been taken yet."""
+        return self._arrivals.waits
 
-        What lies beyond the budget [bytes] waits in the kernel, and is lost there if it becomes too
-        much.
+    def read(self, t_us: int, budget: int) -> int:
+        """Take frames that are there, and answer them; returns what is left of the budget.
+
+        What lies beyond the budget [bytes] waits until its sender's turn, and is lost if it becomes
+        too much. A small frame may ask for as much as a large one, so each costs something, and
+        what is answered as much as what asks.
         """
         while budget > 0:
-            received = self._endpoint.receive_waiting()
-            if received is None:
+            self._arrivals.fetch(self._peers.all)
+            begun = self._arrivals.begin()
+            if begun is None:
                 break
-            datagram, sender = received
-            self._read += 1
-            budget -= max(len(datagram), _MIN_COST)
-            for frame, raw in self._endpoint.cut(datagram, self.losses):
-                if frame.system_id == SYSTEM_ID and raw in self._sent:
-                    self.echoes += 1
-                else:
-                    self._take(t_us, frame, raw, sender)
+            budget -= begun
+            found = self._arrivals.take()
+            if found is None:
+                continue
+            frame, raw = found
+            waiting = self.outbox.bytes
+            if frame.system_id == SYSTEM_ID and raw in self._sent:
+                self.echoes += 1
+            else:
+                self._take(t_us, frame, raw, self._arrivals.sender)
+            budget -= _FRAME_COST + self.outbox.bytes - waiting
         if self.outbox.waiting:
             self._send(t_us)
         return budget
@@ -230,6 +240,7 @@ class GcsLink:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
             self.outbox.add_overdue_texts(snapshot.t_us)
             self._peers.expire(self._clock())
+            self.rates.heard_by(self._peers.heard_of)
             self.talks = self._unheard or self._peers.any_heard
             if self._line is not None:
                 self.rates.fit()
@@ -264,6 +275,7 @@ class GcsLink:
             "unhandled": {_message_name(id_): count for id_, count in self.unhandled.items()},
             "refused": asdict(self.signing.counters),
             "signed": self.signing.active,
+            "unrecorded": self._received.left_out + self._told.left_out,
             "peers": len(self.peers),
             "encode_failures": self.outbox.encode_failures,
             "service_failures": self.dispatch.failures,
@@ -288,8 +300,7 @@ class GcsLink:
         if trust is FrameTrust.REFUSED:
             return
         self.accepted += 1
-        if self._record is not None:
-            self._record(t_us, raw)
+        self._received.add(t_us, raw)
         if trust is FrameTrust.EXEMPT:
             return  # no sign of life either: anybody could start or stop a failsafe with it
         self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
@@ -303,7 +314,7 @@ class GcsLink:
         source = MessageSource(
             frame.system_id, frame.component_id, self.name, f"{host}:{port}", self.signing.active
         )
-        answer = self._commands.handle(frame, t_us, self._snapshot)
+        answer = self._commands.handle(frame, t_us, self._snapshot, sender)
         if answer is None:
             put_off = self._inbox.accept(frame, source)
             if put_off is not None:
@@ -348,10 +359,9 @@ class GcsLink:
 
     def _send(self, t_us: int) -> None:
         frames, asked_for = self.outbox.take()
-        if self._record is not None:
-            for frame in frames:
-                if frame[_MESSAGE_ID] not in _FILE_DATA:
-                    self._record(t_us, frame)
+        for frame in frames:
+            if frame[_MESSAGE_ID] not in _FILE_DATA:
+                self._told.add(t_us, frame)
         old = self._peers.version_1
         self._send_to([peer for peer in self._peers.all if peer not in old], frames)
         if old and not self.signing.active:

@@ -21,10 +21,10 @@ _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 # sending nor what a planning period begins with falls on the same tick.
 _ENCODES: Final = 2
 _SENDS: Final = 3
-_ONE: Final = 1  # byte of budget: one datagram
+_ONE: Final = 1  # byte of budget: one frame
 # What may have to be told at once, of a snapshot.
 _TOLD_AT_ONCE: Final = attrgetter("mode", "intended_mode", "armed", "landed", "failures", "mission")
-_GUARD_US: Final = 200  # before a tick: the dearest datagram takes less
+_GUARD_US: Final = 200  # before a tick: the dearest frame takes less
 # Of files, a tick and link: some 3 MB/s in real time, if the client asks as fast.
 _BULK_DATAGRAMS: Final = 6
 
@@ -66,7 +66,7 @@ class GroundLinks:
     def attend(self, seconds: float) -> None:
         """Sleep for ``seconds`` [s] and answer the ground: in real time it is heard between ticks.
 
-        One datagram is read at a time and none shortly before the end, so a flood delays no tick.
+        One frame is taken at a time and none shortly before the end, so a flood delays no tick.
         """
         self._attends = True
         begin = self._clock()
@@ -78,9 +78,12 @@ class GroundLinks:
             if bulk > 0:
                 served = [link.serve_bulk(t_us) for link in self.links if link.talks]
                 bulk = bulk - 1 if any(served) else 0
-            ready, _, _ = select.select(self.links, (), (), 0.0 if bulk else 1e-6 * left)
-            if not ready and not bulk:
+            begun = [link for link in self.links if link.has_frames]
+            at_once = bool(bulk or begun)
+            came, _, _ = select.select(self.links, (), (), 0.0 if at_once else 1e-6 * left)
+            if not came and not at_once:
                 break
+            ready = [link for link in self.links if link in came or link.has_frames]
             for link in ready:
                 budget -= _ONE - link.read(t_us, _ONE)
                 bulk = max(bulk, _ONE)  # it may have asked for more

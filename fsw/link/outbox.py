@@ -23,6 +23,7 @@ class Outbox:
         self.encode_failures = 0
         self._signing = signing
         self._writers = {id_: FrameWriter(SYSTEM_ID, id_) for id_ in (AUTOPILOT, PANDION)}
+        self.bytes = 0  # of the frames that wait
         self._frames: list[bytes] = []
         self._asked_for: set[bytes] = set()
         self._text_id = 0
@@ -80,6 +81,7 @@ class Outbox:
     def _add_frame(self, frame: bytes) -> int:
         sent = self._signing.signed(frame) if self._signing.active else frame
         self._frames.append(sent)
+        self.bytes += len(sent)
         return len(sent)
 
     def _add_text(self, text: StatusText) -> None:
@@ -90,7 +92,7 @@ class Outbox:
 
     def take(self) -> tuple[list[bytes], set[bytes]]:
         """Hand over the frames, in order, and those among them that were asked for."""
-        frames, self._frames = self._frames, []
+        frames, self._frames, self.bytes = self._frames, [], 0
         asked_for, self._asked_for = self._asked_for, set()
         return frames, asked_for
 

@@ -71,7 +71,7 @@ class ParameterStore:
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Every parameter in use, by name."""
+        """Every parameter in use, by name; another mapping after each change."""
         return self._values
 
     def is_changing(self, name: str) -> bool:
@@ -144,7 +144,7 @@ class ParameterStore:
         if change is None:
             return  # the values of the start
         if taken and self._executor is not None and self._save is not None:
-            self._values.update(change.values)
+            self._values = self._values | dict(change.values)
             self._saving = True
             self._job = self._executor.submit(self._save, dict(self._values))
         else:

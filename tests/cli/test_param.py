@@ -75,6 +75,7 @@ def test_what_cannot_be_done_is_one_sentence(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    Path("v.params").touch()
     where = [] if "--vehicle=here" in arguments else ["--file", "v.params"]
     try:
         ended = param.main([*arguments, *where])
@@ -84,7 +85,7 @@ def test_what_cannot_be_done_is_one_sentence(
     error = capsys.readouterr().err
     assert reported in error
     assert error.count("\n") == 1
-    assert not (tmp_path / "v.params").exists()
+    assert Path("v.params").read_text() == "", "nothing is written"
 
 
 @pytest.mark.parametrize(
@@ -241,3 +242,16 @@ def test_an_export_leaves_out_what_a_reader_would_refuse(
     assert "not a finite number: LND_SPEED, WALL_LAMBDA" in printed.err
     loaded = load(file)
     assert (loaded.values, loaded.complaints) == ({"PID_YAW_P": 5.0}, ())
+
+
+def test_a_file_that_is_not_there_has_no_values(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A name mistyped showed the defaults, as if the file had them."""
+    where = ["--file", str(tmp_path / "none.params")]
+    for words in (["list"], ["get", "WALL_LAMBDA"], ["export", str(tmp_path / "copy.params")]):
+        assert param.main([*words, *where]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert "No such file" in said.err
+    assert param.main(["set", "WALL_LAMBDA", "0.36", *where]) == 0, "this begins one"

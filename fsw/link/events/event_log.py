@@ -61,10 +61,8 @@ class EventLog:
 
     def find(self, sequence: int) -> NumberedEvent | None:
         """The event of a ``sequence`` number [1], None if it is not kept any more."""
-        for one in self._kept:
-            if one.sequence == sequence:
-                return one
-        return None
+        at = (sequence - self.oldest) % _SEQUENCE
+        return self._kept[at] if at < len(self._kept) else None
 
     @property
     def oldest(self) -> int:

@@ -15,7 +15,7 @@ from messages.frames import Frame
 from messages.message_ids import AUTOPILOT, SYSTEM_ID
 
 _ANNOUNCED_US: Final = 3_000_000  # between two announcements of the newest, as PX4
-_MOST: Final = 64  # answers to one request
+_MOST: Final = 32  # answers to one request: it must not take longer than a tick can wait
 _RESET: Final = 1  # MAV_EVENT_CURRENT_SEQUENCE_FLAGS
 _UNAVAILABLE: Final = 0  # MAV_EVENT_ERROR_REASON
 _MS: Final = 0xFFFFFFFF

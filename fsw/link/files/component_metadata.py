@@ -25,7 +25,8 @@ _EVENTS: Final = "events.json"
 
 def metadata_files() -> dict[str, Node]:
     """The documents, by their names in the root of the tree."""
-    _general()  # made now, so that no tick has to
+    for make in (_general, _parameters, event_document):
+        make()  # now, so that no tick has to: it takes longer than six of them
     return {
         _GENERAL: MemoryFile(lambda: _general()[0]),
         _PARAMETERS: MemoryFile(_parameters),

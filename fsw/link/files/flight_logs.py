@@ -55,7 +55,8 @@ class Erasure:
         self.reason = ""  # of the last that could not be
         self._logs = logs
         self._thread = threading.Thread(target=self._work, name="erase", daemon=True)
-        self._thread.start()
+        if logs:  # else there is nothing that takes time: a flood of requests starts no threads
+            self._thread.start()
 
     @property
     def done(self) -> bool:
@@ -118,7 +119,8 @@ class FlightLogs:
         Which of the others are finished is found out beside the ticks.
         """
         others = [log for log in self.all if log.flight != self._present]
-        self.all = tuple(log for log in self.all if log.flight == self._present)
+        if others:
+            self.all = tuple(log for log in self.all if log.flight == self._present)
         return Erasure(others)
 
 

@@ -7,6 +7,7 @@ Source: https://mavlink.io/en/services/ftp.html
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias, cast
@@ -129,10 +130,11 @@ class FtpService(LinkService):
             except StopIteration:
                 continue
             self._jobs[key] = running
-            if reply is not None:
-                running.sequence += 1
-                answers.append(_outgoing(reply, running.request, running.sequence, running.client))
-                ready.append(key)
+            if reply is None:
+                break  # it has worked, or waits: the others at the next tick, in their turn
+            running.sequence += 1
+            answers.append(_outgoing(reply, running.request, running.sequence, running.client))
+            ready.append(key)
         return answers
 
     def _answer(self, request: Request, client: Client, t_us: int) -> Reply | None:
@@ -192,10 +194,23 @@ class FtpService(LinkService):
         for key, session in list(self._sessions.items()):
             if t_us - session.used_us > _EXPIRY_US:
                 self._sessions.pop(key).file.close()
-        if len(self._sessions) >= _MAX_SESSIONS:
+        if len(self._sessions) >= _MAX_SESSIONS and not self._make_room(client):
             return None
         numbers: tuple[int, ...] = (wanted, *range(_MAX_SESSIONS))
         return next(number for number in numbers if (client, number) not in self._sessions)
+
+    def _make_room(self, client: Client) -> bool:
+        """Close the session that was used longest ago of who has most, so that nobody has all.
+
+        False: nobody has more than the ``client`` would have.
+        """
+        held = Counter(holder for holder, _ in self._sessions)
+        holder = max(held, key=held.__getitem__)
+        if held[holder] <= held[client] + 1:
+            return False
+        of_holder = [key for key in self._sessions if key[0] == holder]
+        self._close(min(of_holder, key=lambda key: self._sessions[key].used_us))
+        return True
 
     def _read(self, request: Request, client: Client, t_us: int) -> Reply | None:
         session = self._sessions.get((client, request.session))

@@ -76,7 +76,8 @@ class LogService(LinkService):
         elif frame.message_id == message_ids.LOG_REQUEST_END:
             self._stop()
         elif frame.message_id == message_ids.LOG_ERASE:
-            self._erasure = self._kept.erase()
+            if self._erasure is None:  # of one under way the outcome is still to be told
+                self._erasure = self._kept.erase()
             self._look_again()
         return ()
 

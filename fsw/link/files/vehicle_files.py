@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import count
 from typing import Final
 
@@ -15,37 +15,19 @@ _PX4_NAME: Final = "%Y-%m-%d/%H_%M_%S"
 _MAX_NAME = 200  # bytes: an entry of a directory must fit one message
 
 
-class _Flights(Mapping[str, Node]):
-    """A directory for each flight whose logs there still are."""
+class _LaidOut(Mapping[str, Node]):
+    """A directory made of the flights whose logs there still are."""
 
-    def __init__(self, logs: FlightLogs) -> None:
-        self._logs = logs
-
-    def __getitem__(self, name: str) -> Node:
-        for log in self._logs.all:
-            if log.flight == name and _can_be_listed(name):
-                return {file.path.name: file for file in log.files}
-        raise KeyError(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return (log.flight for log in self._logs.all if _can_be_listed(log.flight))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-
-class _DatedFlights(Mapping[str, Node]):
-    """The log of each flight as PX4 names it: by date and time (UTC) of its beginning."""
-
-    def __init__(self, logs: FlightLogs) -> None:
+    def __init__(self, logs: FlightLogs, lay_out: Callable[[Sequence[LoggedFlight]], Directory]):
         """Lay them out; again only when some have been erased, for it takes a while."""
         self._logs = logs
-        self._laid_out, self._days = logs.all, _by_day(logs.all)
+        self._lay_out = lay_out
+        self._laid_out, self._directory = logs.all, lay_out(logs.all)
 
     def _up_to_date(self) -> Directory:
         if self._logs.all is not self._laid_out:
-            self._laid_out, self._days = self._logs.all, _by_day(self._logs.all)
-        return self._days
+            self._laid_out, self._directory = self._logs.all, self._lay_out(self._logs.all)
+        return self._directory
 
     def __getitem__(self, name: str) -> Node:
         return self._up_to_date()[name]
@@ -55,6 +37,15 @@ class _DatedFlights(Mapping[str, Node]):
 
     def __len__(self) -> int:
         return len(self._up_to_date())
+
+
+def _by_name(flights: Sequence[LoggedFlight]) -> Directory:
+    """A directory for each flight."""
+    return {
+        one.flight: {file.path.name: file for file in one.files}
+        for one in flights
+        if _can_be_listed(one.flight)
+    }
 
 
 def _by_day(flights: Sequence[LoggedFlight]) -> Directory:
@@ -75,9 +66,9 @@ def vehicle_files(logs: FlightLogs) -> Directory:
 
     The logs are also where PX4 has them, in simulation (``log``) and on its card, by date.
     """
-    dated = _DatedFlights(logs)
+    dated = _LaidOut(logs, _by_day)
     px4 = {"log": dated, "fs": {"microsd": {"log": dated}}}
-    return {"logs": _Flights(logs), **metadata_files(), **px4}
+    return {"logs": _LaidOut(logs, _by_name), **metadata_files(), **px4}
 
 
 def _can_be_listed(name: str) -> bool:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, cast
 
 from fsw.autopilot.parameters.facts import ALIASES, FACT_BY_NAME, REPEATED
@@ -62,6 +62,8 @@ class ParameterService(LinkService):
         self._next = _COUNT  # index of the next one to list
         self._awaited: dict[str, None] = {}  # read while a change of them is under way
         self._burst_us = 0
+        self._hashed: Mapping[str, float] | None = None  # the values that have this hash:
+        self._hash_bits = 0.0
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """Answer a read, start a list, or pass a set request on."""
@@ -178,11 +180,13 @@ class ParameterService(LinkService):
 
     def _hash(self) -> Outgoing:
         """CRC-32 over names and values in order, nothing inverted; its bits in place of a float."""
-        state = 0xFFFFFFFF
-        for name in _NAMES:
-            state = zlib.crc32(name.encode() + as_bytes(self._read_value(name)), state)
-        (bits,) = struct.unpack("<f", struct.pack("<I", state ^ 0xFFFFFFFF))
-        return Outgoing(ids.PARAM_VALUE, (bits, _COUNT, _NO_INDEX, _HASH.encode(), _UINT32))
+        if self._hashed is not self._store.values:  # it takes as long as 20 answers
+            self._hashed, state = self._store.values, 0xFFFFFFFF
+            for name in _NAMES:
+                state = zlib.crc32(name.encode() + as_bytes(self._read_value(name)), state)
+            (self._hash_bits,) = struct.unpack("<f", struct.pack("<I", state ^ 0xFFFFFFFF))
+        values = (self._hash_bits, _COUNT, _NO_INDEX, _HASH.encode(), _UINT32)
+        return Outgoing(ids.PARAM_VALUE, values)
 
 
 def _error(index: int, name: str, error: int, asker: _Peer) -> Outgoing:

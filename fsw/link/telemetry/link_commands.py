@@ -11,7 +11,7 @@ from typing import Final
 
 from fsw.autopilot.signals import CommandAck, CommandRequest, FlightSnapshot, Severity, StatusText
 from fsw.link.services.service import LinkService
-from fsw.link.telemetry.stream_rates import UNKNOWN, StreamRates
+from fsw.link.telemetry.stream_rates import OFF, UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode, encode_replies
 from fsw.link.wire.outgoing import Outgoing
@@ -49,15 +49,16 @@ class LinkCommands:
         self._commanded = {command: service for service in services for command in service.commands}
 
     def handle(
-        self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None
+        self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None, asker: object = None
     ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
         """Carry out a command to the link: what to send, and why it was refused, if it was.
 
-        None if the frame is something else. The snapshot is the newest, None before the first tick.
+        None if the frame is something else. The snapshot is the newest, None before the first tick;
+        ``asker`` is the peer, whose wish for a rate is kept beside those of others.
         """
         decoder = _DECODERS.get(frame.message_id)
         request = None if decoder is None else decoder(frame)
-        outcome = None if request is None else self._carry_out(request, t_us, snapshot)
+        outcome = None if request is None else self._carry_out(request, t_us, snapshot, asker)
         if outcome is None or request is None:
             return None
         result, reason, messages = outcome
@@ -66,13 +67,13 @@ class LinkCommands:
         return (reply, *messages), _answer(reason)
 
     def _carry_out(
-        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None
+        self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None, asker: object
     ) -> _Outcome | None:
         message_id, second = _whole(request.params[0]), request.params[1]
         if request.command == _GET_MESSAGE_INTERVAL:
             return self._get_interval(message_id)
         if request.command == _SET_MESSAGE_INTERVAL:
-            return self._set_interval(message_id, _whole(second), t_us)
+            return self._set_interval(message_id, _whole(second), t_us, asker)
         if request.command == _REQUEST_MESSAGE:
             if message_id is None:
                 return _DENIED, "request message: param1 is not a message id", ()
@@ -94,13 +95,21 @@ class LinkCommands:
         values = (self._rates.interval_us(message_id), message_id & 0xFFFF)
         return _ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
 
-    def _set_interval(self, message_id: int | None, interval: int | None, t_us: int) -> _Outcome:
+    def _set_interval(
+        self, message_id: int | None, interval: int | None, t_us: int, asker: object
+    ) -> _Outcome:
         if message_id is None or interval is None:
             return _DENIED, "message interval: param1 is a message id, param2 a time in us", ()
         if self._rates.interval_us(message_id) == UNKNOWN:
             return _FAILED, "", ()
-        refusal = self._rates.set_interval(message_id, interval, t_us)
-        return (_DENIED if refusal else _ACCEPTED), refusal, ()
+        refusal = self._rates.set_interval(message_id, interval, t_us, asker)
+        if refusal:
+            return _DENIED, refusal, ()
+        in_force = self._rates.interval_us(message_id)
+        if in_force != OFF and (interval == OFF or 0 < in_force < interval):
+            why = "it is vital, or others on this link listen and have not asked for less"
+            return _ACCEPTED, f"message {message_id} comes every {in_force} us: {why}", ()
+        return _ACCEPTED, "", ()
 
     def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
         if snapshot is None:

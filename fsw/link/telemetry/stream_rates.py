@@ -6,10 +6,11 @@ is vital.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
+from fsw.link.bounded_memory import renew
 from fsw.link.telemetry.streams import Stream
 from messages.frames import whole_size
 
@@ -19,6 +20,7 @@ UNKNOWN: Final = 0  # MESSAGE_INTERVAL: not available
 _RENEWED: Final = 0.2  # of a size by each frame
 _NOTICED: Final = 0.02  # change of the share
 _MIN_SHARE: Final = 0.1  # of a line
+_MAX_ASKERS: Final = 8  # whose wishes are remembered: more than a link has peers
 _MAX_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
 
 
@@ -32,6 +34,17 @@ class _Timetable:
     due_us: int
     size: float  # bytes of a frame: all of its fields, and then as measured
     interval_us: int = OFF  # in force
+    wishes: dict[object, int] = field(default_factory=dict)  # intervals [us], by who asked
+
+    def want(self, listeners: Collection[object]) -> None:
+        """Take the shortest interval that anybody wishes: who has asked for none, the default.
+
+        So does who cannot speak before it hears us, of what is vital.
+        """
+        wishes = [*self.wishes.values()]
+        if self.stream.vital or any(one not in self.wishes for one in listeners):
+            wishes.append(self.default_us)
+        self.wanted_us = min((wish for wish in wishes if wish != OFF), default=OFF)
 
 
 class StreamRates:
@@ -51,6 +64,7 @@ class StreamRates:
         """
         self._tick_us = tick_us
         self._max_bytes_s = max_bytes_s
+        self._listeners: Collection[object] = ()
         self._begun = False
         self._rows = []
         for place, (stream, rate_hz) in enumerate(zip(streams, rates_hz, strict=True)):
@@ -95,21 +109,37 @@ class StreamRates:
                 return row.interval_us
         return UNKNOWN
 
-    def set_interval(self, message_id: int, interval_us: int, t_us: int) -> str:
-        """Change how often a message is sent, 0 as by default, -1 never; says why not."""
+    def heard_by(self, listeners: Collection[object]) -> None:
+        """Who listens and may ask: nobody loses to another's wish what it has not given up."""
+        if listeners != self._listeners:
+            self._listeners = listeners
+            for row in self._rows:
+                if row.wishes:
+                    row.want(listeners)
+            self._lay_out()
+
+    def set_interval(
+        self, message_id: int, interval_us: int, t_us: int, asker: object = None
+    ) -> str:
+        """Change how often a message is sent, 0 as by default, -1 never; says why not.
+
+        Of what several ask for the shortest interval [us] counts.
+        """
         rows = [row for row in self._rows if row.stream.message_id == message_id]
         if not rows:
             return f"message {message_id} is not one that this vehicle sends"
         if interval_us < OFF or 0 < interval_us < self._tick_us:
             return f"interval {interval_us} us is shorter than a tick, {self._tick_us} us"
-        before = [row.wanted_us for row in rows]
+        before = [(row.wishes, row.wanted_us) for row in rows]
         for row in rows:
-            row.wanted_us = interval_us or row.default_us
+            row.wishes = dict(row.wishes)
+            renew(row.wishes, asker, interval_us or row.default_us, _MAX_ASKERS)
+            row.want(self._listeners)
             row.due_us = t_us + max(row.wanted_us, 0)
         per_second = sum(1e6 / row.wanted_us for row in self._rows if row.wanted_us != OFF)
         if per_second > _MAX_PER_SECOND:
-            for row, wanted in zip(rows, before, strict=True):
-                row.wanted_us = wanted
+            for row, (wishes, wanted) in zip(rows, before, strict=True):
+                row.wishes, row.wanted_us = wishes, wanted
             return f"more than {_MAX_PER_SECOND} messages a second on one link"
         self._begun = True
         self._lay_out()

@@ -86,9 +86,9 @@ def _arm_or_disarm(request: CommandRequest, _: Locate) -> CommandAction:
 
 
 def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
-    if request.params[0] > 0.5:
+    if 0.5 < request.params[0] <= 1.0:
         return Order.TERMINATE
-    raise _InvalidError("not terminated: param1 must be above 0.5; it cannot be taken back")
+    raise _InvalidError("not terminated: param1 must be 1; it cannot be taken back")
 
 
 def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:

@@ -9,6 +9,7 @@ import socket
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -226,6 +227,42 @@ def test_peers_are_bounded_and_the_configured_one_stays(ground: Ground) -> None:
         other.close()
 
 
+def test_a_peer_that_speaks_is_not_pushed_out_by_newcomers(ground: Ground) -> None:
+    """A stranger with a few ports took all telemetry from a station that was not configured."""
+    first, *others = [station_socket() for _ in range(12)]
+    heartbeat = FrameWriter(255, 190).frame(ids.HEARTBEAT, *HEARTBEAT)
+    for other in others:
+        ground.polled(heartbeat, first)
+        ground.polled(heartbeat, other)
+    assert first.getsockname() in ground.link.peers
+    assert others[-1].getsockname() in ground.link.peers, "the newest is answered too"
+    ground.clock.pass_s(2.5)
+    for speaker in (others[-1], others[1], others[-1], first):
+        ground.polled(heartbeat, speaker)
+    kept = {others[-1].getsockname(), others[1].getsockname(), first.getsockname()}
+    assert kept <= set(ground.link.peers), "those that are silent go first"
+    for one in (first, *others):
+        one.close()
+
+
+def test_each_sender_has_its_turn(ground: Ground) -> None:
+    """A stranger's full datagrams delayed a ground station's commands by a second."""
+    heartbeat = FrameWriter(66, 66).frame(ids.HEARTBEAT, *HEARTBEAT)
+    owner = FrameWriter(255, 190)
+    ground.polled(owner.frame(ids.HEARTBEAT, *HEARTBEAT))
+    with closing(station_socket()) as stranger:
+        for _ in range(40):
+            stranger.sendto(heartbeat * 60, ("127.0.0.1", ground.link.port))
+        command = (*(0.0,) * 7, 511, 1, 1, 0)
+        ground.station.sendto(
+            owner.frame(ids.COMMAND_LONG, *command), ("127.0.0.1", ground.link.port)
+        )
+        ground.heard()
+        for _ in range(3):
+            ground.poll()
+        assert ids.COMMAND_ACK in [frame.message_id for frame in ground.heard()]
+
+
 def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
     other = station_socket()
     writer = FrameWriter(255, 190)
@@ -324,6 +361,22 @@ def test_a_flood_is_read_within_a_budget(ground: Ground) -> None:
     assert 0 < len(ground.recorded) < 400
 
 
+def test_a_flood_does_not_fill_the_disk(ground: Ground) -> None:
+    """A stranger's frames made the telemetry log grow by 1.2 MB/s."""
+    writer = FrameWriter(66, 66)
+    flood = b"".join(writer.frame(ids.PING, 1, k, 0, 0) for k in range(60))
+    for _ in range(300):
+        ground.t_us += 2_000
+        ground.polled(flood)
+    received = sum(len(frame) for _, frame in ground.recorded if frame[5] == 66)
+    assert 128_000 <= received + 100 < 1.7 * 128_000  # in 0.6 s, after one without any
+    assert counts(ground)["unrecorded"] > 1_000
+    ground.t_us += 1_000_000
+    before = len(ground.recorded)
+    ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT))
+    assert len(ground.recorded) == before + 1
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux counts them")
 def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
     ground: Ground,
@@ -334,10 +387,10 @@ def test_what_a_flood_left_for_the_kernel_to_drop_is_counted_to_the_datagram(
     sent = 2_000
     for _ in range(sent):
         ground.station.sendto(heartbeat, ("127.0.0.1", ground.link.port))
-    dropped = ground.link.dropped
-    assert dropped is not None
+    assert ground.link.dropped
     for _ in range(sent):
         ground.poll()
+    dropped = ground.link.dropped
     assert dropped == sent - (ground.link.accepted - 1) > 1_000
     assert ground.link.received == ground.links.received == sent + 1, "read or dropped"
     ground.links.close()

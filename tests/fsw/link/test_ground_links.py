@@ -7,7 +7,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +19,10 @@ from fsw.link.link_choice import LinkChoice, addresses
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.udp_endpoint import LinkError, OpenEndpoint
-from fsw.link.wire.outgoing import ServiceOutput
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split
-from tests.fsw.link.ground import Ground, ground_station
+from tests.fsw.link.ground import Ground, ground_station, station_socket
 from tests.fsw.link.snapshots import outputs_at
 
 HEARTBEAT = (0, 6, 8, 0, 4, 3)
@@ -73,6 +73,30 @@ def test_a_rate_is_one_links_own(both: tuple[Ground, Ground, GroundLinks]) -> No
     assert abs(sum(f.message_id == ids.ATTITUDE for f in api.heard()) - 4) <= 1
 
 
+def test_nobody_loses_telemetry_to_the_wish_of_another_on_its_link() -> None:
+    """A stranger turned HEARTBEAT and all else off for the owner."""
+    writer = FrameWriter(66, 66)
+
+    def wish(message_id: int, interval_us: float) -> bytes:
+        command = (float(message_id), interval_us, *(0.0,) * 5, 511, 1, 1, 0)
+        return writer.frame(ids.COMMAND_LONG, *command)
+
+    with ground_station() as gcs, closing(station_socket()) as stranger:
+        speak(gcs)
+        for message_id in (ids.HEARTBEAT, ids.ATTITUDE):
+            gcs.polled(wish(message_id, -1.0), stranger)
+        gcs.fly(600)  # 1.2 s
+        counts = Counter(frame.message_id for frame in gcs.fly(1000))
+        assert abs(counts[ids.ATTITUDE] - 100) <= 1
+        assert counts[ids.HEARTBEAT] == 2
+        gcs.polled(wish(ids.ATTITUDE, 10_000.0), stranger)
+        assert abs(Counter(f.message_id for f in gcs.fly(1000))[ids.ATTITUDE] - 200) <= 2
+        gcs.polled(wish(ids.ATTITUDE, -1.0))
+        gcs.polled(wish(ids.ATTITUDE, -1.0), stranger)
+        gcs.heard()
+        assert Counter(f.message_id for f in gcs.fly(1000))[ids.ATTITUDE] == 0, "nobody wants it"
+
+
 def test_an_answer_goes_to_the_link_the_command_came_from(
     both: tuple[Ground, Ground, GroundLinks],
 ) -> None:
@@ -120,9 +144,10 @@ class Counting(LinkService):
     """A service that says nothing, and counts how often it is asked whether it would."""
 
     message_ids = frozenset((ids.TIMESYNC,))
-    polls = 0
+    polls = asked = 0
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
+        self.asked += 1
         return ()
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
@@ -210,6 +235,44 @@ def test_sleeping_takes_as_long_as_it_should_under_a_flood(
         of_its_own.append(over[-1] - (queued_us() - queued))
     assert min(over) >= -5
     assert sorted(of_its_own)[10] < 500
+
+
+def test_a_datagram_of_many_requests_is_taken_frame_by_frame() -> None:
+    """150 lists of all parameters in one datagram took ten ticks."""
+    service, writer = Counting(), FrameWriter(66, 66)
+    with ground_station(services=(service,)) as gcs:
+        gcs.station.sendto(
+            b"".join(writer.frame(ids.TIMESYNC, 0, 1) for _ in range(90)),
+            ("127.0.0.1", gcs.link.port),
+        )
+        assert gcs.link.read(gcs.t_us, 1) <= 0
+        assert service.asked == 1
+        gcs.link.read(gcs.t_us, 1_000)
+        assert service.asked < 40
+        links = GroundLinks([gcs.link], 2_000, wall_us)
+        links.attend(0.02)
+        assert service.asked == 90, "the rest waits for nobody's next datagram"
+        assert not gcs.link.has_frames
+
+
+def test_what_is_answered_costs_as_much_as_what_asks() -> None:
+    """Nobody can have a vehicle send much more than is sent to it, to every other peer too."""
+    writer = FrameWriter(66, 66)
+    with ground_station(services=(Talkative(),)) as gcs:
+        for _ in range(20):
+            ask = writer.frame(ids.TIMESYNC, 0, 1)
+            gcs.station.sendto(ask, ("127.0.0.1", gcs.link.port))
+        gcs.link.read(gcs.t_us, 4_096)
+        assert 4_096 < sum(map(len, gcs.datagrams())) < 4_096 + 1_500
+
+
+class Talkative(LinkService):
+    """A service that answers a question with 40 messages."""
+
+    message_ids = frozenset((ids.TIMESYNC,))
+
+    def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
+        return [Outgoing(ids.TIMESYNC, (1, 1))] * 40
 
 
 def test_somebody_elses_answer_to_a_ping_is_not_answered(

@@ -299,7 +299,7 @@ def test_events_are_sent_again_and_what_is_not_kept_is_said_with_the_oldest() ->
     (error,) = [one for one in answers if one.message_id == message_ids.RESPONSE_EVENT_ERROR]
     assert error.values == (6, 7, 255, 190, 0)
     assert asked(log, 68, 70, system=2) == []
-    assert len(asked(log, 100, 99)) == 64, "an absurd request is bounded"
+    assert len(asked(log, 100, 99)) == 32, "an absurd request is bounded"
 
 
 def test_sequence_numbers_go_round() -> None:

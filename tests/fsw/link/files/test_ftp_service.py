@@ -6,6 +6,7 @@ import os
 import random
 import struct
 import time
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from fsw.link.files import component_metadata
 from fsw.link.files.flight_logs import MARK, FlightLogs
 from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal
 from fsw.link.files.ftp_service import FtpService
@@ -294,6 +296,33 @@ def test_sessions_are_few_and_come_back_when_their_client_has_gone(client: Clien
     assert client.open("/top")[0] == 1
 
 
+def test_a_tick_works_on_one_checksum(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve of them read and summed 780 kB in each tick."""
+    summed: list[int] = []
+    monkeypatch.setattr(zlib, "crc32", lambda data, crc: summed.append(len(data)) or crc)
+    frames = [
+        next(iter(split(FrameWriter(system, 1).frame(ids.FILE_TRANSFER_PROTOCOL, *request))))
+        for system in range(10, 15)
+        for request in [(0, 1, 1, *HEADER.pack(1, 0, 14, 4, 0, 0, 0), *b"/top".ljust(239, b"\0"))]
+    ]
+    for frame in frames:
+        assert client.service.handle(frame, client.t_us) == ()
+    client.service.poll(client.t_us)
+    assert len(summed) == 1
+
+
+def test_one_client_cannot_hold_all_sessions(client: Client) -> None:
+    for _ in range(8):
+        client.open("/top")
+    client.t_us += SECOND_US
+    client.ask(Opcode.READ_FILE, session=0, size=1)
+    other = Client(client.service, component=1, t_us=client.t_us)
+    other.open("/top")
+    assert client.ask(Opcode.READ_FILE, session=0, size=1).opcode == Opcode.ACK
+    gone = client.ask(Opcode.READ_FILE, session=1, size=1)
+    assert gone.refusal == Refusal.INVALID_SESSION, "the one that was used longest ago"
+
+
 def test_a_client_may_choose_the_number_of_its_session(client: Client) -> None:
     (chosen,) = client.send(Opcode.OPEN_FILE_RO, b"/top", session=231)
     (again,) = client.send(Opcode.OPEN_FILE_RO, b"/files/b", session=231)
@@ -493,3 +522,27 @@ def test_a_flight_keeps_its_date_when_it_is_an_earlier_one(tmp_path: Path) -> No
     os.utime(tmp_path / "first" / "flight.ulg", (4e9, 4e9))
     (earlier, _) = FlightLogs(tmp_path / "second", parameters).all
     assert (earlier.flight, earlier.begun_s) == ("first", before.begun_s)
+
+
+def test_a_directory_of_flights_is_laid_out_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each request for it looked at all 1000 flights, for several hundred microseconds."""
+    for name in ("a", "b", "c"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / MARK).write_bytes(bytes(tmp_path / "vehicle.params"))
+        (tmp_path / name / "flight.ulg").write_bytes(b"log")
+    files = vehicle_files(FlightLogs(tmp_path / "c", tmp_path / "vehicle.params"))
+    monkeypatch.setattr("fsw.link.files.vehicle_files._can_be_listed", None)
+    (listed,) = Client(FtpService(files)).send(Opcode.LIST_DIRECTORY, b"/logs", offset=1)
+    assert listed.data == b"Db\0Dc\0"
+
+
+def test_no_tick_makes_a_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first list of the root in flight wrote 66 kB of JSON, for 12 ms."""
+    (tmp_path / "run").mkdir()
+    component_metadata._parameters.cache_clear()
+    files = vehicle_files(FlightLogs(tmp_path / "run"))
+    monkeypatch.setattr("fsw.autopilot.parameters.metadata.parameter_document", None)
+    (listed,) = Client(FtpService(files)).send(Opcode.LIST_DIRECTORY, b"/")
+    assert b"parameters.json" in listed.data

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -268,6 +269,25 @@ def test_a_log_that_cannot_be_erased_is_told(tmp_path: Path) -> None:
     assert text.severity == 4
     assert "0 logs erased" in text.text
     assert "run-1" in text.text
+
+
+def test_a_flood_of_erasures_starts_one_thread_and_loses_no_outcome(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[threading.Thread] = []
+    monkeypatch.setattr(threading.Thread, "start", lambda thread: started.append(thread))
+    flight(tmp_path, "run-1", b"finished")
+    logs = FlightLogs(flight(tmp_path, "run-2", b"kept"), OWN)
+    client, other = Client(LogService(logs)), Client(LogService(logs))
+    for _ in range(5):
+        client.ask(ids.LOG_ERASE, 1, 1)
+        other.ask(ids.LOG_ERASE, 1, 1)
+    (thread,) = started
+    other.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, 1, 1)
+    client.ask(ids.LOG_ERASE, 1, 1)
+    thread.run()
+    assert client.polled() == [StatusText(Severity.INFO, "1 log erased, this flight's is kept")]
+    assert any(not isinstance(one, StatusText) for one in other.polled()), "the transfer goes on"
 
 
 def test_an_empty_log_of_an_earlier_flight_is_not_listed(tmp_path: Path) -> None:

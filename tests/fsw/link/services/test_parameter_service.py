@@ -373,6 +373,15 @@ def test_the_hash_tells_a_ground_station_that_it_knows_every_value(
     assert service.handle(setting(b"_HASH_CHECK", 1.0, type_=5), 0) == ()
 
 
+def test_the_checksum_is_made_once_for_the_same_values(
+    service: ParameterService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """150 requests for it, which fit one datagram, took five ticks."""
+    service.handle(reading(b"_HASH_CHECK"), 0)
+    monkeypatch.delattr(ParameterService, "_read_value")
+    assert len(service.handle(listing(), 0)) == 1
+
+
 def test_idle_it_says_nothing(service: ParameterService) -> None:
     assert service.poll(0) == ()
 

@@ -248,6 +248,7 @@ def test_termination_is_for_an_armed_vehicle() -> None:
     assert (decision.result, decision.mode, decision.alarming) == (ACCEPTED, Mode.FAULT, True)
     assert ask(STANDING, 185, 1.0).result == DENIED
     assert ask(HOLDING, 185, 0.5).result == DENIED, "as PX4: it cannot be taken back"
+    assert ask(HOLDING, 185, 1e38).result == DENIED, "a number out of range is no wish"
 
 
 @pytest.mark.parametrize("command", [310, 209])
