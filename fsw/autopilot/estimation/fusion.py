@@ -133,7 +133,7 @@ def _leans(x: Any, rows: int, scaled: int) -> bool:
     most, step, along, offset = _LEANS * math.sqrt(scatter), 0.0, 0.0, 0.0
     for k in range(rows):
         step += (x.residual[k] - last[k]) ** 2
-    leaps = step > _LEAPS * _LEAPS
+    leaps = step > _LEAPS * _LEAPS * scatter
     for k in range(rows):
         leapt[k] = _KEEPS * leapt[k] + (x.residual[k] - last[k] if leaps else 0.0)
         last[k] = x.residual[k]
