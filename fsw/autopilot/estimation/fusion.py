@@ -104,7 +104,7 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
         if scaled >= 0:
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     ratio = distance(x, rows) / gate
-    if scaled >= 0 and _leans(x, rows, scaled) and not x.suspect & NOTHING:
+    if scaled >= 0 and _leans(x, rows, scaled, ratio > 1.0) and not x.suspect & NOTHING:
         _doubt_force(x)
         for k in range(rows):
             x.residual[k] = x.innovation[part, k]
@@ -119,10 +119,11 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
 
 
 @compilable
-def _leans(x: Any, rows: int, scaled: int) -> bool:
+def _leans(x: Any, rows: int, scaled: int, refused: bool) -> bool:
     """Whether innovations of a kind that is ``scaled`` [1] lean one way, by a leaky sum of them.
 
-    Noise does not. What has leapt has not grown: it is left out, as far as it stays.
+    Noise does not. What has leapt has not grown: it is left out, as far as it stays, which it does
+    while it is ``refused``.
     """
     # Satellites' places wander. What is wrong beside a pose that does not drift, or an attitude,
     # the law for who is wrong finds soon enough, and a pose's delay leans as well.
@@ -135,18 +136,18 @@ def _leans(x: Any, rows: int, scaled: int) -> bool:
         step += (x.residual[k] - last[k]) ** 2
     leaps = step > _LEAPS * _LEAPS * scatter
     for k in range(rows):
-        leapt[k] = _KEEPS * leapt[k] + (x.residual[k] - last[k] if leaps else 0.0)
+        leapt[k] = (1.0 if refused else _KEEPS) * leapt[k]
+        leapt[k] += x.residual[k] - last[k] if leaps else 0.0
         last[k] = x.residual[k]
         along += leapt[k] * last[k]
         offset += leapt[k] * leapt[k]
     taken, squared = min(max(along / max(offset, 1e-12), 0.0), 1.0), 0.0
     for k in range(rows):
-        leapt[k] *= taken
-        squared += (last[k] - leapt[k]) ** 2
+        squared += (last[k] - taken * leapt[k]) ** 2
     share = 1.0 / max(math.sqrt(squared) / (_COUNTS * most), 1.0)
     squared = 0.0
     for k in range(rows):
-        leaning[k] = 0.0 if leaps else _KEEPS * leaning[k] + (last[k] - leapt[k]) * share
+        leaning[k] = 0.0 if leaps else _KEEPS * leaning[k] + (last[k] - taken * leapt[k]) * share
         squared += leaning[k] * leaning[k]
     if squared < most * most:
         return False
