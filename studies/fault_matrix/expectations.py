@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import typing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -40,6 +40,7 @@ _EXPECTED: Final = (
     "force",
     "why",
 )
+_SIGNED: Final = ("wrong", "drifting", "turning", "tilting")  # kinds whose size has a direction
 _KNOWN: Final = (
     "name",
     "units",
@@ -47,6 +48,7 @@ _KNOWN: Final = (
     "instances",
     "with",
     "suites",
+    "mirrored",
     "link",
     "in",
     *_NUMBERS,
@@ -152,14 +154,9 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
         if key not in _KNOWN:
             raise ExpectationError(f'unknown key "{key}" (known: {", ".join(_KNOWN)})')
     suites = _words(table, "suites", SUITE_NAMES, ("perfect",))
-    link = table.get("link", False)
-    if not isinstance(link, bool):
-        raise ExpectationError(f"link = {_shown(link)}: must be true or false")
-    found = []
-    more = _more(table)
-    for fault, name in _faults(table):
-        modes = _modes(table, _names(fault, names))
-        faults = () if fault is None else (fault, *more)
+    link, found = _truth(table, "link"), []
+    for faults, name in _faults(table):
+        modes = _modes(table, _names(faults, names))
         for suite in suites:
             if any(is_believed(one, suite) for one in faults):
                 raise ExpectationError(
@@ -172,16 +169,24 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
     return found
 
 
-def _faults(table: dict[str, Any]) -> list[tuple[Fault | None, str]]:
+def _truth(table: dict[str, Any], key: str) -> bool:
+    value = table.get(key, False)
+    if not isinstance(value, bool):
+        raise ExpectationError(f"{key} = {_shown(value)}: must be true or false")
+    return value
+
+
+def _faults(table: dict[str, Any]) -> list[tuple[tuple[Fault, ...], str]]:
+    """The faults of each flight, and its name."""
     units = _words(table, "units", _UNITS, ())
     kinds = _words(table, "kinds", _KINDS, ())
     numbers: dict[str, Any] = {key: table[key] for key in _NUMBERS if key in table}
     given = table.get("name")
     if given is not None and not (isinstance(given, str) and given):
         raise ExpectationError(f"name = {_shown(given)}: must be a text")
+    more, found = _more(table), []
     if not units:
-        return [(None, given or "none")]
-    found: list[tuple[Fault | None, str]] = []
+        return [((), given or "none")]
     for unit in units:
         instances = _instances(table, typing.cast(Unit, unit))
         for kind in kinds:
@@ -189,8 +194,19 @@ def _faults(table: dict[str, Any]) -> list[tuple[Fault | None, str]]:
                 keys: dict[str, Any] = {"unit": unit, "kind": kind, "instance": instance, **numbers}
                 fault: Fault = build_table(Fault, keys, "")
                 name = f"{unit}-{kind}" + (f"-{instance}" if instance else "")
-                found.append((fault, (given or name).replace(" ", "-")))
-    return found
+                found.append(((fault, *more), (given or name).replace(" ", "-")))
+    if not _truth(table, "mirrored"):
+        return found
+    others = [(_mirrored(faults), f"{name}-mirrored") for faults, name in found]
+    others = [other for other, one in zip(others, found, strict=True) if other[0] != one[0]]
+    if not others:
+        raise ExpectationError(f"mirrored: one of the kinds must be {', '.join(_SIGNED)}")
+    return found + others
+
+
+def _mirrored(faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
+    """The faults the other way round: what pushed away from a wall leads into it."""
+    return tuple([replace(one, size=-one.size) if one.kind in _SIGNED else one for one in faults])
 
 
 def _more(table: dict[str, Any]) -> tuple[Fault, ...]:
@@ -226,9 +242,9 @@ def _shown(value: Any) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
 
-def _names(fault: Fault | None, names: dict[str, str]) -> str:
-    """What a text of a fault must name, where its table does not say: the unit and its number."""
-    return "" if fault is None else names.get(fault.unit, "").replace("#", str(fault.number))
+def _names(faults: tuple[Fault, ...], names: dict[str, str]) -> str:
+    """What a text must name, where its table does not say: the first one's unit and number."""
+    return names.get(faults[0].unit, "").replace("#", str(faults[0].number)) if faults else ""
 
 
 def _modes(table: dict[str, Any], names: str) -> dict[str, Expectation]:

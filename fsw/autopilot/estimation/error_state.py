@@ -95,10 +95,11 @@ FILTER: Final = np.dtype(
         ("innovated_last", float, (4, ROWS)),
         ("innovated_before", float, (4, len(LAGS), 2, ROWS)),
         ("innovations", np.int64, (4,)),  # how many there have been
-        # By what share of its variance one differs from the next, up to 1; those that lean one way,
-        # each over its deviation; and when they did so plainly [s], 0: never.
+        # By what share of its variance one differs from the next, up to 1; of those that lean one
+        # way, each over its deviation, the sum, the last one, and what of that has leapt; and when
+        # they did so plainly [s], 0: never.
         ("scatter", float, (4,)),
-        ("leaning", float, (4, ROWS)),
+        ("leaning", float, (4, 3, ROWS)),
         ("leant_at", float),
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.

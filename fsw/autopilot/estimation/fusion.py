@@ -47,7 +47,7 @@ _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noi
 _KEEPS = 0.8
 _LEANS = 8.0
 _COUNTS = 0.55
-_LEAPS = 9.0  # deviations, that no growth makes
+_LEAPS = 4.5  # deviations, that no growth makes from one to the next
 _MIN_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
 # What is not known of a force then, for how long it has been so, and how well that is known.
 _LEANT_FORCE = 3.0  # m/s^2
@@ -104,7 +104,7 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
         if scaled >= 0:
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     ratio = distance(x, rows) / gate
-    if scaled >= 0 and _leans(x, rows, scaled) and not x.suspect & NOTHING:
+    if scaled >= 0 and _leans(x, rows, scaled, ratio > 1.0) and not x.suspect & NOTHING:
         _doubt_force(x)
         for k in range(rows):
             x.residual[k] = x.innovation[part, k]
@@ -119,25 +119,35 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
 
 
 @compilable
-def _leans(x: Any, rows: int, scaled: int) -> bool:
+def _leans(x: Any, rows: int, scaled: int, refused: bool) -> bool:
     """Whether innovations of a kind that is ``scaled`` [1] lean one way, by a leaky sum of them.
 
-    Noise does not. One that is far off begins anew: it has jumped, and not grown.
+    Noise does not. What has leapt has not grown: it is left out, as far as it stays, which it does
+    while it is ``refused``.
     """
     # Satellites' places wander. What is wrong beside a pose that does not drift, or an attitude,
     # the law for who is wrong finds soon enough, and a pose's delay leans as well.
     if not (scaled == GNSS + 1 or (scaled == POSE and x.drifts)):
         return False
-    squared, leaning, most = 0.0, x.leaning[scaled], _LEANS
-    if scaled != POSE:
-        most *= math.sqrt(max(x.scatter[scaled], _MIN_SCATTER))
+    leaning, last, leapt = x.leaning[scaled, 0], x.leaning[scaled, 1], x.leaning[scaled, 2]
+    scatter = max(x.scatter[scaled], 1.0 if scaled == POSE else _MIN_SCATTER)
+    most, step, along, offset = _LEANS * math.sqrt(scatter), 0.0, 0.0, 0.0
     for k in range(rows):
-        squared += x.residual[k] * x.residual[k]
-    share = 1.0 if squared < _LEAPS * _LEAPS else 0.0
-    share /= max(math.sqrt(squared) / (_COUNTS * most), 1.0)
+        step += (x.residual[k] - last[k]) ** 2
+    leaps = step > _LEAPS * _LEAPS * scatter
+    for k in range(rows):
+        leapt[k] = (1.0 if refused else _KEEPS) * leapt[k]
+        leapt[k] += x.residual[k] - last[k] if leaps else 0.0
+        last[k] = x.residual[k]
+        along += leapt[k] * last[k]
+        offset += leapt[k] * leapt[k]
+    taken, squared = min(max(along / max(offset, 1e-12), 0.0), 1.0), 0.0
+    for k in range(rows):
+        squared += (last[k] - taken * leapt[k]) ** 2
+    share = 1.0 / max(math.sqrt(squared) / (_COUNTS * most), 1.0)
     squared = 0.0
     for k in range(rows):
-        leaning[k] = (_KEEPS * leaning[k] + x.residual[k] * share) if share > 0.0 else 0.0
+        leaning[k] = 0.0 if leaps else _KEEPS * leaning[k] + (last[k] - taken * leapt[k]) * share
         squared += leaning[k] * leaning[k]
     if squared < most * most:
         return False
@@ -182,7 +192,7 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
             total -= L[k, j] * y[j]
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
-    x.scatter[scaled] += _RATE * (min(0.5 * squared / rows, 1.0) - x.scatter[scaled])
+    x.scatter[scaled] += _RATE * (min(0.5 * squared / rows, _MOST) - x.scatter[scaled])
     own = x.noise_by_lag[scaled]
     own[0] = min(followed(own[0], squared / rows, _SCALE_FROM), _SCALE_LIMIT)
     largest, count = own[0], x.innovations[scaled]

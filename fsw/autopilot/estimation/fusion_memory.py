@@ -182,11 +182,20 @@ class FusionMemory:
         """
         reset = Reset(self.reset.number + 1, position, velocity, turn, expected)
         memory = replace(self, reset=reset)
-        return memory if expected else memory.led(position)
+        return memory._begun_anew() if expected else memory.led(position)
 
     def led(self, by: Vec3) -> FusionMemory:
         """The memory after the estimate was moved ``by`` [m, NED], and none but a place says so."""
-        return replace(self, unproven=add_scaled(self.unproven, by, 1.0))
+        return replace(self, unproven=add_scaled(self.unproven, by, 1.0))._begun_anew()
+
+    def _begun_anew(self) -> FusionMemory:
+        """The memory whose innovations are compared from now on.
+
+        They begin at none: one that has gone because the estimate has moved there was no noise.
+        """
+        for before in ("innovated_last", "innovated_before", "leaning"):
+            self.numbers[before] = 0.0
+        return self
 
 
 def copied(x: NDArray[Any]) -> NDArray[Any]:

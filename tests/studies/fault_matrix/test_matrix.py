@@ -13,7 +13,7 @@ import pytest
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.signals import ActuatorCommand, Mode, Severity
 from pandion.faults import main
-from sitl.faults.keys import KINDS, Fault
+from sitl.faults.keys import KINDS, SENSORS, Fault
 from studies.fault_matrix import matrix
 from studies.fault_matrix.expectations import (
     Expectation,
@@ -42,6 +42,17 @@ def test_every_mode_and_every_way_to_fail_is_flown() -> None:
     there = {(unit, kind) for unit, kinds in KINDS.items() for kind in kinds}
     # No suite has a camera for it.
     assert there - flown == {("optical flow", kind) for kind in KINDS["optical flow"]}
+
+
+def test_what_a_sensor_says_wrongly_is_flown_both_ways_round() -> None:
+    """There is one wall: what pushes away from it is no test of what keeps off it."""
+    all_ways = {(one.faults, one.suite) for one in expectations().values()}
+    signed = ("wrong", "drifting", "turning", "tilting")
+    for faults, suite in all_ways:
+        if any(it.kind in signed for it in faults) and all(it.unit in SENSORS for it in faults):
+            sizes = [-it.size if it.kind in signed else it.size for it in faults]
+            other = [replace(it, size=size) for it, size in zip(faults, sizes, strict=True)]
+            assert (tuple(other), suite) in all_ways, faults
 
 
 def test_what_must_be_told_names_the_unit_and_its_number() -> None:
@@ -209,6 +220,8 @@ _MOTOR = '[[faults]]\nunits = ["motor"]\nkinds = ["weak"]\nthen = ["hold"]\n'
         (f"{_MOTOR}jump_s = {'9' * 400}", "jump_s = 999"),
         (f'{_MOTOR}name = "a"\nwith = [{{ unit = "gyro" }}]', 'missing key "with[0].kind"'),
         (f'{_MOTOR}with = [{{ unit = "gyro", kind = "off" }}]', "needs a name"),
+        (f"{_MOTOR}mirrored = 3", "mirrored = 3: must be true or false"),
+        (f"{_MOTOR}mirrored = true", "mirrored: one of the kinds must be wrong, drifting"),
         (f'{_MOTOR}name = "a"\nwith = 3', "with must be an array of tables"),
         (f"{_MOTOR}name = 5", "name = 5: must be a text"),
         (f'{_MOTOR}link = "no"', "link = 'no': must be true or false"),
