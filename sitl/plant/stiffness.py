@@ -13,6 +13,7 @@ from sitl.plant.actuators import SLOW
 from sitl.plant.aerial_manipulator import Plant, Workspace, empty_workspace, place_bodies
 from sitl.plant.contact import SLIP_RATE
 from sitl.plant.mass_matrix import mass_matrix
+from sitl.plant.packing import pack_params
 from sitl.plant.parameters import GRAVITY, Effects, Surface, plant
 from sitl.plant.state import THRUST, at_rest
 from sitl.plant.vector import Array
@@ -94,7 +95,8 @@ def fastest_rates(vehicle: Vehicle, motor_inertia: float = 0.0) -> tuple[float, 
     and every stop is touched at once. Each joint carries a ``motor_inertia`` [kg·m²] beside its
     armature. The vehicle stands on all feet in its posture of rest.
     """
-    numbers, work = plant(vehicle, Effects(motor_inertia=motor_inertia)), empty_workspace()
+    numbers = plant(vehicle, Effects(motor_inertia=motor_inertia))
+    work = pack_params(empty_workspace())
     joints, arm = len(vehicle.joints), THRUST + len(vehicle.rotors)
     state, stops = at_rest(len(vehicle.rotors), joints), numbers.stops
     there = np.isfinite(stops.most) | np.isfinite(stops.least)
@@ -124,7 +126,8 @@ def steps_of_touch(
     Raises:
         TooStiffError: Into more than the plant has time for.
     """
-    numbers, work = plant(vehicle, Effects(motor_inertia=motor_inertia)), empty_workspace()
+    numbers = plant(vehicle, Effects(motor_inertia=motor_inertia))
+    work = pack_params(empty_workspace())
     state, last = at_rest(len(vehicle.rotors), len(vehicle.joints)), len(vehicle.joints)
     arm, fastest = THRUST + len(vehicle.rotors), 0.0
     for angles in _postures(vehicle):

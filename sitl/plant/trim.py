@@ -8,6 +8,7 @@ import numpy as np
 
 from sitl.plant.bodies import empty_posture, posture_into
 from sitl.plant.newton_euler import wrench_needed_into
+from sitl.plant.packing import pack_params
 from sitl.plant.parameters import GRAVITY, chain, effectiveness
 from sitl.plant.vector import V3
 from vehicles.description import Vehicle
@@ -33,8 +34,9 @@ def level_hover(vehicle: Vehicle, angles: tuple[float, ...]) -> Trim:
     Raises:
         NoTrimError: A rotor or a joint would have to exceed its limit.
     """
-    posture, needed, zeros = empty_posture(), np.empty(6 + len(angles)), np.zeros(len(angles))
-    bodies, still = chain(vehicle), (0.0, 0.0, 0.0)
+    # As the plant has them: for others its kernels would be compiled anew.
+    bodies, posture = pack_params(chain(vehicle)), pack_params(empty_posture())
+    needed, zeros, still = np.empty(6 + len(angles)), np.zeros(len(angles)), (0.0, 0.0, 0.0)
     posture_into(bodies, np.array(angles), 0, posture)
     up = (0.0, 0.0, -GRAVITY)
     wrench_needed_into(bodies, posture, still, still, up, zeros, zeros, needed)
@@ -67,7 +69,7 @@ def standing_height(vehicle: Vehicle) -> float:
 
 def end_effector(vehicle: Vehicle, angles: tuple[float, ...]) -> V3:
     """End-effector in B [m] with the joints at ``angles`` (j,) [rad]."""
-    posture = empty_posture()
-    posture_into(chain(vehicle), np.array(angles), 0, posture)
+    posture = pack_params(empty_posture())
+    posture_into(pack_params(chain(vehicle)), np.array(angles), 0, posture)
     x, y, z = posture.origin[len(angles) + 1].tolist()
     return (x, y, z)
