@@ -29,6 +29,15 @@ from fsw.autopilot.estimation.error_state import (
     vec4,
 )
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.geometry.vectors import (
+    add,
+    add_scaled,
+    dot,
+    norm,
+    put_three,
+    subtract,
+    three,
+)
 from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
@@ -48,6 +57,8 @@ _KEEPS = 0.8
 _LEANS = 8.0
 _COUNTS = 0.55
 _LEAPS = 4.5  # deviations, that no growth makes from one to the next
+_SUM, _LAST, _LEAPT = 0, 1, 2  # what is remembered of each kind
+_NONE: Vec3 = (0.0, 0.0, 0.0)
 _MIN_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
 # What is not known of a force then, for how long it has been so, and how well that is known.
 _LEANT_FORCE = 3.0  # m/s^2
@@ -104,7 +115,7 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
         if scaled >= 0:
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     ratio = distance(x, rows) / gate
-    if scaled >= 0 and _leans(x, rows, scaled, ratio > 1.0) and not x.suspect & NOTHING:
+    if scaled >= 0 and _leans(x, scaled, ratio > 1.0) and not x.suspect & NOTHING:
         _doubt_force(x)
         for k in range(rows):
             x.residual[k] = x.innovation[part, k]
@@ -119,42 +130,47 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
 
 
 @compilable
-def _leans(x: Any, rows: int, scaled: int, refused: bool) -> bool:
+def _leans(x: Any, scaled: int, refused: bool) -> bool:
     """Whether innovations of a kind that is ``scaled`` [1] lean one way, by a leaky sum of them.
 
-    Noise does not. What has leapt has not grown: it is left out, as far as it stays, which it does
-    while it is ``refused``.
+    Noise does not, nor does what has leapt and not grown.
     """
     # Satellites' places wander. What is wrong beside a pose that does not drift, or an attitude,
     # the law for who is wrong finds soon enough, and a pose's delay leans as well.
     if not (scaled == GNSS + 1 or (scaled == POSE and x.drifts)):
         return False
-    leaning, last, leapt = x.leaning[scaled, 0], x.leaning[scaled, 1], x.leaning[scaled, 2]
-    scatter = max(x.scatter[scaled], 1.0 if scaled == POSE else _MIN_SCATTER)
-    most, step, along, offset = _LEANS * math.sqrt(scatter), 0.0, 0.0, 0.0
-    for k in range(rows):
-        step += (x.residual[k] - last[k]) ** 2
-    leaps = step > _LEAPS * _LEAPS * scatter
-    for k in range(rows):
-        leapt[k] = (1.0 if refused else _KEEPS) * leapt[k]
-        leapt[k] += x.residual[k] - last[k] if leaps else 0.0
-        last[k] = x.residual[k]
-        along += leapt[k] * last[k]
-        offset += leapt[k] * leapt[k]
-    taken, squared = min(max(along / max(offset, 1e-12), 0.0), 1.0), 0.0
-    for k in range(rows):
-        squared += (last[k] - taken * leapt[k]) ** 2
-    share = 1.0 / max(math.sqrt(squared) / (_COUNTS * most), 1.0)
-    squared = 0.0
-    for k in range(rows):
-        leaning[k] = 0.0 if leaps else _KEEPS * leaning[k] + (last[k] - taken * leapt[k]) * share
-        squared += leaning[k] * leaning[k]
-    if squared < most * most:
-        return False
-    x.leant_at = x.time
-    for k in range(rows):
-        leaning[k] = 0.0
-    return True
+    memory = x.leaning[scaled]
+    scatter = math.sqrt(max(x.scatter[scaled], 1.0 if scaled == POSE else _MIN_SCATTER))
+    grown, leaps = _without_leap(memory, three(x.residual, 0), _LEAPS * scatter, refused)
+    most = _LEANS * scatter
+    share = 1.0 / max(norm(grown) / (_COUNTS * most), 1.0)
+    total = _NONE
+    if not leaps:
+        kept = add_scaled(_NONE, three(memory[_SUM], 0), _KEEPS)
+        total = add_scaled(kept, grown, share)
+    leans = dot(total, total) >= most * most
+    if leans:
+        x.leant_at, total = x.time, _NONE
+    put_three(memory[_SUM], 0, total)
+    return leans
+
+
+@compilable
+def _without_leap(memory: Any, z: Vec3, most: float, refused: bool) -> tuple[Vec3, bool]:
+    """An innovation ``z`` [1], over its deviation, without what has leapt; whether it leaps.
+
+    That is by more than ``most`` [1] from the last one. It is left out as far as it stays, which it
+    does while it is ``refused``: else the filter takes it in.
+    """
+    step = subtract(z, three(memory[_LAST], 0))
+    leaps = dot(step, step) > most * most
+    leapt = add_scaled(_NONE, three(memory[_LEAPT], 0), 1.0 if refused else _KEEPS)
+    if leaps:
+        leapt = add(leapt, step)
+    put_three(memory[_LAST], 0, z)
+    put_three(memory[_LEAPT], 0, leapt)
+    stays = min(max(dot(leapt, z) / max(dot(leapt, leapt), 1e-12), 0.0), 1.0)
+    return add_scaled(z, leapt, -stays), leaps
 
 
 @compilable
