@@ -50,6 +50,7 @@ _RATE = 0.06
 _MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
+_DOUBTED_GATE = 0.2  # of the chi-square of a part whose other part is refused
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
 # Innovations in a row, each over its deviation, lean one way from so large a sum on that keeps so
 # much of itself from one to the next; a single one counts by at most a share of that.
@@ -102,20 +103,24 @@ def clear(x: Any, rows: int) -> None:
 
 
 @compilable
-def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> float:
+def judged(
+    x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1, doubted: bool = False
+) -> float:
     """Chi-square over ``gate`` [1] of a part of a measurement; fuses what is within it.
 
     The variance of what is ``scaled`` grows where innovations say that it is larger than stated.
     They say so by how they differ from one to the next: noise is what does not stay. What stays is
     somebody's error, and no reason to believe a measurement less. Of what stays and grows the force
-    is doubted that predicts.
+    is doubted that predicts. A part is ``doubted`` whose sensor's other part is refused: what is
+    wrong in one may be so in both, so it must be nearer, and says nothing of a force.
     """
     for k in range(rows):
         x.innovation[part, k] = x.residual[k]
         if scaled >= 0:
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
+    gate *= _DOUBTED_GATE if doubted else 1.0
     ratio = distance(x, rows) / gate
-    if scaled >= 0 and _leans(x, scaled, ratio > 1.0) and not x.suspect & NOTHING:
+    if scaled >= 0 and not doubted and _leans(x, scaled) and not x.suspect & NOTHING:
         _doubt_force(x)
         for k in range(rows):
             x.residual[k] = x.innovation[part, k]
@@ -130,7 +135,7 @@ def judged(x: Any, rows: int, gate: float, part: int = 0, scaled: int = -1) -> f
 
 
 @compilable
-def _leans(x: Any, scaled: int, refused: bool) -> bool:
+def _leans(x: Any, scaled: int) -> bool:
     """Whether innovations of a kind that is ``scaled`` [1] lean one way, by a leaky sum of them.
 
     Noise does not, nor does what has leapt and not grown.
@@ -141,7 +146,7 @@ def _leans(x: Any, scaled: int, refused: bool) -> bool:
         return False
     memory = x.leaning[scaled]
     scatter = math.sqrt(max(x.scatter[scaled], 1.0 if scaled == POSE else _MIN_SCATTER))
-    grown, leaps = _without_leap(memory, three(x.residual, 0), _LEAPS * scatter, refused)
+    grown, leaps = _without_leap(memory, three(x.residual, 0), _LEAPS * scatter)
     most = _LEANS * scatter
     share = 1.0 / max(norm(grown) / (_COUNTS * most), 1.0)
     total = _NONE
@@ -156,15 +161,15 @@ def _leans(x: Any, scaled: int, refused: bool) -> bool:
 
 
 @compilable
-def _without_leap(memory: Any, z: Vec3, most: float, refused: bool) -> tuple[Vec3, bool]:
+def _without_leap(memory: Any, z: Vec3, most: float) -> tuple[Vec3, bool]:
     """An innovation ``z`` [1], over its deviation, without what has leapt; whether it leaps.
 
-    That is by more than ``most`` [1] from the last one. It is left out as far as it stays, which it
-    does while it is ``refused``: else the filter takes it in.
+    That is by more than ``most`` [1] from the last one. It is left out as far as it stays, and as
+    the filter takes it in.
     """
     step = subtract(z, three(memory[_LAST], 0))
     leaps = dot(step, step) > most * most
-    leapt = add_scaled(_NONE, three(memory[_LEAPT], 0), 1.0 if refused else _KEEPS)
+    leapt = add_scaled(_NONE, three(memory[_LEAPT], 0), _KEEPS)
     if leaps:
         leapt = add(leapt, step)
     put_three(memory[_LAST], 0, z)

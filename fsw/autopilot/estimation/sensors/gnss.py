@@ -34,7 +34,6 @@ from fsw.autopilot.signals import Vec2, Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
 _FASTEST: Final = 50.0  # m/s
-_BESIDE_REFUSED: Final = 0.2  # of the velocity's chi-square gate, where the place is refused
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _FINE: Vec3 = (1e-4, 1e-4, 1e-4)
 
@@ -160,16 +159,14 @@ def fuse_gnss(
     """Fuse position and velocity of ``time`` [s]: chi-square over gate of each.
 
     ``gates`` [1] are chi-squares, ``position`` [m, NED], ``velocity`` [m/s, NED],
-    ``position_variance`` [m^2, NED], ``velocity_variance`` [m^2/s^2, NED]. Of a place that is
-    refused the velocity must be nearer: a receiver that is wrong may be so in both.
+    ``position_variance`` [m^2, NED], ``velocity_variance`` [m^2/s^2, NED].
     """
     x = filters[0]
     dt = time - x.time
     position_rows(x, position, position_variance, dt, 0.0)
     first = judged(x, 3, gates[0], 0, GNSS)
     velocity_rows(x, velocity, velocity_variance, dt)
-    share = 1.0 if first <= 1.0 else _BESIDE_REFUSED
-    return first, judged(x, 3, share * gates[1], 1, GNSS + 1)
+    return first, judged(x, 3, gates[1], 1, GNSS + 1, first > 1.0)
 
 
 @machine_code
