@@ -36,6 +36,9 @@ _SPEED_KNOWN: Final = 1.0  # m/s, standard deviation; PX4's limit of a usable ve
 _SPEED_GOOD: Final = 0.5  # m/s; from here to there the vehicle draws back ever slower
 _BACK: Final = 1.0  # m/s, as fast as it draws back at most
 _BACK_RATE: Final = 1.5  # 1/s
+# Legs that touch the ground as the vehicle draws back would trip it: it is at rest across by then.
+_REST_ACROSS: Final = 2.0  # m/s^2 that are counted on
+_RESTS_FOR: Final = 0.3  # s before legs touch; loops lag
 # Where nothing but the rotors' model is left, it sinks ever faster from where the ground should be.
 _THROUGH: Final = 10.0  # m/s
 
@@ -72,7 +75,7 @@ class Descent:
         if is_hurried(aiding, self._unaided_us):
             speed, most = self._hurried_speed(estimate, aiding)
             if place is not None:
-                across = _back(estimate, aiding, place)
+                across = self._back(estimate, aiding, place)
         for _ in range(ticks):
             nominal = self._model.step(nominal, self._input(nominal, speed, most, across))
         if blind:
@@ -107,13 +110,17 @@ class Descent:
         down = clamp_magnitude(_RATE * (speed - vz), most)
         return u._replace(a=(u.a[0], u.a[1], down))
 
+    def _back(self, estimate: StateEstimate, aiding: Aiding, place: Vec3) -> Vec2:
+        """Velocity across [m/s, NED] towards a place to draw back to.
 
-def _back(estimate: StateEstimate, aiding: Aiding, place: Vec3) -> Vec2:
-    """Velocity across [m/s, NED] towards a place to draw back to; slower, the less it is known."""
-    known = (_SPEED_KNOWN - aiding.velocity_sigma) / (_SPEED_KNOWN - _SPEED_GOOD)
-    if not known > 0.0:
-        return 0.0, 0.0
-    dx, dy = place[0] - estimate.p_WB[0], place[1] - estimate.p_WB[1]
-    most = _BACK * min(known, 1.0)
-    share = _BACK_RATE * min(1.0, most / max(_BACK_RATE * math.hypot(dx, dy), 1e-9))
-    return share * dx, share * dy
+        Slower the less it is known, and as the ground comes near.
+        """
+        known = (_SPEED_KNOWN - aiding.velocity_sigma) / (_SPEED_KNOWN - _SPEED_GOOD)
+        height = self._legs_z - estimate.p_WB[2]
+        left = height / max(estimate.v_WB[2], _HURRIED * self._speed) - _RESTS_FOR
+        most = min(_BACK * min(known, 1.0), _REST_ACROSS * left)
+        if not most > 0.0:
+            return 0.0, 0.0
+        dx, dy = place[0] - estimate.p_WB[0], place[1] - estimate.p_WB[1]
+        share = _BACK_RATE * min(1.0, most / max(_BACK_RATE * math.hypot(dx, dy), 1e-9))
+        return share * dx, share * dy
