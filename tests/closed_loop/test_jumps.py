@@ -14,8 +14,7 @@ from tests.closed_loop.harness import ARM, Flight, command
 
 BEGIN = 4.0  # s
 WAY = 0.3  # m, that a vehicle in Hold may be moved by what it is uncertain of
-CLEARANCE = 0.1  # m
-USED = 0.03  # m of it; with satellites the part of the wrong velocity that is believed moves it
+USED = 0.03  # m of 0.1 m of clearance
 JUMPS = [
     (mode, suite, size)
     for mode in ("hold", "offboard", "mission", "trajectory")
@@ -40,7 +39,7 @@ def test_a_place_that_jumps_away_from_a_wall_does_not_lead_into_it(
     flight = fly(mode, (fault,), suite, 42)
     assert flight.contact == "", flight.ended
     assert flight.least_m is not None
-    assert flight.least_m > (-CLEARANCE if suite == "rtk" else -USED)
+    assert flight.least_m > -USED
     if (mode, suite) == ("hold", "mocap"):
         assert flight.away_m is not None
         assert flight.away_m < WAY

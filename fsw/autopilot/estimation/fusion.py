@@ -50,7 +50,7 @@ _RATE = 0.06
 _MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
-_DOUBTED_GATE = 0.2  # of the chi-square of a part whose other part is refused
+_DOUBTED_GATE = 0.05  # of the chi-square of a part whose other part is refused
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
 # Innovations in a row, each over its deviation, lean one way from so large a sum on that keeps so
 # much of itself from one to the next; a single one counts by at most a share of that.

@@ -38,7 +38,7 @@ _BACK: Final = 1.0  # m/s, as fast as it draws back at most
 _BACK_RATE: Final = 1.5  # 1/s
 # Legs that touch the ground as the vehicle draws back would trip it: it is at rest across by then.
 _REST_ACROSS: Final = 2.0  # m/s^2 that are counted on
-_RESTS_FOR: Final = 0.3  # s before legs touch; loops lag
+_RESTS_FOR: Final = 0.5  # s before legs touch; loops lag
 # Where nothing but the rotors' model is left, it sinks ever faster from where the ground should be.
 _THROUGH: Final = 10.0  # m/s
 

@@ -142,6 +142,24 @@ def test_a_blind_vehicle_draws_back_to_a_place_while_it_knows_its_speed(
     assert (vx, vy) == pytest.approx((0.6 * speed, -0.8 * speed), abs=0.01)
 
 
+@pytest.mark.requirement("REQ-EST-5")
+@pytest.mark.parametrize("sigma", [0.03, 0.6])  # it sinks at 1.5 m/s or at 0.5 m/s
+@pytest.mark.parametrize("height", [0.4, 0.9, 1.4, 4.0])
+def test_a_blind_vehicle_that_draws_back_is_at_rest_across_as_its_legs_touch(
+    height: float, sigma: float
+) -> None:
+    """It drew back at 1.1 m/s as it touched down, and fell over."""
+    aiding = BLIND._replace(height_sigma=sigma)
+    nominal = nominal_at_rest(vehicle_at((0.0, 0.0, GROUND_Z - height)))._replace(v=(0.5, 0, 0.3))
+    fastest = 0.0
+    while nominal.p[2] < GROUND_Z:
+        here = vehicle_at(nominal.p, nominal.v)
+        nominal, _ = DESCENT.step(nominal, here, aiding, 1, (99.0, 0.0, 0.0))
+        fastest = max(fastest, nominal.v[0])
+    assert abs(nominal.v[0]) < 0.05
+    assert fastest > 0.9 or height < 2.0, "it draws back while there is time"
+
+
 def test_a_vehicle_that_does_not_know_its_speed_is_level_though_it_has_a_place() -> None:
     adrift = vehicle_at(HIGH, (0.2, 0.0, 0.0))
     level, _ = DESCENT.step(nominal_at_rest(HERE), adrift, LOST, 1, (9.0, 9.0, 0.0))
