@@ -7,9 +7,10 @@ carry less than the weight, the loops open and rotors idle. In the air the vehic
 its velocity shows it within 0.1 s: even an accelerometer that is wrong by 3 m/s^2 shows 6.8 of
 free fall's 9.8, and on the ground no more than 3. Then the loops close again.
 
-Where rotors' torques stand in for the gyro the ground must not carry any of the weight:
-what the legs feel would be taken for a tilt. Then rotors stop as soon as the legs are close above
-the ground, and the vehicle falls less far than its legs stand.
+Where the rotors' model stands in for gyro or accelerometer, or sensors contradict each other, the
+ground must not carry any of the weight: what the legs feel would be taken for a tilt or a climb.
+Then rotors stop as soon as the legs are close above the ground, and the vehicle falls less far than
+its legs stand.
 
 Where neither the height nor the force is measured no ground is noticed, and nothing that falls. A
 descent is faster from where the ground should be (``descent.py``); rotors stop 1 m below that, or
@@ -172,7 +173,8 @@ def feel_ground(
     To be asked where a descent is commanded.
     """
     vehicle, now_us, sinking = state.vehicle, estimate.t_us, estimate.v_WB[2]
-    if state.aiding.gyro_lost and is_close(config, state, estimate):
+    in_doubt = state.aiding.has_lost(Sensor.IMU) or state.aiding.disputed_us > 0
+    if in_doubt and is_close(config, state, estimate):
         return state, True
     sunk = 0.0 if state.aiding.gyro_lost else _SUNK
     if state.aiding.feels_nothing and height_above_ground(config, estimate) < -sunk:
