@@ -13,7 +13,7 @@ from typing import Any, Final
 from command_line.folders import NoHomeError, cache_folder
 from command_line.process import Events
 
-_DECORATED: Final = re.compile(rb"^@(?:compiled|kernel)\b", re.MULTILINE)
+_DECORATED: Final = re.compile(rb"^@kernel\b", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,15 +9,12 @@ from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-from llvmlite.binding import get_host_cpu_name
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from command_line.callee_code import callees_without_code
-from command_line.kernel_cache import KernelCache, kernel_cache, tell_layouts_apart
-from command_line.kernel_types import compile_for_types, compile_quietly, compile_within, types_of
-
-tell_layouts_apart(numba.types.Record)
+from command_line.kernel_cache import KernelCache
+from command_line.kernel_types import types_of
+from command_line.kernels import Kernels
+from command_line.kernels import compilable as compilable
 
 IN_PYTHON: Final = bool(numba.config.DISABLE_JIT)
 """Whether kernels are run as the Python they are, as NUMBA_DISABLE_JIT has it."""
@@ -25,48 +22,19 @@ IN_PYTHON: Final = bool(numba.config.DISABLE_JIT)
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_CACHE: Final = kernel_cache(
-    Path(__file__).parent, numba.config.CACHE_DIR, f"{numba.__version__}-{get_host_cpu_name()}"
-)
+# Most are too short to let go of the GIL.
+_KERNELS: Final = Kernels(Path(__file__).parent, nogil=False)
+kernel = _KERNELS.compile
 
 
 def cache() -> KernelCache:
     """Where the kernels of the flight software are kept."""
-    return _CACHE
-
-
-def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a kernel with numba, cached on disk; it makes no array.
-
-    Its caller holds those that it works on, so references to them need not be counted, which took
-    half of the time of kernels of some ten operations. Those are too short to let go of the GIL,
-    which takes as long as another ten. ``fastmath`` stays off: results must not depend on how a
-    compiler reorders sums.
-    """
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_CACHE.folder)
-    try:
-        dispatcher = numba.njit(
-            cache=_CACHE.folder is not None,
-            fastmath=False,
-            error_model="numpy",
-            no_cfunc_wrapper=True,  # nothing in C calls a kernel
-            _nrt=False,  # numba's own switch for its runtime, undocumented
-        )(function)
-    finally:
-        numba.config.CACHE_DIR = before
-    compile_for_types(dispatcher, numba.types.unliteral)
-    compile_quietly(dispatcher)
-    compile_within(dispatcher, callees_without_code)
-    _DISPATCHERS.append(dispatcher)
-    return cast(Callable[P, R], dispatcher)
-
-
-_DISPATCHERS: list[Any] = []
+    return _KERNELS.cache
 
 
 def compiled_so_far() -> int:
     """How many kernels there are in this process, each for the types of its arguments."""
-    return sum(len(one.overloads) for one in _DISPATCHERS)
+    return sum(len(one.overloads) for one in _KERNELS.dispatchers)
 
 
 def forget_bitcode() -> None:
@@ -75,7 +43,7 @@ def forget_bitcode() -> None:
     numba keeps each as LLVM's bitcode beside its machine code, to link it into kernels that are
     compiled later. Call it where none is: one that calls these would raise a RuntimeError.
     """
-    for dispatcher in _DISPATCHERS:
+    for dispatcher in _KERNELS.dispatchers:
         for overload in dispatcher.overloads.values():
             overload.library._shared_module = None
 
@@ -106,16 +74,6 @@ def machine_code(kernel: Callable[P, R], *example: Any) -> Callable[P, R]:
         return known[0](*args)
 
     return cast(Callable[P, R], call)
-
-
-def compilable(function: Callable[P, R]) -> Callable[P, R]:
-    """Let kernels compile a pure law into themselves; called from Python it stays Python.
-
-    So every law can be read, tested and stepped through as it stands, and flies as machine
-    code (docs/decisions/0017-one-compiled-call-a-tick.md).
-    """
-    in_kernels = register_jitable(fastmath=False, error_model="numpy", no_cfunc_wrapper=True)
-    return cast(Callable[P, R], in_kernels(function))
 
 
 def packed(numbers: Any) -> NDArray[Any]:

@@ -109,8 +109,10 @@ def is_close(config: FlightConfig, state: FlightState, estimate: StateEstimate) 
     measured = _measured_now(config, state, estimate, newest=2)  # 0.1 s later legs carry
     if measured is not None and measured[0] < _CLOSE:
         return height - room < _CLOSE
-    doubtful = measured is None or _has_fault(state, 1e-6 * estimate.t_us, SensorFault.JUMP)
-    return doubtful and height < _CLOSE and height + room < _FALL
+    jumped = _has_fault(state, 1e-6 * estimate.t_us, SensorFault.JUMP)
+    # Sensors that contradict each other may be wrong about the height as well.
+    by_estimate = (measured is None or jumped) and not state.aiding.disputed_us
+    return by_estimate and height < _CLOSE and height + room < _FALL
 
 
 def _measured_now(

@@ -61,6 +61,7 @@ _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _LASTED: Final = 0.05  # s, of integrals
 _BOTH: Final = Source.ACCELEROMETER | Source.MODEL
 _UNIT: Final = Source.GYRO | Source.ACCELEROMETER
+_POSE: Final = Source.POSE | Source.ATTITUDE
 _PARTS: Final = {
     Sensor.POSE: (Source.POSE, Source.ATTITUDE),
     Sensor.GNSS: (Source.GNSS, Source.GNSS),
@@ -149,7 +150,8 @@ class Arbitration:
             else self._sensors[type(sample)].aid(memory, sample)
             for sample, last in zip(newest, before.seen, strict=True)
         ]
-        silent = _silent(memory, now) | _stuck(memory) | (Source.MODEL if touches else NOBODY)
+        silent = _silent(memory, now) | _stuck(memory) | _stepped(memory)
+        silent |= Source.MODEL if touches else NOBODY
         lost = residuals.note_silence(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
         residuals.look(evidence, memory.numbers, now, pose, fix, field, learns)
@@ -362,6 +364,14 @@ def _stuck(memory: FusionMemory) -> Source:
         if is_stuck(same, place):
             found |= source
     return found
+
+
+def _stepped(memory: FusionMemory) -> Source:
+    """A pose whose place has changed at once, and is refused: what is off may be so in both parts.
+
+    Where the rotors' model says nothing either, its attitude would make a sound gyro a suspect.
+    """
+    return _POSE if any(one.stepped for one in memory.runs) else NOBODY
 
 
 def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
