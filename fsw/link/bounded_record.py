@@ -27,10 +27,10 @@ class BoundedRecord:
         if self._record is None:
             return
         passed_s = 1e-6 * max(t_us - self._t_us, 0)
-        self._room = min(self._room + BYTES_PER_S * passed_s, BYTES_PER_S) - len(frame)
+        self._room = min(self._room + BYTES_PER_S * passed_s, BYTES_PER_S)
         self._t_us = t_us
-        if self._room < 0.0:
-            self._room += len(frame)
+        if len(frame) > self._room:
             self.left_out += 1
             return
+        self._room -= len(frame)
         self._record(t_us, frame)

@@ -260,18 +260,8 @@ def _add_squares(
 ) -> None:
     """``add_square`` for all residuals of a node at once: the Hessian is walked through once."""
     guess, hessian, gradient = quadratic
-    at_zero = (
-        _at_zero(value, rows, 0, columns, guess),
-        _at_zero(value, rows, 1, columns, guess),
-        _at_zero(value, rows, 2, columns, guess),
-        _at_zero(value, rows, 3, columns, guess),
-    )
-    others = (
-        _at_zero(value, rows, 4, columns, guess),
-        _at_zero(value, rows, 5, columns, guess),
-        _at_zero(value, rows, 6, columns, guess),
-        _at_zero(value, rows, 7, columns, guess),
-    )
+    at_zero = _at_zero(value, rows, 0, columns, guess)
+    others = _at_zero(value, rows, 4, columns, guess)
     for k in range(columns):
         a, b = _scaled(weight, rows, 0, k), _scaled(weight, rows, 4, k)
         gradient[k] += _sum4(a, at_zero) + _sum4(b, others)
@@ -282,12 +272,15 @@ def _add_squares(
 
 
 @compilable
-def _at_zero(value: Vec8, rows: Array, r: int, columns: int, guess: Array) -> float:
-    """A residual where all inputs are 0, by its gradient."""
-    total = value[r]
+def _at_zero(value: Vec8, rows: Array, r: int, columns: int, guess: Array) -> Vec4:
+    """Four residuals where all inputs are 0, by their gradients."""
+    a, b, c, d = value[r], value[r + 1], value[r + 2], value[r + 3]
     for k in range(columns):
-        total -= rows[r, k] * guess[k]
-    return total
+        a -= rows[r, k] * guess[k]
+        b -= rows[r + 1, k] * guess[k]
+        c -= rows[r + 2, k] * guess[k]
+        d -= rows[r + 3, k] * guess[k]
+    return a, b, c, d
 
 
 @compilable
