@@ -240,7 +240,7 @@ class Arbitration:
             return memory, found
         numbers = back.numbers.copy()
         numbers["believed"] = 0
-        for name in ("witness", "baseline", "model_walk"):
+        for name in ("witness", "model_walk"):
             numbers[name] = memory.numbers[name]
         health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
         start = replace(
