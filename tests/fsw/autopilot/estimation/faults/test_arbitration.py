@@ -39,6 +39,7 @@ def hovering(
     touches: bool = False,
     turned_by: Callable[[float], Vec3] | None = None,
     moved_by: float = 0.0,
+    pushed_by: float = 0.0,
 ) -> Iterator[FusionMemory]:
     """The memories of 5 s.
 
@@ -46,7 +47,7 @@ def hovering(
     encoders jump by an ``angle`` [rad] and back; there may have been no ``poses`` for a second, or
     ``garbage`` in their place, and a part of the vehicle may be known to be ``damaged``, and its
     tool ``touches`` something. Poses may be ``turned_by`` an angle [rad, FRD] at each time [s] of
-    that second, and ``moved_by`` so much [m].
+    that second, and ``moved_by`` so much [m]; the accelerometer is ``pushed_by`` so much [m/s^2].
     """
     memory, random = at_start(2), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -56,9 +57,10 @@ def hovering(
         shakes = 1e-3 * a, 1e-3 * b, 1e-3 * c
         rate = *shakes[:2], shakes[2] + (turns if wrong else 0.0)
         reading = (angle if wrong else 1e-5) * (tick % 2)
+        pushed = pushed_by if wrong else 0.0
         samples: list[Sample] = [
             JointSample(now, (reading, 0.0)),
-            ImuSample(now, (0.02 * d, 0.02 * e, -9.81 + 0.02 * f), rate),
+            ImuSample(now, (0.02 * d + pushed, 0.02 * e, -9.81 + 0.02 * f), rate),
         ]
         good = poses or t < POSES_UNTIL
         if tick % 5 == 0 and (good or garbage):
@@ -253,6 +255,16 @@ def test_a_frame_may_jump_by_a_heading_and_never_by_a_tilt(turn: Vec3, is_believ
     memory = last(hovering(turned_by=lambda _: turn, moved_by=0.5))
     assert bool(memory.reset.number) is is_believed
     assert (memory.now - memory.of(Sensor.POSE).fused[0] < 0.1) is is_believed
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("pushed_by", [-2.0, 3.0, 5.0])
+def test_what_a_named_accelerometer_has_taught_is_forgotten(pushed_by: float) -> None:
+    """A gyro's bias had been learnt from it, and the gyro was a suspect for that from then on."""
+    memories = list(hovering(pushed_by=pushed_by))
+    before = memories[round(WRONG_FROM / TICK) - 1].numbers[0]["baseline"]
+    assert memories[-1].verdict.wrong is Source.ACCELEROMETER
+    np.testing.assert_allclose(memories[-1].numbers[0]["baseline"], before, atol=1e-3)
 
 
 @pytest.mark.requirement("REQ-EST-13")
