@@ -45,12 +45,13 @@ from fsw.compiled import compilable, kernel, machine_code
 _DOUBTED_SPEED = 0.5  # m/s
 _DOUBTED_FORCE = 3.0  # m/s^2
 _DOUBTED_RATE = 0.5  # rad/s
+# Of the chi-square of a part whose other part is refused.
+_DOUBTED_GATE = 0.05
 # Of how a variance follows the noise that there is with each measurement, and by at most so much.
 _RATE = 0.06
 _MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
-_DOUBTED_GATE = 0.05  # of the chi-square of a part whose other part is refused
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
 # Innovations in a row, each over its deviation, lean one way from so large a sum on that keeps so
 # much of itself from one to the next; a single one counts by at most a share of that.
@@ -164,8 +165,8 @@ def _leans(x: Any, scaled: int) -> bool:
 def _without_leap(memory: Any, z: Vec3, most: float) -> tuple[Vec3, bool]:
     """An innovation ``z`` [1], over its deviation, without what has leapt; whether it leaps.
 
-    That is by more than ``most`` [1] from the last one. It is left out as far as it stays, and as
-    the filter takes it in.
+    That is by more than ``most`` [1] from the last one. It is left out as far as it stays, and
+    less and less as the filter takes it in.
     """
     step = subtract(z, three(memory[_LAST], 0))
     leaps = dot(step, step) > most * most
