@@ -381,7 +381,8 @@ def _segments(path: Array) -> Array:
 def _between(begin: Vec3, end: Vec3) -> tuple[Vec3, Vec4]:
     """Middle [m] and attitude of a cylinder, whose axis is z, from one place to another [m]."""
     a, b = np.array(begin), np.array(end)
-    z = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
+    length = float(np.linalg.norm(b - a))
+    z = (b - a) / length if length > 1e-9 else np.array((0.0, 0.0, 1.0))
     x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (1.0, 0.0, 0.0), z)
     x /= np.linalg.norm(x)
     y = np.cross(z, x)

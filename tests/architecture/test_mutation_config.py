@@ -21,9 +21,16 @@ def test_every_line_of_the_list_exists(entry: dict[str, Any]) -> None:
 
 
 def public_functions(path: Path) -> set[str]:
-    tree = ast.parse(path.read_text())
-    names = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-    return {name for name in names if not name.startswith("_")}
+    """Functions that a module defines, takes on from another one, or gives a name."""
+    names = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.FunctionDef):
+            names.add(node.name)
+        elif isinstance(node, ast.ImportFrom):
+            names |= {alias.name for alias in node.names if alias.asname == alias.name}
+        elif isinstance(node, ast.Assign):
+            names |= {one.id for one in node.targets if isinstance(one, ast.Name)}
+    return {name for name in names if not name.startswith("_") and name.islower()}
 
 
 def test_what_stands_in_for_the_compiler_has_all_its_functions() -> None:

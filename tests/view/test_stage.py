@@ -16,6 +16,7 @@ from view.vehicle import chain
 
 
 @pytest.mark.parametrize("name", ["paper", "hexa-3r", "octo-4r"])
+@pytest.mark.filterwarnings("error")
 def test_each_joint_is_shown_where_it_is_with_the_margin_of_what_is_there(name: str) -> None:
     airframe = airframe_of(load_vehicle(name))
     joints = airframe.bodies.joints
