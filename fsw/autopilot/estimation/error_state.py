@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate
-from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable
@@ -52,8 +51,6 @@ MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 29  # integrals: see faults/residuals.py
 HEIGHT_LASTS: Final = 0.15  # s, for which a height counts as measured after it was
 PUSHES: Final = 160  # ticks that the joints' state may lie behind
-# m/s^2; a bias beyond is none, but what else is wrong. PX4's EKF2_ABL_LIM is such a limit.
-ACCEL_BIAS_LIMIT: Final = 5.0
 LAGS: Final = (4, 8, 16)  # measurements, over which noise is looked for that is no white one
 
 FILTER: Final = np.dtype(
@@ -540,8 +537,7 @@ def inject(x: Any) -> None:
     for i in range(3):
         x.p[i] += error[P + i]
         x.v[i] += error[V + i]
-        bias = x.accel_bias[i] + error[BA + i]
-        x.accel_bias[i] = clamp(bias, -ACCEL_BIAS_LIMIT, ACCEL_BIAS_LIMIT)
+        x.accel_bias[i] += error[BA + i]
         x.gyro_bias[i] += error[BG + i]
         x.rate[i] -= error[BG + i]
     x.baro_bias += error[BARO]
