@@ -24,7 +24,7 @@ class Kernels:
     """The kernels of one ``package``, and where they are kept."""
 
     def __init__(self, package: Path, *, nogil: bool) -> None:
-        """Those that let go of the GIL (``nogil``) take as long as another ten operations."""
+        """With ``nogil`` they let go of the GIL, which takes as long as ten operations."""
         compiler = f"{numba.__version__}-{get_host_cpu_name()}"
         self.cache = kernel_cache(package, numba.config.CACHE_DIR, compiler)
         self.dispatchers: list[Any] = []

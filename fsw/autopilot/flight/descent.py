@@ -73,9 +73,10 @@ class Descent:
         blind = aiding.unaided_us >= self._unaided_us
         speed, most, across = self._speed, _MOST, (0.0, 0.0)
         if is_hurried(aiding, self._unaided_us):
-            speed, most = self._hurried_speed(estimate, aiding)
+            height = self._legs_z - estimate.p_WB[2]
+            speed, most = self._hurried_speed(height, aiding)
             if place is not None:
-                across = self._back(estimate, aiding, place)
+                across = self._back(height, estimate, aiding, place)
         for _ in range(ticks):
             nominal = self._model.step(nominal, self._input(nominal, speed, most, across))
         if blind:
@@ -89,9 +90,8 @@ class Descent:
                 )
         return nominal, self._input(nominal, speed, most, across)
 
-    def _hurried_speed(self, estimate: StateEstimate, aiding: Aiding) -> Vec2:
-        """How fast to sink in a hurry, and to get there: [m/s], [m/s^2]."""
-        height = self._legs_z - estimate.p_WB[2]
+    def _hurried_speed(self, height: float, aiding: Aiding) -> Vec2:
+        """How fast to sink in a hurry from a ``height`` [m], and to get there: [m/s], [m/s^2]."""
         if height < 0.0 and aiding.feels_nothing:
             return _THROUGH, _MOST
         slow = _HURRIED * self._speed
@@ -110,13 +110,12 @@ class Descent:
         down = clamp_magnitude(_RATE * (speed - vz), most)
         return u._replace(a=(u.a[0], u.a[1], down))
 
-    def _back(self, estimate: StateEstimate, aiding: Aiding, place: Vec3) -> Vec2:
-        """Velocity across [m/s, NED] towards a place to draw back to.
+    def _back(self, height: float, estimate: StateEstimate, aiding: Aiding, place: Vec3) -> Vec2:
+        """Velocity across [m/s, NED] from a ``height`` [m] towards a place to draw back to.
 
         Slower the less it is known, and as the ground comes near.
         """
         known = (_SPEED_KNOWN - aiding.velocity_sigma) / (_SPEED_KNOWN - _SPEED_GOOD)
-        height = self._legs_z - estimate.p_WB[2]
         left = height / max(estimate.v_WB[2], _HURRIED * self._speed) - _RESTS_FOR
         most = min(_BACK * min(known, 1.0), _REST_ACROSS * left)
         if not most > 0.0:
