@@ -39,9 +39,10 @@ FRAME: Final = 4  # errors of an odometry's frame: north, east, down [m], headin
 FIELD: Final = 3  # errors of a magnetometer that stay: its offset [Gauss, FRD]
 ROWS: Final = 3  # of a measurement, at most
 IMU_CAPACITY: Final = 256  # readings since the filter's time
-# Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, and which of
-# both are of no use: an older reading's, or one that repeats itself.
-TIME, FORCE, RATE, LOST, COLUMNS = 0, 1, 4, 7, 8
+# Columns of a reading: time [s], specific force [m/s^2] and rate [rad/s] in body axes, which of
+# both are of no use: an older reading's, or one that repeats itself; and the variance of velocity
+# [m^2/s^2] and of attitude [rad^2] that it adds because it was refused as a jump.
+TIME, FORCE, RATE, LOST, MISSED, COLUMNS = 0, 1, 4, 7, 8, 10
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
 CONTRADICTED = 32  # by more than what rotors that are off explain
@@ -75,6 +76,10 @@ FILTER: Final = np.dtype(
         ("same", np.int64, (6,)),  # how often each number of the newest came in a row
         ("steady", np.int64, (2,)),  # how many in a row were near the one before
         ("calm", np.int64, (2,)),  # how many in a row were believed
+        # Of those that were refused as a jump in a row: how many, and by what they differ from what
+        # stands in, its integral.
+        ("refused", np.int64, (2,)),
+        ("missed", float, (6,)),  # m/s and rad, body
         ("doubted", np.int64, (2,)),  # how many steady ones it takes to be believed; 0: it is
         # Of the law for who is wrong (verdict.py): which halves are not used, and of which the
         # bias may be anything; what both and the rotors have made of the vehicle since it flies;
@@ -289,7 +294,7 @@ def add_noise(M: Array, law: Any, dt: float, lost: int, model_walk: Array) -> No
 def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
     """Mean force [m/s^2, FRD] and rate [rad/s, FRD] of two readings, without the biases.
 
-    The readings are ``row`` (8,) [SI] and the one ``before`` (8,) [SI], or the same.
+    The readings are ``row`` (10,) [SI] and the one ``before`` (10,) [SI], or the same.
     """
     b, g = x.accel_bias, x.gyro_bias
     return (
@@ -308,7 +313,7 @@ def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
 
 @compilable
 def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
-    """Predict to the time of the reading ``row`` (8,) [SI], which follows ``before`` (8,) [SI].
+    """Predict to the time of the reading ``row`` (10,) [SI], which follows ``before`` (10,) [SI].
 
     Covariance ``M`` (17, 17) [SI]. Where readings are missing, in steps short enough.
     """
@@ -320,6 +325,9 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     dt = gap / steps
     p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
     a = (0.0, 0.0, 0.0)
+    for i in range(3):
+        M[V + i, V + i] += row[MISSED]
+        M[TH + i, TH + i] += row[MISSED + 1]
     for _ in range(steps):
         R = matrix_from_quaternion(q)
         p, v, q, a = integrated(p, v, q, f, w, dt)

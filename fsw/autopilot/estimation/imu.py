@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.error_state import (
     FORCE_MADE,
     IMU_CAPACITY,
     LOST,
+    MISSED,
     MODELLED,
     NO_FORCE,
     NO_RATE,
@@ -25,6 +26,7 @@ from fsw.autopilot.estimation.error_state import (
     TIME,
 )
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
+from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable
 
@@ -38,6 +40,7 @@ _STUCK_AXIS: Final = 50
 STAYS: Final = 3
 STAYS_LONG: Final = 25
 _BACK: Final = 0.5  # of a jump: so near to what is flown, a half has come back to it
+BLOW: Final = 25  # readings: what is felt as a blow is over by then
 CALM: Final = 250  # readings that were believed, in a row
 # Plain numbers: kernels return them.
 _NONE: Final = SensorFault.NONE.value
@@ -85,12 +88,39 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
         row[RATE + i] = w[i] if keep_rate else last[RATE + i]
     if modelled and lost:
         _model_what_is_lost(x, row, last, lost, model)
+    since = min(time - last[TIME], law.imu_gap)
+    row[MISSED] = _missed(x, 0, f, law.accel_range, row, since, of_force)
+    row[MISSED + 1] = _missed(x, 1, w, law.gyro_range, row, since, of_rate)
     if x.end == 0:
         _keep_as(last, row)  # what goes before the first reading
     x.end += 1
     if x.end - x.first >= IMU_CAPACITY:  # the filter has not begun
         x.first += 1
     return fault
+
+
+@compilable
+def _missed(
+    x: Any, half: int, reading: Vec3, most: float, row: Any, since: float, fault: int
+) -> float:
+    """Variance of velocity or attitude that a ``reading`` of one half adds as it is refused [SI].
+
+    A blow is refused as a jump, and yet it moves the vehicle: by up to the integral of what is
+    refused, of which the unit shows ``most`` [SI], in ``since`` [s]. It ends within ``BLOW``
+    readings. What lasts is a fault, and ``faults/verdict.py`` says which.
+    """
+    refused = fault in (_JUMP, _IMPLAUSIBLE)
+    x.refused[half] = x.refused[half] + 1 if refused else 0
+    already, after = 0.0, 0.0
+    for i in range(3 * half, 3 * half + 3):
+        already += x.missed[i] * x.missed[i]
+        if not refused:
+            x.missed[i] = 0.0
+        elif x.refused[half] <= BLOW:
+            shown = clamp(reading[i - 3 * half], -most, most)
+            x.missed[i] += since * (shown - row[FORCE + i])
+        after += x.missed[i] * x.missed[i]
+    return max(after - already, 0.0)
 
 
 @compilable

@@ -14,6 +14,7 @@ from fsw.autopilot.estimation.error_state import (
     BA,
     BARO,
     BG,
+    COLUMNS,
     DELAY,
     ERRORS,
     FILTER,
@@ -240,7 +241,7 @@ def test_what_rotors_do_not_know_of_a_force_does_not_grow_without_bound(
     """Else satellites tell no tilt from it: one vehicle in twenty without its unit fell over."""
     x = some_state()[0]
     x["model_walk"] = 3.0, 0.15
-    rows = np.zeros((2, 8))
+    rows = np.zeros((2, COLUMNS))
     rows[:, LOST] = NO_FORCE | MODELLED | made
     walked = 0.0
     for _ in range(1500):

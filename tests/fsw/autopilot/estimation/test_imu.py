@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from fsw.autopilot.estimation.error_state import (
     FORCE,
     FORCE_MADE,
     LOST,
+    MISSED,
     MODELLED,
     NO_FORCE,
     NO_RATE,
@@ -19,7 +21,7 @@ from fsw.autopilot.estimation.error_state import (
     RATE,
 )
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
-from fsw.autopilot.estimation.imu import STAYS, STAYS_LONG, add_imu
+from fsw.autopilot.estimation.imu import BLOW, STAYS, STAYS_LONG, add_imu
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import packed
@@ -120,6 +122,35 @@ def test_a_jump_is_believed_when_it_is_back_or_stays_and_the_next_one_must_stay_
     assert stays() == STAYS_LONG + 1
     unit = Unit()
     assert stays() == STAYS + 1
+
+
+@pytest.mark.parametrize(
+    ("at", "size"), [(0, 40.0), (1, 10.0), (0, 1e300), (1, -1e300)], ids=["force", "rate", "", "-"]
+)
+def test_what_is_refused_of_a_blow_may_have_moved_the_vehicle_by_its_integral(
+    at: int, size: float
+) -> None:
+    unit, added = Unit(), []
+    believed = unit.last[FORCE + 3 * at]
+    shown = math.copysign(min(abs(size), (LAW.accel_range, LAW.gyro_range)[at]), size)
+    for count in range(1, BLOW + 10):
+        said = (size * (-1) ** count, 0.0, -9.81 if at == 0 else 0.0)
+        unit.read(**{("force", "rate")[at]: said})  # type: ignore[arg-type]
+        added.append(unit.last[MISSED + at])
+        assert unit.last[MISSED + 1 - at] == 0.0
+    one = TICK * (-shown - believed)
+    assert added[0] == pytest.approx(one * one, rel=1e-3), "and the noise of other axes"
+    assert added[1] == 0.0, "it may as well have come back"
+    assert max(added[BLOW:]) == 0.0, "what lasts is no blow"
+    unit = Unit()
+    for _ in range(2):
+        said = (size, 0.0, -9.81 if at == 0 else 0.0)
+        unit.read(**{("force", "rate")[at]: said})  # type: ignore[arg-type]
+    twice = 2.0 * TICK * (shown - unit.last[FORCE + 3 * at])
+    assert unit.x.missed[3 * at] == pytest.approx(twice, rel=1e-6)
+    unit.read()
+    assert not unit.x.missed.any(), "over"
+    assert unit.last[MISSED + at] == 0.0
 
 
 def test_what_is_no_number_loses_its_half_alone() -> None:

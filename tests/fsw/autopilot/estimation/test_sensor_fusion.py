@@ -944,6 +944,36 @@ def test_half_an_inertial_unit_that_fails_leaves_the_place_to_the_pose(half: str
     assert abs(flown.error()[3:6]).max() < 0.3
 
 
+@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("suite", [MOCAP, VIO], ids=["mocap", "vio"])
+def test_what_a_blow_changes_is_the_velocity_and_no_bias(suite: Suite, seed: int) -> None:
+    # A hard touch-down: the legs stop the vehicle within a few readings, each refused as a jump.
+    at, blow = START + 1.0, (60.0, 120.0, 155.0, 120.0, 60.0)
+    flown = run(suite, seed, 2.0)
+    stopped = sum(blow) * TICK  # m/s, up
+    came: list[float] = []
+
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, ImuSample) and now > at and len(came) < len(blow):
+            fx, fy, fz = sample.acceleration
+            came.append(sample.time)
+            return replace(sample, acceleration=(fx, fy, fz - blow[len(came) - 1]))
+        if isinstance(sample, PoseSample):
+            x, y, z = sample.position
+            since = [
+                TICK * force * max(sample.time - t, 0.0)
+                for t, force in zip(came, blow, strict=False)
+            ]
+            return replace(sample, position=(x, y, z - sum(since)))
+        return sample
+
+    after = Flown(flown, change)
+    assert (Sensor.IMU, SensorFault.JUMP) in after.found
+    assert (Sensor.POSE, SensorFault.JUMP) not in after.found
+    assert abs(after.error()[3:6] - (0.0, 0.0, stopped)).max() < 0.1, "but for what it leaned"
+    assert abs(after.error()[9:12]).max() < 0.15
+
+
 @pytest.mark.parametrize(("leap", "rate"), [(0.02, 2.5), (0.05, 2.5), (0.2, 1.3)])
 def test_places_that_leap_turn_nothing_where_no_attitude_comes_with_them(
     leap: float, rate: float
