@@ -167,6 +167,7 @@ class Arbitration:
                 lost=lost,
                 damaged=damaged,
                 sizes=tuple(evidence[0]["size"].tolist()),
+                headed=tuple(evidence[0]["headed"].tolist()),
             )
         memory = replace(memory, verdict=verdict)
         state: StateEstimate | None = found

@@ -143,6 +143,11 @@ EVIDENCE: Final = np.dtype(
         ("came", float, (COUNT,)),  # s, when it was computed last
         ("ratio", float, (COUNT,)),  # the largest of all windows
         ("size", float, (COUNT,)),  # SI, of that
+        # How far gyro and field have turned apart [rad], how the vehicle has accelerated across by
+        # satellites, by window [m/s^2], and what such a heading makes of a residual [m/s^2].
+        ("apart", float),
+        ("across", float, (5,)),
+        ("headed", float, (COUNT,)),
     ],
     align=True,
 )
@@ -312,6 +317,9 @@ def _note_largest(s: Any, now: float, k: int) -> None:
     for i in range(5):
         if heard - silent >= CONTAINED[i] and s.both[k, i] > s.ratio[k]:
             s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
+            s.headed[k] = math.inf
+            if k in (AN, MN):
+                s.headed[k] = min(s.apart, 2.0) * s.across[i]
 
 
 @compilable
@@ -374,7 +382,7 @@ def _begins(W: Array) -> bool:
 
 @compilable
 def _begin_anew(s: Any) -> None:
-    s.began, s.count = -1.0, 0
+    s.began, s.count, s.apart = -1.0, 0, 0.0
     for k in range(3):
         s.aid_count[k], s.aid_first[k], s.waits[k] = 0, 0, 0
     for k in range(COUNT):
@@ -618,6 +626,7 @@ def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns
     over, velocity = b[0] - a[0], _MEASURED + 3
     change = _difference(b, a, velocity, over)
     felt, made = _difference(b, a, _AT + FELT, over), _difference(b, a, _AT + MADE, over)
+    s.across[k] = math.hypot(change[0], change[1])
     noise = 2.5 * speed / over
     _note(s, now, AN, k, subtract(change, felt), _ACCEL_OFF + noise)
     _note_model(s, now, MN, k, subtract(change, made), _FORCE_OFF_AIDED, noise, learns)
@@ -662,7 +671,9 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
     off = _over(off, over)
     iron = _IRON * norm(rotation_vector(_apart(b, c, _AT + SAID)))
     noise = _NOISE_SIGMAS * noise / max(norm(v), 1e-3)
-    _note(s, now, GB, k, _across(bias, v, off), _GYRO_OFF + (iron + noise) / over)
+    r, threshold = _across(bias, v, off), _GYRO_OFF + (iron + noise) / over
+    _note(s, now, GB, k, r, threshold)
+    s.apart = max(s.apart, (norm(r) + threshold) * over)
     first = _before(s, 2, middle, T, 0.03)
     if first < 0:
         return

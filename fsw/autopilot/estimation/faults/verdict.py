@@ -132,14 +132,17 @@ def judged(
     lost: Source = NOBODY,
     damaged: bool = False,
     sizes: tuple[float, ...] = (0.0,) * COUNT,
+    headed: tuple[float, ...] = (math.inf,) * COUNT,
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
-    Their ``sizes`` are in SI. Where nothing that is used ``holds_attitude``, gyro and magnetometer
+    Their ``sizes`` are in SI, and so is what a heading that is wrong makes of each at most
+    (``headed``). Where nothing that is used ``holds_attitude``, gyro and magnetometer
     do. What is ``lost`` says nothing, and is known to be of no use without this law. Of a
     ``damaged`` vehicle it is known that the rotors' model is off.
     """
-    of = _sources(holds_attitude, verdict.wrong)
+    turns = [k for k in range(COUNT) if sizes[k] <= headed[k]]
+    of = _sources(holds_attitude, verdict.wrong, turns)
     # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's;
     # one that was taken for unknown in this trial is whatever the suspects made of it.
     found = holds_attitude or verdict.wrong & Q or any(verdict.unknown)
@@ -272,12 +275,19 @@ def _of_rotors_alone(
     return cost
 
 
-def _sources(holds_attitude: bool, wrong: Source) -> tuple[Source, ...]:
+def _sources(holds_attitude: bool, wrong: Source, headings: list[int]) -> tuple[Source, ...]:
+    """Who each residual is of; ``headings`` are those that a heading may explain."""
     if holds_attitude:
         return OF
-    # A magnetometer that is used turns the heading, and with it what is felt.
-    turn, turned = G | B & ~wrong, (AN, MN, *(_OF_PLACES if wrong & Q else ()))
-    return tuple([one | turn if k in turned else one for k, one in enumerate(OF)])
+    # A magnetometer that is used turns the heading, and with it what is felt across.
+    turned = (AN, MN, *(_OF_PLACES if wrong & Q else ()))
+    heading = B & ~wrong
+    return tuple(
+        [
+            one | G | (heading if k in headings else NOBODY) if k in turned else one
+            for k, one in enumerate(OF)
+        ]
+    )
 
 
 def _with_return(

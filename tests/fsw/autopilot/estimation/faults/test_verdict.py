@@ -20,7 +20,7 @@ from fsw.autopilot.estimation.error_state import (
     ON_TRIAL,
 )
 from fsw.autopilot.estimation.faults import residuals, sources
-from fsw.autopilot.estimation.faults.residuals import EVERY, NO_AID, Aid, look
+from fsw.autopilot.estimation.faults.residuals import EVERY, NO_AID, Aid, Evidence, look
 from fsw.autopilot.estimation.faults.sources import Source
 from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged, lifted
 from fsw.autopilot.geometry.quaternion import turned
@@ -63,6 +63,7 @@ def flown(
     axes: float = 0.0,
     sigma: float = 0.015,
     bias: Vec3 = NONE,
+    evidence: Evidence | None = None,
 ) -> list[Verdict]:
     """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added.
 
@@ -73,7 +74,8 @@ def flown(
     """
     random = np.random.default_rng(seed)
     x: Any = np.zeros(1, FILTER)
-    evidence, verdict, found = residuals.at_start(), Verdict(), []
+    evidence = residuals.at_start() if evidence is None else evidence
+    verdict, found = Verdict(), []
     evidence["began"], x["turns"] = -1.0, residuals.scale_of_turns(1.0, swing)
     s: Any = SimpleNamespace(
         **{name: x[name][0] for name in WITNESSED},
@@ -144,7 +146,9 @@ def flown(
         look(evidence, x, now, pose, fix, field, not verdict.is_on)
         ratios = tuple(evidence[0]["ratio"].tolist())
         sizes = tuple(evidence[0]["size"].tolist())
-        verdict = judged(verdict, ratios, now, holds_attitude=suite == "pose", sizes=sizes)
+        headed = tuple(evidence[0]["headed"].tolist())
+        held = suite == "pose"
+        verdict = judged(verdict, ratios, now, holds_attitude=held, sizes=sizes, headed=headed)
         found.append(verdict)
     return found
 
@@ -552,6 +556,34 @@ def test_a_field_that_has_turned_the_heading_is_a_suspect_beside_the_gyro() -> N
     without = verdict._replace(wrong=Source.COMPASS)
     without = judged(without, tuple(ratios), now, holds_attitude=False)
     assert without.suspects & Source.GNSS, "the heading of one that is not used turns nothing"
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(("size", "who"), [(0.8, Source.GYRO | Source.COMPASS), (1.2, Source.GYRO)])
+def test_a_field_turns_what_is_felt_by_no_more_than_it_has_turned_the_heading(
+    size: float, who: Source
+) -> None:
+    """The gyro of a hexarotor, which pushes turn, was no more to blame than the field: a wall."""
+    headed = tuple(
+        [1.0 if k in (sources.AN, sources.MN) else math.inf for k in range(sources.COUNT)]
+    )
+    ratios = {sources.GM: 0.4, sources.GB: 2.5, sources.AN: 1.3, sources.MN: 0.9}
+    sizes = {sources.AN: size, sources.MN: size}
+    verdict = looked_at(ratios, sizes, holds_attitude=False, headed=headed)
+    assert (verdict.wrong or verdict.suspects) == who
+
+
+@pytest.mark.parametrize("turning", [0.0, 0.2])
+def test_how_far_a_heading_may_be_off_is_how_far_gyro_and_field_have_turned_apart(
+    turning: float,
+) -> None:
+    evidence = residuals.at_start()
+    flown(Wrong(magnetic=(0.0, 0.0, turning)), "satellites", 2.0, evidence=evidence)
+    s, apart = evidence[0], 2.0 * turning * FIELD[0] / math.hypot(*FIELD)
+    assert apart <= s["apart"] < apart + 0.25, "noise, and iron of a vehicle that tilts"
+    windows = s["headed"][[sources.AN, sources.MN]] / s["apart"]
+    assert all(np.isclose(one, s["across"][:4]).any() for one in windows)
+    assert math.isinf(s["headed"][sources.GB])
 
 
 def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
