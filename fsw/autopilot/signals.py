@@ -273,6 +273,11 @@ class MessageSource:
         """Its MAVLink ids."""
         return self.system, self.component
 
+    @property
+    def place(self) -> tuple[str, str]:
+        """Link and address, which no frame can choose."""
+        return self.link, self.address
+
     def is_same(self, other: MessageSource | None) -> bool:
         """Whether both are one sender: of the same address, unless signatures vouch for both."""
         if other is None:
@@ -954,6 +959,7 @@ class FlightSnapshot:
     log_failure: str = ""  # why the flight log is not written as it should be
     arming: ArmingReport = ArmingReport()
     safe_set: SafeSet = SafeSet()  # in force: announced and fence together
+    safe_set_owner: MessageSource | None = None  # of what is announced
     actuators_found: ActuatorReport = ActuatorReport()
     sensors_lost: tuple[str, ...] = ()  # that are of no use, beside the pose
     touching: ContactReport | None = None  # None: no surface that may be touched is near

@@ -29,10 +29,8 @@ from fsw.autopilot.signals import (
     SafeSetAnnouncement,
     SensorFrame,
     TickInputs,
-    Zone,
 )
 from fsw.autopilot.tuning import Tuning
-from fsw.link.bounded_memory import renew
 from fsw.link.wire import decode, decode_commands
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_setpoints import (
@@ -43,6 +41,7 @@ from fsw.link.wire.decode_setpoints import (
     global_setpoint,
     joint_setpoint,
 )
+from fsw.link.wire.zone_transfer import ZoneTransfer
 from messages import message_ids
 from messages.frames import Frame
 
@@ -50,8 +49,9 @@ _MAX_COMMANDS: Final = 16  # a tick; a client sends one at a time and repeats it
 _MAX_PUT_OFF: Final = 64  # more of them a tick and link, which are answered and not carried out
 _MAX_TARGETS: Final = 64  # a tick
 _MAX_ANNOUNCEMENTS: Final = 4  # a tick
+_MAX_OF_ADDRESS: Final = 2  # of them, and so many sets of one address may be incomplete at once
 _MAX_REASONS: Final = 4  # a tick, of refusals; more are counted
-_MAX_ANNOUNCERS: Final = 8  # whose safe sets may be incomplete at the same time
+_MAX_INCOMPLETE: Final = 16  # safe sets, at the same time
 MAX_SAMPLES: Final = 512  # a tick; a second of a suite has some 1300
 _GROUND_STATION: Final = 6  # MAV_TYPE
 UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
@@ -79,30 +79,24 @@ class Received:
     refused: list[str] = field(default_factory=list)  # why, of the first
 
 
-@dataclass(slots=True)
-class _Incomplete:
-    """The zones that one source has announced so far, of a set of ``count``."""
-
-    count: int
-    zones: dict[int, Zone]
-
-
 class Inbox:
     """Collects commands, targets and safe sets until a tick takes them.
 
-    Bounded: what does not fit is dropped and counted, as a lost datagram would be. A command is
-    answered all the same.
+    Bounded: what does not fit is dropped and counted, as a lost datagram would be, and of safe sets
+    it is told. A command is answered all the same. Room is shared out by address, because anybody
+    can write any ids, and the ``owner`` of the safe set has always some.
     """
 
     def __init__(self, origin: Origin = DEFAULT_ORIGIN) -> None:
         """Begin empty; commands name places on Earth, from ``origin`` of the local frame on."""
         self.locate = partial(to_local, origin)
+        self.owner: MessageSource | None = None  # of the safe set in force
         self.refused = 0  # messages with numbers of no use, or too many of them
         self._received = Received()
         self._is_news = False  # there is more in it than samples
         self._put_off: dict[str, int] = {}  # commands answered since the last tick, by link
         # By source: the walls of two announcers must not mix.
-        self._incomplete: dict[MessageSource, _Incomplete] = {}
+        self._transfers: dict[MessageSource, ZoneTransfer] = {}
         self._source = UNKNOWN_SOURCE  # of the frame that is read now
         self._handlers: dict[int, Callable[[Frame], CommandAck | None]] = {
             message_ids.COMMAND_LONG: partial(self._command, decode.command_long),
@@ -277,27 +271,54 @@ class Inbox:
     ) -> None:
         if not decode.for_this_vehicle(frame):
             return
+        transfer, source = self._transfers.pop(self._source, None), self._source
+        if transfer is None:
+            self._make_room()
+            transfer = ZoneTransfer()
+        self._transfers[source] = transfer
         indexed = self._read(read, cast(Numbers, frame.payload_values))
         if indexed is None:
+            transfer.discard()
             return
-        incomplete = self._incomplete.pop(self._source, None)
-        if incomplete is None or indexed.count != incomplete.count:
-            # Another count announces another set; those of two sets must not mix.
-            incomplete = _Incomplete(indexed.count, {})
-        zones = incomplete.zones
-        zones[indexed.index] = indexed.zone
-        if len(zones) < indexed.count:
-            renew(self._incomplete, self._source, incomplete, _MAX_ANNOUNCERS)
-            return
-        self._announce(SafeSet(tuple(zones[i] for i in range(indexed.count))))
+        was_lost = transfer.is_lost
+        self.refused += transfer.is_begun and indexed.index == 0  # the rest of the last one is lost
+        safe_set = transfer.add(indexed)
+        if safe_set is not None:
+            self._announce(safe_set)
+        elif transfer.is_lost:
+            self.refused += 1
+            if not was_lost:
+                self._tell(
+                    f"zone {indexed.index + 1} of {indexed.count} does not follow the one before: "
+                    f"the set is left out; send it again from zone 1; from {source}"
+                )
+
+    def _make_room(self) -> None:
+        """Forget a set that is incomplete, of this source's address if it has more than its share.
+
+        Else that of the newest source: who has been there for longer keeps its place.
+        """
+        self._transfers = {one: its for one, its in self._transfers.items() if not its.is_whole}
+        others = [one for one in self._transfers if not one.is_same(self.owner)]
+        own = [one for one in others if one.place == self._source.place]
+        full = own if len(own) >= _MAX_OF_ADDRESS else others[::-1]
+        if full is own or len(others) >= _MAX_INCOMPLETE:
+            del self._transfers[full[0]]
+            self.refused += 1
+            self._tell("a safe set is left out: too many sources announce one at once")
 
     def _announce(self, safe_set: SafeSet) -> None:
         """Keep the newest safe set of a source."""
-        kept = [one for one in self._received.announced if one.source != self._source]
-        if len(kept) >= _MAX_ANNOUNCEMENTS:
+        source = self._source
+        kept = [one for one in self._received.announced if one.source != source]
+        of_address = sum(one.source.place == source.place for one in kept)
+        if source.is_same(self.owner):
+            del kept[_MAX_ANNOUNCEMENTS - 1 :]
+        elif len(kept) >= _MAX_ANNOUNCEMENTS or of_address >= _MAX_OF_ADDRESS:
             self.refused += 1
+            self._tell("a safe set is left out: too many sources announce one at once")
             return
-        self._received.announced = [*kept, SafeSetAnnouncement(self._source, safe_set)]
+        self._received.announced = [*kept, SafeSetAnnouncement(source, safe_set)]
 
     def _sphere(self, frame: Frame) -> None:
         if not decode.for_this_vehicle(frame):
@@ -311,12 +332,16 @@ class Inbox:
         try:
             meaning = read(values)
         except decode.RefusedError as error:
-            meaning, reasons = None, self._received.refused
-            if len(reasons) < _MAX_REASONS:
-                reasons.append(f"{error}; from {self._source}")
+            meaning = None
+            self._tell(f"{error}; from {self._source}")
         if meaning is None:
             self.refused += 1
         return meaning
+
+    def _tell(self, reason: str) -> None:
+        """Tell why something was refused, of the first of a tick."""
+        if len(self._received.refused) < _MAX_REASONS:
+            self._received.refused.append(reason)
 
 
 def _begun(announcement: SafeSetAnnouncement, now_us: int) -> SafeSetAnnouncement:

@@ -310,6 +310,7 @@ class FlightLoop(Generic[State]):
         if outputs.texts is not sent:
             self._vehicle.queue_texts(outputs.texts[len(sent) :])
         self._missions.observe(outputs.snapshot)
+        self._inbox.owner = outputs.snapshot.safe_set_owner
         self._happened.observe(cycle.inputs, outputs)
         if cycle.inputs.tuning is not None:
             self._parameters.settle(outputs.tuning_taken)

@@ -175,5 +175,6 @@ def _wire(message: PilotMessage) -> tuple[int, *WireValues]:
     begin = (one.t_us, one.clearance_m, *one.velocity)
     flags = (_KEEP_IN if one.keep_in else 0) | (_TOUCH if one.touch is not None else 0)
     tail = (SYSTEM_ID, 1, one.index, one.count, one.number, flags)
-    values: WireValues = (*begin, *one.numbers, *rest, *tail, *_contact(one.touch))
+    set_id = one.t_us // 1000 & 0xFFFFFFFF  # all zones of a set are of one time
+    values: WireValues = (*begin, *one.numbers, *rest, *tail, *_contact(one.touch), set_id)
     return (message_ids.OBSTACLE_SHAPE, *values)

@@ -16,11 +16,11 @@ PINNED = {
     "MPC_STATUS": (60204, 53, 216),
     "MPC_HORIZON": (60205, 237, 234),
     "LOOP_TIMING": (60206, 49, 31),
-    "OBSTACLE_WALL": (60207, 24, 28),
+    "OBSTACLE_WALL": (60207, 28, 28),
     "WORKSPACE_SPHERE": (60208, 18, 197),
     "SETPOINT_STATUS": (60209, 25, 131),
-    "OBSTACLE_POINT": (60210, 20, 254),
-    "OBSTACLE_SHAPE": (60211, 114, 185),
+    "OBSTACLE_POINT": (60210, 24, 254),
+    "OBSTACLE_SHAPE": (60211, 118, 185),
     "JOINT_ENCODERS": (60212, 41, 156),
     "MPC_HORIZON_ARM": (60213, 222, 38),
     "FORCE_TORQUE": (60214, 32, 198),
@@ -127,7 +127,7 @@ def test_every_field_with_a_dimension_states_its_unit():
         *("missed_deadlines", "fallbacks", "cost", "slack_max", "sqp_iterations"),
         *("solver_iterations", "ticks", "late_ticks", "skipped_ticks"),
         *("target_system", "target_component", "accepted", "refused", "numbers"),
-        *("breaches", "departures", "interventions", "steps", "refusals", "friction"),
+        *("breaches", "departures", "interventions", "steps", "refusals", "friction", "set_id"),
         *("start", "inputs"),  # of several dimensions, each with its unit in the description
     }
     for message in ET.parse(DEFINITION).iter("message"):

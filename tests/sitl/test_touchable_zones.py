@@ -275,8 +275,8 @@ def test_the_vehicle_is_told_what_the_tool_meets() -> None:
     spoken = StepEncoder(lockstep=True).spoken((plain, replace(plain, touch=TOUCH)))
     values = [frame.payload_values for frame in split(spoken)]
     assert [one[26:] for one in values] == [
-        (1, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (3, 10.0, 500.0, 2000.0, 4.0, 0.5),
+        (1, 0.0, 0.0, 0.0, 0.0, 0.0, 0),
+        (3, 10.0, 500.0, 2000.0, 4.0, 0.5, 0),
     ]
 
 

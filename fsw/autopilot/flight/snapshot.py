@@ -62,6 +62,7 @@ def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
         log_failure=state.host.log_failure,
         arming=state.arming,
         safe_set=state.mission.safe_set,
+        safe_set_owner=state.mission.owner,
         actuators_found=state.damage.report,
         sensors_lost=tuple([one.sensor.value for one in state.aiding.lost]),
         touching=contact_report(r.pressing) if r.pressing.near else None,

@@ -47,6 +47,7 @@ _KEEP_IN: Final = 1  # PANDION_SHAPE_FLAGS
 _TOUCH: Final = 2
 FORCE_AT: Final = 16  # among the numbers of an END_EFFECTOR_TARGET
 _TOUCH_AT: Final = 27  # of an OBSTACLE_SHAPE
+_SET_AT: Final = 32  # of the same
 
 
 class RefusedError(Exception):
@@ -60,6 +61,7 @@ class IndexedObstacle:
     zone: Zone
     index: int
     count: int
+    set_id: int = 0  # of all zones of the set; 0: not given
 
 
 def for_this_vehicle(frame: Frame) -> bool:
@@ -180,7 +182,7 @@ def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
         RefusedError: It is no plane, or out of bounds.
     """
     zone = wall(cast(Vec3, values[0:3]), values[3], values[4])
-    return _indexed(zone, int(values[7]), int(values[8]))
+    return _indexed(zone, *map(int, values[7:10]))
 
 
 def obstacle_point(values: Numbers) -> IndexedObstacle | None:
@@ -192,7 +194,7 @@ def obstacle_point(values: Numbers) -> IndexedObstacle | None:
     if values[3] <= 0.0:
         return None
     zone = point(cast(Vec3, values[0:3]), values[3])
-    return _indexed(zone, int(values[6]), int(values[7]))
+    return _indexed(zone, *map(int, values[6:9]))
 
 
 def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
@@ -210,7 +212,8 @@ def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
     # One that stands is the same whenever it is announced.
     t_us = int(values[0]) if velocity != _ZERO else 0
     shape = Shape(kind.name, values[5 : 5 + kind.size])
-    return _indexed(Zone(shape, clearance, keep_in, velocity, t_us, touch), index, count)
+    zone = Zone(shape, clearance, keep_in, velocity, t_us, touch)
+    return _indexed(zone, index, count, int(values[_SET_AT]))
 
 
 def workspace_sphere(values: Numbers) -> Zone:
@@ -222,8 +225,10 @@ def workspace_sphere(values: Numbers) -> Zone:
     return _bounded(target_sphere(cast(Vec3, values[0:3]), values[3]))
 
 
-def _indexed(zone: Zone, index: int, count: int) -> IndexedObstacle | None:
-    return IndexedObstacle(_bounded(zone), index, count) if index < count <= MAX_ZONES else None
+def _indexed(zone: Zone, index: int, count: int, set_id: int) -> IndexedObstacle | None:
+    if not index < count <= MAX_ZONES:
+        return None
+    return IndexedObstacle(_bounded(zone), index, count, set_id)
 
 
 def _bounded(zone: Zone) -> Zone:

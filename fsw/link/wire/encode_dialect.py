@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from operator import attrgetter
 from typing import Final
+from zlib import crc32
 
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.shapes import kind_of
@@ -171,9 +172,10 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
     """OBSTACLE_SHAPE of the safe set in force: all, or the one of number ``which`` [1], from 1."""
     zones = snapshot.safe_set.zones
     if not zones:
-        nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0, *_NOT_TOUCHED)
+        nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0, *_NOT_TOUCHED, 0)
         return [Outgoing(message_ids.OBSTACLE_SHAPE, nothing, message_ids.PANDION)]
     every = not which >= 1.0  # NaN and 0 ask for all
+    set_id = crc32(repr(zones).encode())
     return [
         Outgoing(
             message_ids.OBSTACLE_SHAPE,
@@ -182,6 +184,7 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
                 *padded(zone.shape.numbers, _SHAPE_NUMBERS),
                 *(0, 0, index, len(zones), kind_of(zone.shape).number, _flags(zone)),
                 *(_NOT_TOUCHED if zone.touch is None else zone.touch),
+                set_id,
             ),
             message_ids.PANDION,
         )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from fsw.autopilot.signals import BatteryReading, SensorFrame, TickInputs
+from fsw.autopilot.signals import BatteryReading, MessageSource, SensorFrame, TickInputs
 from fsw.link.inbox import Inbox
 from messages import message_ids as ids
 from messages.frames import FrameWriter, split
@@ -53,3 +53,79 @@ def test_news_by_itself_is_in_the_next_tick_alone(
     ]
     assert changed == [field]
     assert taken(inbox) == nothing
+
+
+OWNER = MessageSource(66, 6, "gcs", "127.0.0.1:5555")
+
+
+def ball(
+    inbox: Inbox, source: MessageSource, index: int, count: int, north: float, radius: float = 0.5
+) -> None:
+    """One ball of a set arrives."""
+    begin, tail = (0, 0.1, *NONE, north, 0.0, -1.0, radius), (1, 0, index, count, 1, 0)
+    writer = FrameWriter(source.system, source.component)
+    (one,) = split(writer.frame(ids.OBSTACLE_SHAPE, *begin, *(0.0,) * 12, *tail, *(0.0,) * 5, 0))
+    inbox.accept(one, source)
+
+
+def norths(inbox: Inbox, source: MessageSource) -> list[float]:
+    """Where the balls are that are announced by a source."""
+    sets = [one.safe_set for one in inbox.take().announced if one.source == source]
+    return [zone.shape.numbers[0] for one in sets for zone in one.zones]
+
+
+def stranger(k: int, port: int = 1) -> MessageSource:
+    return MessageSource(100 + k, 1, "gcs", f"127.0.0.1:{port}")
+
+
+def test_a_zone_that_is_refused_leaves_out_its_set_and_no_other() -> None:
+    """With the next set, of as many zones, the rest of the last one was in force."""
+    inbox = Inbox()
+    ball(inbox, OWNER, 0, 2, 1.0, radius=float("nan"))
+    ball(inbox, OWNER, 1, 2, 2.0)
+    for north in (3.0, 5.0):
+        ball(inbox, OWNER, 0, 2, north)
+        ball(inbox, OWNER, 1, 2, north + 1.0)
+        assert norths(inbox, OWNER) == [north, north + 1.0]
+
+
+def test_a_set_of_which_a_zone_is_lost_is_told_once() -> None:
+    inbox = Inbox()
+    for index in (0, 2, 3):
+        ball(inbox, OWNER, index, 4, 1.0)
+    (text,) = inbox.take().refused
+    assert "zone 3 of 4 does not follow" in text
+    assert str(OWNER) in text
+    assert inbox.refused == 2
+
+
+@pytest.mark.parametrize("place", ["incomplete", "whole"])
+def test_who_writes_many_ids_keeps_nobody_else_s_set_out(place: str) -> None:
+    """One socket, which wrote eight, kept the owner's out, and nothing was said."""
+    inbox = Inbox()
+    for index in (0, 1):
+        for k in range(8):
+            ball(inbox, stranger(k), 0, 2 if place == "incomplete" else 1, 50.0)
+        ball(inbox, OWNER, index, 2, float(index))
+    received = inbox.take()
+    assert any(one.source == OWNER for one in received.announced)
+    assert "too many sources" in received.refused[0]
+    assert inbox.refused >= 6
+
+
+@pytest.mark.parametrize("place", ["incomplete", "whole"])
+def test_the_owner_of_the_safe_set_is_heard_whoever_else_speaks(place: str) -> None:
+    inbox = Inbox()
+    inbox.owner = OWNER
+    for index in (0, 1):
+        ball(inbox, OWNER, index, 2, float(index))
+        for k in range(40):
+            ball(inbox, stranger(k, port=k), 0, 2 if place == "incomplete" else 1, 50.0)
+    assert norths(inbox, OWNER) == [0.0, 1.0]
+    for k in range(40):
+        ball(inbox, stranger(k, port=k), 0, 1, 50.0)
+    for index in (0, 1):
+        ball(inbox, OWNER, index, 2, float(index))
+    received = inbox.take()
+    assert OWNER in [one.source for one in received.announced]
+    assert len(received.announced) <= 4

@@ -31,7 +31,7 @@ CLEARANCE = 0.1
 
 
 def wall_frame(writer: FrameWriter, offset: float, *, index: int = 0, count: int = 1) -> bytes:
-    values = (-1.0, 0.0, 0.0, offset, CLEARANCE, 0, 0, index, count)
+    values = (-1.0, 0.0, 0.0, offset, CLEARANCE, 0, 0, index, count, 0)
     return writer.frame(ids.OBSTACLE_WALL, *values)
 
 

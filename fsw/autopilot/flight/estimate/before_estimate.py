@@ -110,5 +110,6 @@ def nothing_known(
         log_failure=state.host.log_failure,
         arming=_REPORT,
         safe_set=state.mission.safe_set,
+        safe_set_owner=state.mission.owner,
     )
     return replace(so_far, shown=snapshot, texts=texts)

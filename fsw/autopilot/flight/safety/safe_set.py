@@ -209,14 +209,9 @@ class SafeSetCheck:
         return self._kept(mission, wanted, f"{who}: {summary(fence)}", texts, flies=flies)
 
     def _may_grow(self, mission: MissionMemory, update: MissionUpdate, *, flies: bool) -> bool:
-        """Whether an upload may put any other fence in place.
-
-        The owner is the source that uploaded the one in force, or all of a chosen system.
-        """
-        source, owner, chosen = update.source, mission.fence_owner, self._chosen
-        if not flies or source is None or (owner is None and not chosen):
-            return True
-        return source.system == chosen if chosen else source.is_same(owner)
+        """Whether an upload may put any other fence in place."""
+        source = update.source
+        return not flies or source is None or self._is_owner(source, mission.fence_owner)
 
     def _take(
         self,
@@ -249,7 +244,7 @@ class SafeSetCheck:
         wanted = replace(
             mission,
             announced=safe_set,
-            silent_zones=0,
+            silent_zones=0 if owns else mission.silent_zones,
             owner=source if owns else owner,
             accepted=(*([] if becomes_owner else others)[1 - _ACCEPTED :], announcement),
         )
@@ -338,16 +333,22 @@ class SafeSetCheck:
         self, mission: MissionMemory, source: MessageSource, now_us: int, *, armed: bool
     ) -> bool:
         """Whether a source owns what is announced, or may from now on."""
-        chosen, owner = self._chosen, mission.owner
+        if self._is_owner(source, mission.owner):
+            return True
+        if armed or self._chosen not in (0, source.system):
+            return False
+        silent_us = now_us - mission.owner_heard_us
+        return mission.owner_heard_us < 0 or silent_us >= self._config.limits.owner_timeout_us
+
+    def _is_owner(self, source: MessageSource, owner: MessageSource | None) -> bool:
+        """Whether a source is the ``owner``, or is the first one that may be.
+
+        A chosen system narrows who may be, and vouches for nobody: anybody can write its number.
+        """
+        chosen = self._chosen
         if chosen not in (0, source.system):
             return False
-        if owner is None or source.is_same(owner):
-            return True
-        if chosen and owner.system != chosen:
-            return True
-        silent_us = now_us - mission.owner_heard_us
-        gone = mission.owner_heard_us < 0 or silent_us >= self._config.limits.owner_timeout_us
-        return gone and not armed
+        return owner is None or source.is_same(owner) or bool(chosen and owner.system != chosen)
 
     @property
     def _chosen(self) -> int:

@@ -119,14 +119,17 @@ def test_a_target_in_another_frame_or_without_position_is_refused(fields: dict[s
     assert inbox.refused == 1
 
 
-def test_walls_arrive_as_one_set_in_any_order() -> None:
+def test_walls_arrive_as_one_set_in_order() -> None:
     inbox = Inbox()
-    inbox.accept(wall(1, 2, offset=-2.0))
-    assert inbox.take().announced == []
     inbox.accept(wall(0, 2, offset=-1.0))
+    assert inbox.take().announced == []
+    inbox.accept(wall(1, 2, offset=-2.0))
     (announced,) = inbox.take().announced
     safe_set = announced.safe_set
     assert [one.shape.numbers[3] for one in safe_set.zones] == [-1.0, -2.0]
+    assert inbox.take().announced == []
+    inbox.accept(wall(1, 2, offset=-2.0))
+    inbox.accept(wall(0, 2, offset=-1.0))
     assert inbox.take().announced == []
 
 
@@ -140,10 +143,10 @@ def test_walls_of_two_sets_do_not_mix() -> None:
 
 def test_walls_and_points_are_one_set() -> None:
     inbox = Inbox()
-    inbox.accept(point(2, 3))
     inbox.accept(wall(0, 3))
-    assert inbox.take().announced == []
     inbox.accept(point(1, 3, **{"position[0]": 7.0}))
+    assert inbox.take().announced == []
+    inbox.accept(point(2, 3))
     (announced,) = inbox.take().announced
     safe_set = announced.safe_set
     assert [one.shape.kind for one in safe_set.zones] == ["half-space", "ball", "ball"]

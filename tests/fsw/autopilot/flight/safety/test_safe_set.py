@@ -54,13 +54,18 @@ def received(
 
 
 def uploaded(
-    memory: MissionMemory, source: MessageSource, *, flies: bool = True, **lists: object
+    memory: MissionMemory,
+    source: MessageSource,
+    *,
+    flies: bool = True,
+    check: SafeSetCheck = CHECK,
+    **lists: object,
 ) -> tuple[MissionMemory, list[StatusText]]:
     """What becomes of lists that a source has uploaded."""
     texts: list[StatusText] = []
     update = MissionUpdate(source=source, **lists)  # type: ignore[arg-type]
     inputs = TickInputs(frame(1_000_000), mission=update)
-    return CHECK.update(memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies), texts
+    return check.update(memory, inputs, vehicle_at((0.0, 0.0, -1.0)), texts, flies=flies), texts
 
 
 def refused(texts: list[StatusText]) -> str:
@@ -277,6 +282,9 @@ def test_a_moving_zone_that_is_silent_too_long_is_held_where_it_is_predicted_the
     assert fenced.silent_zones == 1
     late, texts = received(held, announced, t_s=9.0)
     assert (late.safe_set, texts) == (held.safe_set, []), "what was heard before is not new"
+    shrunk, _ = received(held, SafeSet((*held.announced.zones, TREE)), source=STRANGER, t_s=9.0)
+    assert TREE in shrunk.safe_set.zones
+    assert shrunk.silent_zones == 1, "it is for the source that is silent to speak"
     again = SafeSet((NORTH, walker(9_000_000, north=4.0)))
     back, texts = received(held, again, t_s=9.0)
     assert back.safe_set == joined(again, SafeSet((SOUTH,)))
@@ -463,6 +471,23 @@ def test_a_chosen_owner_is_one_whoever_was_first() -> None:
     assert "which no source owns" in refused(texts)
     memory, _ = received(memory, SafeSet(), check=check, source=chosen)
     assert (memory.safe_set, memory.owner) == (SafeSet(), chosen)
+
+
+@pytest.mark.requirement("REQ-SAFE-9")
+@pytest.mark.parametrize("owner", [0, 1])
+def test_choosing_an_owner_lets_nobody_do_what_it_could_not_without(owner: int) -> None:
+    """Who wrote the chosen system's number could clear its fence in flight."""
+    check = SafeSetCheck(limits(safe_set_owner=owner))
+    memory, _ = received(MissionMemory(), walled(4.0, 4.0), check=check)
+    memory, _ = uploaded(memory, OWNER, check=check, fence=walled(5.0, 5.0))
+    after, texts = uploaded(memory, STRANGER, check=check, fence=SafeSet())
+    assert after.fence == walled(5.0, 5.0)
+    assert f"which {OWNER} owns" in refused(texts)
+    after, texts = received(memory, SafeSet(), check=check, source=STRANGER)
+    assert after.announced == walled(4.0, 4.0)
+    assert f"which {OWNER} owns" in refused(texts)
+    after, _ = uploaded(memory, OWNER, check=check, fence=SafeSet())
+    assert after.fence == SafeSet()
 
 
 def test_one_sender_has_one_address_unless_signatures_vouch_for_it() -> None:
