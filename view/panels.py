@@ -14,6 +14,7 @@ from fsw.autopilot.periods import PLANNING_US
 from view import colours
 from view.colours import Rgb, css, millimetres
 from view.scene import Event, Margin, Scene, Timing, Worst
+from view.telemetry import first_line
 from view.vehicle import tilt
 
 PLANNING_LIMIT: Final = 1e-6 * PLANNING_US  # s, a planning cycle must be over by then
@@ -97,9 +98,8 @@ def parameters_html(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def undrawn(error: Exception) -> str:
-    """Why a frame was not drawn; of a reason of many lines the first."""
-    lines = str(error).strip().splitlines() or [type(error).__name__]
-    return f"not drawn: {lines[0]}"
+    """Why a frame was not drawn."""
+    return f"not drawn: {first_line(error)}"
 
 
 def refusal_html(sentence: str, *, good: bool = False) -> str:
@@ -113,9 +113,9 @@ def refusal_html(sentence: str, *, good: bool = False) -> str:
 
 def _headline(now: Scene, begin: float) -> str:
     badges = [_badge(now.mode or "no mode", colours.BLUE)]
-    badges.append(
-        _badge("armed", colours.ORANGE) if now.armed else _badge("disarmed", colours.GREY)
-    )
+    if now.armed is not None:
+        armed = ("armed", colours.ORANGE) if now.armed else ("disarmed", colours.GREY)
+        badges.append(_badge(*armed))
     if now.landed:
         badges.append(_badge("landed", colours.GREY))
     badges += [_badge(name, colours.RED) for name in now.failures.split(", ") if name]
