@@ -373,6 +373,31 @@ def test_rates_are_measured_and_fall_to_zero() -> None:
     assert "yaw 1.5708" in heard.fields()
 
 
+@pytest.mark.parametrize("hertz", [0.5, 10.0, 75.0, 250.0])
+def test_a_rate_is_true_above_that_of_the_polling(hertz: float) -> None:
+    telemetry = Telemetry(AIRFRAME)
+    (sent,) = messages_now(ids.ATTITUDE, 0.0, FLYING, CONTEXT) or ()
+    came, shown = 0, []
+    for poll in range(1000):
+        at = 0.02 * poll
+        due = int(hertz * at)
+        take(telemetry, *[sent] * (due - came), at=at)
+        came = due
+        if at > 5.0:
+            shown += [one.rate(at) for one in telemetry.heard.values()]
+    assert shown == pytest.approx([hertz] * len(shown), rel=0.05)
+
+
+def test_a_rate_is_of_the_last_seconds() -> None:
+    telemetry = Telemetry(AIRFRAME)
+    (sent,) = messages_now(ids.ATTITUDE, 0.0, FLYING, CONTEXT) or ()
+    for begin, hertz in ((0.0, 100.0), (60.0, 10.0)):
+        for k in range(40):
+            take(telemetry, sent, at=begin + k / hertz)
+    (heard,) = telemetry.heard.values()
+    assert heard.rate(64.0) == pytest.approx(10.0)
+
+
 def test_memory_is_bounded() -> None:
     telemetry = Telemetry(AIRFRAME)
     for k in range(2000):

@@ -78,6 +78,25 @@ def test_the_headline_says_mode_arming_place_and_margin() -> None:
     assert seen() == "no vehicle has answered yet"
 
 
+def test_the_headline_says_who_speaks_where_the_vehicle_does_not() -> None:
+    other = FrameWriter(2, 1)
+    assert seen(frame(other, HEARTBEAT, autopilot=12)) == (
+        "no vehicle of system 1 has answered yet; those of system 2 speak"
+    )
+    assert seen(frame(VEHICLE, ATTITUDE, time_boot_ms=1000)) == "no heartbeat"
+
+
+def test_a_component_s_heartbeat_disarms_no_vehicle() -> None:
+    of_component = frame(VEHICLE, HEARTBEAT, autopilot=8)
+    assert "disarmed" not in seen(beat(), of_component)
+
+
+def test_the_vehicle_is_heard_behind_any_crowd() -> None:
+    crowd = [FrameWriter(s, c) for s in range(2, 40) for c in range(1, 255)]
+    shown = seen(*(frame(one, HEARTBEAT, autopilot=12) for one in crowd), beat())
+    assert "armed" in shown
+
+
 def test_the_headline_counts_what_was_refused() -> None:
     assert "refused" not in seen(beat(), frame(ARM, SETPOINT_STATUS, refused=7), now=0.5)
     assert "3 refused" in seen(beat(), frame(ARM, SETPOINT_STATUS, refusals=3), now=0.5)
