@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Iterable, Sequence
-from html import escape
 from typing import Final
 
+from command_line.printable import printable
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.rotors import rotor_names
@@ -233,6 +234,11 @@ def _timing(groups: Sequence[Timing]) -> str:
         rate = f"{1.0 / one.period:.0f} Hz, " if one.period > 0.0 else ""
         rows.append(_row(one.name, used, bar, f"{rate}late {one.late}, skipped {one.skipped}"))
     return _section("Loops, 99th percentile", _table(rows)) if rows else ""
+
+
+def escape(text: str) -> str:
+    """A text as HTML that shows it; what is no UTF-8, as in a file's name, could not be sent."""
+    return html.escape(printable(text))
 
 
 def _known(value: float) -> str:

@@ -245,14 +245,10 @@ class Telemetry:
     def _thrust(self, servos: tuple[Any, ...] | None) -> RotorVector | None:
         if servos is None:
             return None
-        return tuple(
-            [
-                most * max(pulse - 1000, 0) / 1000.0
-                for pulse, most in zip(
-                    _pulses(servos), self.airframe.rotor_thrust_max, strict=False
-                )
-            ]
-        )
+        pulses = _pulses(servos)[: self.airframe.rotors]
+        shares = [max(pulse - 1000, 0) / 1000.0 for pulse in pulses]
+        most = self.airframe.rotor_thrust_max
+        return tuple([share * top for share, top in zip(shares, most, strict=False)])
 
     def _margins(self, said: _Said) -> tuple[tuple[Margin, ...], float, float, Safety]:
         values, setpoints = said.get(ids.BARRIER_MARGIN), said.get(ids.SETPOINT_STATUS)

@@ -110,6 +110,7 @@ def test_the_scene_is_the_snapshot_that_was_sent() -> None:
     assert scene.estimate.q_arm == pytest.approx((0.7, 0.8))
     assert scene.thrust is not None
     assert scene.thrust[3] > scene.thrust[1]
+    assert len(scene.thrust) == AIRFRAME.rotors
     assert scene.target == pytest.approx((1.6, 2.6, -2.6))
     assert scene.base_target == pytest.approx((1.1, 2.1, -3.1))
     assert scene.minimum == pytest.approx(0.2)
