@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+from fsw.autopilot.flight.commands.bounds import zone_problem
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.ball import ball
@@ -140,10 +141,12 @@ class VehicleLink(threading.Thread):
         The vehicle is asked for the set first, because what is announced replaces it. Returns why
         nothing was announced, None if it was.
         """
-        known = self._announced()
+        new = Zone(ball(centre, radius), _CLEARANCE)
+        problem = zone_problem(new)
+        known = self._announced() if problem is None else problem
         if isinstance(known, str):
             return f"no obstacle: {known}"
-        zones = (*known, Zone(ball(centre, radius), _CLEARANCE))
+        zones = (*known, new)
         for index, zone in enumerate(zones):
             self._shape(index, len(zones), zone)
         return None

@@ -20,6 +20,7 @@ from fsw.link.wire.outgoing import Outgoing
 from messages import message_ids as ids
 from messages.addresses import parse_link_address
 from messages.frames import Frame, FrameWriter, split
+from tests.flood import Flood
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
 from tests.waiting import wait_for
 from vehicles.vehicle_file import load_vehicle
@@ -130,6 +131,14 @@ def test_what_is_not_known_whole_is_not_written_back(
     assert vehicle.told == []
 
 
+def test_a_ball_that_fits_no_message_is_refused_in_a_sentence() -> None:
+    vehicle = Vehicle()
+    with spoken_to(vehicle) as link:
+        refusal = link.announce((1e300, 0.0, 0.0), 0.25)
+    assert refusal is not None
+    assert refusal.startswith("no obstacle: centre north [m] is 1e+300; at most ")
+
+
 @pytest.mark.parametrize(("airframe", "asks"), [("paper", False), ("hexa-3r", True)])
 def test_all_joints_of_a_plan_are_asked_for(airframe: str, asks: bool) -> None:
     vehicle = Vehicle()
@@ -148,31 +157,6 @@ def test_numbers_that_fit_no_message_end_no_link() -> None:
         link.aim(None)
         assert link.is_alive()
     assert [one for one in texts if one.startswith("not sent: ")]
-
-
-class Flood:
-    """A vehicle at the end of a TCP connection that never pauses."""
-
-    def __init__(self) -> None:
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.address = f"tcp:127.0.0.1:{self._listener.getsockname()[1]}"
-        self._ended = False
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def close(self) -> None:
-        self._ended = True
-        self._thread.join()
-        self._listener.close()
-
-    def _run(self) -> None:
-        peer, _ = self._listener.accept()
-        peer.settimeout(0.2)
-        said = b"".join(WRITERS[1].frame(ids.ATTITUDE, 1000 + k, *(0.1,) * 6) for k in range(400))
-        with peer, contextlib.suppress(ConnectionError):
-            while not self._ended:
-                with contextlib.suppress(TimeoutError):
-                    peer.sendall(said)
 
 
 def test_a_stream_that_never_pauses_keeps_the_link_from_nothing(
