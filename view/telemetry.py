@@ -59,6 +59,7 @@ _STEPS: Final = 6  # most of an MPC_HORIZON
 HORIZON_JOINTS: Final = 2  # of it; of a vehicle with more an MPC_HORIZON_ARM has all
 _FENCE_ID_AT: Final = 5  # of a MISSION_CURRENT; 0: there is no fence
 _OUTPUTS: Final = 16  # of a SERVO_OUTPUT_RAW
+_VEHICLE: Final = ((ids.SYSTEM_ID, ids.AUTOPILOT), (ids.SYSTEM_ID, ids.PANDION))
 _NO_AUTOPILOT: Final = 8  # MAV_AUTOPILOT: of a component, not of the vehicle
 _REQUESTS: Final = (511, 512)  # of messages; their answers are of no interest
 _UNTIMED: Final = 0xFFFFFFFF
@@ -152,7 +153,7 @@ class Telemetry:
         ours = _is_of_vehicle(frame)
         key = (frame.system_id, frame.component_id, frame.message_id)
         one = self.heard.get(key)
-        if one is None and (ours or len(self.heard) < _MAX_HEARD):
+        if one is None and (len(self.heard) < _MAX_HEARD or key[:2] in _VEHICLE):
             one = self.heard[key] = Heard(*key)  # else somebody makes it up
         if one is not None:
             one.take(frame.payload_values, at)

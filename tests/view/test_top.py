@@ -208,6 +208,28 @@ async def drive() -> None:
     assert fed.closed
 
 
+def test_a_crowd_is_sorted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asyncio.run(show_a_crowd(monkeypatch))
+
+
+async def show_a_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
+    fed = Fed()
+    app = TopApp(fed, AIRFRAME, lambda: fed.now)
+    async with app.run_test(size=(140, 40)) as pilot:
+        await pilot.pause()
+        sorts: list[Any] = []
+        table = app.query_one("#streams", DataTable)
+        monkeypatch.setattr(table, "sort", lambda *by, **how: sorts.append(by))
+        fed.waiting = [
+            frame(FrameWriter(s, c), HEARTBEAT) for s in range(2, 40) for c in range(1, 255)
+        ]
+        for _ in range(2):
+            app.refresh_all()
+        assert 500 < table.row_count <= 1100
+        assert len(sorts) == 1
+        await pilot.press("q")
+
+
 def test_a_margin_that_is_not_finite_has_no_bar() -> None:
     asyncio.run(show_margins_that_are_not_finite())
 

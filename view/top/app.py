@@ -171,6 +171,7 @@ class TopApp(App[None]):
 
     def _show_streams(self, now: float) -> None:
         table = self.query_one("#streams", DataTable)
+        known = table.row_count
         for key, one in self.streams():
             age = now - one.at
             style = "dim" if age > _STALE_S else ""
@@ -178,11 +179,12 @@ class TopApp(App[None]):
             cells = [Text(cell, style=style, justify="right") for cell in shown]
             if key not in table.rows:
                 table.add_row(Text(one.name), str(one.component), *cells, key=key)
-                table.sort(self._by_name, key=str)
                 continue
             row = table.get_row_index(key)
             for column, cell in enumerate(cells, start=2):
                 table.update_cell_at(Coordinate(row, column), cell)
+        if table.row_count > known:
+            table.sort(self._by_name, key=str)
 
     def chosen(self) -> Heard | None:
         """The kind of message under the cursor."""
