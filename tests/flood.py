@@ -27,7 +27,7 @@ class Flood:
 
     def _run(self) -> None:
         writer = FrameWriter(1, 1)
-        said = b"".join(writer.frame(ids.ATTITUDE, 1000 + k, *(0.1,) * 6) for k in range(400))
+        said = b"".join(writer.frame(ids.ATTITUDE, 1000 + k, *(0.1,) * 6) for k in range(400)) * 100
         self._listener.settimeout(0.1)
         while not self._ended:
             with contextlib.suppress(TimeoutError, ConnectionError):
