@@ -72,6 +72,7 @@ _BELIEVED: Final = 1e6  # numbers of a plan [SI]; larger ones somebody makes up
 _MARK_S: Final = 1.0  # between two marks of a rate
 _MARKS: Final = 3
 _NEVER: Final[tuple[float, tuple[Any, ...]]] = (math.nan, ())
+_COUNTED: Final = (ids.ARM_JOINT_STATE, ids.SERVO_OUTPUT_RAW)  # say how many there are
 _Said = dict[int, tuple[Any, ...]]  # by message
 MODE_NAMES: Final = {one.custom_mode: one.name.lower() for one in AVAILABLE_MODES}
 _WARNING: Final = 4  # MAV_SEVERITY
@@ -181,7 +182,6 @@ class Telemetry:
         arm, beat = said.get(ids.ARM_JOINT_STATE), said.get(ids.HEARTBEAT)
         state, payload = said.get(ids.EXTENDED_SYS_STATE), said.get(ids.PAYLOAD_STATUS)
         margins, minimum, added, safety = self._margins(said)
-        planned_at, horizon = self._led
         return Scene(
             t=self.t,
             estimate=self._posture(said),
@@ -191,7 +191,7 @@ class Telemetry:
             joint_rates=None if arm is None else _arm(arm, 1),
             target=_place(said.get(ids.END_EFFECTOR_TARGET), mask_at=12),
             base_target=_place(said.get(ids.POSITION_TARGET_LOCAL_NED), mask_at=12),
-            horizon=horizon if _is_known(now - planned_at, _SHORT_S) else None,
+            horizon=self._horizon(now),
             safe_set=self._safe_set,
             margins=margins,
             minimum=minimum,
@@ -216,6 +216,14 @@ class Telemetry:
             held=None if payload is None else Held(bool(payload[2]), float(payload[1])),
         )
 
+    def _horizon(self, now: float) -> Horizon | None:
+        at, led = self._led
+        return led if _is_known(now - at, _SHORT_S) and not self._is_another() else None
+
+    def _is_another(self) -> bool:
+        """Whether joints or rotors contradict the airframe."""
+        return any(self._values.get(one) is _NEVER for one in _COUNTED)
+
     def _others(self) -> tuple[int, ...]:
         """The systems that speak where the vehicle does not."""
         if not math.isnan(self.at):
@@ -234,10 +242,10 @@ class Telemetry:
     def _posture(self, said: _Said) -> Posture | None:
         position, attitude = said.get(ids.LOCAL_POSITION_NED), said.get(ids.ATTITUDE)
         arm = said.get(ids.ARM_JOINT_STATE)
-        if position is None or attitude is None:
+        if position is None or attitude is None or self._is_another():
             return None
         if arm is None and ids.ARM_JOINT_STATE in self._values:
-            return None  # it is not known any more, or of another vehicle
+            return None  # it is not known any more
         q_arm = (0.0,) * self.airframe.bodies.joints if arm is None else _arm(arm, 0)
         if not all(map(math.isfinite, (*position[1:4], *attitude[1:4], *q_arm))):
             return None  # an estimate that is lost, or somebody's frame
@@ -290,7 +298,7 @@ class Telemetry:
 
     def read_arm(self, values: tuple[Any, ...]) -> None:
         """Take an ARM_JOINT_STATE of as many joints as the airframe has."""
-        self._fits("joints", int(values[STATE_COUNT_AT]), self.airframe.bodies.joints)
+        _check_fit("joints", int(values[STATE_COUNT_AT]), self.airframe.bodies.joints)
 
     def read_servos(self, values: tuple[Any, ...]) -> None:
         """Take a SERVO_OUTPUT_RAW: of the rotors, perhaps of the joints, of nothing while disarmed.
@@ -300,19 +308,7 @@ class Telemetry:
         used, rotors = sum(pulse > 0 for pulse in _pulses(values)), self.airframe.rotors
         outputs = min(rotors + self.airframe.bodies.joints, _OUTPUTS)
         if used and not rotors <= used <= outputs:
-            self._fits("rotors and joints", used, outputs)
-
-    def _fits(self, what: str, said: int, chosen: int) -> None:
-        """Refuse a number that contradicts the airframe.
-
-        Raises:
-            RefusedError: It does.
-        """
-        if said != chosen:
-            raise decode.RefusedError(
-                f"the vehicle has {said} {what}, the airframe that was chosen {chosen}: it is not "
-                "drawn; choose its own by --airframe"
-            )
+            _check_fit("rotors and joints", used, outputs)
 
     def read_plan(self, _: tuple[Any, ...]) -> None:
         """Take a plan, once both messages of it have come where it is sent in two."""
@@ -320,9 +316,7 @@ class Telemetry:
         at, plan = self._values.get(ids.MPC_HORIZON, _NEVER)
         arm = self._values.get(ids.MPC_HORIZON_ARM, _NEVER)[1]
         if arm:
-            self._fits("joints", arm[55], joints)
-        if self._values.get(ids.ARM_JOINT_STATE) is _NEVER:
-            return  # of another vehicle
+            _check_fit("joints", arm[55], joints)
         if plan and (joints <= HORIZON_JOINTS or (arm and arm[53:55] == (plan[56], plan[58]))):
             self._led = at, _led(plan, arm, self.airframe)
 
@@ -507,6 +501,19 @@ def _vec3(values: tuple[Any, ...]) -> Vec3:
 def first_line(error: Exception) -> str:
     """Why something failed; of a reason of many lines the first."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0]
+
+
+def _check_fit(what: str, said: int, chosen: int) -> None:
+    """Refuse a number that contradicts the airframe.
+
+    Raises:
+        RefusedError: It does.
+    """
+    if said != chosen:
+        raise decode.RefusedError(
+            f"the vehicle has {said} {what}, the airframe that was chosen {chosen}: it is not "
+            "drawn; choose its own by --airframe"
+        )
 
 
 def _is_known(age: float, lasts: float) -> bool:

@@ -192,6 +192,19 @@ def test_a_vehicle_that_is_no_such_airframe_is_said_once_and_not_drawn(
     assert scene.thrust is None or flown == "paper"
 
 
+def test_another_number_of_rotors_is_said_and_not_drawn() -> None:
+    telemetry, snapshot, context = of_vehicle("paper")
+    take(telemetry, *everything(snapshot, context))
+    assert telemetry.scene(0.0).estimate is not None
+    ten = (0, *(1500,) * 8, 0, *(1500,) * 2, *(0,) * 6)
+    take(telemetry, Outgoing(ids.SERVO_OUTPUT_RAW, ten))
+    scene = telemetry.scene(0.0)
+    assert (scene.estimate, scene.horizon, scene.thrust) == (None, None, None)
+    assert telemetry.events[-1].text.startswith("the vehicle has 10 rotors and joints, ")
+    take(telemetry, Outgoing(ids.SERVO_OUTPUT_RAW, (0,) * 18))  # disarmed
+    assert telemetry.scene(0.0).estimate is not None
+
+
 def test_whatever_is_said_a_scene_is_made_of_it() -> None:
     """Any numbers in every message that is read, for vehicles of any number of joints."""
     rng = np.random.default_rng(5)
