@@ -146,6 +146,7 @@ class Telemetry:
     _pieces: dict[int, bytes] = field(default_factory=dict)
     _mode: str = ""
     _conditions: list[Condition] = field(default_factory=list)  # of failsafes, that have begun
+    _plan: tuple[tuple[Any, ...], ...] = ()  # of which is known where it leads
     _led: tuple[float, Horizon | None] = (math.nan, None)
     """When [s] a plan came, and where it leads."""
 
@@ -292,6 +293,7 @@ class Telemetry:
     def _forget(self) -> None:
         """Know nothing any more of a flight that is over; its messages and events stay listed."""
         self.t, self._safe_set, self._mode, self._led = math.nan, None, "", (math.nan, None)
+        self._plan = ()
         self._transfer.discard()
         for kept in (self._values, self._timings, self._told, self._pieces, self._conditions):
             kept.clear()
@@ -317,8 +319,11 @@ class Telemetry:
         arm = self._values.get(ids.MPC_HORIZON_ARM, _NEVER)[1]
         if arm:
             _check_fit("joints", arm[55], joints)
-        if plan and (joints <= HORIZON_JOINTS or (arm and arm[53:55] == (plan[56], plan[58]))):
-            self._led = at, _led(plan, arm, self.airframe)
+        if not plan or (joints > HORIZON_JOINTS and arm[53:55] != (plan[56], plan[58])):
+            return
+        known = plan[1:], arm[1:] if joints > HORIZON_JOINTS else ()
+        led = self._led[1] if known == self._plan else _horizon_of(plan, arm, self.airframe)
+        self._plan, self._led = known, (at, led)
 
     def read_zone(self, values: tuple[Any, ...]) -> None:
         """Take one shape of the safe set; the set changes when it is whole."""
@@ -560,7 +565,7 @@ def _tool(values: tuple[Any, ...] | None) -> Tool | None:
     return Tool(_vec3(values[1:4]), pressed, asked, most, bool(values[10]))
 
 
-def _led(plan: tuple[Any, ...], arm: tuple[Any, ...], airframe: Airframe) -> Horizon | None:
+def _horizon_of(plan: tuple[Any, ...], arm: tuple[Any, ...], airframe: Airframe) -> Horizon | None:
     """Where an MPC_HORIZON leads; with more joints than it has, its MPC_HORIZON_ARM too."""
     joints, steps, x, u = airframe.bodies.joints, int(plan[58]), plan[1:20], plan[20:56]
     q, qd = (arm[1:9], arm[9:17]) if joints > HORIZON_JOINTS else (x[15:17], x[17:19])
