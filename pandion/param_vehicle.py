@@ -172,22 +172,21 @@ class ParameterClient:
     def _hear(self, wanted: tuple[int, ...], patience_s: float) -> Frame | None:
         """The next frame of the vehicle with one of these ids; None after the patience."""
         until = time.monotonic() + patience_s
+        left_s = patience_s
         while True:
             while self._waiting:
                 frame = self._waiting.pop(0)
                 if frame.message_id in wanted and (frame.system_id, frame.component_id) == _VEHICLE:
                     return frame
-            received = self._endpoint.receive_waiting()
-            if received is not None:
-                data, sender = received
-                if sender == self._peer:
-                    self._waiting = [one for one, _ in self._endpoint.cut(data, self._losses)]
-                continue
-            left_s = until - time.monotonic()
-            if left_s <= 0.0:
+            if left_s <= 0.0:  # a stream may never pause
                 return None
-            # A stream is looked after meanwhile.
-            select.select((self._endpoint,), (), (), min(left_s, _LOOK_S))
+            left_s = until - time.monotonic()
+            received = self._endpoint.receive_waiting()
+            if received is None:
+                # A stream is looked after meanwhile.
+                select.select((self._endpoint,), (), (), max(min(left_s, _LOOK_S), 0.0))
+            elif received[1] == self._peer:
+                self._waiting = [one for one, _ in self._endpoint.cut(received[0], self._losses)]
 
 
 def _value(field: float, type_: int) -> float:

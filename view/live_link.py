@@ -9,14 +9,19 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+from fsw.autopilot.flight.commands.bounds import zone_problem
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import SafeSet, Vec3
+from fsw.autopilot.shapes import kind_of
+from fsw.autopilot.shapes.ball import ball
+from fsw.autopilot.signals import Vec3, Zone
 from fsw.link.endpoints import open_endpoint
+from fsw.link.wire import decode
+from fsw.link.wire.zone_transfer import set_id_of
 from messages import message_ids as ids
 from messages.addresses import LinkAddress, address_text
 from messages.frames import FrameWriter, Losses
 from view.scene import Scene
-from view.telemetry import Telemetry, command_name, result_name
+from view.telemetry import HORIZON_JOINTS, Telemetry, command_name, first_line, result_name
 
 Answer = TypeVar("Answer")
 
@@ -33,7 +38,9 @@ _POSITION_ONLY: Final = 0x0DF8  # type mask: position, no heading
 _LOCAL_NED: Final = 1
 _SHAPE_NUMBERS = 16
 _NOT_TOUCHED = (0.0,) * 5  # what OBSTACLE_SHAPE says of contact
-_BALL: Final = 1  # PANDION_SHAPE
+_TOUCH: Final = 2  # PANDION_SHAPE_FLAGS
+_CLEARANCE: Final = 0.1  # m, of a ball
+_HEAR_S: Final = 0.01  # at a time
 _NAN: Final = math.nan
 _PLAN_US: Final = 200_000.0  # between two plans
 _SET_INTERVAL, _REQUEST_MESSAGE = 511, 512
@@ -86,18 +93,21 @@ class VehicleLink(threading.Thread):
         beat_s = setpoint_s = asked_s = -1e9
         while not self._ended:
             select.select((self._endpoint,), (), (), 0.02)
-            self._hear()
-            now_s = time.monotonic()
-            if now_s - beat_s >= _BEAT_S:
-                beat_s = now_s
-                self._beat()
-            if now_s - asked_s >= _ASK_S:
-                asked_s = now_s
-                self._command(_SET_INTERVAL, (ids.MPC_HORIZON, _PLAN_US))
-                self._command(_REQUEST_MESSAGE, (ids.OBSTACLE_SHAPE,))
-            if self._setpoint is not None and now_s - setpoint_s >= _SETPOINT_S:
-                setpoint_s = now_s
-                self._send_setpoint(self._setpoint)
+            try:
+                self._hear()
+                now_s = time.monotonic()
+                if now_s - beat_s >= _BEAT_S:
+                    beat_s = now_s
+                    self._beat()
+                if now_s - asked_s >= _ASK_S:
+                    asked_s = now_s
+                    self._ask_for_more()
+                if self._setpoint is not None and now_s - setpoint_s >= _SETPOINT_S:
+                    setpoint_s = now_s
+                    self._send_setpoint(self._setpoint)
+            except Exception as error:  # what was asked for may fit no message
+                with self._heard:
+                    self._telemetry.tell("link", f"not sent: {first_line(error)}")
 
     def ask(self, command: int, params: tuple[float, ...] = ()) -> tuple[bool, str]:
         """Send a command until it is answered: whether it was accepted, and a sentence.
@@ -132,34 +142,34 @@ class VehicleLink(threading.Thread):
         The vehicle is asked for the set first, because what is announced replaces it. Returns why
         nothing was announced, None if it was.
         """
-        from fsw.autopilot.shapes import kind_of
-
-        safe_set = self._whole_set()
-        if safe_set is None:
-            return f"no obstacle: {self.where} does not say which safe set it keeps"
-        known = safe_set.zones
-        if any(any(zone.velocity) for zone in known):
-            return "no obstacle: zones move, and who announces them would take it away again"
-        count = len(known) + 1
-        for index, zone in enumerate(known):
-            numbers = zone.shape.numbers
-            self._shape(
-                index, count, kind_of(zone.shape).number, numbers, zone.clearance,
-                keep_in=zone.keep_in, velocity=zone.velocity, t_us=zone.t_us,
-            )  # fmt: skip
-        self._shape(len(known), count, _BALL, (*centre, radius), 0.1)
+        new = Zone(ball(centre, radius), _CLEARANCE)
+        problem = zone_problem(new)
+        known = self._announced() if problem is None else problem
+        if isinstance(known, str):
+            return f"no obstacle: {known}"
+        zones = (*known, new)
+        for index, zone in enumerate(zones):
+            self._shape(index, len(zones), zone, set_id_of(zones))
         return None
 
-    def _whole_set(self) -> SafeSet | None:
-        """The safe set as the vehicle keeps it now; None if it does not answer."""
+    def _announced(self) -> tuple[Zone, ...] | str:
+        """The zones that were announced to the vehicle, as it says now; else why not."""
         with self._heard:
-            telemetry = self._telemetry
-            before = telemetry.whole_sets
+            telemetry, asked_s = self._telemetry, time.monotonic()
+            before, telemetry.set_problem = telemetry.whole_sets, ""
+
+            def answered() -> bool:
+                return telemetry.whole_sets > before or bool(telemetry.set_problem)
+
             for _ in range(_TRIES):
+                self._command(_REQUEST_MESSAGE, (ids.MISSION_CURRENT,))
                 self._command(_REQUEST_MESSAGE, (ids.OBSTACLE_SHAPE,))
-                if self._heard.wait_for(lambda: telemetry.whole_sets > before, _ANSWER_S):
-                    return telemetry.scene(time.monotonic()).safe_set
-        return None
+                if self._heard.wait_for(answered, _ANSWER_S):
+                    try:
+                        return telemetry.announced(asked_s)
+                    except decode.RefusedError as error:
+                        return str(error)
+        return f"{self.where} does not say which safe set it keeps"
 
     def ask_for_parameters(self) -> None:
         """Ask for all of them."""
@@ -170,15 +180,25 @@ class VehicleLink(threading.Thread):
         return answers[-1] if answers else None
 
     def _hear(self) -> None:
-        while (received := self._endpoint.receive_waiting()) is not None:
+        """Take what has come, for a moment: a stream may never pause."""
+        until_s = time.monotonic() + _HEAR_S
+        while not self._ended and (received := self._endpoint.receive_waiting()) is not None:
             data, sender = received
-            if sender != self._peer:
-                continue
-            with self._heard:
-                now_s = time.monotonic()
-                for frame, _ in self._endpoint.cut(data, self._losses):
-                    self._telemetry.take(frame, now_s)
-                self._heard.notify_all()
+            now_s = time.monotonic()
+            if sender == self._peer:
+                with self._heard:
+                    for frame, _ in self._endpoint.cut(data, self._losses):
+                        self._telemetry.take(frame, now_s)
+                    self._heard.notify_all()
+            if now_s >= until_s:
+                return
+
+    def _ask_for_more(self) -> None:
+        """Ask for what is not sent by itself."""
+        self._command(_SET_INTERVAL, (ids.MPC_HORIZON, _PLAN_US))
+        if self.airframe.bodies.joints > HORIZON_JOINTS:
+            self._command(_SET_INTERVAL, (ids.MPC_HORIZON_ARM, _PLAN_US))
+        self._command(_REQUEST_MESSAGE, (ids.OBSTACLE_SHAPE,))
 
     def _beat(self) -> None:
         kind = _COMMANDS if self.commands and self.watched else _LOOKS
@@ -193,21 +213,12 @@ class VehicleLink(threading.Thread):
         mask = _POSITION_ONLY
         self._send(ids.END_EFFECTOR_TARGET, 0, *p, *still, 0.0, 0.0, mask, 1, 0, _LOCAL_NED, 0.0)
 
-    def _shape(
-        self,
-        index: int,
-        count: int,
-        kind: int,
-        numbers: tuple[float, ...],
-        clearance: float,
-        *,
-        keep_in: bool = False,
-        velocity: Vec3 = (0.0, 0.0, 0.0),
-        t_us: int = 0,
-    ) -> None:
+    def _shape(self, index: int, count: int, zone: Zone, set_id: int) -> None:
+        kind, numbers, touch = kind_of(zone.shape).number, zone.shape.numbers, zone.touch
         filled = (*numbers, *(0.0 for _ in range(_SHAPE_NUMBERS - len(numbers))))
-        place = (1, 0, index, count, kind, int(keep_in), *_NOT_TOUCHED)
-        self._send(ids.OBSTACLE_SHAPE, t_us, clearance, *velocity, *filled, *place)
+        flags = int(zone.keep_in) | (_TOUCH if touch is not None else 0)
+        place = (1, 0, index, count, kind, flags, *(touch or _NOT_TOUCHED), set_id)
+        self._send(ids.OBSTACLE_SHAPE, zone.t_us, zone.clearance, *zone.velocity, *filled, *place)
 
     def _send(self, message_id: int, *values: Any) -> None:
         self._endpoint.send(self._writer.frame(message_id, *values), self._peer)

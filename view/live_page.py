@@ -17,7 +17,7 @@ import viser
 from fsw.autopilot.signals import Vec3
 from view import live_link, panels
 from view.flight import Trail
-from view.live_link import VehicleLink
+from view.live_link import Answer, VehicleLink
 from view.page import Server
 from view.plots import Plot
 from view.scene import Scene
@@ -31,6 +31,7 @@ _PLOT_S: Final = 1.0
 _KEPT_S: Final = 0.2  # between two scenes that the curves are drawn from
 _CURVE_SCENES: Final = 600  # two minutes
 _TRAIL_S: Final = 0.1
+_STILL_S: Final = 1.0  # between two pictures of a vehicle whose clock stands
 _PIECE: Final = 11  # points of a piece of the trail
 _PIECES: Final = 120  # of the trail: two minutes
 _REACH: Final = 2.5  # m, of walls and floor about where the vehicle was found
@@ -54,7 +55,7 @@ class LivePage:
         self._drawn_t = _NAN
         self._undrawn = ""  # why a frame was not drawn, as it was said last
         self._frames = 0
-        self._due = {"text": 0.0, "plot": 0.0, "kept": 0.0, "trail": 0.0}
+        self._due = {"text": 0.0, "plot": 0.0, "kept": 0.0, "trail": 0.0, "still": 0.0}
         self._airframe = link.airframe
         self.stage = Stage(server, self._airframe)
         self.stage.frame(server, ((-_REACH,) * 3, (_REACH, _REACH, 0.0)))
@@ -189,20 +190,25 @@ class LivePage:
 
     def _run(self) -> None:
         while not self._ended.wait(_FRAME_S):
-            scene, now_s = self._link.scene(), time.monotonic()
-            # Numbers of a vehicle may be such that anything fails; those of the next may be drawn.
+            scene = self._safely(self._link.scene)
             for step in (self._remember, self._draw, self._tell):
-                try:
-                    step(scene, now_s)
-                except Exception as error:
-                    self._say_undrawn(error)
+                if scene is not None:
+                    self._safely(step, scene, time.monotonic())
+
+    def _safely(self, step: Callable[..., Answer], *about: Any) -> Answer | None:
+        """Do a step; with some numbers of a vehicle it may fail, and with the next ones not."""
+        try:
+            return step(*about)
+        except Exception as error:
+            self._say_undrawn(error)
+            return None
 
     def _draw(self, scene: Scene, now_s: float) -> None:
         self._link.watched = bool(self._server.get_clients())
         if not self._link.watched:
             if self._gizmo is not None and self._drag.value:
                 self._drag.value = False  # as if it was cleared
-        elif scene.t != self._drawn_t:
+        elif scene.t != self._drawn_t or self._is_due("still", now_s, _STILL_S):
             self._drawn_t = scene.t
             self._frames += 1
             with self._server.atomic():

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import viser
 
+from command_line.printable import printable
 from view import panels
 from view.flight import Flight
 from view.flight_events import EventKind
@@ -82,7 +83,7 @@ class LogPage:
     def _build_timeline(self) -> None:
         gui, flight = self._server.gui, self._flight
         panel = gui.add_panel()
-        with panel.add_tab(flight.title):
+        with panel.add_tab(printable(flight.title)):
             margins = [c for c in flight.curves() if c.title.startswith("margin")][:1]
             self._plots += [
                 Plot(gui, curve._replace(names=curve.names[:1], rows=curve.rows[:1]),

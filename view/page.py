@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import gzip
 import html
 import http
-import inspect
 import io
 import ipaddress
+import logging
 import re
 import socket
 from collections.abc import Iterator, Sequence
@@ -19,8 +20,11 @@ import viser
 import websockets.asyncio.server
 
 from command_line.html_page import ICON
+from command_line.printable import printable
 
 LOCAL: Final = ("127.0.0.1", "localhost")
+_UNHEARD: Final = logging.getLogger("peers of a page")
+_UNHEARD.setLevel(logging.CRITICAL + 1)
 _TITLE: Final = re.compile(rb"<title>[^<]*</title>")
 _VISERS_ICON: Final = re.compile(rb'(<link\s+rel="icon"\s+)href="[^"]*"')
 _ROOT: Final = re.compile(rb'(<div id="root">)</div>')
@@ -70,6 +74,7 @@ def open_server(host: str, port: int, title: str) -> Server:
     Raises:
         PageError: The port is in use, or the address is none of this machine.
     """
+    title = printable(title)
     with socket.socket() as probe:  # viser would take another port
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -98,21 +103,30 @@ def _own_pages_only(title: str) -> Iterator[None]:
     What it serves has our ``title`` and icon, and says that the scene is loading until it is there.
 
     Any site's page may open a socket to this machine, and could command the vehicle. viser has no
-    option for that; websockets lets a request be looked at first.
+    option for that; websockets lets a request be looked at first. Whatever a peer sends, nothing of
+    it is logged: a request that cannot be read is answered with 400, a socket closed.
     """
     module: Any = websockets.asyncio.server
     usual = module.serve
 
-    def guarded(*args: Any, process_request: Any, **more: Any) -> Any:
+    def guarded(handler: Any, *args: Any, process_request: Any, **more: Any) -> Any:
         async def look(connection: Any, request: Any) -> Any:
-            origins, hosts = request.headers.get_all("Origin"), request.headers.get_all("Host")
-            if not is_own(origins, hosts):
-                return connection.respond(http.HTTPStatus.FORBIDDEN, "a page of another site\n")
-            found = process_request(connection, request)
-            found = await found if inspect.isawaitable(found) else found
-            return titled(found, title)
+            try:
+                origins, hosts = request.headers.get_all("Origin"), request.headers.get_all("Host")
+                if not is_own(origins, hosts):
+                    return connection.respond(http.HTTPStatus.FORBIDDEN, "a page of another site\n")
+                return titled(process_request(connection, request), title)
+            except Exception:
+                return connection.respond(http.HTTPStatus.BAD_REQUEST, "no such page\n")
 
-        return usual(*args, process_request=look, **more)
+        async def speak(connection: Any) -> None:
+            asyncio.get_running_loop().set_exception_handler(lambda *_: None)
+            if connection.subprotocol == f"viser-v{viser.__version__}":
+                await handler(connection)
+            else:  # viser would print it
+                await connection.close(1002, f"Version mismatch. Server: {viser.__version__}")
+
+        return usual(speak, *args, process_request=look, logger=_UNHEARD, **more)
 
     try:
         module.serve = guarded
@@ -130,12 +144,11 @@ def titled(response: Any, title: str) -> Any:
         return response
     packed = response.headers.get("Content-Encoding") == "gzip"
     body = gzip.decompress(response.body) if packed else response.body
-    for was, becomes in (
-        (_TITLE, f"<title>{html.escape(title)} - Pandion</title>{_HEAD}"),
-        (_VISERS_ICON, rf'\g<1>href="{ICON}"'),
-        (_ROOT, rf"\g<1>{_LOADING}</div>"),
-    ):
-        body = was.sub(becomes.encode(), body, count=1)
+    named = f"<title>{html.escape(title)} - Pandion</title>{_HEAD}".encode()
+    # What comes from outside must be no template: it may have group references.
+    body = _TITLE.sub(lambda _: named, body, count=1)
+    body = _VISERS_ICON.sub(rb'\g<1>href="%b"' % ICON.encode(), body, count=1)
+    body = _ROOT.sub(rb"\g<1>%b</div>" % _LOADING.encode(), body, count=1)
     response.body = gzip.compress(body, 1) if packed else body
     del response.headers["Content-Length"]
     response.headers["Content-Length"] = str(len(response.body))

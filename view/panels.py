@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Iterable, Sequence
-from html import escape
 from typing import Final
 
+from command_line.printable import printable
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.rotors import rotor_names
@@ -14,6 +15,7 @@ from fsw.autopilot.periods import PLANNING_US
 from view import colours
 from view.colours import Rgb, css, millimetres
 from view.scene import Event, Margin, Scene, Timing, Worst
+from view.telemetry import first_line
 from view.vehicle import tilt
 
 PLANNING_LIMIT: Final = 1e-6 * PLANNING_US  # s, a planning cycle must be over by then
@@ -97,9 +99,8 @@ def parameters_html(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def undrawn(error: Exception) -> str:
-    """Why a frame was not drawn; of a reason of many lines the first."""
-    lines = str(error).strip().splitlines() or [type(error).__name__]
-    return f"not drawn: {lines[0]}"
+    """Why a frame was not drawn."""
+    return f"not drawn: {first_line(error)}"
 
 
 def refusal_html(sentence: str, *, good: bool = False) -> str:
@@ -113,9 +114,9 @@ def refusal_html(sentence: str, *, good: bool = False) -> str:
 
 def _headline(now: Scene, begin: float) -> str:
     badges = [_badge(now.mode or "no mode", colours.BLUE)]
-    badges.append(
-        _badge("armed", colours.ORANGE) if now.armed else _badge("disarmed", colours.GREY)
-    )
+    if now.armed is not None:
+        armed = ("armed", colours.ORANGE) if now.armed else ("disarmed", colours.GREY)
+        badges.append(_badge(*armed))
     if now.landed:
         badges.append(_badge("landed", colours.GREY))
     badges += [_badge(name, colours.RED) for name in now.failures.split(", ") if name]
@@ -233,6 +234,11 @@ def _timing(groups: Sequence[Timing]) -> str:
         rate = f"{1.0 / one.period:.0f} Hz, " if one.period > 0.0 else ""
         rows.append(_row(one.name, used, bar, f"{rate}late {one.late}, skipped {one.skipped}"))
     return _section("Loops, 99th percentile", _table(rows)) if rows else ""
+
+
+def escape(text: str) -> str:
+    """A text as HTML that shows it; what is no UTF-8, as in a file's name, could not be sent."""
+    return html.escape(printable(text))
 
 
 def _known(value: float) -> str:

@@ -119,11 +119,12 @@ class Scene:
     added: float = math.nan  # m, kept beyond the clearances because the estimate is not sure
     sigma: Vec3 | None = None  # m, standard deviation of the estimated place, NED
     mode: str = ""
-    armed: bool = False
+    armed: bool | None = None  # None: not known
     landed: bool = False
     failures: str = ""  # names of the active failsafes
     battery: Battery | None = None
-    link_age: float = math.nan  # s since something came; NaN for a log
+    link_age: float = math.nan  # s since something came; NaN for a log, and before anything came
+    others: tuple[int, ...] = ()  # systems that speak where the vehicle does not
     dropped: str = ""  # what the vehicle has dropped of all that it was sent
     solver: Solver | None = None
     timing: tuple[Timing, ...] = ()

@@ -34,6 +34,7 @@ _MAX_SCENES: Final = 360_000
 _MAX_EVENTS: Final = 5_000
 _OF_VEHICLES: Final = frozenset({ATTITUDE, LOCAL_POSITION_NED})  # messages of no other component
 _NAMED: Final = 10  # of a kind, in a sentence
+_PAUSE_S: Final = 2.0  # after which the last scene is shown no longer
 _BETWEEN_S: Final = 1.0  # from one flight to the next, as it is shown
 
 
@@ -71,7 +72,7 @@ class _Recording:
         last = self.scenes[-1].t if self.scenes else -math.inf
         if telemetry.t + self._shift >= last + _SCENE_S:
             scene = telemetry.scene(at)
-            if scene.estimate is not None:
+            if scene.estimate is not None or self.scenes:
                 self.scenes.append(replace(scene, t=scene.t + self._shift))
             if len(self.scenes) > _MAX_SCENES:
                 longest = _MAX_SCENES * _SCENE_S / 3600.0
@@ -139,13 +140,15 @@ class TlogFlight:
         self.worst = self._worst()
 
     def scene(self, t: float) -> Scene:
-        """What was at ``t`` [s, the vehicle's clock]."""
-        return self._scenes[max(bisect_right(self._times, t + 1e-9) - 1, 0)]
+        """What was at ``t`` [s, the vehicle's clock]; nothing where the log pauses."""
+        last = self._scenes[max(bisect_right(self._times, t + 1e-9) - 1, 0)]
+        return last if t - last.t <= _PAUSE_S else Scene(t=t)
 
     def trail(self) -> Trail:
         """The end-effector's path."""
-        points = [tip_of(one.estimate, self.airframe) for one in self._scenes if one.estimate]
-        return Trail(np.array(points), np.array([one.minimum for one in self._scenes]))
+        known = [(one.estimate, one.minimum) for one in self._scenes if one.estimate]
+        points = [tip_of(posture, self.airframe) for posture, _ in known]
+        return Trail(np.array(points), np.array([minimum for _, minimum in known]))
 
     def reference(self) -> Array:
         """Where the end-effector should have been, (n, 3) [m, NED]."""

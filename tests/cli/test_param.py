@@ -18,9 +18,11 @@ from fsw.autopilot.parameters.param_type import field_of
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.storage.parameter_file import load
 from messages import message_ids as ids
+from messages.addresses import parse_link_address
 from messages.frames import FrameWriter, split
 from pandion import param, param_vehicle
 from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
+from tests.flood import Flood
 
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 
@@ -223,6 +225,23 @@ def test_a_list_that_only_grows_ends_as_well(monkeypatch: pytest.MonkeyPatch) ->
     ):
         client.read_all()
     assert time.monotonic() - begin < 30.0, "4096 of them would take minutes"
+
+
+def test_a_stream_that_never_pauses_is_not_waited_for_longer() -> None:
+    flood = Flood()
+    with contextlib.closing(flood):
+        began = time.monotonic()
+        with (
+            ParameterClient(parse_link_address(flood.address), 0.2) as client,
+            pytest.raises(NoAnswer, match="nothing came"),
+        ):
+            client.read_all()
+        with (
+            ParameterClient(parse_link_address(flood.address), 0.2) as client,
+            pytest.raises(NoAnswer, match="no answer"),
+        ):
+            client.read("MPC_V_MAX")
+    assert time.monotonic() - began < 5.0
 
 
 def test_an_export_leaves_out_what_a_reader_would_refuse(

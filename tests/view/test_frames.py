@@ -12,6 +12,7 @@ from scipy.spatial import QhullError
 
 from fsw.autopilot.model.airframe import AIRFRAME
 from tests.processes.both_processes import free_port
+from tests.waiting import wait_for
 from view import panels
 from view.live_page import LivePage
 from view.page import Server, open_server
@@ -77,3 +78,38 @@ def test_the_live_page_goes_on_after_a_frame_that_cannot_be_drawn(
     page.close()
     assert len(drawn) >= 5
     assert told == ["not drawn: QH6154 initial simplex is flat"]
+
+
+def test_the_live_page_goes_on_after_a_scene_that_cannot_be_made(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Doubtful(MovingLink):
+        def scene(self) -> Scene:
+            now = super().scene()
+            if now.t < 0.05:
+                raise ValueError("matmul: Input operand 1 has a mismatch")
+            return now
+
+    link: Any = Doubtful()
+    page = LivePage(server, link)
+    drawn: list[float] = []
+    monkeypatch.setattr(page.stage, "show", lambda now: drawn.append(now.t))
+    wait_for(lambda: len(drawn) > 2, "pictures")
+    page.close()
+
+
+def test_a_vehicle_whose_clock_stands_is_drawn_again(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What of it is old by then is not known any more."""
+
+    class Standing(MovingLink):
+        def scene(self) -> Scene:
+            return Scene(t=1.0)
+
+    link: Any = Standing()
+    page = LivePage(server, link)
+    drawn: list[float] = []
+    monkeypatch.setattr(page.stage, "show", lambda now: drawn.append(now.t))
+    wait_for(lambda: len(drawn) > 2, "pictures")
+    page.close()

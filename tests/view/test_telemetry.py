@@ -11,22 +11,34 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.flight.failsafe.conditions import Action, Condition
-from fsw.autopilot.model.airframe import AIRFRAME
+from fsw.autopilot.model.airframe import AIRFRAME, airframe_of
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.shapes.half_space import wall
-from fsw.autopilot.signals import FailsafeEvent, Mode, PlanInput, SafeSet, Severity, Zone
+from fsw.autopilot.signals import (
+    ActuatorCommand,
+    FailsafeEvent,
+    FlightSnapshot,
+    Mode,
+    PlanInput,
+    SafeSet,
+    Severity,
+    Zone,
+)
 from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
 from fsw.link.wire.outgoing import Outgoing
+from fsw.link.wire.telemetry_context import TelemetryContext
 from messages import message_ids as ids
 from messages import tlog_reader
-from messages.frames import FrameWriter, split
-from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
+from messages.frames import LAYOUTS, Frame, FrameWriter, split
+from tests.fsw.link.snapshots import CONTEXT, PLAN, SNAPSHOT
+from vehicles.vehicle_file import load_vehicle
 from view import tlog_flight
 from view.flight_data import UlogError
 from view.scene import Held, Tool
-from view.telemetry import Telemetry
+from view.telemetry import READERS, Telemetry
 from view.tlog_flight import TlogFlight
+from view.vehicle import horizon
 
 WALLS = SafeSet((wall((-1.0, 0.0, 0.0), -1.0, 0.125), Zone(ball((1.0, 2.0, -1.0), 0.5), 0.25)))
 STEP = PlanInput((0.5, 0.0, 0.0), 0.0, (0.0, 0.0))
@@ -42,10 +54,12 @@ def take(telemetry: Telemetry, *sent: Outgoing, at: float = 0.0) -> None:
             telemetry.take(frame, at)
 
 
-def everything(snapshot=FLYING) -> list[Outgoing]:
+def everything(
+    snapshot: FlightSnapshot = FLYING, context: TelemetryContext = CONTEXT
+) -> list[Outgoing]:
     sent = []
     for message_id in dict.fromkeys([*(s.message_id for s in STREAMS), ids.OBSTACLE_SHAPE]):
-        sent += messages_now(message_id, 0.0, snapshot, CONTEXT) or ()
+        sent += messages_now(message_id, 0.0, snapshot, context) or ()
     return sent
 
 
@@ -78,8 +92,8 @@ def test_a_vehicle_that_starts_again_has_none_of_the_last_flight() -> None:
     )
     arguments = said.arguments.ljust(ARGUMENTS, b"\0")
     take(telemetry, Outgoing(ids.EVENT, (said.id, 0, 0, 0, 0, 0x44, *arguments)))
-    for t in (100.0, 0.5):
-        telemetry.read_clock(t)
+    for t_ms in (100_000, 500):
+        take(telemetry, Outgoing(ids.ATTITUDE, (t_ms, *(0.0,) * 6)))
     scene = telemetry.scene(0.0)
     assert scene.t == 0.5
     assert (scene.failures, scene.target, scene.safe_set, scene.margins) == ("", None, None, ())
@@ -96,6 +110,7 @@ def test_the_scene_is_the_snapshot_that_was_sent() -> None:
     assert scene.estimate.q_arm == pytest.approx((0.7, 0.8))
     assert scene.thrust is not None
     assert scene.thrust[3] > scene.thrust[1]
+    assert len(scene.thrust) == AIRFRAME.rotors
     assert scene.target == pytest.approx((1.6, 2.6, -2.6))
     assert scene.base_target == pytest.approx((1.1, 2.1, -3.1))
     assert scene.minimum == pytest.approx(0.2)
@@ -121,6 +136,94 @@ def test_the_horizon_begins_where_the_plan_does_and_is_pushed_by_its_inputs() ->
     assert horizon.tip[0] == pytest.approx((0.0, 0.0, -0.7))
     assert len(horizon.tip) == 6
     assert horizon.base[-1][0] > 0.005
+
+
+def of_vehicle(name: str) -> tuple[Telemetry, FlightSnapshot, TelemetryContext]:
+    """An inspector of a vehicle, and the vehicle with a plan that moves its joints."""
+    airframe = airframe_of(load_vehicle(name))
+    joints, rotors = airframe.bodies.joints, airframe.rotors
+    angles = tuple(0.1 * k for k in range(1, joints + 1))
+    start = PLAN.start._replace(q_arm=angles, qd_arm=angles)
+    steps = tuple(PlanInput((0.5, 0.0, 0.0), 0.0, tuple(k * q for q in angles)) for k in range(4))
+    estimate = SNAPSHOT.estimate._replace(q_arm=angles, qd_arm=angles)
+    actuators = ActuatorCommand((4.0,) * rotors, (0.0,) * joints)
+    plan = replace(PLAN, start=start, inputs=steps)
+    facts = replace(CONTEXT.facts, airframe=airframe)
+    snapshot = replace(FLYING, estimate=estimate, actuators=actuators, plan=plan)
+    return Telemetry(airframe), snapshot, replace(CONTEXT, facts=facts)
+
+
+VEHICLES = ["paper", "probe-2r", "hexa-3r", "octo-4r"]
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_plan_is_drawn_of_any_number_of_joints(name: str) -> None:
+    telemetry, snapshot, context = of_vehicle(name)
+    take(telemetry, *everything(snapshot, context))
+    plan = snapshot.plan
+    scene = telemetry.scene(0.0)
+    assert scene.horizon is not None
+    wanted = horizon(plan.start, plan.inputs, 1e-6 * plan.period_us, telemetry.airframe)
+    assert np.array(scene.horizon.tip) == pytest.approx(np.array(wanted.tip), abs=1e-5)
+    assert scene.estimate is not None
+
+
+def test_of_two_plans_no_third_one_is_made() -> None:
+    telemetry, snapshot, context = of_vehicle("hexa-3r")
+    another = replace(snapshot, plan=replace(snapshot.plan, plan_id=99))
+    for of, message_id in ((snapshot, ids.MPC_HORIZON), (another, ids.MPC_HORIZON_ARM)):
+        take(telemetry, *messages_now(message_id, 0.0, of, context))
+    assert telemetry.scene(0.0).horizon is None
+
+
+@pytest.mark.parametrize(("flown", "chosen"), [("hexa-3r", "paper"), ("paper", "hexa-3r")])
+def test_a_vehicle_that_is_no_such_airframe_is_said_once_and_not_drawn(
+    flown: str, chosen: str
+) -> None:
+    _, snapshot, context = of_vehicle(flown)
+    telemetry = Telemetry(airframe_of(load_vehicle(chosen)))
+    for _ in range(3):
+        take(telemetry, *everything(snapshot, context))
+    scene = telemetry.scene(0.0)
+    assert (scene.estimate, scene.horizon, scene.torque) == (None, None, None)
+    said = [event.text for event in telemetry.events if "airframe" in event.text]
+    assert len([one for one in said if " joints, " in one and "rotors" not in one]) == 1
+    assert len(said) == len(set(said)) <= 2
+    assert scene.thrust is None or flown == "paper"
+
+
+def test_another_number_of_rotors_is_said_and_not_drawn() -> None:
+    telemetry, snapshot, context = of_vehicle("paper")
+    take(telemetry, *everything(snapshot, context))
+    assert telemetry.scene(0.0).estimate is not None
+    ten = (0, *(1500,) * 8, 0, *(1500,) * 2, *(0,) * 6)
+    take(telemetry, Outgoing(ids.SERVO_OUTPUT_RAW, ten))
+    scene = telemetry.scene(0.0)
+    assert (scene.estimate, scene.horizon, scene.thrust) == (None, None, None)
+    assert telemetry.events[-1].text.startswith("the vehicle has 10 rotors and joints, ")
+    take(telemetry, Outgoing(ids.SERVO_OUTPUT_RAW, (0,) * 18))  # disarmed
+    assert telemetry.scene(0.0).estimate is not None
+
+
+def test_whatever_is_said_a_scene_is_made_of_it() -> None:
+    """Any numbers in every message that is read, for vehicles of any number of joints."""
+    rng = np.random.default_rng(5)
+    wild = (0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 3.4e38, 1e-45)
+    for name in VEHICLES:
+        airframe = airframe_of(load_vehicle(name))
+        for k in range(40):
+            telemetry = Telemetry(airframe)
+            floats = wild[: 3 if k % 2 else None]  # every second time of a usual size
+            for message_id in rng.permutation([*READERS]):
+                payload = LAYOUTS[message_id].payload
+                values = []
+                for one in payload.unpack(rng.bytes(payload.size)):
+                    small = k % 2 and isinstance(one, int)
+                    values.append(one % 7 if small else one)
+                    if isinstance(one, float):
+                        values[-1] = float(rng.choice(floats))
+                telemetry.take(Frame(1, 1, 0, int(message_id), tuple(values)), 0.0)
+            telemetry.scene(0.0)
 
 
 def test_a_safe_set_that_is_gone_is_not_shown() -> None:
@@ -154,7 +257,49 @@ def test_a_zone_that_nobody_can_believe_is_counted_and_listed_once(
     assert telemetry.left_out == 3
     (said,) = [event.text for event in telemetry.events if "not shown" in event.text]
     assert words in said
-    assert telemetry.scene(0.0).safe_set == WALLS
+    assert telemetry.scene(0.0).safe_set is None, "a set without one of its zones never was"
+
+
+def three(*north: float) -> list[Outgoing]:
+    """A set of balls of 1 m, as a vehicle sends it."""
+    zones = tuple(Zone(ball((x, 0.0, 0.0), 1.0), 0.5) for x in north)
+    return list(
+        messages_now(ids.OBSTACLE_SHAPE, 0.0, replace(FLYING, safe_set=SafeSet(zones)), CONTEXT)
+    )
+
+
+def without_sense(zone: Outgoing) -> Outgoing:
+    return replace(zone, values=(*zone.values[:25], 99, *zone.values[26:]))
+
+
+OLD = three(1.0, 2.0, 3.0)
+NEW = three(4.0, 5.0, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("sent", "shown", "whole"),
+    [
+        ([*OLD, *NEW], [4.0, 5.0, 6.0], 2),
+        ([*OLD, *NEW[1:]], [1.0, 2.0, 3.0], 1),  # zones are lost
+        ([*OLD, *NEW[:2]], [1.0, 2.0, 3.0], 1),
+        ([*OLD, NEW[0], NEW[2]], [1.0, 2.0, 3.0], 1),
+        ([*OLD[:2], *NEW[1:]], None, 0),
+        ([*OLD[:2], *three(4.0, 5.0)[1:]], None, 0),  # of another count
+        ([NEW[0], NEW[1], NEW[1], NEW[2]], [4.0, 5.0, 6.0], 1),  # one came twice
+        ([*OLD[:2], *NEW], [4.0, 5.0, 6.0], 1),  # begun anew
+        ([*OLD, NEW[0], without_sense(NEW[1]), NEW[2]], None, 1),  # of an unknown kind
+        ([*OLD, without_sense(NEW[0]), *NEW[1:]], None, 1),
+        ([*OLD, without_sense(NEW[0]), *NEW], [4.0, 5.0, 6.0], 2),
+    ],
+)  # fmt: skip
+def test_a_safe_set_is_one_transfer(
+    sent: list[Outgoing], shown: list[float] | None, whole: int
+) -> None:
+    telemetry = Telemetry(AIRFRAME)
+    take(telemetry, *sent)
+    safe_set = telemetry.scene(0.0).safe_set
+    assert shown == (None if safe_set is None else [z.shape.numbers[0] for z in safe_set.zones])
+    assert telemetry.whole_sets == whole
 
 
 def test_half_a_safe_set_does_not_replace_a_whole_one() -> None:
@@ -172,12 +317,56 @@ def test_what_stopped_coming_is_shown_no_longer() -> None:
     telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
     later = replace(FLYING, t_us=9_000_000, estimate=FLYING.estimate._replace(t_us=9_000_000))
-    take(telemetry, *(messages_now(ids.LOCAL_POSITION_NED, 0.0, later, CONTEXT) or ()))
-    scene = telemetry.scene(1.5)
+    assert telemetry.scene(1.5).target is not None, "the listener's clock counts"
+    take(telemetry, *(messages_now(ids.LOCAL_POSITION_NED, 0.0, later, CONTEXT) or ()), at=1.5)
+    scene = telemetry.scene(3.0)
     assert scene.target is None
     assert scene.horizon is None
     assert scene.margins == ()
     assert scene.link_age == 1.5
+
+
+AGES = {
+    "estimate": (ids.ATTITUDE, ids.LOCAL_POSITION_NED, ids.ARM_JOINT_STATE),
+    "thrust": (ids.SERVO_OUTPUT_RAW,),
+    "margins": (ids.BARRIER_MARGIN,),
+    "mode": (ids.HEARTBEAT,),
+    "armed": (ids.HEARTBEAT,),
+    "battery": (ids.SYS_STATUS,),
+    "solver": (ids.MPC_STATUS,),
+    "held": (ids.PAYLOAD_STATUS,),
+    "tool": (ids.TOOL_CONTACT,),
+    "horizon": (ids.MPC_HORIZON,),
+    "timing": (ids.LOOP_TIMING,),
+}
+
+
+@pytest.mark.parametrize("what", AGES)
+def test_each_value_has_an_age_whatever_else_still_comes(what: str) -> None:
+    """On the listener's clock: that of the vehicle may stand."""
+    unknown = getattr(Telemetry(AIRFRAME).scene(0.0), what)
+    for stopped in AGES[what]:
+        telemetry = Telemetry(AIRFRAME)
+        take(telemetry, *everything())
+        assert getattr(telemetry.scene(0.0), what) != unknown
+        assert getattr(telemetry.scene(math.nan), what) == unknown, "of an unknown age it is old"
+        for k in range(1, 20):
+            still = [one for one in everything() if one.message_id != stopped]
+            take(telemetry, *still, at=float(k))
+        assert getattr(telemetry.scene(19.0), what) == unknown, stopped
+
+
+def test_a_companion_of_another_clock_starts_no_flight_anew() -> None:
+    telemetry = Telemetry(AIRFRAME)
+    behind = replace(FLYING, t_us=1_000_000)
+    for k in range(20):
+        at = 10_000_000 + 100_000 * k
+        ahead = replace(FLYING, t_us=at, estimate=FLYING.estimate._replace(t_us=at))
+        take(telemetry, *everything(ahead))
+        take(telemetry, *messages_now(ids.BARRIER_MARGIN, 0.0, behind, CONTEXT))
+    scene = telemetry.scene(0.0)
+    assert (scene.mode, scene.safe_set) == ("hold", WALLS)
+    assert len(scene.margins) == 3
 
 
 def test_a_long_text_is_one_event_and_a_critical_one_a_reason() -> None:
@@ -201,6 +390,31 @@ def test_rates_are_measured_and_fall_to_zero() -> None:
     assert heard.rate(0.98) == pytest.approx(50.0, rel=0.01)
     assert heard.rate(9.0) == 0.0
     assert "yaw 1.5708" in heard.fields()
+
+
+@pytest.mark.parametrize("hertz", [0.5, 10.0, 75.0, 250.0])
+def test_a_rate_is_true_above_that_of_the_polling(hertz: float) -> None:
+    telemetry = Telemetry(AIRFRAME)
+    (sent,) = messages_now(ids.ATTITUDE, 0.0, FLYING, CONTEXT) or ()
+    came, shown = 0, []
+    for poll in range(1000):
+        at = 0.02 * poll
+        due = int(hertz * at)
+        take(telemetry, *[sent] * (due - came), at=at)
+        came = due
+        if at > 5.0:
+            shown += [one.rate(at) for one in telemetry.heard.values()]
+    assert shown == pytest.approx([hertz] * len(shown), rel=0.05)
+
+
+def test_a_rate_is_of_the_last_seconds() -> None:
+    telemetry = Telemetry(AIRFRAME)
+    (sent,) = messages_now(ids.ATTITUDE, 0.0, FLYING, CONTEXT) or ()
+    for begin, hertz in ((0.0, 100.0), (60.0, 10.0)):
+        for k in range(40):
+            take(telemetry, sent, at=begin + k / hertz)
+    (heard,) = telemetry.heard.values()
+    assert heard.rate(64.0) == pytest.approx(10.0)
 
 
 def test_memory_is_bounded() -> None:
@@ -234,10 +448,10 @@ def test_somebody_who_makes_up_messages_does_not_fill_the_memory() -> None:
 def test_an_estimate_that_is_no_number_is_no_place(message_id: int, wrong: float) -> None:
     telemetry = Telemetry(AIRFRAME)
     take(telemetry, *everything())
-    assert telemetry.scene().estimate is not None
+    assert telemetry.scene(0.0).estimate is not None
     (sent,) = messages_now(message_id, 0.0, FLYING, CONTEXT) or ()
     take(telemetry, replace(sent, values=(sent.values[0], wrong, *sent.values[2:])))
-    assert telemetry.scene().estimate is None
+    assert telemetry.scene(0.0).estimate is None
 
 
 @pytest.mark.parametrize("what", ["bytes", "hours"])
@@ -300,6 +514,22 @@ def places(path: Path, log: bytes) -> tuple[TlogFlight, list[float]]:
     flight = TlogFlight(path, AIRFRAME)
     scenes = [flight.scene(float(t)) for t in np.arange(flight.begin, flight.end, 0.1)]
     return flight, [scene.estimate.p[0] for scene in scenes if scene.estimate]
+
+
+def test_where_a_log_pauses_nothing_is_known(tmp_path: Path) -> None:
+    """The scene before a pause is not what was in it."""
+    log = bytearray()
+    for k in (*range(50), *range(1000, 1050)):
+        t_us = 20_000 * k
+        now = replace(FLYING, t_us=t_us, estimate=FLYING.estimate._replace(t_us=t_us))
+        for one in everything(now):
+            frame = WRITERS[one.component].frame(one.message_id, *one.values)
+            log += (1_000_000_000 + t_us).to_bytes(8, "big") + frame
+    flight, _ = places(tmp_path / "paused.tlog", bytes(log))
+    assert flight.scene(0.5).margins
+    assert flight.scene(20.5).margins
+    paused = flight.scene(10.0)
+    assert (paused.estimate, paused.margins, paused.armed, paused.t) == (None, (), None, 10.0)
 
 
 @pytest.mark.parametrize("lengths", [(6, 12), (12, 6)])

@@ -78,6 +78,25 @@ def test_the_headline_says_mode_arming_place_and_margin() -> None:
     assert seen() == "no vehicle has answered yet"
 
 
+def test_the_headline_says_who_speaks_where_the_vehicle_does_not() -> None:
+    other = FrameWriter(2, 1)
+    assert seen(frame(other, HEARTBEAT, autopilot=12)) == (
+        "no vehicle of system 1 has answered yet; those of system 2 speak"
+    )
+    assert seen(frame(VEHICLE, ATTITUDE, time_boot_ms=1000)) == "no heartbeat"
+
+
+def test_a_component_s_heartbeat_disarms_no_vehicle() -> None:
+    of_component = frame(VEHICLE, HEARTBEAT, autopilot=8)
+    assert "disarmed" not in seen(beat(), of_component)
+
+
+def test_the_vehicle_is_heard_behind_any_crowd() -> None:
+    crowd = [FrameWriter(s, c) for s in range(2, 40) for c in range(1, 255)]
+    shown = seen(*(frame(one, HEARTBEAT, autopilot=12) for one in crowd), beat())
+    assert "armed" in shown
+
+
 def test_the_headline_counts_what_was_refused() -> None:
     assert "refused" not in seen(beat(), frame(ARM, SETPOINT_STATUS, refused=7), now=0.5)
     assert "3 refused" in seen(beat(), frame(ARM, SETPOINT_STATUS, refusals=3), now=0.5)
@@ -187,6 +206,28 @@ async def drive() -> None:
         assert streams.row_count == 3
         await pilot.press("q")
     assert fed.closed
+
+
+def test_a_crowd_is_sorted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asyncio.run(show_a_crowd(monkeypatch))
+
+
+async def show_a_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
+    fed = Fed()
+    app = TopApp(fed, AIRFRAME, lambda: fed.now)
+    async with app.run_test(size=(140, 40)) as pilot:
+        await pilot.pause()
+        sorts: list[Any] = []
+        table = app.query_one("#streams", DataTable)
+        monkeypatch.setattr(table, "sort", lambda *by, **how: sorts.append(by))
+        fed.waiting = [
+            frame(FrameWriter(s, c), HEARTBEAT) for s in range(2, 40) for c in range(1, 255)
+        ]
+        for _ in range(2):
+            app.refresh_all()
+        assert 500 < table.row_count <= 1100
+        assert len(sorts) == 1
+        await pilot.press("q")
 
 
 def test_a_margin_that_is_not_finite_has_no_bar() -> None:

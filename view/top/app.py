@@ -14,9 +14,11 @@ from textual.containers import Horizontal
 from textual.coordinate import Coordinate
 from textual.widgets import DataTable, Footer, Input, RichLog, Static
 
+from command_line.output import listed
 from command_line.printable import printable
 from fsw.autopilot.model.airframe import Airframe
 from messages.frames import Frame
+from messages.message_ids import SYSTEM_ID
 from view.flight_events import EventKind
 from view.scene import Event, Scene
 from view.telemetry import Heard, Telemetry
@@ -29,6 +31,7 @@ _BAR: Final = 14  # characters
 _BAR_M: Final = 0.5  # margin that fills it
 _STALE_S: Final = 3.0
 _LOST_S: Final = 2.0
+_NAMED: Final = 5  # systems, in the headline
 _ALARMING: Final = (EventKind.WARNING.value, EventKind.FAULT.value)
 
 
@@ -168,6 +171,7 @@ class TopApp(App[None]):
 
     def _show_streams(self, now: float) -> None:
         table = self.query_one("#streams", DataTable)
+        known = table.row_count
         for key, one in self.streams():
             age = now - one.at
             style = "dim" if age > _STALE_S else ""
@@ -175,11 +179,12 @@ class TopApp(App[None]):
             cells = [Text(cell, style=style, justify="right") for cell in shown]
             if key not in table.rows:
                 table.add_row(Text(one.name), str(one.component), *cells, key=key)
-                table.sort(self._by_name, key=str)
                 continue
             row = table.get_row_index(key)
             for column, cell in enumerate(cells, start=2):
                 table.update_cell_at(Coordinate(row, column), cell)
+        if table.row_count > known:
+            table.sort(self._by_name, key=str)
 
     def chosen(self) -> Heard | None:
         """The kind of message under the cursor."""
@@ -223,11 +228,14 @@ class TopApp(App[None]):
 
 def headline(scene: Scene) -> str:
     """The vehicle in one line."""
-    if not scene.mode:
-        return "no vehicle has answered yet"
+    if math.isnan(scene.link_age):
+        if not scene.others:
+            return "no vehicle has answered yet"
+        others = listed([*map(str, scene.others)], _NAMED)
+        return f"no vehicle of system {SYSTEM_ID} has answered yet; those of system {others} speak"
     if scene.link_age > _LOST_S:
         return f"vehicle lost: silent for {scene.link_age:.0f} s"
-    parts = [scene.mode, "armed" if scene.armed else "disarmed"]
+    parts = [scene.mode, "armed" if scene.armed else "disarmed"] if scene.mode else ["no heartbeat"]
     parts += [scene.failures] if scene.failures else []
     if scene.battery is not None:
         parts.append(f"battery {100.0 * scene.battery.remaining:.0f} %")

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from operator import attrgetter
 from typing import Final
-from zlib import crc32
 
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.shapes import kind_of
@@ -18,6 +17,7 @@ from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind, Zon
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.zone_transfer import set_id_of
 from fsw.record import JOINTS, padded
 from messages import message_ids
 from messages.joint_arrays import JOINTS_MAX, base, more
@@ -175,7 +175,7 @@ def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext)
         nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0, *_NOT_TOUCHED, 0)
         return [Outgoing(message_ids.OBSTACLE_SHAPE, nothing, message_ids.PANDION)]
     every = not which >= 1.0  # NaN and 0 ask for all
-    set_id = crc32(repr(zones).encode())
+    set_id = set_id_of(zones)
     return [
         Outgoing(
             message_ids.OBSTACLE_SHAPE,

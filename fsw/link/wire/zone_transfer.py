@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from fsw.autopilot.signals import SafeSet
+from zlib import crc32
+
+from fsw.autopilot.signals import SafeSet, Zone
 from fsw.link.wire.decode import IndexedObstacle
+
+
+def set_id_of(zones: tuple[Zone, ...]) -> int:
+    """A number that all of these ``zones`` share, and those of another set do not."""
+    return crc32(repr(zones).encode()) or 1
 
 
 class ZoneTransfer:
