@@ -277,6 +277,8 @@ class Talkers:
         # With the wall that another source owns in front: what does not grow is not refused for it.
         zones = (_OWNERS, drawn) if chance.random() < 0.5 else (drawn,)
         for index, (numbers, clearance, velocity, kind, flags) in enumerate(zones):
+            if chance.random() < 0.05:
+                continue  # lost
             self.send(
                 sender, ids.OBSTACLE_SHAPE, time_usec=max(t_us, 0), clearance=clearance,
                 velocity=velocity, numbers=(*numbers, *(0.0,) * 16)[:16],
@@ -526,6 +528,7 @@ class Talkers:
     def _answer(self, inputs: TickInputs, outputs: TickOutputs) -> None:
         """Let those who set or uploaded something know what the tick made of it."""
         self.missions.observe(outputs.snapshot)
+        self.inbox.owner = outputs.snapshot.safe_set_owner
         if inputs.tuning is not None:
             self.parameters.settle(outputs.tuning_taken)
         if inputs.mission is not None:

@@ -110,6 +110,7 @@ class Connected:
         )
         outputs = flight.step_with(inputs)
         self.missions.observe(outputs.snapshot)
+        inbox.owner = outputs.snapshot.safe_set_owner
         if tuning is not None:
             self.parameters.settle(outputs.tuning_taken)
         if inputs.mission is not None:
