@@ -53,6 +53,7 @@ _MOST = 6.0
 # By what differences of innovations are beyond which are expected, variances grow.
 _SCALE_FROM = 2.0
 _SCALE_LIMIT = 100.0  # ten times the stated deviation: what is beyond is no noise, but garbage
+_GARBAGE = 20.0  # of one axis: what is as far beyond that
 # Innovations in a row, each over its deviation, lean one way from so large a sum on that keeps so
 # much of itself from one to the next; a single one counts by at most a share of that.
 _KEEPS = 0.8
@@ -205,15 +206,21 @@ def _doubt_force(x: Any) -> None:
 
 @compilable
 def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
-    """Let a scale of variances follow how innovations differ, from the last and from before it."""
-    L, y, squared = x.factor, x.innovated, 0.0
+    """Let a scale of variances follow how innovations differ, from the last and from before it.
+
+    What differs by more than the largest scale explains is no noise, and makes none.
+    """
+    L, y, squared, beyond = x.factor, x.innovated, 0.0, 0.0
     for k in range(rows):
         total = x.innovation[part, k] - x.innovated_last[scaled, k]
         x.innovated_last[scaled, k] = x.innovation[part, k]
+        beyond += total * total / (_variance(x, k) + _more(x, k, scaled))
         for j in range(k):
             total -= L[k, j] * y[j]
         y[k] = total / L[k, k]
         squared += y[k] * y[k]
+    if beyond > _GARBAGE * rows:
+        squared = 0.0
     x.scatter[scaled] += _RATE * (min(0.5 * squared / rows, _MOST) - x.scatter[scaled])
     own = x.noise_by_lag[scaled]
     own[0] = min(followed(own[0], squared / rows, _SCALE_FROM), _SCALE_LIMIT)
@@ -227,19 +234,36 @@ def _follow_noise(x: Any, rows: int, part: int, scaled: int) -> None:
 
 
 @compilable
+def _variance(x: Any, k: int) -> float:
+    """Variance [SI] of an innovation's row ``k`` [1]."""
+    total = 0.0
+    for j in range(k + 1):
+        total += x.factor[k, j] * x.factor[k, j]
+    return total
+
+
+@compilable
+def _more(x: Any, k: int, scaled: int) -> float:
+    """By how much more [SI] it would be with the largest scale."""
+    more: float = (_SCALE_LIMIT / max(x.noise_scale[scaled], 1.0) - 1.0) * x.variance[k]
+    return more
+
+
+@compilable
 def _look_back(x: Any, rows: int, part: int, scaled: int, lag: int) -> None:
     """Let the scale of a ``lag`` [1] follow how far the innovation has gone back since.
 
     Of two differences in a row noise makes one against the other, as far as it is another noise
     after the lag. What grows, somebody's error, makes both alike, and counts for nothing.
     """
-    before, returned = x.innovated_before[scaled, lag], 0.0
+    before, returned, beyond = x.innovated_before[scaled, lag], 0.0, 0.0
     for k in range(rows):
-        gone, variance = x.innovation[part, k] - before[0, k], 0.0
-        for j in range(k + 1):
-            variance += x.factor[k, j] * x.factor[k, j]
+        gone, variance = x.innovation[part, k] - before[0, k], _variance(x, k)
         returned -= gone * before[1, k] / variance
+        beyond += gone * gone / (variance + _more(x, k, scaled))
         before[0, k], before[1, k] = x.innovation[part, k], gone
+    if beyond > _GARBAGE * rows:
+        returned = 0.0
     scale = max(x.noise_by_lag[scaled, 1 + lag], 1.0)
     start = _LAG_FROM if scale > _SURELY else _SCALE_FROM
     grown = scale * math.exp(_LAG_RATE * (min(max(returned / rows, -_MOST), _LAG_MOST) - start))

@@ -555,7 +555,7 @@ def test_garbage_is_not_used_as_a_pose_with_much_noise(sigma: float) -> None:
         return sample
 
     flown = Flown(run(MOCAP, 8, 2.5), change)
-    assert max(flown.memory.numbers[0]["noise_scale"]) == 100.0
+    assert max(flown.memory.numbers[0]["noise_scale"]) < 2.0
     fused = flown.memory.of(Sensor.POSE).fused
     assert START + 2.5 - fused[0] > 0.2
 
@@ -752,6 +752,23 @@ def test_what_scatters_for_long_is_not_taken_for_noise() -> None:
         if estimate is not None and 0.5 < since < 0.9:
             off = max(off, float(np.linalg.norm(errors(estimate, flown, now)[6:])))
     assert off < 0.03
+
+
+@pytest.mark.parametrize("size", [2.0, 100.0])
+def test_garbage_is_no_noise_and_makes_no_place_less_sure(size: float) -> None:
+    """Variances had grown to a hundred times the stated, until garbage was within the gate."""
+    random, scales = np.random.default_rng(4), []
+
+    def change(now: float, sample: Sample) -> Sample:
+        if isinstance(sample, GnssSample) and now > START + 1.0:
+            return replace(sample, position=tuple(random.uniform(-size, size, 3).tolist()))
+        return sample
+
+    flown = Flown(run(RTK, 8, 5.0), change)
+    scales = flown.memory.numbers["noise_scale"][0]
+    assert scales[2] < 2.0
+    assert (Sensor.GNSS, SensorFault.JUMP) in flown.found
+    assert (Sensor.GNSS, SensorFault.NOISY) not in flown.found
 
 
 def test_of_noise_that_is_known_most_poses_are_used() -> None:
