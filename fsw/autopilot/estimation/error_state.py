@@ -47,7 +47,8 @@ NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
 CONTRADICTED = 32  # by more than what rotors that are off explain
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
-FORCE_MADE = 16  # of LOST: the force of this reading is that of the rotors' model
+# Of LOST: force, or rate, of this reading is that of the rotors' model.
+FORCE_MADE, RATE_MADE = 16, 64
 MADE_LASTS: Final = 0.5  # s, of what the rotors' model does not know of a force
 WITNESS: Final = 29  # integrals: see faults/residuals.py
 HEIGHT_LASTS: Final = 0.15  # s, for which a height counts as measured after it was

@@ -23,6 +23,7 @@ from fsw.autopilot.estimation.error_state import (
     NO_RATE,
     NOTHING,
     RATE,
+    RATE_MADE,
     TIME,
 )
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
@@ -88,6 +89,7 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
         row[RATE + i] = w[i] if keep_rate else last[RATE + i]
     if modelled and lost:
         _model_what_is_lost(x, row, last, lost, model)
+    _count_rate(x, row, last, modelled and lost & NO_RATE != 0, keep_rate)
     since = min(time - last[TIME], law.imu_gap)
     row[MISSED] = _missed(x, 0, f, law.accel_range, row, since, of_force)
     row[MISSED + 1] = _missed(x, 1, w, law.gyro_range, row, since, of_rate)
@@ -145,6 +147,24 @@ def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> 
         dt = row[TIME] - last[TIME]
         for i in range(3):
             row[RATE + i] = last[RATE + i] + dt * model[i]
+
+
+@compilable
+def _count_rate(x: Any, row: Any, last: Any, made: bool, reads: bool) -> None:
+    """Note whether the rate in a ``row`` is ``made``; if it ``reads``, it counts from there again.
+
+    What rotors make runs away, and the bias with it: with a joint that hung limp by 31 rad/s. The
+    difference of both is the rate, and it neither jumps nor is turned by this.
+    """
+    was_made = int(last[LOST]) & RATE_MADE != 0
+    if made or (was_made and not reads):
+        row[LOST] += RATE_MADE
+    elif was_made:
+        for i in range(3):
+            off = row[RATE + i] - last[RATE + i]
+            x.gyro_bias[i] += off
+            for k in range(max(x.first - 1, x.end - IMU_CAPACITY + 1), x.end):
+                x.imu[k % IMU_CAPACITY, RATE + i] += off
 
 
 @compilable

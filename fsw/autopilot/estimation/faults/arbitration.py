@@ -30,6 +30,8 @@ from fsw.autopilot.estimation.error_state import (
     TH,
     P,
     V,
+    correct,
+    distance,
     watch_biases,
 )
 from fsw.autopilot.estimation.faults import residuals
@@ -56,6 +58,7 @@ _FOR: Final = (0.1, 0.06)
 _TURNED: Final = 0.6  # s
 _SEEN_OF_TURN: Final = 1.0 / 3.0
 _SEEN: Final = (0.5, 1.0)
+_IS_WHAT_IT_WAS: Final = 16.3  # chi-square, exceeded by chance once in a thousand
 _HALVES: Final = ((Source.ACCELEROMETER, NO_FORCE), (Source.GYRO, NO_RATE))
 _USED: Final = 0.5  # s; what was refused for longer finds no bias
 _LASTED: Final = 0.05  # s, of integrals
@@ -380,7 +383,8 @@ def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
     """The ``verdict`` with a filter ``x`` that takes the biases of suspects for unknown.
 
     By as much as residuals with them show, and so what that has led to. A bias that may walk alone
-    takes too long to be found; where the filter is not ``aided``, nothing would find it.
+    takes too long to be found; where the filter is not ``aided``, nothing would find it, and what
+    has been found of it so far is kept where it is another one.
     """
     assert verdict.evidence is not None
     M, unknown, k = x["covariance"], list(verdict.unknown), np.arange(3)
@@ -392,7 +396,10 @@ def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
         size = min(seen / (_SEEN_OF_TURN if turned else _SEEN[half]), _MOST[half])
         x["model_walk"][half] = min(x["model_walk"][half], size)
         grown = size**2 - unknown[half] ** 2
-        if aided and grown > 0.0:
+        if not aided and unknown[half]:
+            _recall(x, bias)
+            unknown[half] = 0.0
+        elif aided and grown > 0.0:
             if not unknown[half]:
                 _doubt(x, half)
             unknown[half] = size
@@ -402,6 +409,21 @@ def _widened(x: Any, verdict: Verdict, aided: Source) -> Verdict:
             M[bias + k, bias + k] += grown
             M[state + k, state + k] += _FOR[half] ** 2 * grown
     return verdict._replace(unknown=(unknown[0], unknown[1]))
+
+
+def _recall(x: Any, bias: int) -> None:
+    """Take a ``bias`` [BA, BG] of ``x`` for what it was, unless it has been found to be another.
+
+    As a measurement, because what is known of it has led to a tilt and a velocity.
+    """
+    x.H[:3] = 0.0
+    for i in range(3):
+        x.H[i, bias + i] = 1.0
+        now = x.accel_bias[i] if bias == BA else x.gyro_bias[i]
+        x.residual[i] = x.kept_bias[bias - BA + i] - now
+        x.variance[i] = x.kept_variance[bias - BA + i]
+    if distance(x, 3) <= _IS_WHAT_IT_WAS:
+        correct(x, 3)
 
 
 def _doubt_turn(x: Any, grown: float) -> None:

@@ -19,6 +19,7 @@ from fsw.autopilot.estimation.error_state import (
     NO_RATE,
     NOTHING,
     RATE,
+    RATE_MADE,
 )
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.imu import BLOW, STAYS, STAYS_LONG, add_imu
@@ -168,7 +169,7 @@ def test_a_model_stands_in_for_the_half_that_is_lost_alone() -> None:
     unit, none, model = Unit(), (float("nan"),) * 3, (3.0, -4.0, 0.5, 9.5)
     before = unit.last.copy()
     assert unit.read(rate=none, model=model) is SensorFault.NOT_FINITE
-    assert unit.last[LOST] == NO_RATE + MODELLED
+    assert unit.last[LOST] == NO_RATE + MODELLED + RATE_MADE
     expected = before[RATE : RATE + 3] + TICK * np.array([3.0, -4.0, 0.5])
     np.testing.assert_allclose(unit.last[RATE : RATE + 3], expected, rtol=0.0, atol=1e-15)
     assert unit.last[FORCE + 2] != -9.5, "the accelerometer is believed"
@@ -199,6 +200,29 @@ def test_a_modelled_force_is_what_the_rotors_give_and_leaves_the_mass_as_it_is(k
     assert unit.last[FORCE + 2] == pytest.approx(0.02 - 9.5)
 
 
+def test_a_rate_that_rotors_made_leaves_no_bias_behind() -> None:
+    """It ran away by 31 rad/s, and what the filter had found of it was left as legs touched."""
+    unit, none, model = Unit(), (float("nan"),) * 3, (40.0, 0.0, 0.0, 9.5)
+    for _ in range(300):
+        unit.read(rate=none, model=model)
+    unit.x.gyro_bias[:] = unit.last[RATE : RATE + 3]  # poses say that it does not turn
+    before = [row.copy() for row in unit.x.imu]
+    assert abs(unit.x.gyro_bias[0]) > 20.0
+    unit.x.out = NO_RATE
+    for _ in range(STAYS + 1):  # on the ground: of one that is named the reading is used
+        unit.read(rate=(-0.4 + 0.01 * unit.random.standard_normal(), 0.0, 0.0))
+    assert unit.last[LOST] == NO_RATE
+    np.testing.assert_allclose(unit.x.gyro_bias, (-0.4, 0.0, 0.0), atol=0.05)
+    rates = np.array([row[RATE : RATE + 3] for row in unit.x.imu])
+    was = np.array([row[RATE : RATE + 3] for row in before])
+    new = [k % len(rates) for k in range(unit.x.end - STAYS - 1, unit.x.end)]
+    moved = np.delete(rates - was, new, axis=0)
+    np.testing.assert_allclose(moved - moved[0], 0.0, atol=1e-9, err_msg="all of them alike")
+    assert abs(moved[0, 0]) > 20.0
+    unit.read(rate=none)
+    assert not int(unit.last[LOST]) & RATE_MADE, "held, of one that was read"
+
+
 @pytest.mark.parametrize(("half", "at", "size"), [(NO_FORCE, FORCE, 40.0), (NO_RATE, RATE, 8.0)])
 def test_what_stays_where_it_jumped_to_in_flight_is_believed_when_others_say_so(
     half: int, at: int, size: float
@@ -212,7 +236,7 @@ def test_what_stays_where_it_jumped_to_in_flight_is_believed_when_others_say_so(
     unit = Unit()
     for _ in range(200):
         assert unit.read(**{name: said()}, model=FLIES) is SensorFault.JUMP  # type: ignore[arg-type]
-    made = FORCE_MADE if half == NO_FORCE else 0
+    made = FORCE_MADE if half == NO_FORCE else RATE_MADE
     assert unit.last[LOST] == half | MODELLED | made
     unit.x.believed = half
     assert unit.read(**{name: said()}, model=FLIES) is SensorFault.NONE  # type: ignore[arg-type]
@@ -246,7 +270,7 @@ def test_a_half_that_is_out_is_replaced_and_of_a_suspect_only_the_bias_is_unknow
     np.testing.assert_array_equal(unit.last[FORCE : FORCE + 6], (1.0, 2.0, -9.0, 0.1, 0.2, 0.3))
     unit.x.suspect, unit.x.out = 0, half
     unit.read(force=(3.0, 2.0, -9.0), rate=(0.3, 0.2, 0.3), model=FLIES)
-    assert unit.last[LOST] == half | MODELLED | (FORCE_MADE if half == NO_FORCE else 0)
+    assert unit.last[LOST] == half | MODELLED | (FORCE_MADE if half == NO_FORCE else RATE_MADE)
     assert unit.last[at] != (3.0 if half == NO_FORCE else 0.3)
     other = FORCE if half == NO_RATE else RATE
     assert unit.last[other] == (3.0 if half == NO_RATE else 0.3), "the other half is used"
