@@ -126,9 +126,7 @@ class SensorFusion:
         for sensor in self._sensors.values():
             sensor.take(memory, sensor.at_rest, t, (2.0, 2.0))
         fusion.doubt(memory.numbers, 0.0, 0.0, True)
-        residuals.look(
-            np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False, False
-        )
+        residuals.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
 

@@ -157,8 +157,7 @@ class Arbitration:
         silent |= Source.MODEL if touches else NOBODY
         lost = residuals.note_silence(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
-        told = before.is_of_sensors
-        residuals.look(evidence, memory.numbers, now, pose, fix, field, learns, told)
+        residuals.look(evidence, memory.numbers, now, pose, fix, field, learns)
         ratios = tuple(evidence[0]["ratio"].tolist())
         verdict = before._replace(evidence=evidence, seen=newest)
         if before.is_on or before.wrong or max(ratios) > 1.0:

@@ -263,24 +263,13 @@ def _weigh(b: Array, felt: float, thrust: float, share: float) -> None:
 @machine_code
 @kernel
 def look(
-    e: Evidence,
-    numbers: Any,
-    now: float,
-    pose: Aid,
-    fix: Aid,
-    field: Aid,
-    learns: bool,
-    told: bool,
+    e: Evidence, numbers: Any, now: float, pose: Aid, fix: Aid, field: Aid, learns: bool
 ) -> None:
-    """Take in the newest measurements at ``now`` [s], and compute all residuals.
-
-    The rotors' model learns what is nominal, or not. That sensors are wrong others may have
-    ``told``: then a push is not why, and rotors say more of who is.
-    """
+    """Take in the newest measurements at ``now`` [s], and compute all residuals."""
     s, x = e[0], numbers[0]
     s.looked = now
     for k in range(4):
-        s.turns[k] = 1.0 if told else max(x.turns[k], 1.0)
+        s.turns[k] = max(x.turns[k], 1.0)
     if _begins(x.witness):
         _begin_anew(s)
         return
@@ -309,8 +298,7 @@ def look(
         _note_largest(s, now, k)
     # How quickly the model has been off, which is what a filter without a half of the unit needs.
     x.model_walk[0] = MIN_WALKS[0]
-    nominal = 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1])
-    x.model_walk[1] = max(max(x.turns[1], 1.0) * MIN_WALKS[1], nominal)
+    x.model_walk[1] = max(s.turns[1] * MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
 
 
 @compilable

@@ -92,11 +92,6 @@ class Verdict(NamedTuple):
         """Whether sensors, or one and the rotors' model, contradict each other."""
         return self.since >= 0.0
 
-    @property
-    def is_of_sensors(self) -> bool:
-        """Whether in this trial sensors have contradicted each other, whatever rotors do."""
-        return any(not OF[k] & M for k in self.shown)
-
     def acquitted(self) -> Verdict:
         """The verdict after the trial is over."""
         return self._replace(

@@ -59,7 +59,6 @@ def flown(
     seconds: float,
     seed: int = 1,
     yaw: float = 0.0,
-    agility: float = 1.0,
     swing: float = 0.0,
     axes: float = 0.0,
     sigma: float = 0.015,
@@ -68,8 +67,7 @@ def flown(
 ) -> list[Verdict]:
     """Verdicts of all looks at a vehicle that sways, beside which the ``wrong`` is added.
 
-    It turns about its vertical at up to a rate ``yaw`` [rad/s], its rotors turn it with an
-    ``agility`` [rad/s^2], and its arm makes torques of pushes
+    It turns about its vertical at up to a rate ``yaw`` [rad/s], and its arm makes torques of pushes
     of up to 0.8 m/s^2: ``swing`` [rad/m]. The gyro's axes are off by ``axes`` [rad].
     Satellites say that places are known to ``sigma`` [m]. Of a ``bias`` [rad/s] of the gyro the
     filter knows nothing as it begins, and nearly all after a second.
@@ -78,7 +76,7 @@ def flown(
     x: Any = np.zeros(1, FILTER)
     evidence = residuals.at_start() if evidence is None else evidence
     verdict, found = Verdict(), []
-    evidence["began"], x["turns"] = -1.0, residuals.scale_of_turns(agility, swing)
+    evidence["began"], x["turns"] = -1.0, residuals.scale_of_turns(1.0, swing)
     s: Any = SimpleNamespace(
         **{name: x[name][0] for name in WITNESSED},
         suspect=0,
@@ -145,7 +143,7 @@ def flown(
             body = np.array(rotate_back(seen, FIELD)) + 3e-3 * random.standard_normal(3)
             body += np.array(wrong.iron)
             field = (True, now, tuple(body.tolist()), (1.0, 0.0, 0.0, 0.0), 0.01, 0.0)  # type: ignore[assignment]
-        look(evidence, x, now, pose, fix, field, not verdict.is_on, verdict.is_of_sensors)
+        look(evidence, x, now, pose, fix, field, not verdict.is_on)
         ratios = tuple(evidence[0]["ratio"].tolist())
         sizes = tuple(evidence[0]["size"].tolist())
         headed = tuple(evidence[0]["headed"].tolist())
@@ -373,12 +371,12 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     x["witness"][0, 0] = 1.0
     x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
     for look_ in range(60):
-        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False, False)
+        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
     assert evidence[0]["ratio"][sources.AA] > 1.0
     assert evidence[0]["ratio"][sources.GG] > 1.0
     x["covariance"][0] = 0.5**2 * np.eye(17)
     for look_ in range(60, 90):
-        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False, False)
+        look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
     assert not evidence[0]["ratio"].any(), "nothing is known of them"
 
 
@@ -558,16 +556,6 @@ def test_a_field_that_has_turned_the_heading_is_a_suspect_beside_the_gyro() -> N
     without = verdict._replace(wrong=Source.COMPASS)
     without = judged(without, tuple(ratios), now, holds_attitude=False)
     assert without.suspects & Source.GNSS, "the heading of one that is not used turns nothing"
-
-
-@pytest.mark.requirement("REQ-EST-13")
-@pytest.mark.parametrize("agility", [60.0, 120.0, 230.0])
-def test_rotors_say_who_is_wrong_once_it_is_known_that_a_sensor_is(agility: float) -> None:
-    """Of a push they must not say that one is, and of an agile vehicle they said no more at all."""
-    seen = flown(Wrong(gyro=(0.4, -0.3, 0.0)), "satellites", 1.0, agility=agility)
-    assert named(seen) == Source.GYRO
-    pushed = flown(Wrong(blow=(0.3, 0.0, 0.0)), "satellites", 1.0, agility=230.0)
-    assert not suspected(pushed)
 
 
 @pytest.mark.requirement("REQ-EST-13")
