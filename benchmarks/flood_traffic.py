@@ -91,7 +91,7 @@ def out_of_range(writer: FrameWriter, chance: random.Random) -> bytes:
             (_ATTITUDE_TARGET, (0, *(wild,) * 4, *nothing[:3], wild, 1, 1, 0)),
             (_END_EFFECTOR_TARGET, (2**40, *(wild,) * 11, 0, 1, 1, 1, wild)),
             (_END_EFFECTOR_TARGET, (2**40, *(0.0,) * 11, 0, 1, 1, 99, 0.0)),  # no such frame
-            (_WALL, (0.0, 0.0, 0.0, wild, -1.0, 1, 1, 0, 1)),
+            (_WALL, (0.0, 0.0, 0.0, wild, -1.0, 1, 1, 0, 1, 0)),
         )
     )
     return _of_either_version(writer.frame(message_id, *values), chance)
