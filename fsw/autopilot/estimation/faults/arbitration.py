@@ -39,6 +39,7 @@ from fsw.autopilot.estimation.faults.residuals import LASTS, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged, lifted
+from fsw.autopilot.estimation.fusion import clear
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, TickInputs, Trail, copied
 from fsw.autopilot.estimation.imu import IMU_SILENT, is_stuck
 from fsw.autopilot.estimation.joint_filter import ENCODERS_TOO_OLD
@@ -415,7 +416,7 @@ def _recall(x: Any, bias: int) -> None:
 
     As a measurement, because what is known of it has led to a tilt and a velocity.
     """
-    x.H[:3] = 0.0
+    clear(x, 3)
     for i in range(3):
         x.H[i, bias + i] = 1.0
         now = x.accel_bias[i] if bias == BA else x.gyro_bias[i]

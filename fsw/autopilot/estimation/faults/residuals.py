@@ -317,9 +317,7 @@ def _note_largest(s: Any, now: float, k: int) -> None:
     for i in range(5):
         if heard - silent >= CONTAINED[i] and s.both[k, i] > s.ratio[k]:
             s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
-            s.headed[k] = math.inf
-            if k in (AN, MN):
-                s.headed[k] = min(s.apart, 2.0) * s.across[i]
+            s.headed[k] = min(s.apart, 2.0) * s.across[i] if k in (AN, MN) else math.inf
 
 
 @compilable

@@ -137,12 +137,12 @@ def judged(
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
     Their ``sizes`` are in SI, and so is what a heading that is wrong makes of each at most
-    (``headed``). Where nothing that is used ``holds_attitude``, gyro and magnetometer
-    do. What is ``lost`` says nothing, and is known to be of no use without this law. Of a
-    ``damaged`` vehicle it is known that the rotors' model is off.
+    (``headed``). Where nothing that is used ``holds_attitude``, gyro and magnetometer do. What is
+    ``lost`` says nothing, and is known to be of no use without this law. Of a ``damaged`` vehicle
+    it is known that the rotors' model is off.
     """
-    turns = [k for k in range(COUNT) if sizes[k] <= headed[k]]
-    of = _sources(holds_attitude, verdict.wrong, turns)
+    headings = [k for k in range(COUNT) if sizes[k] <= headed[k]]
+    of = _sources(holds_attitude, verdict.wrong, headings)
     # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's;
     # one that was taken for unknown in this trial is whatever the suspects made of it.
     found = holds_attitude or verdict.wrong & Q or any(verdict.unknown)
@@ -281,13 +281,8 @@ def _sources(holds_attitude: bool, wrong: Source, headings: list[int]) -> tuple[
         return OF
     # A magnetometer that is used turns the heading, and with it what is felt across.
     turned = (AN, MN, *(_OF_PLACES if wrong & Q else ()))
-    heading = B & ~wrong
-    return tuple(
-        [
-            one | G | (heading if k in headings else NOBODY) if k in turned else one
-            for k, one in enumerate(OF)
-        ]
-    )
+    turns = {k: G | (B & ~wrong if k in headings else NOBODY) for k in turned}
+    return tuple([one | turns.get(k, NOBODY) for k, one in enumerate(OF)])
 
 
 def _with_return(
