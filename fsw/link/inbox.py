@@ -54,6 +54,7 @@ _MAX_REASONS: Final = 4  # a tick, of refusals; more are counted
 _MAX_INCOMPLETE: Final = 16  # safe sets, at the same time
 MAX_SAMPLES: Final = 512  # a tick; a second of a suite has some 1300
 _GROUND_STATION: Final = 6  # MAV_TYPE
+_CROWDED: Final = "a safe set is left out: too many sources announce one at once"
 UNKNOWN_SOURCE: Final = MessageSource(0, 0, "unknown")
 
 T = TypeVar("T")
@@ -271,27 +272,26 @@ class Inbox:
     ) -> None:
         if not decode.for_this_vehicle(frame):
             return
-        transfer, source = self._transfers.pop(self._source, None), self._source
-        if transfer is None:
+        source = self._source
+        if source not in self._transfers:
             self._make_room()
-            transfer = ZoneTransfer()
-        self._transfers[source] = transfer
+        transfer = self._transfers.setdefault(source, ZoneTransfer())
         indexed = self._read(read, cast(Numbers, frame.payload_values))
         if indexed is None:
             transfer.discard()
             return
         was_lost = transfer.is_lost
-        self.refused += transfer.is_begun and indexed.index == 0  # the rest of the last one is lost
+        if transfer.is_begun and indexed.index == 0:
+            self._refuse()  # the rest of the last one is lost
         safe_set = transfer.add(indexed)
         if safe_set is not None:
             self._announce(safe_set)
         elif transfer.is_lost:
-            self.refused += 1
-            if not was_lost:
-                self._tell(
-                    f"zone {indexed.index + 1} of {indexed.count} does not follow the one before: "
-                    f"the set is left out; send it again from zone 1; from {source}"
-                )
+            problem = (
+                f"zone {indexed.index + 1} of {indexed.count} does not follow the one before: "
+                f"the set is left out; send it again from zone 1; from {source}"
+            )
+            self._refuse("" if was_lost else problem)
 
     def _make_room(self) -> None:
         """Forget a set that is incomplete, of this source's address if it has more than its share.
@@ -304,20 +304,19 @@ class Inbox:
         full = own if len(own) >= _MAX_OF_ADDRESS else others[::-1]
         if full is own or len(others) >= _MAX_INCOMPLETE:
             del self._transfers[full[0]]
-            self.refused += 1
-            self._tell("a safe set is left out: too many sources announce one at once")
+            self._refuse(_CROWDED)
 
     def _announce(self, safe_set: SafeSet) -> None:
         """Keep the newest safe set of a source."""
         source = self._source
-        kept = [one for one in self._received.announced if one.source != source]
+        kept, owns = self._received.announced, source.is_same(self.owner)
+        kept = [one for one in kept if one.source != source]
         of_address = sum(one.source.place == source.place for one in kept)
-        if source.is_same(self.owner):
-            del kept[_MAX_ANNOUNCEMENTS - 1 :]
-        elif len(kept) >= _MAX_ANNOUNCEMENTS or of_address >= _MAX_OF_ADDRESS:
-            self.refused += 1
-            self._tell("a safe set is left out: too many sources announce one at once")
-            return
+        if len(kept) >= _MAX_ANNOUNCEMENTS or (of_address >= _MAX_OF_ADDRESS and not owns):
+            self._refuse(_CROWDED)
+            if not owns:
+                return
+            kept.pop()
         self._received.announced = [*kept, SafeSetAnnouncement(source, safe_set)]
 
     def _sphere(self, frame: Frame) -> None:
@@ -332,15 +331,16 @@ class Inbox:
         try:
             meaning = read(values)
         except decode.RefusedError as error:
-            meaning = None
-            self._tell(f"{error}; from {self._source}")
+            self._refuse(f"{error}; from {self._source}")
+            return None
         if meaning is None:
-            self.refused += 1
+            self._refuse()
         return meaning
 
-    def _tell(self, reason: str) -> None:
-        """Tell why something was refused, of the first of a tick."""
-        if len(self._received.refused) < _MAX_REASONS:
+    def _refuse(self, reason: str = "") -> None:
+        """Count something that is of no use, and tell why, of the first of a tick."""
+        self.refused += 1
+        if reason and len(self._received.refused) < _MAX_REASONS:
             self._received.refused.append(reason)
 
 

@@ -129,3 +129,25 @@ def test_the_owner_of_the_safe_set_is_heard_whoever_else_speaks(place: str) -> N
     received = inbox.take()
     assert OWNER in [one.source for one in received.announced]
     assert len(received.announced) <= 4
+
+
+def test_what_makes_way_for_the_owner_is_told() -> None:
+    inbox = Inbox()
+    inbox.owner = OWNER
+    for k in range(4):
+        ball(inbox, stranger(k, port=k), 0, 1, 50.0)
+    assert inbox.refused == 0
+    ball(inbox, OWNER, 0, 1, 1.0)
+    received = inbox.take()
+    assert [one.source for one in received.announced] == [*map(stranger, range(3), range(3)), OWNER]
+    assert (inbox.refused, len(received.refused)) == (1, 1)
+
+
+def test_who_has_been_there_for_longer_keeps_its_place() -> None:
+    """Its place was that of its last zone, and the next newcomer took it."""
+    inbox = Inbox()
+    for index in range(3):
+        ball(inbox, OWNER, index, 3, float(index))
+        for k in range(20):
+            ball(inbox, stranger(k, port=100 * index + k), 0, 2, 50.0)
+    assert norths(inbox, OWNER) == [0.0, 1.0, 2.0]
