@@ -11,12 +11,11 @@ from typing import Any, Final, TypeVar
 
 from fsw.autopilot.flight.commands.bounds import zone_problem
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.shapes.ball import ball
 from fsw.autopilot.signals import Vec3, Zone
 from fsw.link.endpoints import open_endpoint
 from fsw.link.wire import decode
-from fsw.link.wire.zone_transfer import set_id_of
+from fsw.link.wire.zone_transfer import shape_values
 from messages import message_ids as ids
 from messages.addresses import LinkAddress, address_text
 from messages.frames import FrameWriter, Losses
@@ -36,9 +35,6 @@ _TRIES: Final = 3
 _ACCEPTED, _IN_PROGRESS = 0, 5
 _POSITION_ONLY: Final = 0x0DF8  # type mask: position, no heading
 _LOCAL_NED: Final = 1
-_SHAPE_NUMBERS = 16
-_NOT_TOUCHED = (0.0,) * 5  # what OBSTACLE_SHAPE says of contact
-_TOUCH: Final = 2  # PANDION_SHAPE_FLAGS
 _CLEARANCE: Final = 0.1  # m, of a ball
 _HEAR_S: Final = 0.01  # at a time
 _NAN: Final = math.nan
@@ -147,9 +143,8 @@ class VehicleLink(threading.Thread):
         known = self._announced() if problem is None else problem
         if isinstance(known, str):
             return f"no obstacle: {known}"
-        zones = (*known, new)
-        for index, zone in enumerate(zones):
-            self._shape(index, len(zones), zone, set_id_of(zones))
+        for values in shape_values((*known, new), ids.SYSTEM_ID):
+            self._send(ids.OBSTACLE_SHAPE, *values)
         return None
 
     def _announced(self) -> tuple[Zone, ...] | str:
@@ -212,13 +207,6 @@ class VehicleLink(threading.Thread):
         still = (0.0,) * 6
         mask = _POSITION_ONLY
         self._send(ids.END_EFFECTOR_TARGET, 0, *p, *still, 0.0, 0.0, mask, 1, 0, _LOCAL_NED, 0.0)
-
-    def _shape(self, index: int, count: int, zone: Zone, set_id: int) -> None:
-        kind, numbers, touch = kind_of(zone.shape).number, zone.shape.numbers, zone.touch
-        filled = (*numbers, *(0.0 for _ in range(_SHAPE_NUMBERS - len(numbers))))
-        flags = int(zone.keep_in) | (_TOUCH if touch is not None else 0)
-        place = (1, 0, index, count, kind, flags, *(touch or _NOT_TOUCHED), set_id)
-        self._send(ids.OBSTACLE_SHAPE, zone.t_us, zone.clearance, *zone.velocity, *filled, *place)
 
     def _send(self, message_id: int, *values: Any) -> None:
         self._endpoint.send(self._writer.frame(message_id, *values), self._peer)

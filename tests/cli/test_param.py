@@ -22,7 +22,7 @@ from messages.addresses import parse_link_address
 from messages.frames import FrameWriter, split
 from pandion import param, param_vehicle
 from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused
-from tests.flood import Flood
+from tests.speakers import Flood
 
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
 

@@ -80,6 +80,15 @@ def test_the_live_page_goes_on_after_a_frame_that_cannot_be_drawn(
     assert told == ["not drawn: QH6154 initial simplex is flat"]
 
 
+def watch_three_pictures(server: Server, link: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait until the page of a ``link`` has drawn so many."""
+    page = LivePage(server, link)
+    drawn: list[float] = []
+    monkeypatch.setattr(page.stage, "show", lambda now: drawn.append(now.t))
+    wait_for(lambda: len(drawn) > 2, "pictures")
+    page.close()
+
+
 def test_the_live_page_goes_on_after_a_scene_that_cannot_be_made(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,12 +99,7 @@ def test_the_live_page_goes_on_after_a_scene_that_cannot_be_made(
                 raise ValueError("matmul: Input operand 1 has a mismatch")
             return now
 
-    link: Any = Doubtful()
-    page = LivePage(server, link)
-    drawn: list[float] = []
-    monkeypatch.setattr(page.stage, "show", lambda now: drawn.append(now.t))
-    wait_for(lambda: len(drawn) > 2, "pictures")
-    page.close()
+    watch_three_pictures(server, Doubtful(), monkeypatch)
 
 
 def test_a_vehicle_whose_clock_stands_is_drawn_again(
@@ -107,9 +111,4 @@ def test_a_vehicle_whose_clock_stands_is_drawn_again(
         def scene(self) -> Scene:
             return Scene(t=1.0)
 
-    link: Any = Standing()
-    page = LivePage(server, link)
-    drawn: list[float] = []
-    monkeypatch.setattr(page.stage, "show", lambda now: drawn.append(now.t))
-    wait_for(lambda: len(drawn) > 2, "pictures")
-    page.close()
+    watch_three_pictures(server, Standing(), monkeypatch)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -20,8 +19,8 @@ from fsw.link.wire.outgoing import Outgoing
 from messages import message_ids as ids
 from messages.addresses import parse_link_address
 from messages.frames import Frame, FrameWriter, split
-from tests.flood import Flood
 from tests.fsw.link.snapshots import CONTEXT, SNAPSHOT
+from tests.speakers import Flood, Speaker
 from tests.waiting import wait_for
 from vehicles.vehicle_file import load_vehicle
 from view import live_link
@@ -33,26 +32,18 @@ INSIDE = Zone(ball((0.0, 0.0, -2.0), 8.0), 0.5, keep_in=True)
 NO_FENCE, FENCE = {0: 1, 1: 0, 2: 0}, {0: 1, 1: 7, 2: 0}
 
 
-class Vehicle:
+class Vehicle(Speaker):
     """Answers what it is asked for; ``told`` is what was announced to it."""
 
     def __init__(self, *zones: Zone, plan_ids: dict[int, int] | None = None) -> None:
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
-        self.socket.settimeout(0.1)
         self.asked: set[int] = set()
         self.told: list[decode.IndexedObstacle] = []
         self.change: Callable[[Outgoing], Outgoing] = lambda one: one
         self._snapshot = replace(SNAPSHOT, safe_set=SafeSet(zones))
         self._context = replace(CONTEXT, plan_ids=plan_ids or NO_FENCE)
-        self._ended = False
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def close(self) -> None:
-        self._ended = True
-        self._thread.join()
-        self.socket.close()
+        own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        own.bind(("127.0.0.1", 0))
+        super().__init__(own)
 
     def _run(self) -> None:
         while not self._ended:

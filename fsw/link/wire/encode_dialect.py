@@ -12,14 +12,14 @@ from operator import attrgetter
 from typing import Final
 
 from fsw.autopilot.model.kinematics import end_effector
-from fsw.autopilot.shapes import kind_of
-from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind, Zone
+from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind
 from fsw.link.wire.encode_standard import as_asked
 from fsw.link.wire.outgoing import Outgoing, WireValues
 from fsw.link.wire.telemetry_context import TelemetryContext
-from fsw.link.wire.zone_transfer import set_id_of
+from fsw.link.wire.zone_transfer import shape_values
 from fsw.record import JOINTS, padded
 from messages import message_ids
+from messages.frames import wire_fields
 from messages.joint_arrays import JOINTS_MAX, base, more
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
@@ -27,9 +27,6 @@ _MAX_CONSTRAINTS: Final = 16
 _U16: Final = 0xFFFF
 _U32: Final = 0xFFFFFFFF
 _HORIZON_STEPS, _HORIZON_JOINTS = 6, 2  # of an MPC_HORIZON
-_SHAPE_NUMBERS: Final = 16  # of an OBSTACLE_SHAPE
-_NOT_TOUCHED: Final = (0.0,) * 5  # its numbers of contact
-_TOUCH: Final = 2  # PANDION_SHAPE_FLAGS
 _RATE_GROUPS: Final = ("inner", "mpc", "telemetry", "housekeeping")  # of LoopHealth
 
 
@@ -163,33 +160,17 @@ def mpc_horizon_arm(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues
     return (plan.t_us, *arm, plan.plan_id & _U32, len(steps), len(x.q_arm))
 
 
-def _flags(zone: Zone) -> int:
-    """PANDION_SHAPE_FLAGS."""
-    return int(zone.keep_in) | (0 if zone.touch is None else _TOUCH)
-
-
 def safe_set_shapes(which: float, snapshot: FlightSnapshot, _: TelemetryContext) -> list[Outgoing]:
     """OBSTACLE_SHAPE of the safe set in force: all, or the one of number ``which`` [1], from 1."""
     zones = snapshot.safe_set.zones
     if not zones:
-        nothing = (0, *(0.0,) * (4 + _SHAPE_NUMBERS), 0, 0, 0, 0, 0, 0, *_NOT_TOUCHED, 0)
+        nothing = (0,) * len(wire_fields(message_ids.OBSTACLE_SHAPE))
         return [Outgoing(message_ids.OBSTACLE_SHAPE, nothing, message_ids.PANDION)]
     every = not which >= 1.0  # NaN and 0 ask for all
-    set_id = set_id_of(zones)
     return [
-        Outgoing(
-            message_ids.OBSTACLE_SHAPE,
-            (
-                *(zone.t_us, zone.clearance, *zone.velocity),
-                *padded(zone.shape.numbers, _SHAPE_NUMBERS),
-                *(0, 0, index, len(zones), kind_of(zone.shape).number, _flags(zone)),
-                *(_NOT_TOUCHED if zone.touch is None else zone.touch),
-                set_id,
-            ),
-            message_ids.PANDION,
-        )
-        for index, zone in enumerate(zones)
-        if every or index + 1 == which
+        Outgoing(message_ids.OBSTACLE_SHAPE, values, message_ids.PANDION)
+        for number, values in enumerate(shape_values(zones), start=1)
+        if every or number == which
     ]
 
 

@@ -1,16 +1,35 @@
-"""A safe set on its way: its zones come one after the other, from the first to the last."""
+"""A safe set on its way: its zones go one after the other, from the first to the last."""
 
 from __future__ import annotations
 
+from typing import Final
 from zlib import crc32
 
+from fsw.autopilot.shapes import kind_of
 from fsw.autopilot.signals import SafeSet, Zone
 from fsw.link.wire.decode import IndexedObstacle
+from fsw.link.wire.outgoing import WireValues
+from fsw.record import padded
+
+_NUMBERS: Final = 16  # of an OBSTACLE_SHAPE
+_NOT_TOUCHED: Final = (0.0,) * 5  # its numbers of contact
+_TOUCH: Final = 2  # PANDION_SHAPE_FLAGS
 
 
-def set_id_of(zones: tuple[Zone, ...]) -> int:
-    """A number that all of these ``zones`` share, and those of another set do not."""
-    return crc32(repr(zones).encode()) or 1
+def shape_values(zones: tuple[Zone, ...], target_system: int = 0) -> list[WireValues]:
+    """An OBSTACLE_SHAPE for each of the ``zones`` of a set, for a ``target_system`` [1]; 0: any."""
+    set_id = crc32(repr(zones).encode()) or 1
+    return [
+        (
+            *(zone.t_us, zone.clearance, *zone.velocity),
+            *padded(zone.shape.numbers, _NUMBERS),
+            *(target_system, 0, index, len(zones), kind_of(zone.shape).number),
+            int(zone.keep_in) | (0 if zone.touch is None else _TOUCH),
+            *(_NOT_TOUCHED if zone.touch is None else zone.touch),
+            set_id,
+        )
+        for index, zone in enumerate(zones)
+    ]
 
 
 class ZoneTransfer:
@@ -41,8 +60,10 @@ class ZoneTransfer:
             came, self.is_lost = [], False
         elif came and indexed == came[-1]:
             return None
-        of = indexed.count, indexed.set_id
-        follows = indexed.index == len(came) and all((one.count, one.set_id) == of for one in came)
+        follows = indexed.index == len(came)
+        if came:
+            last = came[-1]
+            follows &= (indexed.count, indexed.set_id) == (last.count, last.set_id)
         if self.is_lost or not follows:
             self.discard()
             return None
