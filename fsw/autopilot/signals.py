@@ -11,7 +11,6 @@ time of a frozen dataclass (docs/decisions/0017-one-compiled-call-a-tick.md).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
 
@@ -1043,8 +1042,7 @@ class TickOutputs:
     armed: bool
     setpoint: Setpoint | None = None  # for an autopilot with loops of its own; None: nothing flown
     gripper: float = 0.0  # 1: closes and holds, -1: opens, 0: was never told
-    # Made when it is asked for; None: the tick is not concluded.
-    shown: FlightSnapshot | Callable[[], FlightSnapshot] | None = None
+    shown: FlightSnapshot | None = None  # None: the tick is not concluded
     plan_request: PlanRequest | None = None
     acks: tuple[CommandAck, ...] = ()
     texts: tuple[StatusText, ...] = ()
@@ -1055,4 +1053,4 @@ class TickOutputs:
     def snapshot(self) -> FlightSnapshot:
         """The vehicle as telemetry shows it."""
         assert self.shown is not None, "the tick is not concluded"
-        return self.shown if isinstance(self.shown, FlightSnapshot) else self.shown()
+        return self.shown

@@ -340,6 +340,11 @@ class Tick(Record):
         _COMMAND.pack_into(self.memory, _SENT_AT, *thrust, *torque)
 
     @property
+    def stamp_us(self) -> int:
+        """The time of the estimate [us]."""
+        return int(_WHOLE.unpack_from(self.memory, 0)[0])
+
+    @property
     def down(self) -> float:
         """The third of the estimate's position [m, NED]."""
         return float(_ONE.unpack_from(self.memory, _DOWN_AT)[0])

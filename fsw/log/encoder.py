@@ -175,7 +175,7 @@ class LogEncoder:
                 out += _CONTACT.pack(t_us, (*force, *numbers, contact))
             if snapshot.payload is not None:
                 out += _PAYLOAD.pack(t_us, (snapshot.payload.mass, snapshot.payload.closed))
-        if snapshot.plan_state is not None and self._plans.is_due(t_us):
+        if self._plans.is_due(t_us) and snapshot.plan_state is not None:
             out += self._in_flight(snapshot)
         if self._rates.is_due(t_us):
             out += _RATES.pack(t_us, snapshot.estimate.w_WB_B)

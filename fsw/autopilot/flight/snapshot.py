@@ -1,82 +1,108 @@
-"""What telemetry shows of the vehicle after a tick."""
+"""What telemetry shows of the vehicle after a tick: looked up in the state it left, when asked."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
 
 from fsw.autopilot.flight.failsafe.table import FAULTS
 from fsw.autopilot.flight.modes.offboard import report
 from fsw.autopilot.flight.state import FlightState
-from fsw.autopilot.signals import ContactReport, FlightSnapshot, Mode, PayloadReport, SensorFrame
-from fsw.autopilot.tick_record import Pressing
+from fsw.autopilot.signals import (
+    ContactReport,
+    FlightSnapshot,
+    Mode,
+    Orbit,
+    PayloadReport,
+    PlanInput,
+    PredictionState,
+    SensorFrame,
+)
 
 
-class Shown:
-    """The snapshot of a state and the frame of the tick that left it, made when it is asked for."""
+class Shown(FlightSnapshot):
+    """The snapshot of a ``state`` and the frame of the tick that left it.
+
+    Of most ticks hardly anything is sent or logged, so each field is made when it is read.
+    """
+
+    __slots__ = ("sensors", "state")
 
     def __init__(self, state: FlightState, sensors: SensorFrame) -> None:
-        self._of = state, sensors
-        self._snapshot: FlightSnapshot | None = None
-
-    def __call__(self) -> FlightSnapshot:
-        """The snapshot; the same one each time."""
-        if self._snapshot is None:
-            self._snapshot = snapshot_of(*self._of)
-        return self._snapshot
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Shown) and self._of == other._of
-
-    __hash__ = None  # type: ignore[assignment]
+        self.state, self.sensors = state, sensors
 
 
-def snapshot_of(state: FlightState, sensors: SensorFrame) -> FlightSnapshot:
-    """The vehicle after a tick with this frame of its ``sensors``, which left this state."""
-    vehicle, plan, goal, r = state.vehicle, state.plan, state.setpoint.goal, state.record
-    estimate, nominal = r.state_estimate, r.plan_state if vehicle.flies else None
-    assert estimate is not None
-    return FlightSnapshot(
-        t_us=estimate.t_us,
-        mode=vehicle.mode,
-        armed=vehicle.armed,
-        estimate=estimate,
-        reference=state.reference,
-        plan_state=nominal,
-        plan_input=None if nominal is None else r.plan_input,
-        actuators=r.actuator_command,
-        plan=plan.running,
-        plan_status=plan.status,
-        counters=plan.counters,
-        constraints=state.constraints,
-        failures=tuple([c.value for c in vehicle.conditions if c in FAULTS]),
-        landed=vehicle.landed,
-        home=vehicle.home,
-        battery=state.battery,
-        arming_refusal=state.arming_refusal,
-        offboard=report(state, sensors.t_us),
-        intended_mode=vehicle.intended_mode,
-        mission=state.mission.flight.progress,
-        failsafe_from=vehicle.failsafe_from,
-        orbit=goal.orbit if goal is not None and vehicle.mode is Mode.ORBIT else None,
-        accel_B=sensors.accel_B,
-        safety=state.safety.counters,
-        estimator=state.estimator,
-        log_failure=state.host.log_failure,
-        arming=state.arming,
-        safe_set=state.mission.safe_set,
-        safe_set_owner=state.mission.owner,
-        actuators_found=state.damage.report,
-        sensors_lost=tuple([one.sensor.value for one in state.aiding.lost]),
-        touching=contact_report(r.pressing) if r.pressing.near else None,
-        payload=PayloadReport(vehicle.gripper > 0.0, float(r.payload.mass))
-        if vehicle.gripper
-        else None,
-    )
+def _plan_state(state: FlightState) -> PredictionState | None:
+    return state.record.plan_state if state.vehicle.flies else None
 
 
-def contact_report(k: Pressing) -> ContactReport:
+def _plan_input(state: FlightState) -> PlanInput | None:
+    flown = state.vehicle.flies and state.record.has_plan
+    return state.record.plan_input if flown else None
+
+
+def _orbit(state: FlightState) -> Orbit | None:
+    goal = state.setpoint.goal
+    return goal.orbit if goal is not None and state.vehicle.mode is Mode.ORBIT else None
+
+
+def _failures(state: FlightState) -> tuple[str, ...]:
+    held = state.vehicle.conditions
+    return tuple([one.value for one in held if one in FAULTS]) if held else ()
+
+
+def _contact(state: FlightState) -> ContactReport | None:
     """What the fast loop knows of the tool at a surface."""
+    k = state.record.pressing
+    if not k.near:
+        return None
     x, y, z = k.force.tolist()
     return ContactReport(
         bool(k.contact),
         (x, y, z),
         *(k.pressed, k.unsure, k.commanded, k.asked, k.most, k.distance),
     )
+
+
+def _payload(state: FlightState) -> PayloadReport | None:
+    gripper = state.vehicle.gripper
+    return PayloadReport(gripper > 0.0, float(state.record.payload.mass)) if gripper else None
+
+
+_FIELDS: Final[dict[str, Callable[[Shown], Any]]] = {
+    "t_us": lambda shown: shown.state.record.stamp_us,
+    "mode": lambda shown: shown.state.vehicle.mode,
+    "armed": lambda shown: shown.state.vehicle.armed,
+    "estimate": lambda shown: shown.state.record.state_estimate,
+    "reference": lambda shown: shown.state.reference,
+    "plan_state": lambda shown: _plan_state(shown.state),
+    "plan_input": lambda shown: _plan_input(shown.state),
+    "actuators": lambda shown: shown.state.record.actuator_command,
+    "plan": lambda shown: shown.state.plan.running,
+    "plan_status": lambda shown: shown.state.plan.status,
+    "counters": lambda shown: shown.state.plan.counters,
+    "constraints": lambda shown: shown.state.constraints,
+    "failures": lambda shown: _failures(shown.state),
+    "landed": lambda shown: shown.state.vehicle.landed,
+    "home": lambda shown: shown.state.vehicle.home,
+    "battery": lambda shown: shown.state.battery,
+    "arming_refusal": lambda shown: shown.state.arming_refusal,
+    "offboard": lambda shown: report(shown.state, shown.sensors.t_us),
+    "intended_mode": lambda shown: shown.state.vehicle.intended_mode,
+    "mission": lambda shown: shown.state.mission.flight.progress,
+    "failsafe_from": lambda shown: shown.state.vehicle.failsafe_from,
+    "orbit": lambda shown: _orbit(shown.state),
+    "accel_B": lambda shown: shown.sensors.accel_B,
+    "safety": lambda shown: shown.state.safety.counters,
+    "estimator": lambda shown: shown.state.estimator,
+    "log_failure": lambda shown: shown.state.host.log_failure,
+    "arming": lambda shown: shown.state.arming,
+    "safe_set": lambda shown: shown.state.mission.safe_set,
+    "safe_set_owner": lambda shown: shown.state.mission.owner,
+    "actuators_found": lambda shown: shown.state.damage.report,
+    "sensors_lost": lambda shown: tuple([one.sensor.value for one in shown.state.aiding.lost]),
+    "touching": lambda shown: _contact(shown.state),
+    "payload": lambda shown: _payload(shown.state),
+}
+for _name, _found in _FIELDS.items():
+    setattr(Shown, _name, property(_found))

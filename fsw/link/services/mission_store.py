@@ -64,6 +64,7 @@ def _identity(items: tuple[MissionItem, ...]) -> int:
     return zlib.crc32(b"".join(packed)) or 1
 
 
+_NO_PROGRESS: Final = MissionProgress()
 _ITEM: Final = struct.Struct("<HBB4fiif")
 ALL_KINDS: Final = 255  # MAV_MISSION_TYPE_ALL
 ROOM: Final = {Kind.MISSION: 500, Kind.FENCE: 64, Kind.RALLY: 16}
@@ -103,8 +104,6 @@ class MissionStore:
     """The three lists in force, and what the tick has yet to decide on."""
 
     def __init__(self, site: Site) -> None:
-        self.progress = MissionProgress()
-        self.in_mission = False
         self.ids: dict[int, int] = dict.fromkeys(Kind, 0)  # see ``PlanIds``
         self.items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._site = site
@@ -118,8 +117,16 @@ class MissionStore:
     def observe(self, snapshot: FlightSnapshot) -> None:
         """See the vehicle after a tick."""
         self._snapshot = snapshot
-        self.progress = snapshot.mission
-        self.in_mission = snapshot.mode is Mode.MISSION
+
+    @property
+    def progress(self) -> MissionProgress:
+        """How far the mission is."""
+        return _NO_PROGRESS if self._snapshot is None else self._snapshot.mission
+
+    @property
+    def in_mission(self) -> bool:
+        """Whether it is being flown."""
+        return self._snapshot is not None and self._snapshot.mode is Mode.MISSION
 
     def read(self, kind: Kind, item: MissionItem) -> Meaning:
         """What an item means; ``BadItem`` where something is wrong with it by itself."""
