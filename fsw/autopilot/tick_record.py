@@ -25,6 +25,7 @@ from fsw.record import (
     JOINTS,
     ROTORS,
     Floats,
+    Four,
     Nine,
     PerJoint,
     PerRotor,
@@ -369,21 +370,6 @@ class Tick(Record):
         return bool(contact or asked > 0.0 or gripped > 0.0)
 
     @property
-    def undone(self) -> JointVector:
-        """What undoes the torques of the joints (j,) [N m], as the watch observes it."""
-        return _JOINTS.unpack_from(self.memory, _UNDONE_AT)[: self.joint_count]
-
-    @property
-    def unseen(self) -> JointVector:
-        """By how much joints must have moved unseen to hold a tool in contact (j,) [rad]."""
-        return _JOINTS.unpack_from(self.memory, _UNSEEN_AT)[: self.joint_count]
-
-    @property
-    def joint_acceleration(self) -> JointVector:
-        """What was found for the joints (j,) [rad/s^2] by ``accelerate_joints``."""
-        return _JOINTS.unpack_from(self.memory, _WORK_AT)[: self.joint_count]
-
-    @property
     def joint_reference(self) -> JointVector:
         """What the joints were asked for (j,) [rad]."""
         return _JOINTS.unpack_from(self.memory, _REFERENCE_AT)[: self.joint_count]
@@ -445,6 +431,20 @@ def estimate_in(record: Record, at: int, joints: int) -> StateEstimate:
     return StateEstimate(x[0], p, v, R, w, x[19], q, qd, x[-1])
 
 
+class Expected(Record):
+    """What commands and loops tell the filter of a tick (``Cascade.expected``); zeros: nothing."""
+
+    u: PerJoint  # rad/s^2, what torques make of the joints
+    model: Four  # rad/s^2 (3,) and m/s^2, FRD: what rotors make of the vehicle; 0: not known
+    pushed: Three  # m/s^2, NED: what surfaces that the tool touches make of it besides
+    # Of each joint, for the watch over its encoder (estimation/faults/encoder_watch.py).
+    undone: PerJoint  # N m, what acts against its torque
+    unseen: PerJoint  # rad, by which it must have moved unseen to hold a tool on a surface
+    felt: PerJoint  # share of what acts against it that is felt nearer to the base
+    judges: int  # NOT_WATCHED, BEGINS_ANEW or JUDGES
+
+
+NOT_WATCHED, BEGINS_ANEW, JUDGES = 0, 1, 2  # what the watch over the encoders does
 NO_ROTOR: Final = -1
 _ESTIMATES: Final = [struct.Struct(f"<q19d{2 * per_joint(n)}d") for n in range(JOINTS + 1)]
 _PLAN: Final = struct.Struct(f"<{15 + 2 * JOINTS}d")
@@ -464,12 +464,9 @@ _PLAN_AT: Final = Tick.place("plan")
 _INPUT_AT: Final = Tick.place("u")
 _SENT_AT: Final = Tick.place("sent")
 _HEAD_AT: Final = Tick.place("has_estimate")
-_WORK_AT: Final = Tick.place("bodies", "work")
 _COUNTS_AT: Final = Tick.place("rotor_count")
 _WIND_AT: Final = Tick.place("observed", "disturbance_bias")
 _REFERENCE_AT: Final = Tick.place("joints", "reference")
-_UNDONE_AT: Final = Tick.place("watch", "undone")
-_UNSEEN_AT: Final = Tick.place("watch", "unseen")
 _CONTACT_AT: Final = Tick.place("pressing", "contact")
 _ASKED_AT: Final = Tick.place("pressing", "asked")
 _GRIPPED_AT: Final = Tick.place("payload", "gripped")

@@ -45,7 +45,7 @@ from fsw.autopilot.model.multibody import (
     posture,
 )
 from fsw.autopilot.model.rotors import lag_rotor, load_of_tip, rotor_wrench
-from fsw.autopilot.signals import JointVector, Vec3
+from fsw.autopilot.signals import Vec3
 from fsw.autopilot.tick_record import NO_ROTOR, Sent, Tick, Watched, watch_anew
 from fsw.compiled import compilable, kernel
 from fsw.record import ROTORS, Floats, padded
@@ -497,23 +497,24 @@ def _yielding(r: Tick, joints: int) -> Vec3:
     return carried, moved, max(whole, _SHORT * _SHORT)
 
 
-def felt_inside(r: Tick, airframe: Airframe) -> JointVector:
-    """How much of what undoes each joint's torque is felt nearer to the base (j,) [1].
+@compilable
+def felt_inside(r: Tick, airframe: Airframe, felt: Floats) -> None:
+    """Write how much of what undoes each joint's torque is ``felt`` nearer to the base (j,) [1].
 
     By mean squares, of what turns the base beside the model where drives act on it as they are
     asked, and as the arm is seen to move; or of what undoes the torque of a joint between. The
     first is a share of what turns the base: a gyro that is off shows more there than any joint.
     """
     s = r.watch
-    if r.pressing.near > 0:  # what a surface does is felt as well
-        return (0.0,) * int(airframe.bodies.joints)
-    turned2 = airframe.rotor_lever**2 * float(s.products[0] + s.products[1])
-    unseen, inside, felt = float(s.odd2) - turned2, 0.0, []
-    for u in s.undone2[: airframe.bodies.joints].tolist():
+    turned2 = airframe.rotor_lever**2 * (s.products[0] + s.products[1])
+    unseen, inside = s.odd2 - turned2, 0.0
+    for k in range(int(airframe.bodies.joints)):
+        u = s.undone2[k]
         by_base = unseen / max(u, ODD * ODD, turned2)
-        felt.append(max(by_base, inside / max(u, UNDONE * UNDONE)))
+        felt[k] = max(by_base, inside / max(u, UNDONE * UNDONE))
+        if r.pressing.near > 0:  # what a surface does is felt as well
+            felt[k] = 0.0
         inside = max(inside, u)
-    return tuple(felt)
 
 
 @compilable

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.control.actuator_watch import felt_inside
 from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
 from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
@@ -64,22 +65,22 @@ from fsw.autopilot.model.rotors import (
     rotor_decay,
 )
 from fsw.autopilot.shapes.zones import NO_ZONES
-from fsw.autopilot.signals import JointVector, Mat3, Setpoint, StateEstimate, Vec3, Vec4
+from fsw.autopilot.signals import Mat3, Setpoint, StateEstimate, Vec3
 from fsw.autopilot.tick_record import (
+    BEGINS_ANEW,
     BREACH,
     FILTER_ACTED,
     GATE_NEEDED,
     IMPAIRED,
+    JUDGES,
     OFF_PLAN,
+    Expected,
     Tick,
     new_tick,
 )
 from fsw.compiled import compilable, kernel, machine_code, packed
 
 Inner = Literal["tracking", "pid", "px4"]
-ExpectedMotion = Vec4
-"""By the rotors alone: angular accelerations [rad/s^2, FRD], thrust over mass [m/s^2]."""
-
 _NONE: Vec3 = (0.0, 0.0, 0.0)
 _LEVEL: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -183,7 +184,7 @@ class Cascade:
     def _load(self) -> None:
         """Load what says how the vehicle moves, for a law that is packed."""
         example = self.packed, Tick().array
-        self._expected = machine_code(_expected, *example)
+        self._expected = machine_code(_expected, *example, Expected().array, True, True)
         self._motion = machine_code(_motion, *example)
 
     def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
@@ -192,13 +193,15 @@ class Cascade:
         now.state_estimate = estimate
         return self._motion(self.packed, now.array)
 
-    def expected(self, r: Tick) -> tuple[JointVector, ExpectedMotion, Vec3]:
-        """What the commands sent last make of the joints (j,) [rad/s^2] and of the vehicle.
+    def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
+        """What the commands sent last make of joints and vehicle, for the filter.
 
-        And what a surface that the tool presses on makes of it besides [m/s^2, NED].
+        On the ground thrust does not ``explain`` how the vehicle moves. Encoders are ``judged``
+        unless a joint has failed.
         """
-        model, surface = self._expected(self.packed, r.array)
-        return r.joint_acceleration, model, surface
+        found = Expected()
+        self._expected(self.packed, r.array, found.array, explains, judged)
+        return found
 
     def setpoint(self, r: Tick) -> Setpoint | None:
         """What another autopilot is asked for; None: these loops command rotors."""
@@ -441,8 +444,10 @@ def _close_loops(
 
 
 @kernel
-def _expected(laws: NDArray[Any], records: NDArray[Any]) -> tuple[ExpectedMotion, Vec3]:
-    airframe, r = laws[0].airframe, records[0]
+def _expected(
+    laws: NDArray[Any], records: NDArray[Any], filled: NDArray[Any], explains: bool, judged: bool
+) -> None:
+    airframe, r, found = laws[0].airframe, records[0], filled[0]
     for i in range(int(airframe.rotors)):
         settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
         r.mixer.mean[i] = lag_rotor(r.rotors[i], settling_at, laws[0].rotor_decay)
@@ -451,9 +456,18 @@ def _expected(laws: NDArray[Any], records: NDArray[Any]) -> tuple[ExpectedMotion
     # The accelerometer knows of gusts, and of the ground.
     field = 0.0, 0.0, r.estimate.specific_force
     accelerate_joints(r, airframe.bodies, field, motion.turning)
-    # Not by the mass that is flown: it goes by the accelerometer, which this is a witness against.
-    (x, y, z), lift = motion.turning, motion.thrust / (airframe.mass + r.payload.mass)
-    return (x, y, z, lift), three(r.observed.known, 0)
+    felt_inside(r, airframe, found.felt)
+    for i in range(int(airframe.bodies.joints)):
+        found.u[i], found.undone[i] = r.bodies.work[i], r.watch.undone[i]
+        found.unseen[i] = r.watch.unseen[i]
+    for i in range(3):
+        found.pushed[i] = r.observed.known[i]
+        if explains:
+            found.model[i] = motion.turning[i]
+    if explains:
+        # Not by the mass that is flown: it goes by the accelerometer, which this is a witness to.
+        found.model[3] = motion.thrust / (airframe.mass + r.payload.mass)
+    found.judges = JUDGES if judged else BEGINS_ANEW
 
 
 @kernel

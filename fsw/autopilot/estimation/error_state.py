@@ -121,6 +121,12 @@ FILTER: Final = np.dtype(
         # Encoders: the newest reading [rad] and its time [s], and as above.
         ("encoders", float, (JOINTS,)),
         ("encoders_read", float),
+        # Whether they are stuck (faults/encoder_watch.py). Of each: readings in a row that were the
+        # same, infinite of one that is stuck, what undid its joint's torque when they began [N m],
+        # and by how much it had moved unseen [rad].
+        ("encoder_repeats", float, (JOINTS,)),
+        ("encoder_undone", float, (JOINTS,)),
+        ("encoder_unseen", float, (JOINTS,)),
         ("encoder_steady", np.int64),
         ("encoder_calm", np.int64),
         ("encoder_doubted", np.int64),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fsw.autopilot.estimation.drift import FrameDrift
 from fsw.autopilot.estimation.error_state import FILTER, Filter
 from fsw.autopilot.estimation.faults.confirmation import Run
-from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
+from fsw.autopilot.estimation.faults.encoder_watch import REPEATS
 from fsw.autopilot.estimation.faults.residuals import MIN_WALKS
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
@@ -26,7 +26,8 @@ from fsw.autopilot.measurements import (
     Sample,
     Sensor,
 )
-from fsw.autopilot.signals import JointVector, Vec3, Vec4
+from fsw.autopilot.signals import Vec3, Vec4
+from fsw.autopilot.tick_record import Expected
 from fsw.frozen import dataclass, replace
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
@@ -52,8 +53,8 @@ class Reset(NamedTuple):
     expected: bool = True  # within what the filter doubted; else no other sensor says so
 
 
-TickInputs = tuple[Sequence[Sample], float, JointVector, Vec4, Vec3]
-"""Samples, now [s], the joints' acceleration, the rotors' model and what surfaces push."""
+TickInputs = tuple[Sequence[Sample], float, Expected]
+"""Samples, now [s], and what commands make of the vehicle."""
 
 
 class Trail(NamedTuple):
@@ -80,7 +81,6 @@ class FusionMemory:
     now: float = -1.0  # s, of the last tick; negative: there was none
     imu_came: float = -1.0  # s, when a reading came last; negative: never
     joints_came: float = -1.0
-    encoders: EncoderWatch = EncoderWatch()
     trail: Trail | None = None  # the newest one
     waiting: tuple[Waiting, ...] = ()
     health: tuple[Health, ...] = ()  # of each sensor heard so far
@@ -112,6 +112,17 @@ class FusionMemory:
             if one.sensor is sensor:
                 return one
         return Health(sensor)
+
+    @property
+    def encoders_stuck(self) -> bool:
+        """Whether any of them is."""
+        return bool(np.isinf(self.numbers[0]["encoder_repeats"]).any())
+
+    @property
+    def encoders_repeat(self) -> bool:
+        """Whether all have said the same for long enough to ask whether they are stuck."""
+        x = self.numbers[0]
+        return bool(x["encoder_repeats"][: x["joint_count"]].min() >= REPEATS)
 
     def fault_at(self, sensor: Sensor) -> float:
         """When a fault of a sensor was seen last [s]; minus infinity: never."""

@@ -39,18 +39,19 @@ from fsw.autopilot.estimation.error_state import (
     vec4,
 )
 from fsw.autopilot.estimation.faults import residuals
+from fsw.autopilot.estimation.faults.encoder_watch import encoders_stuck, watch_encoders
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
-from fsw.autopilot.tick_record import Estimate
+from fsw.autopilot.tick_record import Estimate, Expected
 from fsw.compiled import compilable, kernel, machine_code
 from fsw.record import JOINTS as JOINT_CAPACITY
-from fsw.record import Four, PerJoint, Record, Three, per_joint
+from fsw.record import PerJoint, Record, Three, per_joint
 
 # What ``tick`` does, in this order.
 PUSH, JOINTS, READING, ADVANCE, END = 1, 2, 4, 8, 16
 # What came of it.
-FAULT, FINITE = 1, 2
+FAULT, FINITE, STUCK = 1, 2, 4
 
 
 class Asked(Record):
@@ -58,9 +59,7 @@ class Asked(Record):
 
     t_us: int  # now
     dt: float  # s, length of the tick
-    u: PerJoint  # rad/s^2, what torques made of the joints
-    model: Four  # SI, FRD: what rotors make of the vehicle, see ``imu.add_imu``
-    pushed: Three  # m/s^2, NED: what surfaces that the tool touches make of it besides
+    expected: Expected
     encoders: PerJoint  # rad
     encoders_age: float  # s
     time: float  # s, of a reading of the IMU
@@ -70,15 +69,9 @@ class Asked(Record):
     of_encoders: int
     present: Estimate
 
-    def begin(
-        self, now: float, dt: float, u: JointVector, model: Vec4, pushed: Vec3 = (0.0, 0.0, 0.0)
-    ) -> None:
-        """A tick of ``dt`` [s] that ends ``now`` [s].
-
-        Torques made ``u`` [rad/s^2] of the joints, rotors the ``model`` [SI, FRD] of the vehicle
-        and surfaces ``pushed`` it [m/s^2, NED].
-        """
-        _TICKS[len(u)].pack_into(self.memory, 0, round(1e6 * now), dt, *u, *model, *pushed)
+    def begin(self, now: float, dt: float, expected: Expected) -> None:
+        """A tick of ``dt`` [s] that ends ``now`` [s]; commands make of it what is ``expected``."""
+        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, expected.memory)
 
     def read_joints(self, angles: JointVector, age: float) -> None:
         """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
@@ -89,7 +82,7 @@ class Asked(Record):
         _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
 
 
-_TICKS = [struct.Struct(f"<qd{per_joint(n)}7d") for n in range(JOINT_CAPACITY + 1)]
+_TICK = struct.Struct(f"<qd{len(Expected().memory)}s")
 _ENCODERS = [struct.Struct(f"<{per_joint(n)}d") for n in range(JOINT_CAPACITY + 1)]
 _ENCODERS_AT = Asked.place("encoders")
 _READING = struct.Struct("<7d")
@@ -108,21 +101,28 @@ def tick(
 ) -> int:
     """Do some ``parts`` [1] of a tick as asked by one of ``requests`` (1,) [SI]; what came of it.
 
-    ``PUSH``: note what torques made of the joints; take in encoders; take in a reading of the IMU;
-    ``ADVANCE`` ``until`` [s]; and at the ``END`` predict the present ``now`` [s] from there, which
-    may be no number.
+    ``PUSH``: note what torques made of the joints; take in encoders, unless they are ``STUCK``:
+    joints then follow from torques; take in a reading of the IMU; ``ADVANCE`` ``until`` [s]; and at
+    the ``END`` predict the present ``now`` [s] from there, which may be no number.
     """
     x, t, a = filters[0], law[0], requests[0]
-    model = a.model[0], a.model[1], a.model[2], a.model[3]
-    if parts & PUSH:
-        joint_filter.push(x, t, now, a.dt, a.u)
-    a.of_imu, a.of_encoders = 0, 0
+    e = a.expected
+    model = e.model[0], e.model[1], e.model[2], e.model[3]
+    a.of_imu, a.of_encoders, stuck = 0, 0, False
     if parts & JOINTS:
+        was_stuck = encoders_stuck(x)
+        stuck = watch_encoders(x, a.encoders, e)
+        if stuck and not was_stuck:
+            # An arm that stands still where the reading is, and nothing disturbs it.
+            joint_filter.begin(x, t, now - a.encoders_age, a.encoders)
+    if parts & PUSH:
+        joint_filter.push(x, t, now, a.dt, e.u)
+    if parts & JOINTS and not stuck:
         a.of_encoders = joint_filter.read(x, t, now, a.encoders, a.encoders_age)
     if parts & READING:
         f, w = (a.force[0], a.force[1], a.force[2]), (a.rate[0], a.rate[1], a.rate[2])
         a.of_imu = imu.add_imu(x, t, now, a.time, f, w, model)
-    found = FAULT if a.of_imu or a.of_encoders else 0
+    found = (FAULT if a.of_imu or a.of_encoders else 0) | (STUCK if stuck else 0)
     if parts & ADVANCE:
         advance(x, t, until)
     if parts & END:
@@ -131,7 +131,7 @@ def tick(
         if finite:
             found |= FINITE
         if a.dt > 0.0:
-            residuals.witness(x, R, a.dt, model, (a.pushed[0], a.pushed[1], a.pushed[2]))
+            residuals.witness(x, R, a.dt, model, (e.pushed[0], e.pushed[1], e.pushed[2]))
     return found
 
 

@@ -29,7 +29,6 @@ from fsw.autopilot.estimation.error_state import (
 from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, ended, extended
-from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
 from fsw.autopilot.estimation.faults.residuals import EVIDENCE, NO_AID
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.faults.sources import Source
@@ -54,6 +53,7 @@ from fsw.autopilot.estimation.kernels import (
     PRESENT_AT,
     PUSH,
     READING,
+    STUCK,
     Asked,
 )
 from fsw.autopilot.estimation.sensors import SENSORS
@@ -72,8 +72,8 @@ from fsw.autopilot.measurements import (
     Sample,
     Sensor,
 )
-from fsw.autopilot.signals import JointVector, StateEstimate, Vec3, Vec4
-from fsw.autopilot.tick_record import estimate_in
+from fsw.autopilot.signals import StateEstimate, Vec3, Vec4
+from fsw.autopilot.tick_record import Expected, estimate_in
 from fsw.compiled import machine_code, packed
 from fsw.frozen import replace
 from fsw.record import JOINTS as JOINT_CAPACITY
@@ -93,8 +93,7 @@ _SIGMAS: Final = 3.0
 _JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
 _SOON: Final = 0.25  # s, in which what an inertial unit does wrong shows by little
 _REST: Vec3 = (0.0, 0.0, 0.0)
-UNKNOWN: Final[Vec4] = (0.0, 0.0, 0.0, 0.0)  # what rotors make of the vehicle
-UNPUSHED: Final[Vec3] = (0.0, 0.0, 0.0)  # by what the tool touches
+_UNKNOWN: Final = Expected()
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
 
@@ -135,15 +134,10 @@ class SensorFusion:
         memory: FusionMemory,
         samples: Sequence[Sample],
         now: float,
-        joint_acceleration: JointVector = (),
-        watch: EncoderWatch | None = None,
-        model: Vec4 = UNKNOWN,
+        expected: Expected = _UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both.
-
-        ``joint_acceleration`` [rad/s^2, joints] and ``model`` [SI, FRD] are theirs.
-        """
-        memory, estimate = self.take_in(memory, samples, now, joint_acceleration, watch, model)
+        """``take_in`` and ``catch_up``; the state at ``now`` [s] after both."""
+        memory, estimate = self.take_in(memory, samples, now, expected)
         return self.catch_up(memory, samples, now, estimate)
 
     def take_in(
@@ -151,24 +145,18 @@ class SensorFusion:
         memory: FusionMemory,
         samples: Sequence[Sample],
         now: float,
-        joint_acceleration: JointVector = (),
-        watch: EncoderWatch | None = None,
-        model: Vec4 = UNKNOWN,
-        pushed: Vec3 = UNPUSHED,
+        expected: Expected = _UNKNOWN,
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Take in what IMU and encoders measured since the last tick; the state at ``now`` [s].
 
-        Of the other ``samples`` it knows what ``catch_up`` has fused so far.
-        ``joint_acceleration`` [rad/s^2, joints] is what the torques make of the arm; a ``watch`` of
-        its encoders is kept in the memory. Where the IMU is silent or of no use, the ``model``
-        [SI, FRD] tells what the rotors make of the vehicle (``imu.add_imu``), which surfaces
-        ``pushed`` [m/s^2, NED] besides. None before there was a pose, or a position and a heading,
-        to start from, and a reading of the arm.
+        Of the other ``samples`` it knows what ``catch_up`` has fused so far. Where IMU or encoders
+        are silent or of no use, what is ``expected`` of the commands stands in. None before there
+        was a pose, or a position and a heading, to start from, and a reading of the arm.
         """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = copied(memory.numbers)
         asked = self._asked
-        asked.begin(now, dt, joint_acceleration, model, pushed)
+        asked.begin(now, dt, expected)
         memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
         silent = 0.0 <= imu_came < now - IMU_SILENT
         if silent:
@@ -183,15 +171,13 @@ class SensorFusion:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         trail = memory.trail
         if trail is not None:
-            tick = samples, now, joint_acceleration, model, pushed
-            trail = Trail(trail.start, trail.began, (tick, trail.ticks))
+            trail = Trail(trail.start, trail.began, ((samples, now, expected), trail.ticks))
         memory = replace(
             memory,
             numbers=x,
             now=now,
             imu_came=imu_came,
-            joints_came=joints_came,
-            encoders=memory.encoders if watch is None else watch,
+            joints_came=memory.joints_came if found & STUCK else joints_came,
             trail=trail,
         )
         if found & FINITE:
@@ -266,8 +252,8 @@ class SensorFusion:
     def _again(
         self, memory: FusionMemory, tick: TickInputs
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        samples, now, u, model, pushed = tick
-        memory, found = self.take_in(memory, samples, now, u, None, model, pushed)
+        samples, now, expected = tick
+        memory, found = self.take_in(memory, samples, now, expected)
         return self._caught_up(memory, samples, now, found)
 
     def _caught_up(
@@ -284,7 +270,7 @@ class SensorFusion:
             return memory, estimate
         x = copied(memory.numbers)
         memory = replace(memory, numbers=x)
-        self._asked.begin(now, 0.0, (), UNKNOWN)
+        self._asked.begin(now, 0.0, _UNKNOWN)
         if not memory.started:
             memory = self._start(memory)
         if not (memory.started and memory.joints_came >= 0.0):

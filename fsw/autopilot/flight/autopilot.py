@@ -679,7 +679,7 @@ class Autopilot:
             state.record,
             r,
             controlled.ticks,
-            angles_repeat=state.fusion is not None and state.fusion.encoders.repeating,
+            memory=state.fusion,
             angles_known=not lost,
         )
 

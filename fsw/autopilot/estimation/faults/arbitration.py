@@ -358,7 +358,7 @@ def _silent(memory: FusionMemory, now: float) -> Source:
     unit = now - memory.imu_came > IMU_SILENT
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
     wrong = now - encoders.fault_at < residuals.EVERY and encoders.fault not in _FOLLOWED
-    arm = memory.encoders.stuck or wrong or came > ENCODERS_TOO_OLD
+    arm = memory.encoders_stuck or wrong or came > ENCODERS_TOO_OLD
     return (_UNIT if unit else NOBODY) | (Source.MODEL if arm else NOBODY)
 
 

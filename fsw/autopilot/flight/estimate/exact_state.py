@@ -78,8 +78,11 @@ class ExactState:
         texts.extend(StatusText(Severity.WARNING, text) for text in sentences)
         aiding = AIDED
         if missing:
-            r, expected = state.record, self._cascade.expected
-            found = filled(missing, inputs.sensors, found, before, lambda: expected(r)[0])
+            r = state.record
+            found = filled(
+                *(missing, inputs.sensors, found, before),
+                lambda: tuple(self._cascade.expected(r).u[: r.joint_count].tolist()),
+            )
             aiding = _aiding(dropout, found.t_us)
         if away and dropout.pose.since_us < 0:
             state = returned(state, found, before, texts)

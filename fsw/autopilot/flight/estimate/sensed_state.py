@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import NamedTuple
 
-from fsw.autopilot.control.actuator_watch import felt_inside
 from fsw.autopilot.control.cascade import Cascade, in_hover
-from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.dead_reckoning import moved_on
-from fsw.autopilot.estimation.error_state import Array, Law, P
-from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
+from fsw.autopilot.estimation.error_state import Array, P
 from fsw.autopilot.estimation.faults.residuals import scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
@@ -21,9 +17,8 @@ from fsw.autopilot.estimation.fusion_memory import (
     FusionMemory,
     Reset,
     at_start,
-    copied,
 )
-from fsw.autopilot.estimation.sensor_fusion import UNKNOWN, UNPUSHED, SensorFusion
+from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 from fsw.autopilot.flight.estimate.estimator_report import (
@@ -36,20 +31,17 @@ from fsw.autopilot.flight.estimate.jump import on_return, told
 from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
-from fsw.autopilot.measurements import JointSample, Sample, Sensor
-from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.measurements import Sample, Sensor
 from fsw.autopilot.model.rotors import agility, swing
 from fsw.autopilot.signals import (
     EstimatorReport,
-    JointVector,
     Severity,
     StateEstimate,
     StatusText,
     TickInputs,
 )
+from fsw.autopilot.tick_record import Expected
 from fsw.frozen import replace
-from fsw.record import JOINTS as JOINT_CAPACITY
-from fsw.record import padded
 
 _CHECKED_US = 100_000  # between checks for silent sensors
 _IMU = Sensor.IMU
@@ -128,19 +120,7 @@ class SensedState:
         """
         now = 1e-6 * inputs.sensors.t_us
         before = self._memory(state, now)
-        pushed: JointVector = ()
-        model, surfaces = UNKNOWN, UNPUSHED
-        if state.record.has_estimate:
-            pushed, model, surfaces = self._cascade.expected(state.record)
-            # On the ground thrust does not explain how the vehicle moves.
-            if not state.vehicle.flies or state.vehicle.unloaded is not None:
-                model = UNKNOWN
-        law = self._fusion.law
-        airframe = self._cascade.law.airframe
-        started, watch, samples = _without_stuck(state, before, inputs.samples, law, airframe)
-        memory, estimate = self._fusion.take_in(
-            started, samples, now, pushed, watch, model, surfaces
-        )
+        memory, estimate = self._fusion.take_in(before, inputs.samples, now, self._expected(state))
         caught = None
         if estimate is None and not state.record.has_estimate:
             caught = self.catch_up(state, memory, None, inputs)
@@ -151,6 +131,16 @@ class SensedState:
         if state.invalid_ticks:
             state = replace(state, invalid_ticks=0)
         return state, memory, estimate, caught
+
+    def _expected(self, state: FlightState) -> Expected:
+        """What commands make of a vehicle in a ``state``."""
+        r, flies = state.record, state.vehicle.flies
+        if not r.has_estimate:
+            return Expected()
+        # On the ground thrust does not explain how the vehicle moves.
+        explains = flies and state.vehicle.unloaded is None
+        judged = flies and not state.damage.joint
+        return self._cascade.expected(r, explains=explains, judged=judged)
 
     def take_missed(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickInputs]:
         """The state after ticks that were missed, and the ``inputs`` that are left for this one.
@@ -326,34 +316,6 @@ def _report_noise(memory: FusionMemory, now: float, texts: list[StatusText]) -> 
     return memory
 
 
-def _without_stuck(
-    state: FlightState,
-    memory: FusionMemory,
-    samples: tuple[Sample, ...],
-    law: Law,
-    airframe: Airframe,
-) -> tuple[FusionMemory, EncoderWatch, tuple[Sample, ...]]:
-    """The samples without those of encoders that are stuck: joints then follow from torques."""
-    before = watch = memory.encoders
-    for one in samples:
-        if type(one) is JointSample:
-            r, judged = state.record, state.vehicle.flies and not state.damage.joint
-            felt = partial(felt_inside, r, airframe)
-            watch = watch.after(one.angles, r.undone, r.unseen, felt, judged=judged)
-            if watch.stuck and not before.stuck:
-                memory = _at_rest(memory, law, one)
-    if watch.stuck:
-        samples = tuple([one for one in samples if not isinstance(one, JointSample)])
-    return memory, watch, samples
-
-
-def _at_rest(memory: FusionMemory, law: Law, reading: JointSample) -> FusionMemory:
-    """The memory with an arm that stands still where a ``reading`` is, and nothing disturbs it."""
-    numbers = copied(memory.numbers)
-    kernels.set_joints(numbers, law, reading.time, padded(reading.angles, JOINT_CAPACITY))
-    return replace(memory, numbers=numbers)
-
-
 def _aiding(
     state: FlightState, memory: FusionMemory, report: EstimatorReport, drifted: float
 ) -> Aiding:
@@ -427,7 +389,7 @@ def _lost(
     now, found = memory.now, []
     for sensor in _EVERY_TICK:
         health, fault = memory.of(sensor), SensorFault.NONE
-        if sensor is Sensor.ENCODERS and memory.encoders.stuck:
+        if sensor is Sensor.ENCODERS and memory.encoders_stuck:
             fault = SensorFault.STUCK
         elif sensor is Sensor.IMU and memory.verdict.wrong & _INERTIAL:
             fault = SensorFault.DISAGREES

@@ -13,6 +13,7 @@ from typing import Final
 from fsw.autopilot.control.actuator_watch import watch, watch_law
 from fsw.autopilot.control.rotor_loss import balancing_posture
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault, sentence
+from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK, ActuatorHealth
@@ -54,13 +55,14 @@ class DamageWatch:
         after: Tick,
         ticks: int,
         *,
-        angles_repeat: bool = False,
+        memory: FusionMemory | None = None,
         angles_known: bool = True,
     ) -> Damage:
         """What is known of actuators a tick, or some ``ticks``, later.
 
         Reads what was commanded in the record ``before``; writes the watch of that ``after``.
-        Where the encoders' ``angles_repeat``, a joint that has failed may be one that is not seen.
+        Where by the filter's ``memory`` encoders repeat themselves, a joint that has failed may be
+        one that is not seen.
         Where the angles are not known by encoders, joints are not judged.
         """
         dt, decay = self._tick, self._decay
@@ -71,7 +73,8 @@ class DamageWatch:
             s, now_us = after.watch, after.estimate.t_us
             back = before.watch.failed != NO_ROTOR and s.failed == NO_ROTOR
             damage = self._of_rotors(damage, s, now_us, back=back)
-            damage = _of_joints(damage, s, after.joint_count, now_us, angles_repeat)
+            repeat = memory is not None and memory.encoders_repeat
+            damage = _of_joints(damage, s, after.joint_count, now_us, repeat)
         return damage
 
     def finds(self, before: Tick, after: Tick) -> bool:

@@ -29,6 +29,7 @@ from fsw.autopilot.measurements import (
     Sensor,
 )
 from fsw.autopilot.signals import StateEstimate
+from fsw.autopilot.tick_record import Expected
 from fsw.autopilot.tuning import tuned
 from tests.fsw.autopilot.estimation.sensor_runs import (
     ARM,
@@ -1043,9 +1044,11 @@ def test_without_imu_and_pose_the_rate_goes_on_as_the_rotors_make_it() -> None:
     flown = Flown(run(MOCAP, 8, 0.6))
     assert flown.estimate is not None
     before, memory, now = flown.estimate, flown.memory, flown.now
+    expected = Expected()
+    expected.model[:] = (1.0, -2.0, 0.5, 9.9)
     for _ in range(50):  # 0.1 s
         now += TICK
-        memory, estimate = flown.fusion.step(memory, (), now, model=(1.0, -2.0, 0.5, 9.9))
+        memory, estimate = flown.fusion.step(memory, (), now, expected)
     assert estimate is not None
     turned = [after - rate for after, rate in zip(estimate.w_WB_B, before.w_WB_B, strict=True)]
     assert turned == pytest.approx([0.1, -0.2, 0.05], abs=0.03)

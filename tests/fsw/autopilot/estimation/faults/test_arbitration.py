@@ -18,11 +18,13 @@ from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
 from fsw.autopilot.signals import Vec3, Vec4
+from fsw.autopilot.tick_record import Expected
 from fsw.frozen import replace
 
 FUSION = SensorFusion(EstimatorTuning(), 2)
-HOVERS: Vec4 = (0.0, 0.0, 0.0, 9.81)  # what rotors make of it
-STANDS: Vec4 = (0.0, 0.0, 0.0, 0.0)  # it does not fly
+HOVERS = Expected()  # what rotors make of it
+HOVERS.model[3] = 9.81
+STANDS = Expected()  # it does not fly
 TICK = 0.002
 POSES_UNTIL, WRONG_FROM = 3.0, 4.0  # s
 LEVEL: Vec4 = (1.0, 0.0, 0.0, 0.0)
@@ -73,7 +75,7 @@ def hovering(
                 attitude = turned(attitude, *turned_by(t - WRONG_FROM))
                 place = place[0] + moved_by, *place[1:]
             samples.insert(0, PoseSample(now, place, attitude, FINE, FINE))
-        memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
+        memory, found = FUSION.take_in(memory, samples, now, HOVERS)
         memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged, touches=touches)
         yield memory
 
@@ -170,7 +172,7 @@ def test_doubts_do_not_end_with_a_descent_but_where_the_rotors_stand() -> None:
             break
     began, now, suspect = memory.verdict.since, memory.now, int(memory.numbers["suspect"][0])
     # The ground that is felt leaves the rotors' model unknown, as it is where they stand.
-    for model, flies in ((HOVERS, True), (STANDS, True), (STANDS, True), (STANDS, False)):
+    for expected, flies in ((HOVERS, True), (STANDS, True), (STANDS, True), (STANDS, False)):
         for _ in range(round(residuals.EVERY / TICK) + 1):  # the next look is among them
             now += TICK
             samples: list[Sample] = [
@@ -179,7 +181,7 @@ def test_doubts_do_not_end_with_a_descent_but_where_the_rotors_stand() -> None:
                     now, (0.0, 0.0, -9.81 + 1e-3 * (now % 0.1)), (1e-4 * (now % 0.3), 0, 0.3)
                 ),
             ]
-            memory, found = FUSION.take_in(memory, samples, now, model=model)
+            memory, found = FUSION.take_in(memory, samples, now, expected)
             how = {"aloft": lambda: False, "flies": flies}
             memory, _ = FUSION.catch_up(memory, samples, now, found, **how)
         assert memory.verdict.since == (began if flies else -1.0)
@@ -252,7 +254,7 @@ def test_of_a_pose_whose_attitude_repeats_itself_the_place_is_used() -> None:
         if tick % 5 == 0:
             said = turned(LEVEL, a, b, c) if now < 2.0 else said
             samples.insert(0, PoseSample(now, (a, b, c - 1.5), said, FINE, FINE))
-        memory, found = FUSION.take_in(memory, samples, now, model=HOVERS)
+        memory, found = FUSION.take_in(memory, samples, now, HOVERS)
         memory, _ = FUSION.catch_up(memory, samples, now, found)
     health = memory.of(Sensor.POSE)
     assert memory.now - health.fused[0] < 0.1

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from fsw.autopilot.estimation.faults.encoder_watch import EncoderWatch
+from fsw.autopilot.estimation.faults.encoder_watch import watch_encoders
+from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.signals import JointVector
+from fsw.autopilot.tick_record import BEGINS_ANEW, JUDGES, NOT_WATCHED, Expected
 
 STANDS, MOVES = (0.7, -0.2), (0.7015, -0.2)  # rad
 LOAD, HELD = 0.3, 0.25  # N m
@@ -13,13 +16,38 @@ RESTS = (0.0, 0.0)  # rad, that each joint has moved unseen while a surface held
 FELT, UNFELT = (1.0, 1.0), (-1.0, 0.0)  # of it, nearer to the base
 
 
-def watched(
-    undone: list[JointVector], felt: JointVector = FELT, *, judged: bool = True
-) -> EncoderWatch:
+class Watch:
+    """What is known of two encoders."""
+
+    def __init__(self) -> None:
+        self.memory: FusionMemory = at_start(2)
+
+    def read(
+        self,
+        angles: JointVector,
+        undone: JointVector,
+        felt: JointVector = FELT,
+        unseen: JointVector = RESTS,
+        judges: int = JUDGES,
+    ) -> Watch:
+        """A reading, and what the loops tell of its tick."""
+        x, expected = self.memory.numbers.view(np.recarray)[0], Expected()
+        expected.undone[:2], expected.unseen[:2], expected.felt[:2] = undone, unseen, felt
+        expected.judges = judges
+        assert watch_encoders(x, np.array(angles), expected) == self.stuck
+        x.encoders[:2] = angles
+        return self
+
+    @property
+    def stuck(self) -> bool:
+        return self.memory.encoders_stuck
+
+
+def watched(undone: list[JointVector], felt: JointVector = FELT, judges: int = JUDGES) -> Watch:
     """A watch after equal readings, while torques [N m] go nowhere."""
-    watch = EncoderWatch()
+    watch = Watch()
     for one in undone:
-        watch = watch.after(STANDS, one, RESTS, lambda: felt, judged=judged)
+        watch.read(STANDS, one, felt, judges=judges)
     return watch
 
 
@@ -42,16 +70,16 @@ def test_an_encoder_is_stuck_where_its_joint_is_felt_to_move(
 ) -> None:
     watch = watched(undone, felt)
     assert watch.stuck
-    assert watch.after(STANDS, (0.0, 0.0), RESTS, lambda: UNFELT, judged=True).stuck, (
-        "until it speaks again"
-    )
+    assert watch.read(STANDS, (0.0, 0.0), UNFELT).stuck, "until it speaks again"
+    assert watch.read(MOVES, (0.0, 0.0), judges=NOT_WATCHED).stuck, "or is looked at"
+    watch.read(STANDS, (0.0, 0.0), judges=NOT_WATCHED)
     speaks = tuple(angle + 0.0015 for angle in STANDS)
-    assert not watch.after(speaks, (HELD, HELD), RESTS, lambda: FELT, judged=True).stuck
+    assert not watch.read(speaks, (HELD, HELD)).stuck
 
 
 def test_one_that_is_stuck_stays_so_while_another_one_moves() -> None:
     watch = watched(rising(0.0, HELD), (-1.0, 0.7))
-    assert watch.after(MOVES, (0.0, 0.0), RESTS, lambda: UNFELT, judged=True).stuck
+    assert watch.read(MOVES, (0.0, 0.0), UNFELT).stuck
 
 
 @pytest.mark.parametrize(
@@ -75,12 +103,12 @@ def test_what_is_not_felt_or_was_there_before_is_no_encoder_s_fault(
     undone: list[JointVector], felt: JointVector
 ) -> None:
     watch = watched(undone, felt)
-    assert watch.repeating
+    assert watch.memory.encoders_repeat
     assert not watch.stuck
 
 
 def test_encoders_are_not_judged_on_the_ground_or_beside_a_failed_joint() -> None:
-    assert not watched(rising(HELD, HELD), judged=False).stuck
+    assert not watched(rising(HELD, HELD), judges=BEGINS_ANEW).stuck
 
 
 def test_readings_that_repeat_themselves_for_a_moment_are_a_resting_arm() -> None:
@@ -96,8 +124,8 @@ def test_an_encoder_is_stuck_whose_joint_must_have_moved_while_a_surface_held_th
     unseen: JointVector, stuck: bool
 ) -> None:
     """Whatever the base feels: what a surface does it feels as well."""
-    watch = EncoderWatch()
+    watch = Watch()
     for k in range(11):
         so_far = tuple(k / 10 * one for one in unseen)
-        watch = watch.after(STANDS, RESTS, so_far, lambda: UNFELT, judged=True)
+        watch.read(STANDS, RESTS, UNFELT, so_far)
     assert watch.stuck is stuck
