@@ -249,6 +249,13 @@ class SensorFusion:
             memory, now, found, aloft=aloft, flies=flies, damaged=damaged, touches=touches
         )
 
+    def rests(self, memory: FusionMemory, samples: Sequence[Sample]) -> bool:
+        """Whether ``catch_up`` would find nothing to do: nothing came, or is due."""
+        if not memory.started or self._arbitration.is_due(memory, memory.now):
+            return False
+        came = [one for one in samples if not isinstance(one, _OF_EVERY_TICK)]
+        return not came and _rests(memory, memory.now)
+
     def _again(
         self, memory: FusionMemory, tick: TickInputs
     ) -> tuple[FusionMemory, StateEstimate | None]:

@@ -113,7 +113,7 @@ class Arbitration:
         evidence = memory.verdict.evidence
         if evidence is None:
             return begun(memory), found
-        if now - evidence["looked"][0] < residuals.EVERY - _ROUNDING:
+        if not self.is_due(memory, now):
             return memory, found
         before = memory.verdict
         memory = _lifted(memory, now, found, flies=flies, known=damaged or touches)
@@ -133,6 +133,11 @@ class Arbitration:
             on_ground = memory.verdict.wrong and not (flies and _is_unseen(memory))
             return (_on_ground(memory, now) if on_ground else memory), found
         return self._look(memory, now, found, damaged=damaged, touches=touches)
+
+    def is_due(self, memory: FusionMemory, now: float) -> bool:
+        """Whether ``step`` at ``now`` [s] would do anything."""
+        evidence = memory.verdict.evidence
+        return evidence is None or now - evidence["looked"][0] >= residuals.EVERY - _ROUNDING
 
     def _look(
         self,
