@@ -202,12 +202,12 @@ class LogEncoder:
                 self._px4.feel(sample.acceleration, sample.rate)
         if not inputs.samples:
             self._px4.feel(one.accel_B, one.gyro_B)
-        of, arm = self._of, (*one.q_arm, *one.qd_arm)
-        frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)
-        command = (*sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
+        of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        if self._imu and of.samples.frame.pack(*frame) == of.samples.frame_of(self._imu):
+        if self._imu and of.samples.says_it_all(self._imu, one):
             return of.short_tick.pack(t_us, (), command)
+        arm = (*one.q_arm, *one.qd_arm)
+        frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)
         return of.whole_tick.pack(t_us, frame, command)
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:

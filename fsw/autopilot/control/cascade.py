@@ -184,7 +184,8 @@ class Cascade:
     def _load(self) -> None:
         """Load what says how the vehicle moves, for a law that is packed."""
         example = self.packed, Tick().array
-        self._expected = machine_code(_expected, *example, Expected().array, True, True)
+        self._found = Expected()
+        self._expected = machine_code(_expected, *example, self._found.array, True, True)
         self._motion = machine_code(_motion, *example)
 
     def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
@@ -194,14 +195,13 @@ class Cascade:
         return self._motion(self.packed, now.array)
 
     def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
-        """What the commands sent last make of joints and vehicle, for the filter.
+        """What the commands sent last make of joints and vehicle; it is good until the next call.
 
         On the ground thrust does not ``explain`` how the vehicle moves. Encoders are ``judged``
         unless a joint has failed.
         """
-        found = Expected()
-        self._expected(self.packed, r.array, found.array, explains, judged)
-        return found
+        self._expected(self.packed, r.array, self._found.array, explains, judged)
+        return self._found
 
     def setpoint(self, r: Tick) -> Setpoint | None:
         """What another autopilot is asked for; None: these loops command rotors."""
@@ -462,11 +462,10 @@ def _expected(
         found.unseen[i] = r.watch.unseen[i]
     for i in range(3):
         found.pushed[i] = r.observed.known[i]
-        if explains:
-            found.model[i] = motion.turning[i]
-    if explains:
-        # Not by the mass that is flown: it goes by the accelerometer, which this is a witness to.
-        found.model[3] = motion.thrust / (airframe.mass + r.payload.mass)
+        found.model[i] = motion.turning[i] if explains else 0.0
+    # Not by the mass that is flown: it goes by the accelerometer, which this is a witness against.
+    lift = motion.thrust / (airframe.mass + r.payload.mass)
+    found.model[3] = lift if explains else 0.0
     found.judges = JUDGES if judged else BEGINS_ANEW
 
 

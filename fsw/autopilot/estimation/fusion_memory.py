@@ -27,7 +27,6 @@ from fsw.autopilot.measurements import (
     Sensor,
 )
 from fsw.autopilot.signals import Vec3, Vec4
-from fsw.autopilot.tick_record import Expected
 from fsw.frozen import dataclass, replace
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
@@ -53,8 +52,8 @@ class Reset(NamedTuple):
     expected: bool = True  # within what the filter doubted; else no other sensor says so
 
 
-TickInputs = tuple[Sequence[Sample], float, Expected]
-"""Samples, now [s], and what commands make of the vehicle."""
+TickInputs = tuple[Sequence[Sample], float, bytes]
+"""Samples, now [s], and the memory of what was ``Expected``."""
 
 
 class Trail(NamedTuple):
@@ -116,7 +115,7 @@ class FusionMemory:
     @property
     def encoders_stuck(self) -> bool:
         """Whether any of them is."""
-        return bool(np.isinf(self.numbers[0]["encoder_repeats"]).any())
+        return math.inf in self.numbers["encoder_repeats"].ravel().tolist()
 
     @property
     def encoders_repeat(self) -> bool:

@@ -171,7 +171,8 @@ class SensorFusion:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         trail = memory.trail
         if trail is not None:
-            trail = Trail(trail.start, trail.began, ((samples, now, expected), trail.ticks))
+            tick = samples, now, bytes(expected.memory)
+            trail = Trail(trail.start, trail.began, (tick, trail.ticks))
         memory = replace(
             memory,
             numbers=x,
@@ -260,7 +261,7 @@ class SensorFusion:
         self, memory: FusionMemory, tick: TickInputs
     ) -> tuple[FusionMemory, StateEstimate | None]:
         samples, now, expected = tick
-        memory, found = self.take_in(memory, samples, now, expected)
+        memory, found = self.take_in(memory, samples, now, Expected(expected))
         return self._caught_up(memory, samples, now, found)
 
     def _caught_up(

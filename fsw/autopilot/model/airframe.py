@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from operator import truediv
 
 import numpy as np
 
@@ -96,10 +97,9 @@ class Airframe:
 
     def shares(self, command: ActuatorCommand) -> ActuatorCommand:
         """The command with each thrust and torque as a share [1] of the largest."""
-        thrusts = zip(command.rotor_thrust, self.rotor_thrust_max, strict=False)
-        torques = zip(command.joint_torque, self.joint_torque_max, strict=False)
         return ActuatorCommand(
-            tuple([f / most for f, most in thrusts]), tuple([t / most for t, most in torques])
+            tuple(map(truediv, command.rotor_thrust, self.rotor_thrust_max)),
+            tuple(map(truediv, command.joint_torque, self.joint_torque_max)),
         )
 
 

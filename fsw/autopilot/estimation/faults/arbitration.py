@@ -322,14 +322,9 @@ def _lifted(
     That rotors are off is ``known`` of a vehicle that is damaged or touches something.
     """
     v, p = _made_down(memory)
-    verdict = lifted(
-        memory.verdict,
-        (found.v_WB[2] - v, found.p_WB[2] - p),
-        now,
-        measured=not (flies and _is_unseen(memory)),
-        told=known or bool(_silent(memory, now) & _BOTH),
-    )
-    return replace(memory, verdict=verdict)
+    told = not (flies and _is_unseen(memory)) or known or bool(_silent(memory, now) & _BOTH)
+    down = found.v_WB[2] - v, found.p_WB[2] - p
+    return replace(memory, verdict=lifted(memory.verdict, down, now, told=told))
 
 
 def _made_down(memory: FusionMemory) -> Vec2:

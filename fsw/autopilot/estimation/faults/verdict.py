@@ -191,16 +191,17 @@ def judged(
     return verdict if not named or named is M else _convicted(verdict, named)
 
 
-def lifted(verdict: Verdict, down: Vec2, now: float, *, measured: bool, told: bool) -> Verdict:
+def lifted(verdict: Verdict, down: Vec2, now: float, *, told: bool) -> Verdict:
     """The verdict at ``now`` [s] on an accelerometer that says that the vehicle sinks.
 
     Who believes one that is wrong climbs for ever, and one that is right lands all the same: while
-    nothing has ``measured`` the height, rotors that say otherwise are right. The other way round
-    the ground may carry the vehicle. Velocity and place of the estimate are ``down`` [m/s, m, NED]
-    of the integrals of what rotors make. Nothing follows where one of both is ``told`` to be off.
+    nothing measures the height, rotors that say otherwise are right. The other way round the ground
+    may carry the vehicle. Velocity and place of the estimate are ``down`` [m/s, m, NED] of the
+    integrals of what rotors make. Nothing follows where the height, or that one of both is off, is
+    ``told``.
     """
     told = told or verdict.explained or bool(verdict.wrong & A)
-    if measured or told or verdict.measured < 0.0:
+    if told or verdict.measured < 0.0:
         return verdict._replace(seen_down=down, measured=now)
     gained, since = down[0] - verdict.seen_down[0], now - verdict.measured
     return _convicted(verdict, A) if gained > _GAINED + _MODEL_OFF * since else verdict

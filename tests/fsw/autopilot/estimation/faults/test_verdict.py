@@ -650,17 +650,15 @@ def test_rotors_do_not_learn_their_lift_while_nothing_measures_the_height() -> N
 def test_while_no_height_is_measured_rotors_are_right_that_the_vehicle_does_not_sink() -> None:
     """An accelerometer that said so lifted it, in a descent that never ended."""
 
-    def after(gained: float, **known: Any) -> Source:
-        said = {"measured": False, "told": False} | known
-        return lifted(seen, (0.3 + gained, 0.0), 3.0, **said).wrong  # type: ignore[arg-type]
+    def after(gained: float, told: bool = False) -> Source:
+        return lifted(seen, (0.3 + gained, 0.0), 3.0, told=told).wrong
 
-    seen = lifted(Verdict(), (0.3, 0.1), 2.0, measured=True, told=False)
+    seen = lifted(Verdict(), (0.3, 0.1), 2.0, told=True)
     assert not seen.wrong
     assert seen.seen_down == (0.3, 0.1)
     assert not after(0.45), "rotors may be off"
     assert after(0.6) is Source.ACCELEROMETER
     assert not after(-5.0), "the ground may carry it"
-    assert not after(0.6, measured=True)
     assert not after(0.6, told=True)
     seen = seen._replace(explained=True)
     assert not after(0.6), "rotors are what is wrong"
