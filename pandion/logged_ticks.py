@@ -173,8 +173,7 @@ class _Inputs:
         """The frame of a tick that says nothing but what the inertial unit measured last."""
         if self._imu is None:
             raise ValueError("it repeats what an inertial unit says, and none was heard")
-        numbers = self._samples.frame.unpack(self._samples.frame_of(self._imu))
-        return _sensor_frame((t_us, *numbers), self._joints)
+        return self._samples.frame_of(t_us, self._imu)
 
     def _check_numbers(self) -> None:
         for number, topic in enumerate(topics.TOPICS):

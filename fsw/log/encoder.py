@@ -204,7 +204,7 @@ class LogEncoder:
             self._px4.feel(one.accel_B, one.gyro_B)
         of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        if self._imu and of.samples.says_it_all(self._imu, one):
+        if self._imu and one == of.samples.frame_of(t_us, self._imu):
             return of.short_tick.pack(t_us, (), command)
         arm = (*one.q_arm, *one.qd_arm)
         frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
-from operator import attrgetter
 from struct import Struct
 from typing import Any, Final
 
@@ -17,8 +16,6 @@ from messages.ulog_reader import unpacker
 
 Values = tuple[Any, ...]
 _NO_VECTOR: Final = (math.nan, math.nan, math.nan)
-# Of a frame, what the inertial unit does not say.
-_OTHERS: Final = attrgetter("p_WB", "v_WB", "q_WB", "q_arm", "qd_arm")
 _LATEST: Final = 1e12  # s; what is later fits no field
 
 
@@ -73,21 +70,21 @@ class Samples:
     """Records of a vehicle with so many joints."""
 
     def __init__(self, joints: int) -> None:
-        arm = (math.nan,) * joints
-        self._unknown = _NO_VECTOR, _NO_VECTOR, (*_NO_VECTOR, math.nan), arm, arm
+        self._arm = (math.nan,) * joints
         self._codecs = {
             kind: _Codec(kind, topic.sized(joint=joints))
             for kind, topic in topics.OF_SAMPLES.items()
         }
         self._by_number = {codec.number: codec for codec in self._codecs.values()}
 
-    def says_it_all(self, imu: ImuSample, frame: SensorFrame) -> bool:
-        """Whether of a ``frame`` nothing is known but what the inertial unit has measured.
+    def frame_of(self, t_us: int, imu: ImuSample) -> SensorFrame:
+        """The frame of a tick of which nothing is known but what the inertial unit measured.
 
-        What is not known is ``math.nan`` itself, as the link makes it: tuples of it are equal.
+        Like the link's: what is not known is ``math.nan`` itself, so that such frames are equal.
         """
-        measured = frame.gyro_B == imu.rate and frame.accel_B == imu.acceleration
-        return measured and _OTHERS(frame) == self._unknown
+        attitude = (*_NO_VECTOR, math.nan)
+        known = imu.rate, imu.acceleration
+        return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, attitude, *known, self._arm, self._arm)
 
     def record(self, t_us: int, sample: Sample) -> bytes:
         """The record of a sample that arrived for the tick of ``t_us``."""
