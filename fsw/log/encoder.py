@@ -8,7 +8,7 @@ each would cost more than the numbers in them.
 from __future__ import annotations
 
 import math
-from operator import attrgetter
+from operator import attrgetter, is_not
 from typing import Any, Final
 
 from fsw.autopilot.flight.estimate.estimator_report import (
@@ -29,6 +29,7 @@ from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import GroupTiming
 from fsw.autopilot.signals import (
     CommandRequest,
+    ConstraintReport,
     EstimatorReport,
     FlightSnapshot,
     Origin,
@@ -66,6 +67,9 @@ _UNAIDED_US: Final = 1_000_000
 _INNOVATION_BITS: Final = (0, 1, 2, 6, 9)
 _ROTARY_WING: Final = 1  # VEHICLE_TYPE of PX4
 
+
+_TOLD: Final = attrgetter("failsafe_from", "mode", "armed", "landed", "failures")
+_PLAN: Final = attrgetter("plan", "counters", "plan_status")
 
 # What tools look at the spectrum of.
 _RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
@@ -137,7 +141,10 @@ class LogEncoder:
         self._changing = tuple(name for name in self.inputs.names if name not in (TYPED, SAMPLES))
         self._changing_of = attrgetter(*self._changing)
         self._last_values: tuple[Any, ...] | None = None
-        self._last: FlightSnapshot | None = None
+        # Of the last tick.
+        self._constraints: ConstraintReport | None = None
+        self._plan: tuple[Any, ...] = (None, None, None)
+        self._told: tuple[Any, ...] | None = None
         self._ticks_to_status = 0
 
     def add(self, inputs: TickInputs, outputs: TickOutputs, out: bytearray) -> None:
@@ -149,21 +156,21 @@ class LogEncoder:
         self._timed(snapshot, out)
         self._px4.add(snapshot, out)
         self._add_inputs(inputs, out)
-        last = self._last
-        if last is None or snapshot.constraints is not last.constraints:
+        constraints, plan = snapshot.constraints, _PLAN(snapshot)
+        if constraints is not self._constraints:
             out += self._planning(snapshot)
-        if last is None or _plan_changed(snapshot, last):
+        if any(map(is_not, plan, self._plan)):
             out += self._mpc(snapshot)
+        self._constraints, self._plan = constraints, plan
         if outputs.plan_request is not None:
             out += _request(self._of.request, snapshot.t_us, outputs.plan_request)
-        self._add_status(snapshot, last, out)
+        self._add_status(snapshot, out)
         for ack in outputs.acks:
             addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
             values = (ack.command & _U32, ack.result & 0xFF, *addressee)
             out += _ANSWERED.pack(snapshot.t_us, values)
         for text in outputs.texts:
             out += logged_text(text.severity & 7, snapshot.t_us, text.text)
-        self._last = snapshot
 
     def _timed(self, snapshot: FlightSnapshot, out: bytearray) -> None:
         """What has a rate of its own, as far as it is due."""
@@ -180,16 +187,15 @@ class LogEncoder:
         if self._rates.is_due(t_us):
             out += _RATES.pack(t_us, snapshot.estimate.w_WB_B)
 
-    def _add_status(
-        self, snapshot: FlightSnapshot, last: FlightSnapshot | None, out: bytearray
-    ) -> None:
+    def _add_status(self, snapshot: FlightSnapshot, out: bytearray) -> None:
         """Mode, landing and faults, on change and every second."""
         self._ticks_to_status -= 1
-        if self._ticks_to_status < 0 or last is None or _status_changed(snapshot, last):
+        before, self._told = self._told, _TOLD(snapshot)
+        if self._ticks_to_status < 0 or self._told != before:
             self._ticks_to_status = STATUS_TICKS - 1
             if not snapshot.failures or snapshot.failsafe_from is not None:
                 self._took_over = False
-            elif last is not None and last.failsafe_from is not None:
+            elif before is not None and before[0] is not None:
                 self._took_over = True
             out += self._status(snapshot)
 
@@ -306,27 +312,9 @@ def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:
     return _TIMING.pack(t_us, (*timing.shown, group))
 
 
-def _plan_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
-    return (
-        now.plan is not last.plan
-        or now.counters is not last.counters
-        or now.plan_status is not last.plan_status
-    )
-
-
 def _sees_ground(snapshot: FlightSnapshot) -> bool:
     """Whether a distance to the ground is measured and used."""
     return snapshot.estimator is not None and bool(snapshot.estimator.flags & ABOVE_GROUND)
-
-
-def _status_changed(now: FlightSnapshot, last: FlightSnapshot) -> bool:
-    return (
-        now.mode is not last.mode
-        or now.armed is not last.armed
-        or now.landed is not last.landed
-        or now.failsafe_from is not last.failsafe_from
-        or (now.failures is not last.failures and now.failures != last.failures)
-    )
 
 
 def _estimator(t_us: int, known: EstimatorReport) -> bytes:
