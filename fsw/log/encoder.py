@@ -150,7 +150,7 @@ class LogEncoder:
     def add(self, inputs: TickInputs, outputs: TickOutputs, out: bytearray) -> None:
         """Append the records of one tick; the sensors' are the first."""
         snapshot = outputs.snapshot
-        out += self._every_tick(inputs, snapshot)
+        out += self._every_tick(inputs, outputs)
         for sample in inputs.samples:
             out += self._of.samples.record(inputs.sensors.t_us, sample)
         self._timed(snapshot, out)
@@ -199,8 +199,8 @@ class LogEncoder:
                 self._took_over = True
             out += self._status(snapshot)
 
-    def _every_tick(self, inputs: TickInputs, snapshot: FlightSnapshot) -> bytes:
-        one, sent = inputs.sensors, snapshot.actuators
+    def _every_tick(self, inputs: TickInputs, outputs: TickOutputs) -> bytes:
+        one, sent = inputs.sensors, outputs.actuators
         t_us = one.t_us
         for sample in inputs.samples:
             if type(sample) is ImuSample:
@@ -208,7 +208,7 @@ class LogEncoder:
                 self._px4.feel(sample.acceleration, sample.rate)
         if not inputs.samples:
             self._px4.feel(one.accel_B, one.gyro_B)
-        of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, snapshot.armed)
+        of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, outputs.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
         if self._imu and one == of.samples.frame_of(t_us, self._imu):
             return of.short_tick.pack(t_us, (), command)

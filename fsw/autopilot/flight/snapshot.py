@@ -20,16 +20,26 @@ from fsw.autopilot.signals import (
 )
 
 
+class _Once:
+    """A field that is made when it is read first, and kept by its ``name``."""
+
+    def __init__(self, name: str, made: Callable[[Shown], Any]) -> None:
+        self._name, self._made = name, made
+
+    def __get__(self, shown: Shown, kind: type[Shown]) -> Any:
+        value = shown.__dict__[self._name] = self._made(shown)
+        return value
+
+
 class Shown(FlightSnapshot):
     """The snapshot of a ``state`` and the frame of the tick that left it.
 
-    Of most ticks hardly anything is sent or logged, so each field is made when it is read.
+    Of most ticks hardly anything is sent or logged, so each field is looked up when it is read.
     """
-
-    __slots__ = ("sensors", "state")
 
     def __init__(self, state: FlightState, sensors: SensorFrame) -> None:
         self.state, self.sensors = state, sensors
+        object.__setattr__(self, "t_us", state.record.stamp_us)
 
 
 def _plan_state(state: FlightState) -> PredictionState | None:
@@ -69,20 +79,22 @@ def _payload(state: FlightState) -> PayloadReport | None:
     return PayloadReport(gripper > 0.0, float(state.record.payload.mass)) if gripper else None
 
 
-_FIELDS: Final[dict[str, Callable[[Shown], Any]]] = {
-    "t_us": lambda shown: shown.state.record.stamp_us,
-    "mode": lambda shown: shown.state.vehicle.mode,
-    "armed": lambda shown: shown.state.vehicle.armed,
+# What takes longer is made once.
+_MADE: Final[dict[str, Callable[[Shown], Any]]] = {
     "estimate": lambda shown: shown.state.record.state_estimate,
-    "reference": lambda shown: shown.state.reference,
     "plan_state": lambda shown: _plan_state(shown.state),
     "plan_input": lambda shown: _plan_input(shown.state),
     "actuators": lambda shown: shown.state.record.actuator_command,
+    "failures": lambda shown: _failures(shown.state),
+}
+_FIELDS: Final[dict[str, Callable[[Shown], Any]]] = {
+    "mode": lambda shown: shown.state.vehicle.mode,
+    "armed": lambda shown: shown.state.vehicle.armed,
+    "reference": lambda shown: shown.state.reference,
     "plan": lambda shown: shown.state.plan.running,
     "plan_status": lambda shown: shown.state.plan.status,
     "counters": lambda shown: shown.state.plan.counters,
     "constraints": lambda shown: shown.state.constraints,
-    "failures": lambda shown: _failures(shown.state),
     "landed": lambda shown: shown.state.vehicle.landed,
     "home": lambda shown: shown.state.vehicle.home,
     "battery": lambda shown: shown.state.battery,
@@ -106,3 +118,5 @@ _FIELDS: Final[dict[str, Callable[[Shown], Any]]] = {
 }
 for _name, _found in _FIELDS.items():
     setattr(Shown, _name, property(_found))
+for _name, _found in _MADE.items():
+    setattr(Shown, _name, _Once(_name, _found))
