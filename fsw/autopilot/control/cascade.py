@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
-from fsw.autopilot.control.actuator_watch import felt_inside
 from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
 from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
+from fsw.autopilot.control.expectation import tell_filter
 from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.joint_reference import refer
 from fsw.autopilot.control.joints import (
-    accelerate_joints,
     joint_torques,
     observe_contact,
     observe_disturbance,
@@ -67,12 +66,10 @@ from fsw.autopilot.model.rotors import (
 from fsw.autopilot.shapes.zones import NO_ZONES
 from fsw.autopilot.signals import Mat3, Setpoint, StateEstimate, Vec3
 from fsw.autopilot.tick_record import (
-    BEGINS_ANEW,
     BREACH,
     FILTER_ACTED,
     GATE_NEEDED,
     IMPAIRED,
-    JUDGES,
     OFF_PLAN,
     Expected,
     Tick,
@@ -447,26 +444,7 @@ def _close_loops(
 def _expected(
     laws: NDArray[Any], records: NDArray[Any], filled: NDArray[Any], explains: bool, judged: bool
 ) -> None:
-    airframe, r, found = laws[0].airframe, records[0], filled[0]
-    for i in range(int(airframe.rotors)):
-        settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
-        r.mixer.mean[i] = lag_rotor(r.rotors[i], settling_at, laws[0].rotor_decay)
-    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
-    motion = motion_state(airframe, r, r.mixer.mean, r.sent.joint_torque)
-    # The accelerometer knows of gusts, and of the ground.
-    field = 0.0, 0.0, r.estimate.specific_force
-    accelerate_joints(r, airframe.bodies, field, motion.turning)
-    felt_inside(r, airframe, found.felt)
-    for i in range(int(airframe.bodies.joints)):
-        found.u[i], found.undone[i] = r.bodies.work[i], r.watch.undone[i]
-        found.unseen[i] = r.watch.unseen[i]
-    for i in range(3):
-        found.pushed[i] = r.observed.known[i]
-        found.model[i] = motion.turning[i] if explains else 0.0
-    # Not by the mass that is flown: it goes by the accelerometer, which this is a witness against.
-    lift = motion.thrust / (airframe.mass + r.payload.mass)
-    found.model[3] = lift if explains else 0.0
-    found.judges = JUDGES if judged else BEGINS_ANEW
+    tell_filter(records[0], laws[0].airframe, laws[0].rotor_decay, filled[0], explains, judged)
 
 
 @kernel

@@ -10,6 +10,7 @@ import pytest
 
 from fsw.autopilot.control.actuator_watch import pause
 from fsw.autopilot.control.cascade import in_hover
+from fsw.autopilot.estimation.fusion_memory import at_start
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.state import Damage
 from fsw.autopilot.model.actuator_health import HEALTHY, LIMP, SOUND, STUCK
@@ -313,7 +314,9 @@ def test_a_joint_that_fails_and_stands_still_may_be_one_that_is_not_seen(
     kind: float, repeat: bool
 ) -> None:
     loops = with_failed((SOUND, kind), 0.1, 5.0)
-    damage = WATCHER.see(Damage(), loops, loops.copy(), 1, angles_repeat=repeat)
+    memory = at_start(2)
+    memory.numbers["encoder_repeats"][0, :2] = (9.0, 9.0 if repeat else 0.0)
+    damage = WATCHER.see(Damage(), loops, loops.copy(), 1, memory=memory)
     assert damage.joint.startswith("joint 2 ")
     assert ("joint encoders stuck" in damage.joint) is repeat
 
