@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, Final
 
 from fsw.autopilot.flight.failsafe.table import FAULTS
@@ -42,28 +43,28 @@ class Shown(FlightSnapshot):
         object.__setattr__(self, "t_us", state.record.stamp_us)
 
 
-def _plan_state(state: FlightState) -> PredictionState | None:
-    return state.record.plan_state if state.vehicle.flies else None
+def _plan_state(shown: Shown) -> PredictionState | None:
+    return shown.state.record.plan_state if shown.state.vehicle.flies else None
 
 
-def _plan_input(state: FlightState) -> PlanInput | None:
-    flown = state.vehicle.flies and state.record.has_plan
-    return state.record.plan_input if flown else None
+def _plan_input(shown: Shown) -> PlanInput | None:
+    state = shown.state
+    return state.record.plan_input if state.vehicle.flies and state.record.has_plan else None
 
 
-def _orbit(state: FlightState) -> Orbit | None:
-    goal = state.setpoint.goal
-    return goal.orbit if goal is not None and state.vehicle.mode is Mode.ORBIT else None
-
-
-def _failures(state: FlightState) -> tuple[str, ...]:
-    held = state.vehicle.conditions
+def _failures(shown: Shown) -> tuple[str, ...]:
+    held = shown.state.vehicle.conditions
     return tuple([one.value for one in held if one in FAULTS]) if held else ()
 
 
-def _contact(state: FlightState) -> ContactReport | None:
+def _orbit(shown: Shown) -> Orbit | None:
+    goal = shown.state.setpoint.goal
+    return goal.orbit if goal is not None and shown.mode is Mode.ORBIT else None
+
+
+def _contact(shown: Shown) -> ContactReport | None:
     """What the fast loop knows of the tool at a surface."""
-    k = state.record.pressing
+    k = shown.state.record.pressing
     if not k.near:
         return None
     x, y, z = k.force.tolist()
@@ -74,49 +75,50 @@ def _contact(state: FlightState) -> ContactReport | None:
     )
 
 
-def _payload(state: FlightState) -> PayloadReport | None:
-    gripper = state.vehicle.gripper
-    return PayloadReport(gripper > 0.0, float(state.record.payload.mass)) if gripper else None
+def _payload(shown: Shown) -> PayloadReport | None:
+    gripper, mass = shown.state.vehicle.gripper, shown.state.record.payload.mass
+    return PayloadReport(gripper > 0.0, float(mass)) if gripper else None
 
 
-# What takes longer is made once.
+# Where fields are that the state has as they are.
+_PLACES: Final = {
+    "mode": "state.vehicle.mode",
+    "armed": "state.vehicle.armed",
+    "reference": "state.reference",
+    "plan": "state.plan.running",
+    "plan_status": "state.plan.status",
+    "counters": "state.plan.counters",
+    "constraints": "state.constraints",
+    "landed": "state.vehicle.landed",
+    "home": "state.vehicle.home",
+    "battery": "state.battery",
+    "arming_refusal": "state.arming_refusal",
+    "intended_mode": "state.vehicle.intended_mode",
+    "mission": "state.mission.flight.progress",
+    "failsafe_from": "state.vehicle.failsafe_from",
+    "accel_B": "sensors.accel_B",
+    "safety": "state.safety.counters",
+    "estimator": "state.estimator",
+    "log_failure": "state.host.log_failure",
+    "arming": "state.arming",
+    "safe_set": "state.mission.safe_set",
+    "safe_set_owner": "state.mission.owner",
+    "actuators_found": "state.damage.report",
+}
+# The others are made when they are read first.
 _MADE: Final[dict[str, Callable[[Shown], Any]]] = {
-    "estimate": lambda shown: shown.state.record.state_estimate,
-    "plan_state": lambda shown: _plan_state(shown.state),
-    "plan_input": lambda shown: _plan_input(shown.state),
-    "actuators": lambda shown: shown.state.record.actuator_command,
-    "failures": lambda shown: _failures(shown.state),
-}
-_FIELDS: Final[dict[str, Callable[[Shown], Any]]] = {
-    "mode": lambda shown: shown.state.vehicle.mode,
-    "armed": lambda shown: shown.state.vehicle.armed,
-    "reference": lambda shown: shown.state.reference,
-    "plan": lambda shown: shown.state.plan.running,
-    "plan_status": lambda shown: shown.state.plan.status,
-    "counters": lambda shown: shown.state.plan.counters,
-    "constraints": lambda shown: shown.state.constraints,
-    "landed": lambda shown: shown.state.vehicle.landed,
-    "home": lambda shown: shown.state.vehicle.home,
-    "battery": lambda shown: shown.state.battery,
-    "arming_refusal": lambda shown: shown.state.arming_refusal,
+    "estimate": attrgetter("state.record.state_estimate"),
+    "plan_state": _plan_state,
+    "plan_input": _plan_input,
+    "actuators": attrgetter("state.record.actuator_command"),
+    "failures": _failures,
     "offboard": lambda shown: report(shown.state, shown.sensors.t_us),
-    "intended_mode": lambda shown: shown.state.vehicle.intended_mode,
-    "mission": lambda shown: shown.state.mission.flight.progress,
-    "failsafe_from": lambda shown: shown.state.vehicle.failsafe_from,
-    "orbit": lambda shown: _orbit(shown.state),
-    "accel_B": lambda shown: shown.sensors.accel_B,
-    "safety": lambda shown: shown.state.safety.counters,
-    "estimator": lambda shown: shown.state.estimator,
-    "log_failure": lambda shown: shown.state.host.log_failure,
-    "arming": lambda shown: shown.state.arming,
-    "safe_set": lambda shown: shown.state.mission.safe_set,
-    "safe_set_owner": lambda shown: shown.state.mission.owner,
-    "actuators_found": lambda shown: shown.state.damage.report,
+    "orbit": _orbit,
     "sensors_lost": lambda shown: tuple([one.sensor.value for one in shown.state.aiding.lost]),
-    "touching": lambda shown: _contact(shown.state),
-    "payload": lambda shown: _payload(shown.state),
+    "touching": _contact,
+    "payload": _payload,
 }
-for _name, _found in _FIELDS.items():
-    setattr(Shown, _name, property(_found))
-for _name, _found in _MADE.items():
-    setattr(Shown, _name, _Once(_name, _found))
+for _name, _place in _PLACES.items():
+    setattr(Shown, _name, property(attrgetter(_place)))
+for _name, _made in _MADE.items():
+    setattr(Shown, _name, _Once(_name, _made))
