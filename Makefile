@@ -74,7 +74,7 @@ test: setup ## set up, then run every check: ruff, mypy, import-linter, pytest
 OF_CLOCKS := tests/fsw/link/test_stream_links.py tests/messages
 OF_CLIENTS := tests/conversations tests/interop
 OF_PROCESSES := tests/benchmarks tests/cli tests/processes tests/timing
-OF_STUDIES := $(addprefix tests/,architecture fuzz library mutation replay sitl studies view) \
+OF_STUDIES := $(addprefix tests/,architecture fuzz library mutation sitl studies view) \
 	$(addprefix tests/fsw/autopilot/,control estimation)
 code-checks:
 	$(call check,lint,$(BIN)/ruff check .)
