@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fsw.autopilot.measurements import ImuSample, Sample
-from fsw.autopilot.signals import SensorFrame, TickInputs
+from fsw.autopilot.signals import SensorFrame, TickInputs, frame_of_samples
 from fsw.log import px4_topics, topics
 from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
@@ -173,7 +173,7 @@ class _Inputs:
         """The frame of a tick that says nothing but what the inertial unit measured last."""
         if self._imu is None:
             raise ValueError("it repeats what an inertial unit says, and none was heard")
-        return self._samples.frame_of(t_us, self._imu)
+        return frame_of_samples(t_us, (self._imu,), self._joints)
 
     def _check_numbers(self) -> None:
         for number, topic in enumerate(topics.TOPICS):

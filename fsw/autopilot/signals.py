@@ -11,12 +11,13 @@ time of a frozen dataclass (docs/decisions/0017-one-compiled-call-a-tick.md).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
 
+from fsw.autopilot.measurements import ImuSample, Sample
 from fsw.autopilot.measurements import JointVector as JointVector
 from fsw.autopilot.measurements import RotorVector as RotorVector
-from fsw.autopilot.measurements import Sample
 from fsw.autopilot.measurements import Vec2 as Vec2
 from fsw.autopilot.measurements import Vec3 as Vec3
 from fsw.autopilot.measurements import Vec4 as Vec4
@@ -100,6 +101,24 @@ class SensorFrame:
     accel_B: Vec3  # m/s^2, specific force
     q_arm: JointVector  # rad
     qd_arm: JointVector  # rad/s
+
+
+_NO_VECTOR: Final[Vec3] = (math.nan, math.nan, math.nan)
+
+
+def frame_of_samples(t_us: int, samples: Sequence[Sample], joints: int) -> SensorFrame:
+    """The frame of a tick that has ``samples`` instead, of a vehicle with so many ``joints``.
+
+    It has the time, and what the inertial unit measured where that is the last sample. What is not
+    known is ``math.nan`` itself: two such frames of the same numbers are equal.
+    """
+    newest = samples[-1] if samples else None
+    rate, force = _NO_VECTOR, _NO_VECTOR
+    if type(newest) is ImuSample:
+        rate, force = newest.rate, newest.acceleration
+    arm = (math.nan,) * joints
+    attitude = (math.nan, *_NO_VECTOR)
+    return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, attitude, rate, force, arm, arm)
 
 
 @dataclass(frozen=True, slots=True)

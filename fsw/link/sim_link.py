@@ -13,11 +13,10 @@ Stamps on the wire are of the sensors' clock, all others of the vehicle's time: 
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from typing import Final, cast
 
-from fsw.autopilot.measurements import ImuSample, Sample
+from fsw.autopilot.measurements import Sample
 from fsw.autopilot.ports import Clock, VehicleFacts
 from fsw.autopilot.signals import (
     CommandAck,
@@ -28,6 +27,7 @@ from fsw.autopilot.signals import (
     Severity,
     StatusText,
     TickOutputs,
+    frame_of_samples,
 )
 from fsw.frozen import replace
 from fsw.link.inbox import MAX_SAMPLES, Inbox
@@ -70,8 +70,6 @@ _INERTIAL: Final = 0x3F
 _NUMBER_AT: Final = 4  # in a datagram, of its first frame
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
-_NO_VECTOR: Final = (math.nan, math.nan, math.nan)
-_NO_ATTITUDE: Final = (math.nan, math.nan, math.nan, math.nan)
 _NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
 
 
@@ -301,12 +299,7 @@ class SimLink:
             self._early.clear()
             t_us -= self._steps.ahead_us
         self._inbox.accept_samples(samples)
-        newest = samples[-1] if samples else None
-        rate, force = _NO_VECTOR, _NO_VECTOR
-        if type(newest) is ImuSample:
-            rate, force = newest.rate, newest.acceleration
-        arm = (math.nan,) * self._joints
-        return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, arm, arm)
+        return frame_of_samples(t_us, samples, self._joints)
 
     def _is_next(self, t_us: int, number: int) -> bool:
         """Whether a step is a new one, which it is only once; a known one is answered again."""

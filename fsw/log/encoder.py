@@ -38,6 +38,7 @@ from fsw.autopilot.signals import (
     TestRatios,
     TickInputs,
     TickOutputs,
+    frame_of_samples,
 )
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
@@ -210,7 +211,7 @@ class LogEncoder:
             self._px4.feel(one.accel_B, one.gyro_B)
         of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, outputs.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        if self._imu and one == of.samples.frame_of(t_us, self._imu):
+        if self._imu and one == frame_of_samples(t_us, (self._imu,), self._joints):
             return of.short_tick.pack(t_us, (), command)
         arm = (*one.q_arm, *one.qd_arm)
         frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)

@@ -19,15 +19,13 @@ class Packed:
 
     def __init__(self, *members: Topic) -> None:
         self._struct = Struct("<" + "".join("5s" + topic.codes for topic in members))
-        heads = [data_head(topics.NUMBERS[topic.name], topic) for topic in members]
-        # All entries in one tuple, by a function made for so many members.
-        values = [f"of_{k}" for k in range(len(heads))]
-        entries = "".join(f"{head!r}, t, *{one}, " for head, one in zip(heads, values, strict=True))
-        self._entries = eval(f"lambda t, {', '.join(values)}: ({entries})")
+        self._heads = tuple(data_head(topics.NUMBERS[topic.name], topic) for topic in members)
 
     def pack(self, t_us: int, *values: Sequence[Any]) -> bytes:
         """The records at ``t_us``, of the values of each; what no float can hold is infinite."""
-        entries = self._entries(t_us, *values)
+        entries: list[Any] = []
+        for head, of_topic in zip(self._heads, values, strict=True):
+            entries += (head, t_us, *of_topic)
         try:
             return self._struct.pack(*entries)
         except OverflowError:

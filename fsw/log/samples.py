@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from operator import attrgetter
 from struct import Struct
 from typing import Any, Final
 
-from fsw.autopilot.measurements import ImuSample, Sample
-from fsw.autopilot.signals import SensorFrame
+from fsw.autopilot.measurements import Sample
 from fsw.log import topics
 from messages.ulog import Topic, data_head
 from messages.ulog_reader import unpacker
 
 Values = tuple[Any, ...]
-_NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 _LATEST: Final = 1e12  # s; what is later fits no field
 
 
@@ -24,24 +22,15 @@ def _sampled_us(one: Sample) -> int:
     return round(1e6 * one.time) if 0.0 <= one.time < _LATEST else 0
 
 
-def _flattener(names: Sequence[str], sizes: Sequence[int]) -> Callable[[Sample], Values]:
-    """What takes a sample's fields apart, those that have a size into their numbers."""
-    fields = zip(names, sizes, strict=True)
-    parts = [f"*one.{name}" if size else f"one.{name}" for name, size in fields]
-    made: Callable[[Sample], Values] = eval(f"lambda one: ({', '.join(parts)},)")
-    return made
-
-
 class _Codec:
     """Records of one kind of sample."""
 
     def __init__(self, kind: type[Sample], topic: Topic) -> None:
         self.number = topics.NUMBERS[topic.name]
         self._kind = kind
+        self._of = attrgetter(*[field.name for field in dataclasses.fields(kind)])
         own = [field for field in topic.fields if field.name != topics.SAMPLED]
         self._sizes = tuple(field.count for field in own)  # 0: a number by itself
-        names = [field.name for field in dataclasses.fields(kind)]
-        self._values = _flattener(names, self._sizes)
         self._is_stamped = len(own) < len(topic.fields)
         self.head = data_head(self.number, topic)
         self.pack = Struct("<5s" + topic.codes).pack
@@ -49,8 +38,15 @@ class _Codec:
 
     def values(self, sample: Sample) -> Values:
         """As the record has them."""
-        values = self._values(sample)
-        return (*values, _sampled_us(sample)) if self._is_stamped else values
+        values: list[float] = []
+        for value, size in zip(self._of(sample), self._sizes, strict=True):
+            if size:
+                values += value
+            else:
+                values.append(value)
+        if self._is_stamped:
+            values.append(_sampled_us(sample))
+        return tuple(values)
 
     def read(self, body: bytes) -> Sample:
         """The sample again."""
@@ -70,21 +66,11 @@ class Samples:
     """Records of a vehicle with so many joints."""
 
     def __init__(self, joints: int) -> None:
-        self._arm = (math.nan,) * joints
         self._codecs = {
             kind: _Codec(kind, topic.sized(joint=joints))
             for kind, topic in topics.OF_SAMPLES.items()
         }
         self._by_number = {codec.number: codec for codec in self._codecs.values()}
-
-    def frame_of(self, t_us: int, imu: ImuSample) -> SensorFrame:
-        """The frame of a tick of which nothing is known but what the inertial unit measured.
-
-        Like the link's: what is not known is ``math.nan`` itself, so that such frames are equal.
-        """
-        attitude = (*_NO_VECTOR, math.nan)
-        known = imu.rate, imu.acceleration
-        return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, attitude, *known, self._arm, self._arm)
 
     def record(self, t_us: int, sample: Sample) -> bytes:
         """The record of a sample that arrived for the tick of ``t_us``."""

@@ -43,6 +43,7 @@ from fsw.autopilot.signals import (
     SwitchMode,
     TickInputs,
     TickOutputs,
+    frame_of_samples,
 )
 from sitl.scenario import Push, Scenario
 from sitl.scenario_file import ScenarioError
@@ -58,7 +59,7 @@ from studies.flight.result import (
     TracePoint,
     touched,
 )
-from studies.flight.samples import only_the_time, sample
+from studies.flight.samples import sample
 from studies.flight.sensor_faults import Fault, FaultySensors
 
 TARGET_US = 100_000  # between points of the reference, as the pilot sends them
@@ -179,7 +180,7 @@ def readings(simulation: Simulation) -> tuple[SensorFrame, tuple[Sample, ...]]:
     if arrived is not None:
         # What a force sensor says the flight software does not take in.
         samples = tuple([sample(one) for one in arrived if type(one) is not WrenchMeasurement])
-        return only_the_time(
+        return frame_of_samples(
             simulation.sensor_time_us, samples, len(simulation.vehicle.joints)
         ), samples
     now = simulation.sense()
@@ -318,7 +319,7 @@ class ScenarioFlight:
             sensors = (
                 self._faulty.frame(sensors)
                 if exact
-                else only_the_time(sensors.t_us, samples, joints)
+                else frame_of_samples(sensors.t_us, samples, joints)
             )
         self._stamp_us = sensors.t_us
         inputs = loop.inputs(sensors, samples)

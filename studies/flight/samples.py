@@ -6,12 +6,10 @@ as the link's decoder states them.
 
 from __future__ import annotations
 
-import math
 from dataclasses import fields
 from typing import Any, Final, get_args
 
 from fsw.autopilot.measurements import GnssSample, ImuSample, PressureSample, Sample
-from fsw.autopilot.signals import SensorFrame
 from sitl.sensors.barometer import PressureMeasurement, standard_altitude
 from sitl.sensors.channel import Measurement
 from sitl.sensors.gnss import GnssMeasurement
@@ -23,7 +21,6 @@ _NOT_STATED: Final = 0.0  # a variance that the message has no field for
 _KINDS: Final[dict[str, tuple[Any, int]]] = {
     kind.__name__.removesuffix("Sample"): (kind, len(fields(kind))) for kind in get_args(Sample)
 }
-_NO_VECTOR: Final = (math.nan, math.nan, math.nan)
 
 
 def sample(said: Measurement) -> Sample:
@@ -52,21 +49,3 @@ def sample(said: Measurement) -> Sample:
         raise TypeError(f"{said} is nothing that the flight software takes in")
     found: Sample = kind(time, *values[1:count])
     return found
-
-
-def only_the_time(t_us: int, samples: tuple[Sample, ...], joints: int) -> SensorFrame:
-    """The frame of a tick that has samples instead, as the link makes it.
-
-    Of a vehicle with so many ``joints``.
-    """
-    newest = samples[-1] if samples else None
-    return SensorFrame(
-        t_us,
-        p_WB=_NO_VECTOR,
-        v_WB=_NO_VECTOR,
-        q_WB=(math.nan, *_NO_VECTOR),
-        gyro_B=newest.rate if isinstance(newest, ImuSample) else _NO_VECTOR,
-        accel_B=newest.acceleration if isinstance(newest, ImuSample) else _NO_VECTOR,
-        q_arm=(math.nan,) * joints,
-        qd_arm=(math.nan,) * joints,
-    )

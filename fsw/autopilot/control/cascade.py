@@ -194,8 +194,7 @@ class Cascade:
     def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
         """What the commands sent last make of joints and vehicle; it is good until the next call.
 
-        On the ground thrust does not ``explain`` how the vehicle moves. Encoders are ``judged``
-        unless a joint has failed.
+        ``explains`` and ``judged`` are of ``tell_filter``.
         """
         self._expected(self.packed, r.array, self._found.array, explains, judged)
         return self._found

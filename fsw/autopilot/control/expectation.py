@@ -15,11 +15,11 @@ from fsw.compiled import compilable
 def tell_filter(
     r: Tick, airframe: Airframe, rotor_decay: float, found: Expected, explains: bool, judged: bool
 ) -> None:
-    """Write what is expected of the next tick, in which rotors come ``rotor_decay`` [1] closer.
+    """Write what is expected of the next tick, after which ``rotor_decay`` [1] of a lag is left.
 
-    Thrust does not ``explain`` how a vehicle moves that stands; encoders are ``judged`` unless a
-    joint has failed. Reads estimate, sent, rotors, health, watch, pressing, observed, payload;
-    writes bodies, mixer.
+    Of a vehicle that stands thrust does not say how it moves: then it ``explains`` nothing.
+    Encoders are ``judged`` unless a joint has failed. Reads estimate, sent, rotors, health, watch,
+    pressing, observed, payload; writes bodies, mixer.
     """
     for i in range(int(airframe.rotors)):
         settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]

@@ -90,12 +90,6 @@ class Px4Estimate:
         return SensorFrame(t_us, p, v, self._q, self._w, (0.0, 0.0, -force), q_arm, qd_arm)
 
 
-def nothing_known(t_us: int, joints: int) -> SensorFrame:
-    """Readings of an instant at which nothing has come."""
-    arm, none = (math.nan,) * joints, _NO_VECTOR
-    return SensorFrame(t_us, none, none, (math.nan,) * 4, none, none, arm, arm)
-
-
 def _moved(p: Vec3, v: Vec3, a: Vec3, seconds: float) -> Vec3:
     """``p`` [SI] after some ``seconds`` [s] of ``v`` and half of ``a``, its derivatives [SI]."""
     t, half = seconds, 0.5 * seconds * seconds

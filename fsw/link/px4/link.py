@@ -28,11 +28,12 @@ from fsw.autopilot.signals import (
     Severity,
     StatusText,
     TickOutputs,
+    frame_of_samples,
 )
 from fsw.link.inbox import Inbox
 from fsw.link.px4.arm import Joints, servo_ranges
 from fsw.link.px4.clock import ASK_US, Px4Clock
-from fsw.link.px4.estimate import Px4Estimate, nothing_known
+from fsw.link.px4.estimate import Px4Estimate
 from fsw.link.px4.handover import LOST_US, Handover, Px4Seen
 from fsw.link.px4.messages import (
     ACTUATORS,
@@ -207,7 +208,7 @@ class Px4Link:
             return None
         t_us = self._t_us + round(1e6 * _PATIENCE_S)
         self._px4_time.passed(t_us)
-        return self._handed_on(nothing_known(t_us, len(self.joints.q)))
+        return self._handed_on(frame_of_samples(t_us, (), len(self.joints.q)))
 
     def newest(self) -> SensorFrame | None:
         """What PX4's newest attitude says, with all that came before it."""

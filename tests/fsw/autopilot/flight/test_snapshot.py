@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.flight.snapshot import Shown
-from fsw.autopilot.signals import FlightSnapshot, Mode, PayloadReport, PlanInput, SensorFrame
+from fsw.autopilot.signals import (
+    FlightSnapshot,
+    HostHealth,
+    Mode,
+    PayloadReport,
+    PlanInput,
+    SensorFrame,
+)
 from fsw.frozen import replace
 from tests.fsw.autopilot.flight.in_flight import flying, vehicle_at
 
@@ -16,7 +23,9 @@ FRAME = SensorFrame(2_000, NONE, NONE, (1.0, *NONE), NONE, (0.1, 0.2, -9.7), (0.
 
 
 def shown(**changes: Any) -> Shown:
-    state = flying(Mode.LAND, gripper=1.0, **changes)
+    state = flying(Mode.LAND, gripper=1.0, failsafe_from=Mode.ORBIT, **changes)
+    full = HostHealth(log_failure="the disk is full")
+    state = replace(state, arming_refusal="it may not arm", host=full)
     r = state.record.copy()
     r.state_estimate = vehicle_at((1.0, 2.0, -3.0), t_us=2_000)
     r.plan_input = PlanInput((0.1, 0.2, 0.3), 0.4, (0.5, 0.6))
@@ -26,13 +35,16 @@ def shown(**changes: Any) -> Shown:
 
 def test_every_field_is_found_in_the_state() -> None:
     one = shown()
-    values = {field.name: getattr(one, field.name) for field in fields(FlightSnapshot)}
+    for name, kind in get_type_hints(FlightSnapshot).items():
+        kinds = get_args(kind) if isinstance(kind, UnionType) else (kind,)
+        assert isinstance(getattr(one, name), tuple(get_origin(k) or k for k in kinds)), name
     assert (one.t_us, one.mode, one.armed, one.landed) == (2_000, Mode.LAND, True, False)
     assert one.estimate.p_WB == (1.0, 2.0, -3.0)
     assert one.accel_B == FRAME.accel_B
     assert one.payload == PayloadReport(True, 0.25)
     assert one.touching is None
-    assert all(getattr(FlightSnapshot(**values), name) == values[name] for name in values)
+    assert (one.arming_refusal, one.log_failure) == ("it may not arm", "the disk is full")
+    assert (one.intended_mode, one.failsafe_from) == (one.state.vehicle.intended_mode, Mode.ORBIT)
 
 
 def test_failures_are_those_conditions_that_are_faults() -> None:
