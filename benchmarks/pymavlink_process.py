@@ -74,7 +74,7 @@ def step(sender: Any, readings: Any) -> bytes:
 
 def _swap_fsw() -> None:
     from fsw.link.sim_link import SimLink
-    from fsw.link.wire.encode_replies import end_of_controls, hil_actuator_controls
+    from fsw.link.wire.encode_standard import hil_actuator_controls
 
     sender, receiver = _codec(1), _codec(1)
     general = SimLink._read
@@ -90,9 +90,8 @@ def _swap_fsw() -> None:
         return self._new(messages[-1].get_seq(), odometry, arm, hil)
 
     def controls_of(self: Any, stamp_us: int, outputs: Any) -> bytes:
-        t_us, flags, *used = hil_actuator_controls(self._airframe, stamp_us, outputs.actuators)
-        *rest, mode = end_of_controls(len(used), armed=outputs.armed, gripper=outputs.gripper)
-        message = sender.hil_actuator_controls_encode(t_us, [*used, *rest], mode, flags)
+        t_us, flags, *controls, mode = hil_actuator_controls(self._airframe, stamp_us, outputs)
+        message = sender.hil_actuator_controls_encode(t_us, controls, mode, flags)
         return _packed(sender, message)
 
     SimLink._read = read  # type: ignore[method-assign]

@@ -32,8 +32,8 @@ from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
 from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
-from fsw.link.wire import encode_replies
 from fsw.link.wire.decode import for_this_vehicle
+from fsw.link.wire.encode_standard import command_ack
 from fsw.link.wire.telemetry_context import TelemetryContext
 from messages import dialect, message_ids
 from messages.addresses import Address, LinkAddress
@@ -343,7 +343,7 @@ class GcsLink:
             self.outbox.add_text(text, t_us)
 
     def _add_answer(self, ack: CommandAck) -> None:
-        self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, command_ack(ack))
 
     def _encode(self, stream: Stream, snapshot: FlightSnapshot) -> None:
         try:

@@ -36,21 +36,13 @@ from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sensor_clock import SensorClock
 from fsw.link.udp_endpoint import Address
 from fsw.link.vehicle_link import Pacing
-from fsw.link.wire import decode, encode_replies
+from fsw.link.wire import decode
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.decode_sensors import (
-    ODOMETRY_VALUES,
-    SampleDecoder,
-    battery_reading,
-    inertial_sample,
-    joint_sample,
-    pose_sample,
-)
+from fsw.link.wire.decode_sensors import SampleDecoder, battery_reading
+from fsw.link.wire.encode_standard import command_ack, hil_actuator_controls
 from fsw.link.wire.px4_mode import custom_mode
 from messages import message_ids, status_text
 from messages.frames import Frame, FrameWriter, split
-from messages.joint_arrays import BASE, ENCODERS_AT, STATE_AT
-from messages.lockstep_codec import LockstepFrame, LockstepReader
 from messages.message_ids import AUTOPILOT, SYSTEM_ID
 from messages.udp import PeerSocket
 
@@ -65,9 +57,6 @@ _PX4: Final = 12  # MAV_AUTOPILOT
 _CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG
 _ARMED: Final = 128
 _STANDBY, _ACTIVE = 3, 4  # MAV_STATE
-_FLAGS_AT: Final = -3
-_INERTIAL: Final = 0x3F
-_NUMBER_AT: Final = 4  # in a datagram, of its first frame
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
@@ -85,36 +74,11 @@ class SimLink:
         self.routed_acks: list[CommandAck] = []  # of the simulator to what was routed; the same
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
-        airframe = facts.airframe
-        joints = self._joints = airframe.bodies.joints
-        self._decoder = SampleDecoder(inbox.locate, joints)
-        # An ordinary step; with the number of first values that are of use.
-        arm, encoders = _up_to(STATE_AT[1], joints), _up_to(ENCODERS_AT, joints)
-        inertial = message_ids.HIL_SENSOR, 7
-        self._step = LockstepReader(
-            (message_ids.ODOMETRY, 14), (message_ids.ARM_JOINT_STATE, arm), inertial
-        )
-        # The same of a vehicle with sensors, if its HIL_SENSOR is the inertial unit's: then the
-        # flags are the last byte before the checksum, because zeros at the end are not sent.
-        self._measured_step = LockstepReader((message_ids.JOINT_ENCODERS, encoders), inertial)
-        self._step_with_pose = LockstepReader(
-            (message_ids.ODOMETRY, ODOMETRY_VALUES),
-            (message_ids.JOINT_ENCODERS, encoders),
-            inertial,
-        )
+        self._for_inbox = inbox.message_ids - {message_ids.HEARTBEAT}
+        self._airframe = facts.airframe
+        self._joints = self._airframe.bodies.joints
+        self._decoder = SampleDecoder(inbox.locate, self._joints)
         self._writer = FrameWriter(SYSTEM_ID, AUTOPILOT)
-        self._controls_frames = {
-            (armed, gripper): LockstepFrame(
-                self._writer,
-                message_ids.HIL_ACTUATOR_CONTROLS,
-                *encode_replies.end_of_controls(
-                    airframe.rotors + joints, armed=armed, gripper=gripper
-                ),
-            )
-            for armed in (False, True)
-            for gripper in (0.0, 1.0, -1.0)
-        }
-        self._airframe = airframe
         self._steps = SensorClock(
             facts.tick_period_us, clock, self._note_what_is_odd, inbox.accept_clock_jump
         )
@@ -203,25 +167,7 @@ class SimLink:
 
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""
-        if not self.measured:
-            step = self._step.read(datagram)
-            if step is not None:
-                return self._new(datagram[_NUMBER_AT], *step)
-        else:
-            measured = self._measured_step.read(datagram) or self._step_with_pose.read(datagram)
-            if measured is not None and datagram[_FLAGS_AT] == _INERTIAL:
-                *pose, joints, inertial = measured
-                samples: list[Sample] = [
-                    joint_sample(joints, self._joints),
-                    inertial_sample(inertial),
-                ]
-                if pose and (seen := pose_sample(pose[0])) is not None:
-                    samples.insert(0, seen)
-                return self._new_measured(int(inertial[0]), samples, datagram[_NUMBER_AT])
-        return self._read_frames(list(split(datagram)))
-
-    def _read_frames(self, frames: list[Frame]) -> SensorFrame | None:
-        """What :meth:`_read` says, of a datagram with anything in it."""
+        frames = list(split(datagram))
         payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
         barrier = payloads.get(message_ids.HIL_SENSOR)  # the last one
         number = next((f.sequence for f in frames if f.message_id == message_ids.HIL_SENSOR), 0)
@@ -246,7 +192,7 @@ class SimLink:
             if reading is not None:
                 self._inbox.accept_battery(reading)
             for frame in frames:
-                if frame.message_id != message_ids.HEARTBEAT:
+                if frame.message_id in self._for_inbox:
                     self._inbox.accept(frame, _source(frame))
         return sensors
 
@@ -347,8 +293,8 @@ class SimLink:
 
     def _controls(self, stamp_us: int, outputs: TickOutputs) -> bytes:
         """HIL_ACTUATOR_CONTROLS of a step."""
-        values = encode_replies.hil_actuator_controls(self._airframe, stamp_us, outputs.actuators)
-        return self._controls_frames[outputs.armed, outputs.gripper](*values)
+        values = hil_actuator_controls(self._airframe, stamp_us, outputs)
+        return self._writer.frame(message_ids.HIL_ACTUATOR_CONTROLS, *values)
 
     def _mode(self, t_us: int, outputs: TickOutputs) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
@@ -360,14 +306,9 @@ class SimLink:
         return self._writer.frame(message_ids.HEARTBEAT, *values)
 
     def _ack_frame(self, ack: CommandAck) -> bytes:
-        return self._writer.frame(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))
+        return self._writer.frame(message_ids.COMMAND_ACK, *command_ack(ack))
 
 
 def _source(frame: Frame) -> MessageSource:
     """The simulator is the only peer of its link, whichever port it has."""
     return MessageSource(frame.system_id, frame.component_id, "simulator")
-
-
-def _up_to(at: tuple[int, int], joints: int) -> int:
-    """How many first values a message has up to the last joint of an array."""
-    return at[0] + joints if joints <= BASE else at[1] + joints - BASE

@@ -16,8 +16,8 @@ from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import CommandAck, JointVector, MessageSource, Mode, TickOutputs
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
-from fsw.link.wire import encode_replies
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.encode_standard import command_ack
 from fsw.link.wire.px4_mode import custom_mode
 from messages import message_ids
 from messages.addresses import LinkAddress
@@ -120,7 +120,7 @@ class ArmLink:
     def acknowledge(self, ack: CommandAck) -> None:
         """Answer a command that came here."""
         if self._known:
-            self._send(message_ids.COMMAND_ACK, *encode_replies.command_ack(ack))
+            self._send(message_ids.COMMAND_ACK, *command_ack(ack))
 
     def close(self) -> None:
         """Close the socket."""

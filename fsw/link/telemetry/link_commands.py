@@ -13,7 +13,8 @@ from fsw.autopilot.signals import CommandAck, CommandRequest, FlightSnapshot, Se
 from fsw.link.services.service import LinkService
 from fsw.link.telemetry.stream_rates import OFF, UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
-from fsw.link.wire import decode, encode_replies
+from fsw.link.wire import decode
+from fsw.link.wire.encode_standard import command_ack
 from fsw.link.wire.outgoing import Outgoing
 from fsw.link.wire.telemetry_context import TelemetryContext
 from messages import message_ids
@@ -63,7 +64,7 @@ class LinkCommands:
             return None
         result, reason, messages = outcome
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
-        reply = Outgoing(message_ids.COMMAND_ACK, encode_replies.command_ack(ack))
+        reply = Outgoing(message_ids.COMMAND_ACK, command_ack(ack))
         return (reply, *messages), _answer(reason)
 
     def _carry_out(

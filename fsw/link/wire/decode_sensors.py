@@ -36,7 +36,6 @@ _MAGNETIC: Final = 0x1C0
 _PRESSURE: Final = 0x200
 _RESET: Final = 0x80000000
 
-ODOMETRY_VALUES: Final = 61  # all of them
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _DRIFTING: Final = (2, 3, 7)  # MAV_ESTIMATOR_TYPE: vision, visual-inertial, lidar
 _DOWNWARD: Final = 25  # MAV_SENSOR_ORIENTATION

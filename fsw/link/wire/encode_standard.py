@@ -1,6 +1,6 @@
-"""Standard MAVLink messages from the vehicle's snapshot; pure.
+"""Standard MAVLink messages from the vehicle's snapshot, and replies; pure.
 
-Each encoder returns every field of its message in wire order (larger types first, see
+Each encoder of a snapshot returns every field of its message in wire order (larger types first, see
 ``messages.frames.wire_fields``), or None when there is nothing to say yet.
 """
 
@@ -12,7 +12,16 @@ from typing import Final
 from fsw.autopilot.control.attitude import attitude_reference
 from fsw.autopilot.geometry.geodesy import to_global
 from fsw.autopilot.geometry.rotation import euler_zyx, quaternion_from_euler, quaternion_from_matrix
-from fsw.autopilot.signals import FlightSnapshot, Mode, MotionSetpoint, SetpointKind, Vec3
+from fsw.autopilot.model.airframe import Airframe
+from fsw.autopilot.signals import (
+    CommandAck,
+    FlightSnapshot,
+    Mode,
+    MotionSetpoint,
+    SetpointKind,
+    TickOutputs,
+    Vec3,
+)
 from fsw.link.wire.outgoing import WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
 from fsw.link.wire.telemetry_context import TelemetryContext
@@ -41,6 +50,8 @@ _RATES_IGNORED: Final = 0x07  # ATTITUDE_TARGET_TYPEMASK
 _ATTITUDE_IGNORED: Final = 0x80
 _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 _U32: Final = 0xFFFFFFFF
+_LOCKSTEP: Final = 1  # HIL_ACTUATOR_CONTROLS_FLAGS
+_CONTROLS: Final = 16  # of a HIL_ACTUATOR_CONTROLS
 
 
 def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -155,6 +166,23 @@ def orbit_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireVal
     radius = orbit.radius if orbit.clockwise else -orbit.radius
     place = (round(1e7 * latitude), round(1e7 * longitude), altitude)
     return (snapshot.t_us, radius, *place, _GLOBAL)
+
+
+def command_ack(ack: CommandAck) -> WireValues:
+    """COMMAND_ACK: no progress, no detail."""
+    return (ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
+
+
+def hil_actuator_controls(airframe: Airframe, t_us: int, outputs: TickOutputs) -> WireValues:
+    """HIL_ACTUATOR_CONTROLS, the answer to a HIL_SENSOR of ``t_us`` [us].
+
+    Rotors come first, then joints, each as a share of its largest value; the last control is the
+    gripper: 1 closes, -1 opens.
+    """
+    thrust, torque = airframe.shares(outputs.actuators)
+    unused = (0.0,) * (_CONTROLS - 1 - len(thrust) - len(torque))
+    mode = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
+    return (t_us, _LOCKSTEP, *thrust, *torque, *unused, outputs.gripper, mode)
 
 
 def as_asked(motion: MotionSetpoint) -> tuple[tuple[float, ...], int]:

@@ -25,9 +25,10 @@ from fsw.autopilot.signals import (
     SensorReport,
     SetpointKind,
     Severity,
+    TickOutputs,
 )
 from fsw.link.telemetry.streams import STREAMS, Stream
-from fsw.link.wire import encode_replies, encode_standard
+from fsw.link.wire import encode_standard
 from fsw.link.wire.telemetry_context import GENERIC
 from messages import dialect, status_text
 from messages import message_ids as ids
@@ -365,9 +366,9 @@ def test_there_is_nothing_to_say_before_the_first_plan() -> None:
 
 def test_actuators_are_fractions_of_their_limits() -> None:
     airframe = replace(AIRFRAME, rotor_thrust_max=(16.0,) * 4, joint_torque_max=(2.0,) * 2)
-    values = encode_replies.hil_actuator_controls(airframe, 3_004_000, ACTUATORS)
-    end = encode_replies.end_of_controls(6, armed=True)
-    message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values, *end))
+    outputs = TickOutputs(ACTUATORS, Mode.HOLD, armed=True)
+    values = encode_standard.hil_actuator_controls(airframe, 3_004_000, outputs)
+    message = decoded(FrameWriter(1, 1).frame(ids.HIL_ACTUATOR_CONTROLS, *values))
     assert message.time_usec == 3_004_000
     assert message.controls[:6] == pytest.approx([0.5, 0.25, 0.75, 1.0, 0.5, -0.25])
     assert message.mode & 128
