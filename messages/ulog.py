@@ -10,6 +10,7 @@ Source: ULog file format, https://docs.px4.io/main/en/dev_log/ulog_file_format.h
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from struct import Struct, calcsize, pack
 from typing import Final
@@ -83,16 +84,6 @@ class Field:
         return 1 if self.type == "char" else self.count or 1
 
 
-def floats(*names: str, note: str = "") -> tuple[Field, ...]:
-    """Fields of one number each, all with the same ``note``."""
-    return tuple(Field(name, "float", note=note) for name in names)
-
-
-def doubles(name: str, size: int, note: str) -> Field:
-    """A field of double precision: an array, or with ``size`` 0 a single value."""
-    return Field(name, "double", size, note)
-
-
 @dataclass(frozen=True, slots=True)
 class Topic:
     """A named record; every one begins with its time."""
@@ -116,6 +107,31 @@ class Topic:
     def codes(self) -> str:
         """How :mod:`struct` packs one record, without the byte order."""
         return "".join(field.code for field in self.all_fields)
+
+
+_USUAL: Final = {"rotor": 4, "joint": 2}  # of the paper's vehicle
+
+
+def declared(text: str) -> tuple[Topic, ...]:
+    """Topics as they are written down, much as PX4 does.
+
+    A topic begins with a line ``name | about | when``. Each line of fields is indented,
+    ``type name, name: note`` or ``type[size] name``, where a size may be ``rotor`` or ``joint``. A
+    line that is indented further goes on with the one before it.
+    """
+    topics: list[Topic] = []
+    for line in filter(None, re.sub(r"\n {4,}", " ", text).splitlines()):
+        if not line.startswith(" "):
+            name, about, when = line.split(" | ")
+            topics.append(Topic(name, about, when, ()))
+            continue
+        kind, _, rest = line.strip().partition(" ")
+        names, _, note = rest.partition(": ")
+        type_, _, size = kind.removesuffix("]").partition("[")
+        count, per = (_USUAL[size], size) if size in _USUAL else (int(size or 0), "")
+        fields = (Field(one, type_, count, note, per) for one in names.split(", "))
+        topics[-1] = replace(topics[-1], fields=(*topics[-1].fields, *fields))
+    return tuple(topics)
 
 
 def message(kind: bytes, body: bytes) -> bytes:

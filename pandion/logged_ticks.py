@@ -9,19 +9,17 @@ from typing import Any, Final
 
 from fsw.autopilot.measurements import ImuSample, Sample
 from fsw.autopilot.signals import SensorFrame, TickInputs, frame_of_samples
-from fsw.log import px4_topics, topics
+from fsw.log import topics
 from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
 from fsw.log.samples import TOPIC_NUMBERS, Samples
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
 
-_SENSORS: Final = topics.TOPICS.index(topics.SENSOR_FRAME)
-_INPUT: Final = topics.TOPICS.index(topics.TICK_INPUT)
-_TICK: Final = topics.TOPICS.index(topics.TICK)
-_OF_THE_LOOP: Final = frozenset(
-    {topics.TOPICS.index(topics.LOOP_TIMING), topics.TOPICS.index(px4_topics.CPULOAD)}
-)
+_SENSORS: Final = topics.NUMBERS["sensor_frame"]
+_INPUT: Final = topics.NUMBERS["tick_input"]
+_TICK: Final = topics.NUMBERS["tick"]
+_OF_THE_LOOP: Final = frozenset({topics.NUMBERS["loop_timing"], topics.NUMBERS["cpuload"]})
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ def counts(log: UlogFile) -> tuple[int, int]:
     Raises:
         KeyError: The log does not say.
     """
-    sizes = {one.name: one.count for one in log.formats[topics.ACTUATOR_COMMAND.name].fields}
+    sizes = {one.name: one.count for one in log.formats["actuator_command"].fields}
     return sizes["rotor_thrust"], sizes["joint_torque"]
 
 
@@ -137,8 +135,8 @@ class _Inputs:
         self._imu: ImuSample | None = None  # the last one
         joints = counts(log)[1]
         self._samples, self._joints = Samples(joints), joints
-        self._sensors = unpacker(topics.SENSOR_FRAME.sized(joint=joints))
-        self._input = unpacker(topics.TICK_INPUT)
+        self._sensors = unpacker(topics.BY_NAME["sensor_frame"].sized(joint=joints))
+        self._input = unpacker(topics.BY_NAME["tick_input"])
 
     def tick(self, index: int, records: list[Record]) -> LoggedTick:
         if index == 0:

@@ -8,6 +8,7 @@ each would cost more than the numbers in them.
 from __future__ import annotations
 
 import math
+from functools import partial
 from operator import attrgetter, is_not
 from typing import Any, Final
 
@@ -45,7 +46,7 @@ from fsw.log.json_codec import JsonCodec
 from fsw.log.packed import Every, Packed
 from fsw.log.px4_records import Px4Records, validity
 from fsw.log.samples import Samples
-from messages.ulog import Topic, logged_text
+from messages.ulog import logged_text
 
 TYPED: Final = "sensors"  # the inputs that have topics of their own
 SAMPLES: Final = "samples"
@@ -73,45 +74,39 @@ _TOLD: Final = attrgetter("failsafe_from", "mode", "armed", "landed", "failures"
 _PLAN: Final = attrgetter("plan", "counters", "plan_status")
 
 # What tools look at the spectrum of.
-_RATES: Final = Packed(topics.VEHICLE_ANGULAR_VELOCITY)
-_PLANNING: Final = Packed(topics.BARRIER_MARGIN, topics.END_EFFECTOR)
-_MPC: Final = Packed(topics.MPC_STATUS)
-_CONTACT: Final = Packed(topics.TOOL_CONTACT)
-_PAYLOAD: Final = Packed(topics.PAYLOAD)
-_ASKED: Final = Packed(topics.VEHICLE_COMMAND)
-_ANSWERED: Final = Packed(topics.VEHICLE_COMMAND_ACK)
-_INPUT: Final = Packed(topics.TICK_INPUT)
-_TIMING: Final = Packed(topics.LOOP_TIMING)
-_ESTIMATOR: Final = Packed(
-    topics.ESTIMATOR_STATUS, topics.ESTIMATOR_INNOVATIONS, topics.ESTIMATOR_SENSOR_BIAS
-)
+_RATES: Final = Packed("vehicle_angular_velocity")
+_PLANNING: Final = Packed("barrier_margin", "end_effector")
+_MPC: Final = Packed("mpc_status")
+_CONTACT: Final = Packed("tool_contact")
+_PAYLOAD: Final = Packed("payload")
+_ASKED: Final = Packed("vehicle_command")
+_ANSWERED: Final = Packed("vehicle_command_ack")
+_INPUT: Final = Packed("tick_input")
+_TIMING: Final = Packed("loop_timing")
+_ESTIMATOR: Final = Packed("estimator_status", "estimator_innovations", "estimator_sensor_bias")
 
 
 class _Layout:
     """Records that are as long as a vehicle has joints and rotors."""
 
     def __init__(self, rotors: int, joints: int) -> None:
-        def packed(*members: Topic) -> Packed:
-            return Packed(*(topic.sized(rotor=rotors, joint=joints) for topic in members))
-
+        packed = partial(Packed, rotor=rotors, joint=joints)
         self.samples = Samples(joints)
         # What a replay needs and what it is compared by: every tick in every profile.
-        self.short_tick = packed(topics.TICK, topics.ACTUATOR_COMMAND)
-        self.whole_tick = packed(topics.SENSOR_FRAME, topics.ACTUATOR_COMMAND)
+        self.short_tick = packed("tick", "actuator_command")
+        self.whole_tick = packed("sensor_frame", "actuator_command")
         # What follows from that, for reading.
         self.detail = packed(
-            topics.VEHICLE_ATTITUDE,
-            topics.VEHICLE_LOCAL_POSITION,
-            topics.ACTUATOR_MOTORS,
-            topics.ARM_JOINT_STATE,
+            "vehicle_attitude",
+            "vehicle_local_position",
+            "actuator_motors",
+            "arm_joint_state",
         )
         self.in_flight = packed(
-            topics.VEHICLE_LOCAL_POSITION_SETPOINT, topics.ARM_JOINT_SETPOINT, topics.PLAN_INPUT
+            "vehicle_local_position_setpoint", "arm_joint_setpoint", "plan_input"
         )
-        self.request = packed(topics.MPC_REQUEST)
-        self.status = packed(
-            topics.VEHICLE_STATUS, topics.VEHICLE_LAND_DETECTED, topics.FAILURE_DETECTOR_STATUS
-        )
+        self.request = packed("mpc_request")
+        self.status = packed("vehicle_status", "vehicle_land_detected", "failure_detector_status")
 
 
 class LogEncoder:

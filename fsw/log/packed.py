@@ -9,7 +9,7 @@ from struct import Struct
 from typing import Any, Final
 
 from fsw.log import topics
-from messages.ulog import Topic, data_head
+from messages.ulog import data_head
 
 _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 
@@ -17,7 +17,9 @@ _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 class Packed:
     """Records of some topics of one instant."""
 
-    def __init__(self, *members: Topic) -> None:
+    def __init__(self, *names: str, **counts: int) -> None:
+        """Take topics by their names, of a vehicle with so many of each ``rotor`` and ``joint``."""
+        members = [topics.BY_NAME[name].sized(**counts) for name in names]
         self._struct = Struct("<" + "".join("5s" + topic.codes for topic in members))
         self._heads = tuple(data_head(topics.NUMBERS[topic.name], topic) for topic in members)
 

@@ -1,4 +1,4 @@
-"""Records of the topics that PX4's tools draw, each at its own rate; see ``px4_topics``."""
+"""Records of the topics that PX4's tools draw, each at its own rate."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ from fsw.autopilot.signals import (
     Vec3,
     Vec4,
 )
-from fsw.log import px4_topics as topics
 from fsw.log.packed import Every, Packed
 
 _TORQUE_US: Final = 10_000
@@ -46,13 +45,13 @@ _POSITION_LOST: Final = frozenset(
 _ATTITUDE_LOST: Final = frozenset({Condition.ESTIMATE_INVALID.value, Condition.ATTITUDE_LOST.value})
 _ROTOR: Final = frozenset({Condition.ROTOR_LOST.value, Condition.ROTOR_FAILED.value})
 
-_TORQUE: Final = Packed(topics.VEHICLE_TORQUE_SETPOINT)
-_THRUST: Final = Packed(topics.VEHICLE_THRUST_SETPOINT)
-_ATTITUDE: Final = Packed(topics.VEHICLE_ATTITUDE_SETPOINT, topics.VEHICLE_RATES_SETPOINT)
-_PLACE: Final = Packed(topics.VEHICLE_GLOBAL_POSITION, topics.VEHICLE_GPS_POSITION)
-_SLOW: Final = Packed(topics.BATTERY_STATUS, topics.VEHICLE_IMU_STATUS)
-_FLAGS: Final = Packed(topics.FAILSAFE_FLAGS)
-_LOAD: Final = Packed(topics.CPULOAD)
+_TORQUE: Final = Packed("vehicle_torque_setpoint")
+_THRUST: Final = Packed("vehicle_thrust_setpoint")
+_ATTITUDE: Final = Packed("vehicle_attitude_setpoint", "vehicle_rates_setpoint")
+_PLACE: Final = Packed("vehicle_global_position", "vehicle_gps_position")
+_SLOW: Final = Packed("battery_status", "vehicle_imu_status")
+_FLAGS: Final = Packed("failsafe_flags")
+_LOAD: Final = Packed("cpuload")
 
 
 class Px4Records:

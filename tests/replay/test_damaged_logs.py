@@ -12,7 +12,7 @@ import pytest
 
 from fsw.autopilot.signals import TickInputs
 from fsw.log.json_codec import JsonCodec
-from fsw.log.topics import SENSOR_FRAME, TOPICS
+from fsw.log.topics import BY_NAME, NUMBERS
 from messages import ulog
 from messages.ulog_reader import open_log
 from pandion import export, replay
@@ -20,7 +20,7 @@ from tests.cli.command import one_sentence
 from tests.replay.recorded import flight, written
 
 SECONDS = 0.12
-SENSORS = ulog.data_head(TOPICS.index(SENSOR_FRAME), SENSOR_FRAME)
+SENSORS = ulog.data_head(NUMBERS["sensor_frame"], BY_NAME["sensor_frame"])
 COMMANDS: dict[str, Callable[[Path], int]] = {
     "verify": lambda log: replay.main([str(log), "--verify", "--json", str(log.parent / "j")]),
     "show": lambda log: replay.main([str(log)]),
@@ -113,7 +113,7 @@ def test_a_log_cut_between_two_records_is_compared_up_to_its_last_whole_tick(
     attempt.log.write_bytes(whole)
     log = open_log(attempt.log)
     ends = [(log.at, record) for record in log.records()]
-    starts = [k for k, (_, r) in enumerate(ends) if r.number == TOPICS.index(SENSOR_FRAME)]
+    starts = [k for k, (_, r) in enumerate(ends) if r.number == NUMBERS["sensor_frame"]]
     ticks = len(starts)
     for k in range(starts[-2], len(ends)):
         assert attempt(whole[: ends[k][0]]) == 0

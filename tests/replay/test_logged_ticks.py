@@ -71,8 +71,8 @@ def test_each_input_is_missed_if_it_is_not_recorded(tmp_path: Path) -> None:
 
 def test_the_topic_of_the_sensors_has_every_field_of_theirs() -> None:
     fields = {field.name for field in dataclasses.fields(SensorFrame)}
-    assert {field.name for field in topics.SENSOR_FRAME.fields} == fields - {"t_us"}
-    assert {field.type for field in topics.SENSOR_FRAME.fields} == {"double"}
+    assert {field.name for field in topics.BY_NAME["sensor_frame"].fields} == fields - {"t_us"}
+    assert {field.type for field in topics.BY_NAME["sensor_frame"].fields} == {"double"}
     assert typing.get_type_hints(TickInputs)[TYPED] is SensorFrame
 
 

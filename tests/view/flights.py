@@ -16,8 +16,7 @@ from fsw.autopilot.tuning import flat
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
 from messages import ulog
-from messages.ground_truth import FIRST_NUMBER, SIM_GROUND_TRUTH, SIM_TRACKING, TRUTH_TOPICS
-from messages.ulog import Topic
+from messages.ground_truth import FIRST_NUMBER, TRUTH_TOPICS
 from sitl.scenario_file import scenario_digest
 
 SECONDS = 4
@@ -30,6 +29,7 @@ OFFSET_M = (0.001, -0.002, 0.0005)  # of the estimate
 CYCLES_US = (400.0, 900.0, 300.0, 2000.0)
 BALL = Zone(ball((0.3, 0.8, -1.5), 0.05), 0.1)
 TEXT = 'it\'s "</script><b>wet</b>"'
+BY_NAME = {topic.name: topic for topic in (*topics.TOPICS, *TRUTH_TOPICS)}
 NUMBERS = {topic.name: k for k, topic in enumerate(topics.TOPICS)} | {
     topic.name: FIRST_NUMBER + k for k, topic in enumerate(TRUTH_TOPICS)
 }
@@ -40,9 +40,10 @@ def north(t: float) -> float:
     return 0.85 - 0.1 * abs(t - 3.0)
 
 
-def record(topic: Topic, t_s: float, *values: Any) -> bytes:
+def record(name: str, t_s: float, *values: Any) -> bytes:
     """One record; fields at its end that nothing here looks at are 0."""
-    head = ulog.data_head(NUMBERS[topic.name], topic)
+    topic = BY_NAME[name]
+    head = ulog.data_head(NUMBERS[name], topic)
     rest = (0,) * (sum(field.values for field in topic.fields) - len(values))
     return head + struct.pack("<" + topic.codes, BEGIN_US + round(1e6 * t_s), *values, *rest)
 
@@ -84,10 +85,9 @@ def _definitions() -> bytes:
         "numbers": json.dumps(flat(flight_config(body="points"))),
     }  # fmt: skip
     parts = [ulog.opening(BEGIN_US), *(ulog.information(*fact) for fact in facts.items())]
-    parts += [ulog.format_of(topic) for topic in (*topics.TOPICS, *TRUTH_TOPICS)]
+    parts += [ulog.format_of(topic) for topic in BY_NAME.values()]
     parts.append(ulog.parameter("PLN_TILT_MAX", 17.0))
-    named = {topic.name: topic for topic in (*topics.TOPICS, *TRUTH_TOPICS)}
-    parts += [ulog.subscription(number, named[name]) for name, number in NUMBERS.items()]
+    parts += [ulog.subscription(number, BY_NAME[name]) for name, number in NUMBERS.items()]
     return b"".join(parts)
 
 
@@ -96,7 +96,7 @@ def _records(seconds: int) -> list[bytes]:
         _status(0.0, b"hold", b""), _status(0.5, b"trajectory", b""),
         ulog.logged_text(3, BEGIN_US + 2_500_000, TEXT),
         _status(2.75, b"trajectory", b"no plan"), _status(3.5, b"trajectory", b""),
-        record(topics.VEHICLE_COMMAND_ACK, 0.5, 176, 0, 255, 190),
+        record("vehicle_command_ack", 0.5, 176, 0, 255, 190),
     ]  # fmt: skip
     found += _announced(0.0, (wall((-1.0, 0.0, 0.0), -1.0, 0.1), BALL))
     found += [_actuators(0.002 * k) for k in range(500 * seconds)]
@@ -114,19 +114,19 @@ def _announced(t: float, zones: tuple[Zone, ...]) -> list[bytes]:
     size = topics.TEXT_SIZE
     pieces = [text[at : at + size] for at in range(0, len(text), size)]
     return [
-        record(topics.TICK_INPUT, t, b"announced", k, len(pieces), piece)
+        record("tick_input", t, b"announced", k, len(pieces), piece)
         for k, piece in enumerate(pieces)
     ]
 
 
 def _status(t: float, mode: bytes, faults: bytes) -> bytes:
-    return record(topics.VEHICLE_STATUS, t, 2, 4, bool(faults), mode, faults)
+    return record("vehicle_status", t, 2, 4, bool(faults), mode, faults)
 
 
 def _actuators(t: float) -> bytes:
     first = SPIKE_N if abs(t - SPIKE_S) < 1e-6 else 8.0 + 0.5 * math.sin(9.0 * t)
     thrusts = (first, 8.1, 8.2, 8.3)
-    return record(topics.ACTUATOR_COMMAND, t, *thrusts, 0.1, -0.1, True)
+    return record("actuator_command", t, *thrusts, 0.1, -0.1, True)
 
 
 def _fast(t: float) -> list[bytes]:
@@ -135,12 +135,12 @@ def _fast(t: float) -> list[bytes]:
     still = (0.0, 0.0, 0.0)
     own = [a + b for a, b in zip(p, OFFSET_M, strict=True)]
     return [
-        record(SIM_GROUND_TRUTH, t, *p, *still, *level, *still, *(8.0,) * 4, 0.0, 0.0, 0.0, 0.0),
-        record(topics.VEHICLE_LOCAL_POSITION, t, *own, *still, 0.0),
-        record(topics.VEHICLE_ATTITUDE, t, *level),
-        record(topics.ARM_JOINT_STATE, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        record(topics.PLAN_INPUT, t, 0.1, 0.0, 0.0, 0.0),
-        record(topics.ARM_JOINT_SETPOINT, t, 0.0, 0.0, 0.0, 0.0, 0.5, -0.5),
+        record("sim_ground_truth", t, *p, *still, *level, *still, *(8.0,) * 4, 0.0, 0.0, 0.0, 0.0),
+        record("vehicle_local_position", t, *own, *still, 0.0),
+        record("vehicle_attitude", t, *level),
+        record("arm_joint_state", t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        record("plan_input", t, 0.1, 0.0, 0.0, 0.0),
+        record("arm_joint_setpoint", t, 0.0, 0.0, 0.0, 0.0, 0.5, -0.5),
     ]
 
 
@@ -150,14 +150,14 @@ def _slow(t: float, k: int) -> list[bytes]:
     reached = [a + b for a, b in zip(target, ERROR_M, strict=True)]
     took = CYCLES_US[k % len(CYCLES_US)]
     found = [
-        record(SIM_TRACKING, t, *reached, *target),
-        record(topics.BARRIER_MARGIN, t, *own, *own, 0.2, 1, 3, 0, 0, 0, 0, *own, 0.0),
-        record(topics.MPC_STATUS, t, BEGIN_US, k, k, 0, 0, 1.0, 0.0, 1.0, 1.0, took, 2, k % 5, 0),
-        record(topics.ESTIMATOR_STATUS, t, 0.002, 0.001, *(0.5,) * 5, 0.01, 0.01, 0.0, 0.0, 0,
+        record("sim_tracking", t, *reached, *target),
+        record("barrier_margin", t, *own, *own, 0.2, 1, 3, 0, 0, 0, 0, *own, 0.0),
+        record("mpc_status", t, BEGIN_US, k, k, 0, 0, 1.0, 0.0, 1.0, 1.0, took, 2, k % 5, 0),
+        record("estimator_status", t, 0.002, 0.001, *(0.5,) * 5, 0.01, 0.01, 0.0, 0.0, 0,
                0, b""),
     ]  # fmt: skip
     if k % 10 == 0:
         for group in range(4):
-            found.append(record(topics.LOOP_TIMING, t, 500, 0, 0, 2000, 80.0, 90.0, 120.0,
+            found.append(record("loop_timing", t, 500, 0, 0, 2000, 80.0, 90.0, 120.0,
                                 10.0, 20.0, 30.0, group))  # fmt: skip
     return found

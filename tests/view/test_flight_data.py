@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 from messages import ulog
-from messages.ulog import Field, Topic, doubles
+from messages.ulog import Topic
 from view.flight_data import UlogError, read_flight
 
-PLACE = Topic("place", "", "", (doubles("p", 3, "m"), Field("mode", "char", 8)))
-INPUT = Topic(
-    "tick_input",
-    "",
-    "",
-    (Field("field", "char", 24), Field("part", "uint16_t"), Field("parts", "uint16_t"),
-     Field("text", "char", 4)),
-)  # fmt: skip
+PLACE, INPUT = ulog.declared("""
+place | - | -
+  double[3] p: m
+  char[8] mode
+
+tick_input | - | -
+  char[24] field
+  uint16_t part, parts
+  char[4] text
+""")
 
 
 def record(number: int, topic: Topic, *values: object) -> bytes:
