@@ -19,7 +19,7 @@ from command_line.process import StopRequest
 from fsw.runtime.clock import now_us
 from fsw.runtime.rate_groups import INNER
 from fsw.runtime.realtime import claim_real_time
-from fsw.runtime.release_schedule import ReleaseSchedule
+from fsw.runtime.releases import ReleaseSchedule
 
 _PRIORITY: Final = 60  # SCHED_FIFO; the tick has 50
 # Waking costs a virtual machine 30 us, and at twice the rate the tick's median grew by process. Not

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from command_line.output import json_text, try_write
 from command_line.process import (
@@ -33,14 +33,13 @@ from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
-from fsw.link.px4.link import Px4Link
-from fsw.link.px4.open import open_px4, px4_addresses
+from fsw.link.px4.link import Px4Link, open_px4, px4_addresses
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import SimLink
 from fsw.link.udp_endpoint import LinkError, parse_address
 from fsw.link.vehicle_link import Pacing, VehicleLink
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext
 from fsw.log.flight_log import LogSubject, vehicle_facts
 from fsw.log.run_files import RunFiles
 from fsw.runtime import clock, report
@@ -64,7 +63,7 @@ DONE: Final = 0  # exit code
 
 NO_PERMISSION = "no permission for {}: ticks may be late on a busy machine"
 
-ProgramLoader = Callable[[FswOptions], FlightProgram[Any]]
+ProgramLoader = Callable[[FswOptions], FlightProgram]
 
 
 def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
@@ -160,7 +159,7 @@ class _Session:
             self._events.report("unwritten", f"fsw: cannot write {what}", what=what)
         return DONE if end.ending is Ending.SHUTDOWN and not lost else NOT_COMPLETED
 
-    def _files(self, directory: Path, start_us: int, program: FlightProgram[Any]) -> RunFiles:
+    def _files(self, directory: Path, start_us: int, program: FlightProgram) -> RunFiles:
         """Create the logs.
 
         Raises:
@@ -174,7 +173,7 @@ class _Session:
     def _warn(self, sentence: str) -> None:
         self._events.report("warning", f"fsw: {sentence}")
 
-    def _services(self, program: FlightProgram[Any], logs: FlightLogs) -> tuple[LinkService, ...]:
+    def _services(self, program: FlightProgram, logs: FlightLogs) -> tuple[LinkService, ...]:
         """What one link serves; called once a link."""
         # Its table of parameters knows all that flies, as the program does.
         from fsw.link.services.parameter_service import ParameterService
@@ -212,7 +211,7 @@ class _Session:
             self._events.report("warning", f"fsw: {path}, {complaint}")
         return keeping
 
-    def _restore_parameters(self, keeping: ParameterFile, program: FlightProgram[Any]) -> None:
+    def _restore_parameters(self, keeping: ParameterFile, program: FlightProgram) -> None:
         """Let the program take them over.
 
         Raises:
@@ -227,7 +226,7 @@ class _Session:
 
     def _fly(
         self,
-        loop: FlightLoop[Any],
+        loop: FlightLoop,
         vehicle: VehicleLink,
         inline: PlanningCycle,
         planner: ProcessPlanner,
@@ -260,7 +259,7 @@ class _Session:
             release_real_time()
 
 
-def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[Any]:
+def load_flight_software(options: FswOptions, events: Events) -> FlightProgram:
     """Build and warm up the flight software; compiling takes long and is reported.
 
     Raises:
@@ -271,7 +270,7 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[A
     from fsw.runtime.assembly import flight_software
     from vehicles.vehicle_file import load_vehicle
 
-    def load() -> FlightProgram[Any]:
+    def load() -> FlightProgram:
         return flight_software(
             options.flown,
             origin=options.links.origin,
@@ -294,7 +293,7 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram[A
         raise CouldNotStart(str(error)) from None
 
 
-def _subject(options: FswOptions, program: FlightProgram[Any]) -> LogSubject:
+def _subject(options: FswOptions, program: FlightProgram) -> LogSubject:
     """What the flight log says about the flight."""
     from vehicles.vehicle_file import load_vehicle
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from command_line.bounded_json import JsonError, json_numbers
 from fsw.autopilot.model.airframe import Airframe
@@ -52,7 +51,7 @@ class Replayed:
         return self.difference is None and not self.lost_ms
 
 
-def replay(log: UlogFile, program: FlightProgram[Any], progress: Progress) -> Replayed:
+def replay(log: UlogFile, program: FlightProgram, progress: Progress) -> Replayed:
     """Compare a log with the outputs of a program for its inputs, up to the first difference.
 
     Raises:
@@ -107,7 +106,7 @@ def logged_numbers(log: UlogFile) -> dict[str, float]:
 
 
 def _difference(
-    logged: LoggedTick, tick: TickRunner[Any], encoder: LogEncoder, airframe: Airframe
+    logged: LoggedTick, tick: TickRunner, encoder: LogEncoder, airframe: Airframe
 ) -> Difference | None:
     out = bytearray()
     try:
@@ -170,7 +169,7 @@ def _text_of(record: Record) -> str:
     return "" if text is None else text[2]
 
 
-def other_numbers(log: UlogFile, program: FlightProgram[Any]) -> tuple[str, ...]:
+def other_numbers(log: UlogFile, program: FlightProgram) -> tuple[str, ...]:
     """Differences between the configuration of the program and the logged one."""
     logged = logged_numbers(log)
     here = program.numbers

@@ -18,8 +18,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig, above_px4, flig
 from fsw.autopilot.parameters.registry import PARAMETERS
 from fsw.autopilot.signals import ActuatorCommand, Arm, Mode, SensorFrame, TickOutputs
 from fsw.link.inbox import Inbox
-from fsw.link.px4.link import PX4_PORT, Px4Link
-from fsw.link.px4.open import Px4Addresses, open_px4
+from fsw.link.px4.link import PX4_PORT, Px4Addresses, Px4Link, open_px4
 from fsw.runtime import clock
 from messages.addresses import LinkAddress
 from pandion.param_vehicle import NoAnswer, ParameterClient, ParameterRefused

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from command_line.options import json_file, option, read, switch
 from command_line.output import console_beside, json_text, listed, print_error, say, write_text
@@ -84,7 +84,7 @@ def _note(notes: Sequence[str], what: str, console: TextIO) -> None:
         say(f"note: {len(notes) - _NOTES_SHOWN} more {what} differ", console)
 
 
-def _program(log: UlogFile) -> FlightProgram[Any]:
+def _program(log: UlogFile) -> FlightProgram:
     """The flight software of this build, configured by the names in the log."""
     from fsw.autopilot.parameters.control_choice import choice_of
     from fsw.runtime.assembly import flight_software

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from ctypes import c_float
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from fsw.autopilot.parameters.control_choice import choice_of
 from fsw.autopilot.parameters.registry import PARAMETERS
@@ -25,7 +25,7 @@ _NAME: Final = "vehicle"  # information on which nothing else in a log depends
 
 
 def compare_definitions(
-    log: UlogFile, program: FlightProgram[Any], found: Replayed
+    log: UlogFile, program: FlightProgram, found: Replayed
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What a replayed log says otherwise than its numbers, choice and ticks; what is not compared.
 
@@ -54,7 +54,7 @@ def compare_definitions(
     return tuple(notes), (*others, *not_of_ticks(log))
 
 
-def _subject(log: UlogFile, program: FlightProgram[Any], first: TickInputs) -> LogSubject:
+def _subject(log: UlogFile, program: FlightProgram, first: TickInputs) -> LogSubject:
     """What the log must have been begun with, to have these numbers and inputs of its first tick.
 
     A vehicle's parameters that are not as configured are tuned by its first tick.

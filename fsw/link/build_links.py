@@ -7,19 +7,18 @@ from typing import Final
 
 from command_line.folders import NoHomeError, state_folder
 from fsw.autopilot.ports import Clock
-from fsw.link.bounded_record import RecordFrame
+from fsw.link.bounded_memory import RecordFrame, SentFrames
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice, addresses
-from fsw.link.sent_frames import SentFrames
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile, NoKeyFile
 from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext
 
 _GCS_PORT: Final = 18570  # of our own, as PX4 has it, if they are free
 _API_PORT: Final = 14580

@@ -19,14 +19,12 @@ from fsw.autopilot.signals import (
     TickOutputs,
 )
 from fsw.link.arrivals import Arrivals
-from fsw.link.bounded_memory import renew
-from fsw.link.bounded_record import BoundedRecord, RecordFrame
+from fsw.link.bounded_memory import BoundedRecord, RecordFrame, SentFrames, renew
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.line_budget import TELEMETRY, LineBudget
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
-from fsw.link.sent_frames import SentFrames
 from fsw.link.services.service import Dispatch, LinkService
 from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
@@ -34,7 +32,7 @@ from fsw.link.telemetry.stream_rates import StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.encode_standard import command_ack
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext
 from messages import dialect, message_ids
 from messages.addresses import Address, LinkAddress
 from messages.frames import Frame, Losses, as_version_1, is_version_1

@@ -10,7 +10,7 @@ from command_line.options import option, switch
 from command_line.values import one_of, place
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN
 from fsw.autopilot.signals import Origin
-from fsw.link.wire.telemetry_context import GENERIC, PX4
+from fsw.link.wire.outgoing import GENERIC, PX4
 from messages.addresses import LinkAddress, LinkError, SerialLine, parse_link_address
 
 NO_LINK: Final = "none"

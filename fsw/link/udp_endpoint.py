@@ -25,7 +25,7 @@ def is_loopback(address: Address) -> bool:
 
 
 class OpenEndpoint:
-    """A socket that talks to anyone and never waits; ``stream_endpoint`` has what it has."""
+    """A socket that talks to anyone and never waits; ``StreamEndpoint`` has what it has."""
 
     bytes_per_s: Final = None  # not known of a network
     cut = staticmethod(cut)  # no state between datagrams

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Any, cast
+from typing import cast
 
 from fsw.autopilot.control.cascade import Inner
 from fsw.autopilot.flight.state import first_state
@@ -30,7 +30,7 @@ def flight_software(
     vehicle: Vehicle | None = None,
     to_plan: bool = True,
     px4: Tuning = (),
-) -> FlightProgram[Any]:
+) -> FlightProgram:
     """Build the program and, unless ``to_plan`` is False, compile it: a minute the first time.
 
     For a ``vehicle``; without one, the paper's. Above PX4, ``px4`` is what is known of its loops

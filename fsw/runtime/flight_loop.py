@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Final, Generic
+from typing import Final
 
 from command_line.process import StopRequest
 from fsw.autopilot.control.control_metrics import ControlMetrics
@@ -41,9 +41,8 @@ from fsw.log.run_files import RunFiles
 from fsw.runtime.clock import unix_us
 from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.host_watch import HostWatch
-from fsw.runtime.link_watchdog import LinkWatchdog
 from fsw.runtime.planner_service import PlannerRecord
-from fsw.runtime.program import FlightProgram, State
+from fsw.runtime.program import FlightProgram
 from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
 from fsw.runtime.realtime import rank_threads
 from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
@@ -61,16 +60,14 @@ def to_route(commands: tuple[Command, ...], acks: tuple[CommandAck, ...]) -> lis
     understood: MAVLink leaves a parameter out as NaN.
     """
     return [
-        replace(command.request, params=_understood(command.action))
+        replace(
+            command.request,
+            params=(float(asked.unit), float(asked.kind), float(asked.instance), *(0.0,) * 4),
+        )
         for command, ack in zip(commands, acks, strict=False)
-        if ack.result == CommandResult.IN_PROGRESS and isinstance(command.action, InjectFailure)
+        if isinstance(asked := command.action, InjectFailure)
+        and ack.result == CommandResult.IN_PROGRESS
     ]
-
-
-def _understood(
-    asked: InjectFailure,
-) -> tuple[float, float, float, float, float, float, float]:
-    return float(asked.unit), float(asked.kind), float(asked.instance), 0.0, 0.0, 0.0, 0.0
 
 
 class Ending(enum.Enum):
@@ -130,12 +127,37 @@ class Cycle:
     outputs: TickOutputs = field(init=False)  # from TICK on; whole from CONCLUDE on
 
 
-class FlightLoop(Generic[State]):
+# A release waits for less; longer gaps mean this process was suspended. After a suspension of the
+# whole machine the simulator goes on as well, so such a gap must not end the flight.
+_LONGEST_GAP_US: Final = 250_000
+
+
+class LinkWatchdog:
+    """How long the simulator has been silent: the time between checks without a frame."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._checked_us = clock()
+        self._silent_us = 0
+
+    def reset(self, now_us: int) -> None:
+        """Start again: a frame arrived at ``now_us`` [us, monotonic]."""
+        self._checked_us, self._silent_us = now_us, 0
+
+    def check(self) -> int:
+        """Time without a frame up to now [us]; a gap between checks counts 0.25 s at most."""
+        now_us = self._clock()
+        self._silent_us += min(now_us - self._checked_us, _LONGEST_GAP_US)
+        self._checked_us = now_us
+        return self._silent_us
+
+
+class FlightLoop:
     """Walks the table of rate groups on every release."""
 
     def __init__(
         self,
-        program: FlightProgram[State],
+        program: FlightProgram,
         vehicle: VehicleLink,
         ground: GroundLinks,
         inbox: Inbox,

@@ -6,12 +6,13 @@ and a replay repeats it. Numbers are rounded, so that there is news only where s
 
 from __future__ import annotations
 
-from typing import Final, Protocol
+from typing import Final
 
 from fsw.autopilot.flight.failsafe.evidence import JUMP_US, MISSED_TICKS
 from fsw.autopilot.ports import Clock
 from fsw.autopilot.signals import HostHealth
 from fsw.link.ground_links import GroundLinks
+from fsw.log.run_files import RunFiles
 
 _FEW: Final = 100  # datagrams/s; fewer are not worth a number
 _ENOUGH_S: Final = 60.0  # for which a disk should take the log
@@ -19,27 +20,12 @@ _STEP_S: Final = 5.0
 _MIN_RATE: Final = 1e5  # bytes/s of a log that has only begun
 
 
-class Disk(Protocol):
-    """The files of a flight, as far as their health matters."""
-
-    def failure(self) -> str:
-        """What is wrong with them now."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """Bytes written."""
-        ...
-
-    def room(self) -> int:
-        """Bytes that the disk will take."""
-        ...
-
-
 class HostWatch:
     """Looks at one machine; ``look`` is called once a second of the vehicle's time."""
 
-    def __init__(self, disk: Disk, ground: GroundLinks, clock: Clock, wall_clock: Clock) -> None:
+    def __init__(
+        self, disk: RunFiles, ground: GroundLinks, clock: Clock, wall_clock: Clock
+    ) -> None:
         self._disk = disk
         self._ground = ground
         self._clock = clock

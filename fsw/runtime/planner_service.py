@@ -18,12 +18,12 @@ from fsw.autopilot.ports import Clock, PlanningCycle
 from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest
 from fsw.runtime.planner_process import (
     Answer,
+    PeerGone,
     WorkerExited,
     WorkerStarted,
     answer,
     start_fork_server,
 )
-from fsw.runtime.process_link import PeerGone
 from fsw.runtime.timing import GroupTimer
 
 # The limit of a solve in wall time: a planner process that is silent for longer is replaced.

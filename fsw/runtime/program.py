@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeAlias
 
 from fsw.autopilot.ports import PlanningCycle, VehicleFacts
 from fsw.autopilot.signals import TickInputs, TickOutputs
@@ -12,35 +12,25 @@ from fsw.link.events.event_log import EventLog
 from fsw.link.services.mission_store import MissionStore
 
 if TYPE_CHECKING:
-    # Its table of parameters imports everything that flies; a refusal need not wait for that.
+    # They import everything that flies; a refusal need not wait for that.
+    from fsw.autopilot.flight.autopilot import Controlled
+    from fsw.autopilot.flight.state import FlightState
     from fsw.storage.parameter_store import ParameterStore
 
-State = TypeVar("State")
-
-
-class Answered(Protocol):
-    """A tick whose command is decided."""
-
-    @property
-    def outputs(self) -> TickOutputs:
-        """What the actuators get, and what goes out with it."""
-        ...
-
-
-Control = Callable[[State, TickInputs], Answered]
+Control: TypeAlias = "Callable[[FlightState, TickInputs], Controlled]"
 """A tick from a state and its inputs up to its answer."""
-Conclude = Callable[[Any], tuple[State, TickOutputs]]
+Conclude: TypeAlias = "Callable[[Controlled], tuple[FlightState, TickOutputs]]"
 """The rest of that tick: the next state, and everything the tick says."""
 
 
 @dataclass(frozen=True, slots=True)
-class FlightProgram(Generic[State]):
+class FlightProgram:
     """Everything that is pure, with its stores; the loop adds time, links and logs."""
 
     facts: VehicleFacts
-    first_state: State
-    control: Control[State]
-    conclude: Conclude[State]
+    first_state: FlightState
+    control: Control
+    conclude: Conclude
     planner: PlanningCycle
     parameters: ParameterStore
     missions: MissionStore

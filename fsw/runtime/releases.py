@@ -8,6 +8,7 @@ until a frame arrives; without commands the motor controllers level the vehicle 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -18,7 +19,6 @@ from fsw.autopilot.signals import SensorFrame
 from fsw.frozen import dataclass
 from fsw.link.vehicle_link import VehicleLink
 from fsw.runtime.deadline_monitor import DeadlineMonitor
-from fsw.runtime.release_schedule import ReleaseSchedule
 
 MAX_STALE_TICKS: Final = 10_000 // TICK_US  # as long as an estimate may be missing
 LEAD_US: Final = 600  # frames arrive so much before their tick, and may be so much late
@@ -30,6 +30,37 @@ _PROBE_US: Final = LEAD_US + 300  # before the release
 _MAX_SHIFT_US: Final = 25.0  # a measurement; 500 us/s is more than clocks differ
 _GAIN: Final = 0.25
 _REMATCH_FRAMES: Final = 3  # in a row behind or ahead of their release, until it is another's
+
+
+@dataclasses.dataclass(slots=True)
+class ReleaseSchedule:
+    """Releases at ``start + k * period``. Missed ones are skipped; the others do not move."""
+
+    start_us: float  # of release 0 [us, monotonic]
+    period_us: int
+    index: int = -1  # of the last release
+    skipped: int = 0  # releases that were never taken
+
+    def advance(self, now_us: int) -> int:
+        """Go to the next release whose period is not over at ``now_us`` [us]; returns the steps.
+
+        A release whose period is not over yet is still taken, late; one whose period is over is
+        skipped. If the clock jumps back, the next release is waited for, and none is repeated.
+        """
+        current = int((now_us - self.start_us) // self.period_us)
+        steps = max(current - self.index, 1)
+        self.index += steps
+        self.skipped += steps - 1
+        return steps
+
+    @property
+    def due_us(self) -> int:
+        """When the current release is or was due [us, monotonic]."""
+        return round(self.start_us + self.index * self.period_us)
+
+    def shift(self, shift_us: float) -> None:
+        """Move all coming releases by ``shift_us`` [us]: the sensors' clock differs from ours."""
+        self.start_us += shift_us
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final, Generic
+from typing import TYPE_CHECKING, Final
 
 from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.signals import Severity, StatusText, TickInputs, TickOutputs
-from fsw.runtime.program import Answered, Conclude, Control, State
+from fsw.runtime.program import Conclude, Control
+
+if TYPE_CHECKING:
+    from fsw.autopilot.flight.autopilot import Controlled
+    from fsw.autopilot.flight.state import FlightState
 
 MAX_FAILED_TICKS: Final = 10_000 // TICK_US  # as long as the estimate may be missing
 
 
-class TickRunner(Generic[State]):
+class TickRunner:
     """Keeps the state between ticks, and repeats the last command if a tick fails.
 
     A failed tick leaves the state as it was. Repeating the last command is the safest thing known
@@ -24,9 +28,9 @@ class TickRunner(Generic[State]):
 
     def __init__(
         self,
-        control: Control[State],
-        conclude: Conclude[State],
-        first_state: State,
+        control: Control,
+        conclude: Conclude,
+        first_state: FlightState,
         on_error: Callable[[], None] = traceback.print_exc,
     ) -> None:
         """Start before the first tick; a survived error calls ``on_error`` in its handler."""
@@ -34,7 +38,7 @@ class TickRunner(Generic[State]):
         self._conclude = conclude
         self._on_error = on_error
         self._state = first_state
-        self._begun: Answered | TickOutputs | None = None  # the outputs are of a tick that failed
+        self._begun: Controlled | TickOutputs | None = None  # the outputs are of a tick that failed
         self._last: TickOutputs | None = None
         self._failed = 0  # in a row
 

@@ -32,7 +32,7 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext
 from fsw.runtime.assembly import vehicle_facts
 from fsw.storage.parameter_store import ParameterStore
 from messages import dialect

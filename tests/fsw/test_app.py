@@ -43,7 +43,7 @@ def standing(state: int, inputs: TickInputs) -> tuple[int, TickOutputs]:
     return state + 1, outputs_at(inputs.sensors.t_us)
 
 
-def load(options: FswOptions) -> FlightProgram[int]:
+def load(options: FswOptions) -> FlightProgram:
     parameters = ParameterStore(FlightConfig(), lambda tuning: None)
     site = Site(lambda *place: (0.0, 0.0, 0.0), lambda: 0.1)
     return FlightProgram(FACTS, 0, *parts_of(standing), NoPlanner(), parameters, MissionStore(site))
@@ -151,7 +151,7 @@ def test_parameters_of_no_use_are_refused_before_anything_is_compiled(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def compiling(options: FswOptions) -> FlightProgram[int]:
+    def compiling(options: FswOptions) -> FlightProgram:
         raise AssertionError("it was to be refused before")
 
     make(tmp_path / "vehicle.params")

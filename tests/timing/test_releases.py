@@ -9,8 +9,13 @@ from itertools import pairwise
 import pytest
 
 from fsw.runtime.deadline_monitor import DeadlineMonitor
-from fsw.runtime.release_schedule import ReleaseSchedule
-from fsw.runtime.releases import LEAD_US, MAX_STALE_TICKS, Release, ScheduledReleases
+from fsw.runtime.releases import (
+    LEAD_US,
+    MAX_STALE_TICKS,
+    Release,
+    ReleaseSchedule,
+    ScheduledReleases,
+)
 from tests.timing.virtual_time import FIRST_US, PERIOD_US, VirtualSensors, VirtualTime, frame
 
 SETTLED = 25  # the schedule has begun by then

@@ -26,8 +26,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.events.event_table import ARGUMENTS, failsafe_event
 from fsw.link.telemetry.streams import STREAMS, messages_now
-from fsw.link.wire.outgoing import Outgoing
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, TelemetryContext
 from messages import message_ids as ids
 from messages import tlog_reader
 from messages.frames import LAYOUTS, Frame, FrameWriter, split

@@ -14,8 +14,7 @@ from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.events.event_table import event_document
 from fsw.link.files.ftp_tree import Node
 from fsw.link.files.served_file import MemoryFile
-from fsw.link.wire.outgoing import Outgoing
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, TelemetryContext
 from messages import message_ids
 
 _GENERAL: Final = "general.json"

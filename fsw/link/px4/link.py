@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 import select
-from collections.abc import Callable, Iterable
-from typing import Final, Protocol, cast
+from collections.abc import Callable
+from functools import partial
+from typing import Final, NamedTuple, cast
 
 from fsw.autopilot.ports import Clock, VehicleFacts
 from fsw.autopilot.signals import (
@@ -22,7 +23,6 @@ from fsw.autopilot.signals import (
     CommandRequest,
     CommandResult,
     Disarm,
-    JointVector,
     SensorFrame,
     Setpoint,
     Severity,
@@ -30,8 +30,9 @@ from fsw.autopilot.signals import (
     TickOutputs,
     frame_of_samples,
 )
+from fsw.link.endpoints import Endpoint, open_endpoint
 from fsw.link.inbox import Inbox
-from fsw.link.px4.arm import Joints, servo_ranges
+from fsw.link.px4.arm import ArmLink, Joints, servo_ranges
 from fsw.link.px4.clock import ASK_US, Px4Clock
 from fsw.link.px4.estimate import Px4Estimate
 from fsw.link.px4.handover import LOST_US, Handover, Px4Seen
@@ -53,6 +54,7 @@ from fsw.link.vehicle_link import Pacing
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import battery_reading
 from messages import message_ids, status_text
+from messages.addresses import Address, LinkAddress, parse_link_address
 from messages.frames import Frame, Losses
 
 _STREAMS: Final = {  # asked for, with its period [us]
@@ -74,57 +76,27 @@ _SLOW: Final = 0.5  # of the rate asked for: less is asked for again
 _SPOKEN: Final = {ARM_DISARM: "arming", SET_MODE: "its mode", SET_INTERVAL: "a stream"}
 
 
-class Endpoint(Protocol):
-    """The end of a link, as ``fsw.link.endpoints`` opens it."""
+class Px4Addresses(NamedTuple):
+    """Where PX4 is, and where the arm speaks; None: on no link of its own."""
 
-    def fileno(self) -> int:
-        """The handle, to wait for."""
-        ...
-
-    def receive_waiting(self) -> tuple[bytes, tuple[str, int]] | None:
-        """What is there, and whose it is."""
-        ...
-
-    def cut(self, data: bytes, losses: Losses) -> Iterable[tuple[Frame, bytes]]:
-        """The frames in it."""
-        ...
-
-    def send(self, datagram: bytes, peer: tuple[str, int]) -> None:
-        """Send it, if anybody is there."""
-        ...
-
-    def news(self) -> str | None:
-        """That a connection has come or gone."""
-        ...
-
-    def close(self) -> None:
-        """Give everything back."""
-        ...
+    px4: LinkAddress
+    arm: LinkAddress | None
 
 
-class AnyArm(Protocol):
-    """What the link needs of the arm's own."""
+def px4_addresses(px4: str, arm: str | None) -> Px4Addresses:
+    """Read addresses.
 
-    @property
-    def silent(self) -> bool:
-        """Whether it has said nothing for long."""
-        ...
-
-    def poll(self) -> None:
-        """Read what is there."""
-        ...
-
-    def send(self, t_us: int, outputs: TickOutputs, q: JointVector | None) -> None:
-        """Send where joints are to be [rad]; None: they are not its own to move."""
-        ...
-
-    def acknowledge(self, ack: CommandAck) -> None:
-        """Send an answer to who speaks beside the arm."""
-        ...
-
-    def close(self) -> None:
-        """Close it."""
-        ...
+    Raises:
+        LinkError: One of them is none, or PX4's is a line that is too slow for its estimate.
+    """
+    found = Px4Addresses(parse_link_address(px4), None if arm is None else parse_link_address(arm))
+    speed = None if isinstance(found.px4, tuple) else found.px4.bytes_per_s
+    if speed is not None and speed < MIN_BYTES_PER_S:
+        raise LinkError(
+            f"{px4} takes {speed} bytes/s and PX4's estimate needs {MIN_BYTES_PER_S}; "
+            "use 460800 baud or more"
+        )
+    return found
 
 
 class Px4Link:
@@ -133,11 +105,11 @@ class Px4Link:
     def __init__(
         self,
         endpoint: Endpoint,
-        peer: tuple[str, int],
+        peer: Address,
         inbox: Inbox,
         facts: VehicleFacts,
         clock: Clock,
-        arm: Callable[[Joints], AnyArm] | None = None,
+        arm: Callable[[Joints], ArmLink] | None = None,
         *,
         servos: bool = False,
         wait: Callable[[Endpoint, float], bool] | None = None,
@@ -431,3 +403,16 @@ def _wait_for(endpoint: Endpoint, wait_s: float) -> bool:
     """Wait until something has come, or looks so."""
     ready = select.select((endpoint.fileno(),), (), (), wait_s)[0]
     return bool(ready)
+
+
+def open_px4(
+    where: Px4Addresses, inbox: Inbox, facts: VehicleFacts, clock: Clock, *, servos: bool = False
+) -> Px4Link:
+    """Open the links; joints are PX4's ``servos``, without a link of the arm they are anyway.
+
+    Raises:
+        LinkError: One cannot be opened, or is too slow.
+    """
+    endpoint, peer = open_endpoint(where.px4, clock, PX4_PORT)
+    arm = None if where.arm is None else partial(ArmLink, where.arm, inbox=inbox, clock=clock)
+    return Px4Link(endpoint, peer, inbox, facts, clock, arm, servos=servos)

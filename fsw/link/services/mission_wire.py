@@ -14,8 +14,7 @@ from fsw.link.wire.mission_items import (
     BadItem,
     MissionItem,
 )
-from fsw.link.wire.outgoing import Outgoing, WireValues
-from fsw.link.wire.telemetry_context import PlanIds, TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, PlanIds, TelemetryContext, WireValues
 from messages import message_ids as ids
 
 Peer = tuple[int, int]

@@ -15,8 +15,7 @@ from fsw.link.telemetry.stream_rates import OFF, UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode
 from fsw.link.wire.encode_standard import command_ack
-from fsw.link.wire.outgoing import Outgoing
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, TelemetryContext
 from messages import message_ids
 from messages.frames import Frame
 

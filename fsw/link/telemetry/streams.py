@@ -19,8 +19,7 @@ from fsw.link.wire import (
     encode_place,
     encode_standard,
 )
-from fsw.link.wire.outgoing import Outgoing, WireValues
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, TelemetryContext, WireValues
 from messages import message_ids
 from messages.message_ids import AUTOPILOT, PANDION
 

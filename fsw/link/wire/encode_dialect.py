@@ -14,8 +14,7 @@ from typing import Final
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.signals import FlightSnapshot, JointVector, SetpointKind
 from fsw.link.wire.encode_standard import as_asked
-from fsw.link.wire.outgoing import Outgoing, WireValues
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, TelemetryContext, WireValues
 from fsw.link.wire.zone_transfer import shape_values
 from fsw.record import JOINTS, padded
 from messages import message_ids

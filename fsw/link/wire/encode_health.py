@@ -16,8 +16,7 @@ from fsw.autopilot.signals import (
     FlightSnapshot,
     SensorReport,
 )
-from fsw.link.wire.outgoing import WireValues
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext, WireValues
 
 # MAV_SYS_STATUS_SENSOR bits of what every vehicle has. The bits of the magnetometer and of the
 # receiver say whether heading and position are known, which is what clients ask them for; where

@@ -7,9 +7,8 @@ from typing import Final
 
 from command_line.version import version
 from fsw.autopilot.signals import FlightSnapshot
-from fsw.link.wire.outgoing import Outgoing, WireValues
+from fsw.link.wire.outgoing import Outgoing, TelemetryContext, WireValues
 from fsw.link.wire.px4_mode import AVAILABLE_MODES, custom_mode, shown_mode
-from fsw.link.wire.telemetry_context import TelemetryContext
 from messages import message_ids
 
 # MAV_PROTOCOL_CAPABILITY: missions in floats and integers, float parameters, encoded bytewise

@@ -13,8 +13,7 @@ from fsw.autopilot.geometry.geodesy import to_global
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
 from fsw.autopilot.signals import FlightSnapshot, SatelliteFix, Vec3
 from fsw.link.wire.encode_standard import boot_ms
-from fsw.link.wire.outgoing import WireValues
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext, WireValues
 
 _LOCAL_NED: Final = 1  # MAV_FRAME
 _BODY_FRD: Final = 12  # MAV_FRAME

@@ -22,9 +22,8 @@ from fsw.autopilot.signals import (
     TickOutputs,
     Vec3,
 )
-from fsw.link.wire.outgoing import WireValues
+from fsw.link.wire.outgoing import TelemetryContext, WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
-from fsw.link.wire.telemetry_context import TelemetryContext
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1

@@ -11,6 +11,7 @@ from typing import Any
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import Vec3
+from fsw.link.bounded_memory import SentFrames
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
@@ -19,7 +20,6 @@ from fsw.link.files.vehicle_files import vehicle_files
 from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
-from fsw.link.sent_frames import SentFrames
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService

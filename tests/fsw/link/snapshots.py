@@ -36,7 +36,7 @@ from fsw.autopilot.signals import (
     TestRatios,
     TickOutputs,
 )
-from fsw.link.wire.telemetry_context import TelemetryContext
+from fsw.link.wire.outgoing import TelemetryContext
 
 VEHICLE = replace(AIRFRAME, rotor_thrust_max=(16.0,) * 4)
 FACTS = VehicleFacts(

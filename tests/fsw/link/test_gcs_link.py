@@ -19,10 +19,10 @@ from pymavlink.dialects.v10 import common as old_protocol
 
 from fsw.autopilot.ports import LinkLosses
 from fsw.autopilot.signals import BatteryState, CommandAck, Mode, Severity, StatusText
+from fsw.link.bounded_memory import SentFrames
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
-from fsw.link.sent_frames import SentFrames
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS

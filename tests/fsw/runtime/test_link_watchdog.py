@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.runtime.link_watchdog import LinkWatchdog
+from fsw.runtime.flight_loop import LinkWatchdog
 
 
 class Clock:

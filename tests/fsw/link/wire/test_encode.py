@@ -29,7 +29,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.telemetry.streams import STREAMS, Stream
 from fsw.link.wire import encode_standard
-from fsw.link.wire.telemetry_context import GENERIC
+from fsw.link.wire.outgoing import GENERIC
 from messages import dialect, status_text
 from messages import message_ids as ids
 from messages.frames import FrameWriter

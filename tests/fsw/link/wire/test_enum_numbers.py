@@ -27,8 +27,8 @@ from fsw.link.wire import (
     encode_standard,
     fence_items,
     mission_items,
+    outgoing,
     px4_mode,
-    telemetry_context,
 )
 from messages import dialect, message_ids
 from sitl.link import decode as sitl_decode
@@ -187,8 +187,8 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (mission_items, "INVALID_PARAM1", "MAV_MISSION", "INVALID_PARAM1"),
     (mission_items, "DENIED", "MAV_MISSION", "DENIED"),
     (px4_mode, "_NOT_SELECTABLE", "MAV_MODE_PROPERTY", "NOT_USER_SELECTABLE"),
-    (telemetry_context, "GENERIC", "MAV_AUTOPILOT", "GENERIC"),
-    (telemetry_context, "PX4", "MAV_AUTOPILOT", "PX4"),
+    (outgoing, "GENERIC", "MAV_AUTOPILOT", "GENERIC"),
+    (outgoing, "PX4", "MAV_AUTOPILOT", "PX4"),
     (estimator_report, "NO_FIX", "GPS_FIX_TYPE", "NO_FIX"),
     (estimator_report, "ATTITUDE", "ESTIMATOR", "ATTITUDE"),
     (estimator_report, "LEVEL_VELOCITY", "ESTIMATOR", "VELOCITY_HORIZ"),
