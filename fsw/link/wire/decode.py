@@ -29,13 +29,12 @@ from fsw.autopilot.signals import (
 )
 from messages.frames import Frame, wire_fields
 from messages.joint_arrays import STATE_AT, joined
-from messages.message_ids import AUTOPILOT, PANDION, SYSTEM_ID
+from messages.message_ids import AUTOPILOT, CMD_DO_SET_MODE, PANDION, SYSTEM_ID
 
 Numbers = tuple[float, ...]  # a payload without text, in wire order
 
 _LOCAL_NED: Final = 1  # MAV_FRAME_LOCAL_NED
 _INT32_MAX: Final = 0x7FFFFFFF
-_DO_SET_MODE: Final = 176  # MAV_CMD
 _LOCAL_FRAMES: Final = frozenset({1, 7, 8, 9, 12})  # COMMAND_INT scales x, y by 1e4 here
 _VELOCITY_IGNORED: Final = 0x038  # POSITION_TARGET_TYPEMASK
 _ACCELERATION_IGNORED: Final = 0x1C0
@@ -138,7 +137,7 @@ def set_mode(frame: Frame) -> CommandRequest | None:
     custom_mode, _, base_mode = cast("tuple[int, int, int]", frame.payload_values)
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
     return CommandRequest(
-        command=_DO_SET_MODE,
+        command=CMD_DO_SET_MODE,
         params=(float(base_mode), float(main), float(sub), *(math.nan,) * 4),
         source_system=frame.system_id,
         source_component=frame.component_id,
@@ -155,9 +154,6 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
 
     A masked velocity, acceleration or yaw reads as zero; a target without a position or in another
     frame than local NED is none.
-
-    Raises:
-        RefusedError: A number is out of bounds, or none.
     """
     mask, frame = int(values[12]), values[15]
     if frame != _LOCAL_NED or mask & _POSITION_IGNORED:
@@ -176,21 +172,13 @@ def end_effector_target(values: Numbers) -> EndEffectorTarget | None:
 
 
 def obstacle_wall(values: Numbers) -> IndexedObstacle | None:
-    """Read an OBSTACLE_WALL; None if it has no place in its set.
-
-    Raises:
-        RefusedError: It is no plane, or out of bounds.
-    """
+    """Read an OBSTACLE_WALL; None if it has no place in its set."""
     zone = wall(cast(Vec3, values[0:3]), values[3], values[4])
     return _indexed(zone, *map(int, values[7:10]))
 
 
 def obstacle_point(values: Numbers) -> IndexedObstacle | None:
-    """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set.
-
-    Raises:
-        RefusedError: It is out of bounds.
-    """
+    """Read an OBSTACLE_POINT; None if it keeps nothing away or has no place in its set."""
     if values[3] <= 0.0:
         return None
     zone = point(cast(Vec3, values[0:3]), values[3])
@@ -198,11 +186,7 @@ def obstacle_point(values: Numbers) -> IndexedObstacle | None:
 
 
 def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
-    """Read an OBSTACLE_SHAPE; None if its kind is not known or it has no place in its set.
-
-    Raises:
-        RefusedError: It is no such shape, or out of bounds.
-    """
+    """Read an OBSTACLE_SHAPE; None if its kind is not known or it has no place in its set."""
     index, count, number, flags = map(int, values[23:27])
     kind = BY_NUMBER.get(number)
     if kind is None or flags & ~(_KEEP_IN | _TOUCH):
@@ -217,11 +201,7 @@ def obstacle_shape(values: Numbers) -> IndexedObstacle | None:
 
 
 def workspace_sphere(values: Numbers) -> Zone:
-    """Read a WORKSPACE_SPHERE.
-
-    Raises:
-        RefusedError: It contains nothing, or is out of bounds.
-    """
+    """Read a WORKSPACE_SPHERE."""
     return _bounded(target_sphere(cast(Vec3, values[0:3]), values[3]))
 
 

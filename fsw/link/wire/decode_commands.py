@@ -46,16 +46,14 @@ from fsw.link.wire.mission_items import (
     Locate,
 )
 from fsw.link.wire.px4_mode import MODE_BY_PX4, MODE_BY_STANDARD
+from messages import dialect
 
-_CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks
-_MAY_SWITCH_MODE: Final = 1  # MAV_DO_REPOSITION_FLAGS
 _FLAGS: Final = float(1 << 24)  # what a float holds whole
 _UNCHANGED: Final = 5.0  # ORBIT_YAW_BEHAVIOUR: what an earlier orbit said, here the usual
 _FACINGS: Final = {float(facing): facing for facing in Facing} | {_UNCHANGED: Facing.CENTRE}
 _SPEED_TYPES: Final = (0.0, 1.0)  # SPEED_TYPE of air and ground, which are one here
 _KEEP_SPEED, _USUAL_SPEED = -1.0, -2.0  # of DO_CHANGE_SPEED
-_ROI_NONE, _ROI_LOCATION = 0.0, 3.0  # MAV_ROI
 
 
 class _InvalidError(Exception):
@@ -94,7 +92,7 @@ def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
 def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:
     """Without its flag parameter 2 is of no known meaning; QGroundControl and MAVSDK set it."""
     flags, main, sub = request.params[:3]
-    if not (math.isfinite(flags) and int(flags) & _CUSTOM_MODE):
+    if not (math.isfinite(flags) and int(flags) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED):
         raise _InvalidError("mode unchanged: param1 lacks flag 1, custom mode")
     mode = MODE_BY_PX4.get((main, 0.0 if math.isnan(sub) else sub))
     if mode is None:
@@ -109,6 +107,10 @@ def _set_standard_mode(request: CommandRequest, _: Locate) -> CommandAction:
     return SwitchMode(mode)
 
 
+def _take_off(request: CommandRequest, locate: Locate) -> CommandAction:
+    return TakeOff(_height(request, locate, "no takeoff"))
+
+
 def _reposition(request: CommandRequest, locate: Locate) -> CommandAction:
     speed, flags, _, yaw = request.params[:4]
     if abs(yaw) > MAX_YAW:
@@ -121,7 +123,8 @@ def _reposition(request: CommandRequest, locate: Locate) -> CommandAction:
         _place(request, locate, "no goto"),
         None if math.isnan(yaw) else yaw,
         speed if speed > 0.0 else None,
-        may_switch_mode=not math.isnan(flags) and bool(int(flags) & _MAY_SWITCH_MODE),
+        may_switch_mode=not math.isnan(flags)
+        and bool(int(flags) & dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
     )
 
 
@@ -163,9 +166,9 @@ def _look_at(request: CommandRequest, locate: Locate) -> CommandAction:
 def _look(request: CommandRequest, locate: Locate) -> CommandAction:
     """DO_SET_ROI, the older form: parameter 1 says whether there is a place at all."""
     kind = request.params[0]
-    if kind == _ROI_NONE:
+    if kind == dialect.MAV_ROI_NONE:
         return LookAt(None)
-    if kind == _ROI_LOCATION:
+    if kind == dialect.MAV_ROI_LOCATION:
         return _look_at(request, locate)
     raise _InvalidError(f"kind {kind:g} of a region of interest is not 0 or 3")
 
@@ -305,32 +308,31 @@ def _or_none(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-# By MAV_CMD of MAVLink common.xml.
 _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = {
-    17: _always(SwitchMode(Mode.HOLD)),  # NAV_LOITER_UNLIM
-    20: _always(SwitchMode(Mode.RETURN)),  # NAV_RETURN_TO_LAUNCH
-    21: _always(SwitchMode(Mode.LAND)),  # NAV_LAND
-    22: lambda request, locate: TakeOff(_height(request, locate, "no takeoff")),  # NAV_TAKEOFF
-    34: _orbit,  # DO_ORBIT
-    176: _set_mode,  # DO_SET_MODE
-    178: _change_speed,  # DO_CHANGE_SPEED
-    179: _set_home,  # DO_SET_HOME
-    185: _terminate,  # DO_FLIGHTTERMINATION
-    187: _set_actuator,  # DO_SET_ACTUATOR
-    192: _reposition,  # DO_REPOSITION
-    193: _pause_or_continue,  # DO_PAUSE_CONTINUE
-    195: _look_at,  # DO_SET_ROI_LOCATION
-    197: _always(LookAt(None)),  # DO_SET_ROI_NONE
-    201: _look,  # DO_SET_ROI
-    209: _test_actuator,  # DO_MOTOR_TEST
-    211: _grip,  # DO_GRIPPER
-    224: _set_mission_step,  # DO_SET_MISSION_CURRENT
-    241: _calibrate,  # PREFLIGHT_CALIBRATION
-    246: _restart,  # PREFLIGHT_REBOOT_SHUTDOWN
-    262: _set_standard_mode,  # DO_SET_STANDARD_MODE
-    300: _start_mission,  # MISSION_START
-    310: _test_actuator,  # ACTUATOR_TEST
-    400: _arm_or_disarm,  # COMPONENT_ARM_DISARM
-    401: _always(Order.CHECK_ARMING),  # RUN_PREARM_CHECKS
-    420: _inject_failure,  # INJECT_FAILURE
+    dialect.MAV_CMD_NAV_LOITER_UNLIM: _always(SwitchMode(Mode.HOLD)),
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: _always(SwitchMode(Mode.RETURN)),
+    dialect.MAV_CMD_NAV_LAND: _always(SwitchMode(Mode.LAND)),
+    dialect.MAV_CMD_NAV_TAKEOFF: _take_off,
+    dialect.MAV_CMD_DO_ORBIT: _orbit,
+    dialect.MAV_CMD_DO_SET_MODE: _set_mode,
+    dialect.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
+    dialect.MAV_CMD_DO_SET_HOME: _set_home,
+    dialect.MAV_CMD_DO_FLIGHTTERMINATION: _terminate,
+    dialect.MAV_CMD_DO_SET_ACTUATOR: _set_actuator,
+    dialect.MAV_CMD_DO_REPOSITION: _reposition,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause_or_continue,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION: _look_at,
+    dialect.MAV_CMD_DO_SET_ROI_NONE: _always(LookAt(None)),
+    dialect.MAV_CMD_DO_SET_ROI: _look,
+    dialect.MAV_CMD_DO_MOTOR_TEST: _test_actuator,
+    dialect.MAV_CMD_DO_GRIPPER: _grip,
+    dialect.MAV_CMD_DO_SET_MISSION_CURRENT: _set_mission_step,
+    dialect.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
+    dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _restart,
+    dialect.MAV_CMD_DO_SET_STANDARD_MODE: _set_standard_mode,
+    dialect.MAV_CMD_MISSION_START: _start_mission,
+    dialect.MAV_CMD_ACTUATOR_TEST: _test_actuator,
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM: _arm_or_disarm,
+    dialect.MAV_CMD_RUN_PREARM_CHECKS: _always(Order.CHECK_ARMING),
+    dialect.MAV_CMD_INJECT_FAILURE: _inject_failure,
 }

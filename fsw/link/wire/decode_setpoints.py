@@ -1,4 +1,6 @@
-"""Offboard setpoints from wire values; pure. What is of no use is refused with its reason.
+"""Offboard setpoints from wire values; pure.
+
+What is of no use is refused: each reader raises ``RefusedError``, which says why.
 
 An axis is used or not by the message's mask, as PX4 takes it; a number that is not used may be NaN,
 one that is used may not. Each axis needs a position, a velocity or an acceleration.
@@ -43,20 +45,12 @@ _ATTITUDE: Final = 0x80
 
 
 def body_setpoint(values: Numbers) -> MotionSetpoint:
-    """Read a SET_POSITION_TARGET_LOCAL_NED.
-
-    Raises:
-        RefusedError: It is of no use.
-    """
+    """Read a SET_POSITION_TARGET_LOCAL_NED."""
     return _local(values, of_end_effector=False)
 
 
 def end_effector_setpoint(values: Numbers) -> MotionSetpoint:
-    """Read an END_EFFECTOR_TARGET without a time, and so without a force.
-
-    Raises:
-        RefusedError: It is of no use.
-    """
+    """Read an END_EFFECTOR_TARGET without a time, and so without a force."""
     if values[FORCE_AT] != 0.0:
         raise RefusedError("a force needs a time: stream targets ahead")
     return _local(values, of_end_effector=True)
@@ -66,9 +60,6 @@ def global_setpoint(locate: Locate, values: Numbers) -> MotionSetpoint:
     """Read a SET_POSITION_TARGET_GLOBAL_INT; ``locate`` takes places on Earth to local NED.
 
     Velocities and accelerations are north, east and down, as in PX4.
-
-    Raises:
-        RefusedError: It is of no use.
     """
     mask, frame = int(values[12]), values[15]
     if frame in _TERRAIN:
@@ -90,11 +81,7 @@ def global_setpoint(locate: Locate, values: Numbers) -> MotionSetpoint:
 
 
 def attitude_setpoint(values: Numbers) -> AttitudeSetpoint:
-    """Read a SET_ATTITUDE_TARGET: an attitude, or body rates, and a thrust.
-
-    Raises:
-        RefusedError: It is of no use.
-    """
+    """Read a SET_ATTITUDE_TARGET: an attitude, or body rates, and a thrust."""
     mask, thrust = int(values[11]), values[8]
     q_WB, rates = cast(Vec4, values[1:5]), cast(Vec3, values[5:8])
     if mask & _THRUST:
@@ -111,20 +98,12 @@ def attitude_setpoint(values: Numbers) -> AttitudeSetpoint:
 
 
 def actuator_setpoint(_: Numbers) -> JointSetpoint:
-    """Refuse a SET_ACTUATOR_CONTROL_TARGET: rotors and joints are the loops'.
-
-    Raises:
-        RefusedError: Always.
-    """
+    """Refuse a SET_ACTUATOR_CONTROL_TARGET: rotors and joints are the loops'."""
     raise RefusedError("SET_ACTUATOR_CONTROL_TARGET is not supported: loops drive actuators")
 
 
 def joint_setpoint(values: Numbers) -> JointSetpoint:
-    """Read an ARM_JOINT_SETPOINT.
-
-    Raises:
-        RefusedError: It is for more joints than it has room for, or an angle is not finite.
-    """
+    """Read an ARM_JOINT_SETPOINT."""
     count = int(values[SETPOINT_COUNT_AT])
     if not 0 < count <= JOINTS_MAX:
         raise RefusedError(f"it is for {count} joints; must be 1 to {JOINTS_MAX}")

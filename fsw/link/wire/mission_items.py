@@ -23,25 +23,6 @@ from fsw.autopilot.flight.commands.bounds import (
 from fsw.autopilot.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
 from messages import dialect
 
-# MAV_CMD
-NAV_WAYPOINT: Final = 16
-NAV_LOITER_UNLIMITED: Final = 17
-NAV_LOITER_TURNS: Final = 18
-NAV_LOITER_TIME: Final = 19
-NAV_RETURN: Final = 20
-NAV_LAND: Final = 21
-NAV_TAKEOFF: Final = 22
-NAV_LOITER_TO_ALT: Final = 31
-NAV_DELAY: Final = 93
-DO_JUMP: Final = 177
-DO_CHANGE_SPEED: Final = 178
-DO_SET_ROI_LOCATION: Final = 195
-DO_SET_ROI_NONE: Final = 197
-DO_SET_ROI: Final = 201
-DO_GRIPPER: Final = 211
-NAV_RALLY_POINT: Final = 5100
-WAYPOINT_USER_1: Final = 31000  # presses on a surface
-
 # What leaves the way as it is, and why it is skipped.
 _NO_CAMERA: Final = "this vehicle has no camera"
 SKIPPED: Final[dict[int, str]] = {
@@ -127,7 +108,7 @@ def read_step(item: MissionItem, locate: Locate) -> MissionStep:
 
 def read_rally(item: MissionItem, locate: Locate) -> Vec2:
     """North and east of a rally point [m]; its altitude is not used, a return has its own."""
-    if item.command != NAV_RALLY_POINT:
+    if item.command != dialect.MAV_CMD_NAV_RALLY_POINT:
         raise BadItem(UNSUPPORTED, f"{command_name(item.command)} is no rally point")
     north, east, _ = _place(item, locate, "a rally point needs a place")
     return north, east
@@ -294,22 +275,22 @@ def _look(item: MissionItem, locate: Locate) -> MissionStep:
 _MAX_ITEMS: Final = float(1 << 16)
 _MAX_HEADING: Final = math.degrees(MAX_YAW)
 _READERS: Final[dict[int, Callable[[MissionItem, Locate], MissionStep]]] = {
-    NAV_WAYPOINT: _waypoint,
-    NAV_LOITER_UNLIMITED: lambda item, locate: _loiter(item, locate, math.inf),
-    NAV_LOITER_TIME: _loiter_time,
-    NAV_LOITER_TURNS: _loiter_turns,
-    NAV_LOITER_TO_ALT: _loiter_to_height,
-    DO_JUMP: _jump,
-    NAV_RETURN: lambda *_: MissionStep(MissionAction.RETURN),
-    NAV_LAND: _land,
-    NAV_TAKEOFF: _take_off,
-    NAV_DELAY: _delay,
-    DO_CHANGE_SPEED: _change_speed,
-    DO_SET_ROI_LOCATION: _look_at,
-    DO_SET_ROI_NONE: lambda *_: MissionStep(MissionAction.LOOK_AT),
-    DO_SET_ROI: _look,
-    DO_GRIPPER: _grip,
-    WAYPOINT_USER_1: _push,
+    dialect.MAV_CMD_NAV_WAYPOINT: _waypoint,
+    dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda item, locate: _loiter(item, locate, math.inf),
+    dialect.MAV_CMD_NAV_LOITER_TIME: _loiter_time,
+    dialect.MAV_CMD_NAV_LOITER_TURNS: _loiter_turns,
+    dialect.MAV_CMD_NAV_LOITER_TO_ALT: _loiter_to_height,
+    dialect.MAV_CMD_DO_JUMP: _jump,
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: MissionStep(MissionAction.RETURN),
+    dialect.MAV_CMD_NAV_LAND: _land,
+    dialect.MAV_CMD_NAV_TAKEOFF: _take_off,
+    dialect.MAV_CMD_NAV_DELAY: _delay,
+    dialect.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION: _look_at,
+    dialect.MAV_CMD_DO_SET_ROI_NONE: lambda *_: MissionStep(MissionAction.LOOK_AT),
+    dialect.MAV_CMD_DO_SET_ROI: _look,
+    dialect.MAV_CMD_DO_GRIPPER: _grip,
+    dialect.MAV_CMD_WAYPOINT_USER_1: _push,  # presses on a surface
 }
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import re
 from dataclasses import replace
 from functools import reduce
 from operator import or_
@@ -49,7 +47,6 @@ _MASK, _ATTITUDE_MASK = "POSITION_TARGET_TYPEMASK", "ATTITUDE_TARGET_TYPEMASK"
 _SENSORS, _HIL = "MAV_SYS_STATUS", "HIL_SENSOR_UPDATED"
 TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (decode, "_LOCAL_NED", "MAV_FRAME", "LOCAL_NED"),
-    (decode, "_DO_SET_MODE", "MAV_CMD", "DO_SET_MODE"),
     (
         decode,
         "_LOCAL_FRAMES",
@@ -61,12 +58,8 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (decode, "_ACCELERATION_IGNORED", _MASK, _A),
     (decode, "_YAW_IGNORED", _MASK, "YAW_IGNORE"),
     (decode, "_KEEP_IN", "PANDION_SHAPE_FLAGS", "KEEP_IN"),
-    (decode_commands, "_CUSTOM_MODE", "MAV_MODE_FLAG", "CUSTOM_MODE_ENABLED"),
-    (decode_commands, "_MAY_SWITCH_MODE", "MAV_DO_REPOSITION_FLAGS", "CHANGE_MODE"),
     (decode_commands, "_UNCHANGED", "ORBIT_YAW_BEHAVIOUR", "UNCHANGED"),
     (decode_commands, "_SPEED_TYPES", "SPEED_TYPE", "AIRSPEED GROUNDSPEED"),
-    (decode_commands, "_ROI_NONE", "MAV_ROI", "NONE"),
-    (decode_commands, "_ROI_LOCATION", "MAV_ROI", "LOCATION"),
     (decode_sensors, "_INERTIAL", _HIL, _IMU),
     (decode_sensors, "_MAGNETIC", _HIL, "XMAG|YMAG|ZMAG"),
     (decode_sensors, "_PRESSURE", _HIL, "ABS_PRESSURE"),
@@ -164,18 +157,6 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (message_ids, "AUTOPILOT", "MAV_COMP_ID", "AUTOPILOT1"),
     (message_ids, "PANDION", "MAV_COMP_ID", "USER1"),
     (message_ids, "PATH_PLANNER", "MAV_COMP_ID", "PATHPLANNER"),
-    (mission_items, "NAV_WAYPOINT", "MAV_CMD", "NAV_WAYPOINT"),
-    (mission_items, "NAV_LOITER_UNLIMITED", "MAV_CMD", "NAV_LOITER_UNLIM"),
-    (mission_items, "NAV_LOITER_TIME", "MAV_CMD", "NAV_LOITER_TIME"),
-    (mission_items, "NAV_RETURN", "MAV_CMD", "NAV_RETURN_TO_LAUNCH"),
-    (mission_items, "NAV_LAND", "MAV_CMD", "NAV_LAND"),
-    (mission_items, "NAV_TAKEOFF", "MAV_CMD", "NAV_TAKEOFF"),
-    (mission_items, "NAV_DELAY", "MAV_CMD", "NAV_DELAY"),
-    (mission_items, "DO_CHANGE_SPEED", "MAV_CMD", "DO_CHANGE_SPEED"),
-    (mission_items, "DO_SET_ROI_LOCATION", "MAV_CMD", "DO_SET_ROI_LOCATION"),
-    (mission_items, "DO_SET_ROI_NONE", "MAV_CMD", "DO_SET_ROI_NONE"),
-    (mission_items, "DO_SET_ROI", "MAV_CMD", "DO_SET_ROI"),
-    (mission_items, "NAV_RALLY_POINT", "MAV_CMD", "NAV_RALLY_POINT"),
     (mission_items, "GLOBAL_FRAMES", "MAV_FRAME", "GLOBAL GLOBAL_INT"),
     (mission_items, "HOME_FRAMES", "MAV_FRAME", "GLOBAL_RELATIVE_ALT GLOBAL_RELATIVE_ALT_INT"),
     (mission_items, "LOCAL_NED", "MAV_FRAME", "LOCAL_NED"),
@@ -282,13 +263,6 @@ def test_a_message_has_its_number(name: str) -> None:
 
 def test_most_message_numbers_are_compared() -> None:
     assert len(MESSAGES) > 85
-
-
-def test_commands_have_the_numbers_of_the_names_beside_them() -> None:
-    rows = re.findall(r"^    (\d+): \w.*# ([A-Z_]+)$", inspect.getsource(decode_commands), re.M)
-    assert len(rows) == len(decode_commands._READERS)
-    for number, name in rows:
-        assert int(number) == entry("MAV_CMD", name)
 
 
 def test_failures_have_mavlinks_numbers() -> None:
