@@ -45,27 +45,12 @@ def build_links(
     """
     gcs, api = addresses(choice)
     now_us, unix_us = clocks
-    setups = [
-        LinkSetup(
-            name="gcs",
-            target=gcs,
-            local_port=_GCS_PORT + beside,
-            rates_hz=GROUND_RATES,
-            unheard=True,
-            remote=choice.allow_remote,
-        ),
-    ]
+    remote = choice.allow_remote
+    setups = [LinkSetup("gcs", gcs, _GCS_PORT + beside, GROUND_RATES, unheard=True, remote=remote)]
     if api is not None:
+        # Until a program speaks, a heartbeat a second is all it needs to find the vehicle.
         setups.append(
-            # Until a program speaks, a heartbeat a second is all it needs to find the vehicle.
-            LinkSetup(
-                name="api",
-                target=api,
-                local_port=_API_PORT + beside,
-                rates_hz=API_RATES,
-                unheard=False,
-                remote=choice.allow_remote,
-            )
+            LinkSetup("api", api, _API_PORT + beside, API_RATES, unheard=False, remote=remote)
         )
     times, sent = SignedTimes(), SentFrames()
     links = [

@@ -79,9 +79,9 @@ class GcsLink:
         context: TelemetryContext,
         signing: Signing,
         clock: Clock,
-        record: RecordFrame | None = None,
-        services: Sequence[LinkService] = (),
-        sent: SentFrames | None = None,
+        record: RecordFrame | None,
+        services: Sequence[LinkService],
+        sent: SentFrames,
     ) -> None:
         """Open the link; ``record`` takes all frames of both directions; the clock is wall time.
 
@@ -96,7 +96,7 @@ class GcsLink:
         self.echoes = 0  # frames of ours that came back: dropped
         self.elsewhere = 0  # accepted frames for another system or component
         self.unhandled: dict[int, int] = {}  # accepted frames of no use here, by message
-        self._sent = SentFrames() if sent is None else sent
+        self._sent = sent
         handled = (inbox.message_ids, self.dispatch.message_ids, {message_ids.SETUP_SIGNING})
         self._handled = frozenset[int]().union(*handled)
         self._endpoint, peer = open_endpoint(

@@ -52,12 +52,8 @@ TYPED: Final = "sensors"  # the inputs that have topics of their own
 SAMPLES: Final = "samples"
 STATUS_TICKS: Final = 1_000_000 // TICK_US
 THIN, FULL = 0, 1  # values of LOG_PROFILE
-DETAIL_US: Final = {
-    THIN: 20_000,
-    FULL: 1,
-}  # from one record of what follows from others to the next
-FAST_US: Final = {THIN: 10_000, FULL: 1}
-PLAN_US: Final = {THIN: 50_000, FULL: 1}
+# From one record of what follows from others to the next, in a thin log.
+_DETAIL_US, _FAST_US, _PLAN_US = 20_000, 10_000, 50_000
 
 _UNMEASURED: Final = PlanTimings(math.nan, math.nan, math.nan)
 _NO_TIMES: Final = PlanTimings(-1.0, -1.0, -1.0)  # in inputs: JSON has no NaN
@@ -124,8 +120,9 @@ class LogEncoder:
 
         Of a vehicle with this ``airframe``, THIN or FULL. The local frame begins at ``origin``.
         """
-        self._details, self._rates = Every(DETAIL_US[profile]), Every(FAST_US[profile])
-        self._plans = Every(PLAN_US[profile])
+        self._details, self._rates, self._plans = (
+            Every(1 if profile == FULL else us) for us in (_DETAIL_US, _FAST_US, _PLAN_US)
+        )
         self._px4 = Px4Records(airframe, origin)
         self._of = _Layout(airframe.rotors, airframe.bodies.joints)
         self._joints = airframe.bodies.joints

@@ -18,6 +18,7 @@ from typing import Any
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.ports import LoopHealth
+from fsw.link.bounded_memory import SentFrames
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
@@ -30,6 +31,7 @@ from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
+from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.link.wire.outgoing import TelemetryContext
@@ -39,6 +41,7 @@ from messages import dialect
 from messages.frames import as_version_1
 from sitl.scenario import Scenario
 from tests.closed_loop.harness import Flight, on_the_ground
+from tests.fsw.link.ground import Unkept
 from tests.fsw.storage.threads import AtOnce
 
 Message = Any
@@ -160,10 +163,11 @@ def connected(
         LinkSetup("gcs", station.getsockname(), 0, GROUND_RATES, unheard=True),
         inbox,
         context,
-        Signing(0, now_us, None),
+        Signing(0, now_us, Unkept(), SignedTimes()),
         now_us,
         None,
         services,
+        SentFrames(),
     )
     links = GroundLinks([link], config.tick_period_us, now_us)
     try:

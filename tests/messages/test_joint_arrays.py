@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from fsw.link.inbox import Inbox
 from fsw.link.wire.decode import sensor_frame
-from fsw.link.wire.decode_sensors import joint_sample
+from fsw.link.wire.decode_sensors import SampleDecoder
 from messages.frames import FrameWriter, split
 from messages.joint_arrays import STATE_AT, STATE_COUNT_AT, base, joined, more
 from sitl.earth import DEFAULT_ORIGIN
@@ -47,7 +48,8 @@ def test_encoders_are_read_as_they_were_sent(count: int) -> None:
     encoder = SensorEncoder(FrameWriter(1, 200), DEFAULT_ORIGIN)
     sent = encoder.frames(4_000, (JointMeasurement(2_000, angles(count)),))
     (frame,) = [one for one in split(b"".join(sent)) if one.message_id == ENCODERS]
-    assert joint_sample(frame.payload_values, count).angles == angles(count)  # type: ignore[arg-type]
+    (sample,) = SampleDecoder(Inbox().locate, count).samples(frame)
+    assert sample.angles == angles(count)
 
 
 @pytest.mark.parametrize("count", range(1, 5))

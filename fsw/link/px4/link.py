@@ -160,8 +160,6 @@ class Px4Link:
         self._odd = ""  # the frame of velocities that was told of
         self._believed_us = 0
 
-    # ------------------------------------------------------------------ readings
-
     def announce(self) -> None:
         """Say that a companion is there, and what it wants to hear."""
         self._send(self._writer.heartbeat())
@@ -278,8 +276,6 @@ class Px4Link:
                 Severity.WARNING, f"PX4 refused a command about {_SPOKEN[command]}: result {result}"
             )
 
-    # ------------------------------------------------------------------ setpoints
-
     def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Hand the vehicle over or take it, and stream where it is to be."""
         silent_us = self._clock() - self._heard_us
@@ -340,8 +336,6 @@ class Px4Link:
         self._inbox.accept_command(
             Command(action, CommandRequest(ARM_DISARM, params, *VEHICLE_PILOT))
         )
-
-    # ------------------------------------------------------------------ the rest
 
     def queue_texts(self, texts: tuple[StatusText, ...]) -> None:
         """PX4 is told nothing: its own ground station hears it, not us."""

@@ -169,8 +169,6 @@ class MissionService(LinkService):
         self._repeat_us = t_us + _REPEAT_US
         return Outgoing(ids.MISSION_ITEM_REACHED, (self._shown.reached,))
 
-    # ------------------------------------------------------------ upload
-
     def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number, count = int(values[3]), int(values[0])
         refused = self._unavailable(number, peer, t_us)
@@ -257,8 +255,6 @@ class MissionService(LinkService):
             *(StatusText(Severity.WARNING, remark) for remark in upload.remarks),
         )
 
-    # ------------------------------------------------------------ download
-
     def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
         refused = self._unavailable(number, peer, t_us)
@@ -287,8 +283,6 @@ class MissionService(LinkService):
             return (encode_ack(INVALID_SEQUENCE, number, peer),)
         download.last_received_us = t_us
         return (encode_item(download.items[seq], seq, number, peer, as_int),)
-
-    # ------------------------------------------------------------ the rest
 
     def _ack(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """Handle the client's acknowledgement, which ends the transfer."""

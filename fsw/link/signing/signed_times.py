@@ -24,25 +24,25 @@ class KeyTimes:
     def __init__(self, key: bytes, oldest: int) -> None:
         """Frames under ``key`` (32 bytes) that are not newer than ``oldest`` are refused."""
         self.newest = oldest
-        self.links = 0  # that have the key now
         self._key = key
         self._oldest = oldest
         self._senders: dict[Sender, int] = {}
-        self._files: list[KeyFile] = []
+        self._files: list[KeyFile] = []  # of the links that have the key now
 
-    def join(self, file: KeyFile | None, newest: int) -> None:
+    def join(self, file: KeyFile, newest: int) -> None:
         """Count a link in, whose file says the ``newest`` time that it knows of."""
-        self.links += 1
         self._oldest = max(self._oldest, newest)
-        if file is not None:
-            self._files.append(file)
+        self._files.append(file)
         self._note(newest)
 
-    def leave(self, file: KeyFile | None) -> None:
+    def leave(self, file: KeyFile) -> None:
         """Count a link out, which has another key from now on."""
-        self.links -= 1
-        if file is not None:
-            self._files.remove(file)
+        self._files.remove(file)
+
+    @property
+    def in_use(self) -> bool:
+        """Whether a link has the key."""
+        return bool(self._files)
 
     def accept(self, sender: Sender, time: int, now: int) -> bool:
         """Whether a frame's time is newer than its sender's last one and not far ahead.
@@ -83,7 +83,7 @@ class SignedTimes:
         """
         found = self._by_key.get(key)
         if found is None:
-            idle = [one for one, times in self._by_key.items() if not times.links]
+            idle = [one for one, times in self._by_key.items() if not times.in_use]
             for one in idle[: max(len(idle) + 1 - _MAX_KEYS, 0)]:
                 self._forgotten = max(self._forgotten, self._by_key.pop(one).newest)
             found = self._by_key[key] = KeyTimes(key, self._forgotten)

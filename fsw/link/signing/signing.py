@@ -56,10 +56,10 @@ class Signing:
         self,
         link_id: int,
         unix_us: Callable[[], int],
-        file: KeyFile | None,
-        times: SignedTimes | None = None,
+        file: KeyFile,
+        times: SignedTimes,
     ) -> None:
-        """Take up the key that an earlier flight left; without a file it ends with the process.
+        """Take up the key that an earlier flight left.
 
         ``link_id``, 0..255, distinguishes our links in our own signatures. All links of a vehicle
         share their ``times``, so that no frame of one can be played to another.
@@ -71,8 +71,8 @@ class Signing:
         self._link_id = link_id
         self._unix_us = unix_us
         self._file = file
-        self._times = SignedTimes() if times is None else times
-        stored = None if file is None else file.read(self._now() + TOLERANCE)
+        self._times = times
+        stored = file.read(self._now() + TOLERANCE)
         self._key = b"" if stored is None else stored.key
         self._sent = 0
         if stored is not None:
@@ -124,12 +124,11 @@ class Signing:
         new = key if any(key) else b""
         old_times = self._times.of(self._key) if self._key else None
         new_times = self._times.of(new) if new else None
-        if self._file is not None:
-            if new_times is not None:
-                known = 0 if old_times is None else old_times.newest
-                self._file.write(SigningKey(new, max(new_times.newest, known)))
-            else:
-                self._file.remove()
+        if new_times is not None:
+            known = 0 if old_times is None else old_times.newest
+            self._file.write(SigningKey(new, max(new_times.newest, known)))
+        else:
+            self._file.remove()
         if new != self._key:
             if old_times is not None:
                 old_times.leave(self._file)
@@ -141,8 +140,7 @@ class Signing:
 
     def close(self) -> None:
         """Release the key's file."""
-        if self._file is not None:
-            self._file.close()
+        self._file.close()
 
     def _hash(self, covered: bytes) -> bytes:
         return sha256(self._key + covered).digest()[:_HASH_SIZE]

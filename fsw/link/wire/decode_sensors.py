@@ -74,9 +74,10 @@ class SampleDecoder:
         return [] if found is None else [found]
 
     def _joints(self, values: Numbers) -> JointSample | None:
-        """Encoders of this arm; those of an arm of more or fewer joints say nothing of it."""
-        ours = values[ENCODERS_COUNT_AT] == self._count
-        return joint_sample(values, self._count) if ours else None
+        """JOINT_ENCODERS of this arm; those of one of more or fewer joints say nothing of it."""
+        if values[ENCODERS_COUNT_AT] != self._count:
+            return None
+        return JointSample(1e-6 * values[0], joined(values, *ENCODERS_AT, self._count))
 
     def _hil_sensor(self, values: Numbers) -> list[Sample]:
         """Those of the sensors in a HIL_SENSOR that have something new."""
@@ -120,11 +121,6 @@ def inertial_sample(values: Numbers) -> ImuSample:
     """The inertial unit's part of a HIL_SENSOR."""
     _, ax, ay, az, wx, wy, wz = values[:7]
     return ImuSample(1e-6 * values[0], (ax, ay, az), (wx, wy, wz))
-
-
-def joint_sample(values: Numbers, joints: int) -> JointSample:
-    """JOINT_ENCODERS of a vehicle with so many ``joints``."""
-    return JointSample(1e-6 * values[0], joined(values, *ENCODERS_AT, joints))
 
 
 def pose_sample(values: Numbers) -> PoseSample | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,7 +26,7 @@ from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
-from fsw.link.signing.key_file import KeyFile
+from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
@@ -110,12 +111,28 @@ class Ground:
         return frames + self.heard()
 
 
+class Unkept(KeyFile):
+    """A file that keeps no key."""
+
+    def __init__(self) -> None:
+        super().__init__(Path(os.devnull))
+
+    def read(self, latest: int) -> None:
+        return None
+
+    def write(self, key: SigningKey) -> None:
+        pass
+
+    def remove(self) -> None:
+        pass
+
+
 @contextmanager
 def ground_station(
     *,
     services: Sequence[LinkService] = (),
     api: bool = False,
-    key_file: KeyFile | None = None,
+    key_file: KeyFile | None = None,  # none: the key ends with the link
     times: SignedTimes | None = None,
     sent: SentFrames | None = None,
 ) -> Iterator[Ground]:
@@ -127,11 +144,11 @@ def ground_station(
         LinkSetup("test", station.getsockname(), 0, rates, unheard=not api),
         inbox,
         CONTEXT,
-        Signing(0, lambda: clock.unix_us, key_file, times),
+        Signing(0, lambda: clock.unix_us, key_file or Unkept(), times or SignedTimes()),
         lambda: clock.now_us,
         lambda t, frame: recorded.append((t, frame)),
         services,
-        sent,
+        sent or SentFrames(),
     )
     links = GroundLinks([link], 2_000, lambda: clock.now_us)
     try:

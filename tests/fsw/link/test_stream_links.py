@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
+from fsw.link.bounded_memory import SentFrames
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.gcs_link import GcsLink, LinkSetup
@@ -19,6 +20,8 @@ from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
+from fsw.link.signing.key_file import NoKeyFile
+from fsw.link.signing.signed_times import SignedTimes
 from fsw.link.signing.signing import Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.storage.parameter_store import ParameterStore
@@ -42,8 +45,8 @@ def link_at(
     address: LinkAddress, services: Sequence[LinkService] = ()
 ) -> Iterator[tuple[GcsLink, GroundLinks]]:
     setup = LinkSetup("gcs", address, 0, GROUND_RATES, unheard=True)
-    signing = Signing(0, lambda: 1_750_000_000_000_000, None)
-    link = GcsLink(setup, Inbox(), CONTEXT, signing, wall_us, None, services)
+    signing = Signing(0, lambda: 1_750_000_000_000_000, NoKeyFile(), SignedTimes())
+    link = GcsLink(setup, Inbox(), CONTEXT, signing, wall_us, None, services, SentFrames())
     with closing(GroundLinks([link], 2_000, wall_us)) as links:
         yield link, links
 

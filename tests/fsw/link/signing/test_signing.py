@@ -20,7 +20,7 @@ from fsw.link.udp_endpoint import LinkError
 from messages import dialect
 from messages import message_ids as ids
 from messages.frames import FrameWriter, as_version_1, is_signed, split
-from tests.fsw.link.ground import Ground, ManualClock, ground_station, station_socket
+from tests.fsw.link.ground import Ground, ManualClock, Unkept, ground_station, station_socket
 from tests.fsw.link.snapshots import CONTEXT, outputs_at
 
 KEY = bytes(range(1, 33))
@@ -339,12 +339,12 @@ def test_a_key_that_comes_back_remembers_its_times(ground: Ground) -> None:
 
 
 def test_keys_that_are_remembered_are_bounded() -> None:
-    times = SignedTimes()
+    times, file = SignedTimes(), Unkept()
     for number in range(20):
         record = times.of(bytes([number]) * 32)
-        record.join(None, 0)
+        record.join(file, 0)
         assert record.accept((255, 190, 0), 100 + number, 0)
-        record.leave(None)
+        record.leave(file)
     assert times.of(bytes([19]) * 32).newest == 119
     assert not times.of(bytes(32)).accept((255, 190, 0), 100, 0)  # forgotten, and still refused
 
