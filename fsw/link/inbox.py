@@ -205,12 +205,10 @@ class Inbox:
             setpoint_problem=came.setpoint_problem,
         )
 
-    def _command(
-        self, read: Callable[[Frame], CommandRequest | None], frame: Frame
-    ) -> CommandAck | None:
-        request = read(frame)
-        if request is None:
+    def _command(self, read: Callable[[Frame], CommandRequest], frame: Frame) -> CommandAck | None:
+        if not decode.for_this_vehicle(frame):
             return None
+        request = read(frame)
         if len(self._received.commands) >= _MAX_COMMANDS:
             self.refused += 1
             return self._later(request)

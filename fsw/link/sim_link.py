@@ -270,13 +270,9 @@ class SimLink:
             if self.measured:
                 self._early += self._decoder.samples(frame)
                 del self._early[:-MAX_SAMPLES]
-            if frame.message_id == message_ids.COMMAND_LONG:
+            if frame.message_id == message_ids.COMMAND_LONG and decode.for_this_vehicle(frame):
                 request = decode.command_long(frame)
-                if (
-                    request is not None
-                    and request.command == _SHUTDOWN
-                    and request.params[1] == _POWER_OFF
-                ):
+                if request.command == _SHUTDOWN and request.params[1] == _POWER_OFF:
                     self.shutdown = True
                     ack = CommandAck(_SHUTDOWN, _ACCEPTED, frame.system_id, frame.component_id)
                     self._endpoint.send(self._ack_frame(ack))

@@ -19,7 +19,6 @@ from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, re
 from fsw.link.files.ftp_tree import Directory, find, listing
 from fsw.link.files.served_file import OpenFile
 from fsw.link.services.service import LinkService
-from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing
 from messages import message_ids
 from messages.frames import Frame
@@ -93,8 +92,6 @@ class FtpService(LinkService):
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
         """Answer a request, or start the job that will."""
-        if not for_this_vehicle(frame):
-            return ()
         _, _, _, *payload = cast("tuple[int, ...]", frame.payload_values)
         client, packed = (frame.system_id, frame.component_id), bytes(payload)
         before = self._answered.get(client)

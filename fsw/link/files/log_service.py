@@ -17,7 +17,7 @@ from fsw.autopilot.signals import Severity, StatusText
 from fsw.link.files.flight_logs import Erasure, FlightLogs
 from fsw.link.files.served_file import OpenFile
 from fsw.link.services.service import LinkService
-from fsw.link.wire.decode import Numbers, for_this_vehicle
+from fsw.link.wire.decode import Numbers
 from fsw.link.wire.outgoing import Outgoing, PackedOutgoing, ServiceOutput
 from messages import message_ids
 from messages.frames import Frame
@@ -65,8 +65,6 @@ class LogService(LinkService):
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
         """Store a request."""
-        if not for_this_vehicle(frame):
-            return ()
         values = cast(Numbers, frame.payload_values)
         self._look_again()
         if frame.message_id == message_ids.LOG_REQUEST_LIST:

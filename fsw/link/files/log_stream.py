@@ -18,7 +18,6 @@ from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, Statu
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.served_file import DiskFile, OpenFile
 from fsw.link.services.service import LinkService, Outcome
-from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import PackedOutgoing, ServiceOutput
 from messages import message_ids
 from messages.frames import Frame
@@ -82,7 +81,7 @@ class LogStreamService(LinkService):
         """Go on when a piece is acknowledged."""
         sender = (frame.system_id, frame.component_id)
         awaited = self._awaited is not None and frame.payload_values[0] == self._sequence
-        if not awaited or sender != self._client or not for_this_vehicle(frame):
+        if not awaited or sender != self._client:
             return ()
         self._awaited, self._next_us = None, t_us
         self._sequence = (self._sequence + 1) & 0xFFFF

@@ -38,7 +38,7 @@ from fsw.link.services.mission_wire import (
     item_int,
 )
 from fsw.link.services.service import LinkService
-from fsw.link.wire.decode import Numbers, for_this_vehicle
+from fsw.link.wire.decode import Numbers
 from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids as ids
@@ -122,8 +122,6 @@ class MissionService(LinkService):
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """See :class:`~fsw.link.services.service.LinkService`."""
-        if not for_this_vehicle(frame):
-            return ()
         values, peer = cast(Numbers, frame.payload_values), (frame.system_id, frame.component_id)
         return self._handlers[frame.message_id](values, peer, t_us)
 

@@ -26,7 +26,6 @@ from fsw.autopilot.parameters.param_type import (
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import CommandRequest, CommandResult, Severity, StatusText
 from fsw.link.services.service import LinkService, Outcome
-from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from fsw.storage.parameter_store import ParameterStore
 from messages import message_ids as ids
@@ -67,8 +66,6 @@ class ParameterService(LinkService):
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """Answer a read, start a list, or pass a set request on."""
-        if not for_this_vehicle(frame):
-            return ()
         asker = (frame.system_id, frame.component_id)
         if frame.message_id == ids.PARAM_REQUEST_LIST:
             self._next, self._burst_us = 0, t_us

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from fsw.autopilot.signals import CommandRequest, MessageSource
+from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.outgoing import ServiceOutput
 from messages.frames import Frame
 
@@ -20,7 +21,7 @@ Outcome = tuple[int, str]
 
 
 class LinkService:
-    """One protocol on one link. Checks itself whether a frame is addressed to this vehicle."""
+    """One protocol on one link; it hears only what is addressed to this vehicle."""
 
     message_ids: frozenset[int] = frozenset()  # what it wants to hear
     commands: frozenset[int] = frozenset()  # MAV_CMD that it carries out; no tick sees them
@@ -70,7 +71,9 @@ class Dispatch:
         return frozenset(self._wanting)
 
     def handle(self, frame: Frame, t_us: int, source: MessageSource | None = None) -> None:
-        """Let every service that wants the frame answer it."""
+        """Let every service that wants the frame answer it, if it is for this vehicle."""
+        if not for_this_vehicle(frame):
+            return
         for service in self._wanting.get(frame.message_id, ()):
             service.source = source
             self.busy_until_us = t_us + _BUSY_US

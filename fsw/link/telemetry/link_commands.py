@@ -57,9 +57,11 @@ class LinkCommands:
         ``asker`` is the peer, whose wish for a rate is kept beside those of others.
         """
         decoder = _DECODERS.get(frame.message_id)
-        request = None if decoder is None else decoder(frame)
-        outcome = None if request is None else self._carry_out(request, t_us, snapshot, asker)
-        if outcome is None or request is None:
+        if decoder is None or not decode.for_this_vehicle(frame):
+            return None
+        request = decoder(frame)
+        outcome = self._carry_out(request, t_us, snapshot, asker)
+        if outcome is None:
             return None
         result, reason, messages = outcome
         ack = CommandAck(request.command, result, request.source_system, request.source_component)

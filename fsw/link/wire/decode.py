@@ -98,10 +98,8 @@ def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers, joints: i
     )
 
 
-def command_long(frame: Frame) -> CommandRequest | None:
-    """Read a COMMAND_LONG; None if it is for another system."""
-    if not for_this_vehicle(frame):
-        return None
+def command_long(frame: Frame) -> CommandRequest:
+    """Read a COMMAND_LONG."""
     *params, command, _, _, confirmation = cast(Numbers, frame.payload_values)
     return CommandRequest(
         command=int(command),
@@ -112,10 +110,8 @@ def command_long(frame: Frame) -> CommandRequest | None:
     )
 
 
-def command_int(frame: Frame) -> CommandRequest | None:
+def command_int(frame: Frame) -> CommandRequest:
     """Read a COMMAND_INT; parameters 5 and 6 come back in metres or degrees."""
-    if not for_this_vehicle(frame):
-        return None
     p1, p2, p3, p4, x, y, z, command, _, _, mav_frame, *_ = cast(Numbers, frame.payload_values)
     scale = 1e-4 if mav_frame in _LOCAL_FRAMES else 1e-7
     return CommandRequest(
@@ -127,13 +123,11 @@ def command_int(frame: Frame) -> CommandRequest | None:
     )
 
 
-def set_mode(frame: Frame) -> CommandRequest | None:
-    """Read a SET_MODE, the older form of DO_SET_MODE; None if it is for another system.
+def set_mode(frame: Frame) -> CommandRequest:
+    """Read a SET_MODE, the older form of DO_SET_MODE.
 
     It names PX4's main and sub mode in one number, and no component.
     """
-    if not for_this_vehicle(frame):
-        return None
     custom_mode, _, base_mode = cast("tuple[int, int, int]", frame.payload_values)
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
     return CommandRequest(

@@ -392,11 +392,6 @@ def test_a_file_that_became_shorter_is_a_failure_and_not_silence(tmp_path: Path)
     assert answer.refusal == Refusal.FAIL
 
 
-@pytest.mark.parametrize("target", [(2, 1), (1, 100)])
-def test_what_is_for_another_vehicle_is_left_to_it(client: Client, target: tuple[int, int]) -> None:
-    assert client.send(Opcode.LIST_DIRECTORY, b"/", target=target) == []
-
-
 def test_names_that_do_not_fit_a_message_are_left_out(tmp_path: Path) -> None:
     for name in ("n" * 230, "tab\there", "plain"):
         (tmp_path / name).mkdir()

@@ -312,12 +312,3 @@ def test_a_request_for_another_log_ends_the_download_of_the_first(tmp_path: Path
     client.polled()
     client.download(1)
     assert bytes(client.log) == b"the other"
-
-
-@pytest.mark.parametrize("target", [(2, 1), (1, 100)])
-def test_what_is_for_another_vehicle_is_left_to_it(tmp_path: Path, target: tuple[int, int]) -> None:
-    client = Client(LogService(FlightLogs(flight(tmp_path, "run-1", b"log"), OWN)))
-    client.ask(ids.LOG_REQUEST_LIST, 0, 0xFFFF, *target)
-    client.ask(ids.LOG_REQUEST_DATA, 0, ALL, 0, *target)
-    assert client.ask(ids.LOG_ERASE, *target) == []
-    assert client.polled() == []

@@ -322,18 +322,6 @@ def test_setting_the_unknown_is_an_error(service: ParameterService) -> None:
     assert error["error"] == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
-def test_other_systems_parameters_are_none_of_ours(
-    store: ParameterStore, service: ParameterService
-) -> None:
-    assert service.handle(listing(system=7), 0) == ()
-    assert later(service, 50) == []
-    assert service.handle(reading(b"PID_YAW_P", system=7), 0) == ()
-    assert service.handle(setting(b"PID_YAW_P", 5.0, system=7), 0) == ()
-    assert ticks(store) == []
-    assert service.handle(listing(component=154), 0) == ()
-    assert later(service, 5) == []
-
-
 def test_everybody_is_this_vehicle_too(service: ParameterService) -> None:
     service.handle(listing(0, 0), 0)
     assert len(later(service, 2)) == BURST
