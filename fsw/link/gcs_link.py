@@ -318,11 +318,8 @@ class GcsLink:
             if put_off is not None:
                 self._add_answer(put_off)
         else:
-            messages, refusal = answer
-            for message in messages:
-                self.outbox.add_asked_for(message)
-            if refusal is not None:
-                self.outbox.add_text(refusal, t_us)
+            for message in answer:
+                self.outbox.add_asked_for(message, t_us)
         self.dispatch.handle(frame, t_us, source)
 
     def _count_use(self, frame: Frame) -> None:

@@ -58,13 +58,13 @@ class Outbox:
         writer = self._writers[outgoing.component]
         self._add_frame(writer.packed_frame(outgoing.message_id, outgoing.payload))
 
-    def add_asked_for(self, outgoing: Outgoing) -> None:
+    def add_asked_for(self, outgoing: ServiceOutput, t_us: int) -> None:
         """Take a requested message: in MAVLink 2 if MAVLink 1 has no such message.
 
         A peer may speak MAVLink 1 only because it does not know our version yet.
         """
         before = len(self._frames)
-        self.add(outgoing.component, outgoing.message_id, outgoing.values)
+        self.add_output(outgoing, t_us)
         self._asked_for.update(self._frames[before:])
 
     def add_text(self, text: StatusText, t_us: int) -> None:

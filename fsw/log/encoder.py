@@ -198,9 +198,9 @@ class LogEncoder:
         for sample in inputs.samples:
             if type(sample) is ImuSample:
                 self._imu = sample
-                self._px4.feel(sample.acceleration, sample.rate)
+                self._px4.vibration.add(sample.rate, sample.acceleration)
         if not inputs.samples:
-            self._px4.feel(one.accel_B, one.gyro_B)
+            self._px4.vibration.add(one.gyro_B, one.accel_B)
         of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, outputs.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
         if self._imu and one == frame_of_samples(t_us, (self._imu,), self._joints):

@@ -8,6 +8,7 @@ from dataclasses import fields
 from typing import Any, Final
 
 from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.estimation.vibration import VibrationMeter
 from fsw.autopilot.flight.estimate.estimator_report import (
     ABSOLUTE,
     HEIGHT,
@@ -35,10 +36,8 @@ _TORQUE_US: Final = 10_000
 _SETPOINTS_US: Final = 50_000
 _PLACE_US: Final = 200_000
 _SECOND_US: Final = 1_000_000
-_VIBRATION_SHARE: Final = 0.01  # of a change that is taken over, as in PX4
 _FIX_3D: Final = 3  # GPS_FIX_TYPE
 _NAN: Final = math.nan
-_UNKNOWN: Final[Vec3] = (_NAN, _NAN, _NAN)
 _POSITION_LOST: Final = frozenset(
     {Condition.ESTIMATE_INVALID.value, Condition.POSITION_LOST.value, Condition.ATTITUDE_LOST.value}
 )
@@ -55,7 +54,7 @@ _LOAD: Final = Packed("cpuload")
 
 
 class Px4Records:
-    """Remembers when each was written last, and what the inertial unit measured."""
+    """Remembers when each was written last, and how much the inertial unit shakes."""
 
     def __init__(self, airframe: Airframe, origin: Origin) -> None:
         """Start a log of a vehicle."""
@@ -68,8 +67,7 @@ class Px4Records:
         self._torque, self._setpoints = Every(_TORQUE_US), Every(_SETPOINTS_US)
         self._place, self._second = Every(_PLACE_US), Every(_SECOND_US)
         self._failures: tuple[str, ...] = ()
-        self._accel = self._gyro = _UNKNOWN
-        self._shaken = self._turned = 0.0  # m/s^2, rad/s
+        self.vibration = VibrationMeter()
 
     def add(self, snapshot: FlightSnapshot, out: bytearray) -> None:
         """Append what is due in this tick."""
@@ -86,19 +84,6 @@ class Px4Records:
             out += self._slow(snapshot)
         if second or self._failures != before:
             out += _failsafe_flags(snapshot)
-
-    def feel(self, accel: Vec3, gyro: Vec3) -> None:
-        """Take what the inertial unit measured next.
-
-        Specific force ``accel`` [m/s^2, FRD] and body rates ``gyro`` [rad/s, FRD].
-        """
-        (ax, ay, az), (gx, gy, gz) = self._accel, self._gyro
-        shaken = math.hypot(accel[0] - ax, accel[1] - ay, accel[2] - az)
-        turned = math.hypot(gyro[0] - gx, gyro[1] - gy, gyro[2] - gz)
-        if shaken + turned < math.inf:  # no number yet, or none any more
-            self._shaken += _VIBRATION_SHARE * (shaken - self._shaken)
-            self._turned += _VIBRATION_SHARE * (turned - self._turned)
-        self._accel, self._gyro = accel, gyro
 
     def _torques(self, snapshot: FlightSnapshot) -> bytes:
         thrust = snapshot.actuators.rotor_thrust
@@ -122,7 +107,8 @@ class Px4Records:
             *(battery.voltage, battery.current, 1e3 * battery.consumed),
             *(battery.remaining, left, int(battery.charge)),
         )
-        return _SLOW.pack(snapshot.t_us, status, (self._shaken, self._turned))
+        gyro, accel = self.vibration.metrics
+        return _SLOW.pack(snapshot.t_us, status, (accel, gyro))
 
 
 def origin_of(numbers: Mapping[str, float]) -> Origin:

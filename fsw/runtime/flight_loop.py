@@ -25,9 +25,6 @@ from fsw.autopilot.signals import (
     FlightSnapshot,
     HostHealth,
     InjectFailure,
-    OffboardReport,
-    PlannerCounters,
-    SafetyCounters,
     SensorFrame,
     Severity,
     StatusText,
@@ -100,21 +97,6 @@ class FlightRecord:
     stale: int = 0  # ticks without a sensor frame of their own
     scheduler: str = ""  # class and priority of the tick process
     snapshot: FlightSnapshot | None = None  # of the last tick
-
-    @property
-    def counters(self) -> PlannerCounters:
-        """The planner's, as the tick counts them."""
-        return PlannerCounters() if self.snapshot is None else self.snapshot.counters
-
-    @property
-    def safety(self) -> SafetyCounters:
-        """How often the vehicle was not where it should be."""
-        return SafetyCounters() if self.snapshot is None else self.snapshot.safety
-
-    @property
-    def offboard(self) -> OffboardReport:
-        """Setpoints of clients."""
-        return OffboardReport() if self.snapshot is None else self.snapshot.offboard
 
 
 @dataclass(slots=True)
@@ -397,7 +379,7 @@ class FlightLoop:
             late=inner.late,
             skipped=inner.skipped,
             stale=self._record.stale,
-            plans_late=self._record.counters.missed_deadlines,
+            plans_late=cycle.outputs.snapshot.counters.missed_deadlines,
         )
         if sentence is not None:
             self._notices.append(StatusText(Severity.WARNING, sentence))

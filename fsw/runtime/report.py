@@ -6,8 +6,8 @@ from dataclasses import asdict
 
 from fsw.autopilot.parameters.control_choice import ControlChoice
 from fsw.autopilot.ports import VehicleFacts
+from fsw.autopilot.signals import OffboardReport, PlannerCounters, SafetyCounters
 from fsw.runtime.flight_loop import FlightEnd, FlightRecord
-from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.rate_groups import HOUSEKEEPING, INNER, TELEMETRY
 from fsw.runtime.timing import GroupTimer, Histogram
 
@@ -19,6 +19,9 @@ def as_json(
     for timer in record.groups.values():
         timer.close_interval()
     record.mpc.timer.close_interval()
+    seen = record.snapshot
+    safety = SafetyCounters() if seen is None else seen.safety
+    setpoints = OffboardReport() if seen is None else seen.offboard
     return {
         "controller": control.controller,
         "inner_loop": control.inner,
@@ -36,17 +39,14 @@ def as_json(
         "housekeeping": _group(record.groups[HOUSEKEEPING.name]),
         "scheduler": record.scheduler,
         "stages": {name: _percentiles(times) for name, times in record.stages.items()},
-        "safety": asdict(record.safety),
-        "setpoints": {
-            "accepted": record.offboard.accepted,
-            "refused": record.offboard.refused,
-        },
+        "safety": asdict(safety),
+        "setpoints": {"accepted": setpoints.accepted, "refused": setpoints.refused},
     }
 
 
 def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:
-    planner: PlannerRecord = record.mpc
-    timer = planner.timer
+    planner, seen = record.mpc, record.snapshot
+    timer, counters = planner.timer, PlannerCounters() if seen is None else seen.counters
     return {
         "horizon": facts.horizon,
         "rate_hz": 1e6 / facts.mpc_period_us,
@@ -54,8 +54,8 @@ def _mpc(facts: VehicleFacts, record: FlightRecord) -> dict[str, object]:
         "cycles": timer.execution.count,
         **_percentiles(timer.execution),
         "lateness_p99_us": timer.lateness.percentile_us(0.99),
-        "missed_deadlines": record.counters.missed_deadlines,
-        "fallbacks": record.counters.fallbacks,
+        "missed_deadlines": counters.missed_deadlines,
+        "fallbacks": counters.fallbacks,
         "restarts": planner.restarts,
         "status": dict(planner.status),
     }

@@ -15,7 +15,7 @@ from fsw.link.telemetry.stream_rates import OFF, UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
 from fsw.link.wire import decode
 from fsw.link.wire.encode_standard import command_ack
-from fsw.link.wire.outgoing import Outgoing, TelemetryContext
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput, TelemetryContext
 from messages import message_ids
 from messages.frames import Frame
 
@@ -50,8 +50,8 @@ class LinkCommands:
 
     def handle(
         self, frame: Frame, t_us: int, snapshot: FlightSnapshot | None, asker: object = None
-    ) -> tuple[Sequence[Outgoing], StatusText | None] | None:
-        """Carry out a command to the link: what to send, and why it was refused, if it was.
+    ) -> Sequence[ServiceOutput] | None:
+        """Carry out a command to the link: what to send, with a text where it was refused.
 
         None if the frame is something else. The snapshot is the newest, None before the first tick;
         ``asker`` is the peer, whose wish for a rate is kept beside those of others.
@@ -66,7 +66,8 @@ class LinkCommands:
         result, reason, messages = outcome
         ack = CommandAck(request.command, result, request.source_system, request.source_component)
         reply = Outgoing(message_ids.COMMAND_ACK, command_ack(ack))
-        return (reply, *messages), _answer(reason)
+        texts = [StatusText(Severity.INFO, reason, prompt=True)] if reason else []
+        return (reply, *messages, *texts)
 
     def _carry_out(
         self, request: CommandRequest, t_us: int, snapshot: FlightSnapshot | None, asker: object
@@ -128,7 +129,3 @@ class LinkCommands:
 def _whole(number: float) -> int | None:
     """A parameter as an integer of 32 bits; None for NaN, infinity and what is out of range."""
     return round(number) if abs(number) < 2**31 else None
-
-
-def _answer(reason: str) -> StatusText | None:
-    return StatusText(Severity.INFO, reason, prompt=True) if reason else None
