@@ -39,24 +39,18 @@ from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import decode
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import SampleDecoder, battery_reading
-from fsw.link.wire.encode_standard import command_ack, hil_actuator_controls
-from fsw.link.wire.px4_mode import custom_mode
-from messages import message_ids, status_text
+from fsw.link.wire.encode_standard import command_ack, hil_actuator_controls, vehicle_heartbeat
+from fsw.link.wire.outgoing import PX4
+from messages import dialect, message_ids, status_text
 from messages.frames import Frame, FrameWriter, split
-from messages.message_ids import AUTOPILOT, SYSTEM_ID
+from messages.message_ids import ACCEPTED, AUTOPILOT, CMD_REBOOT_SHUTDOWN, SYSTEM_ID
 from messages.udp import PeerSocket
 
 PATIENCE_S: Final = 0.2  # one wait for a datagram; also the interval of announcements
 
 _ANSWERS: Final = 32  # steps with answers that are remembered: more than can be late or repeated
-_SHUTDOWN: Final = 246  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 _POWER_OFF: Final = 2.0  # its second parameter here: shut the autopilot down
-_ACCEPTED: Final = 0  # MAV_RESULT
 _REPORT_US: Final = 1_000_000  # the mode is reported when it changes, and this often
-_PX4: Final = 12  # MAV_AUTOPILOT
-_CUSTOM_MODE: Final = 1  # MAV_MODE_FLAG
-_ARMED: Final = 128
-_STANDBY, _ACTIVE = 3, 4  # MAV_STATE
 _SENSOR_AT: Final = 15  # place of HIL_SENSOR's id; the step's clock has 0
 _LOCKSTEP_BIT, _MEASURED_BIT = 1, 2  # of the custom_mode in the simulator's HEARTBEAT
 _NO_ANSWER: Final = "the simulator does not answer: a fault may have begun or ended, or not"
@@ -94,7 +88,7 @@ class SimLink:
 
     def announce(self) -> None:
         """Send a heartbeat, until the simulator sends steps."""
-        values = (0, self._airframe.mav_type, _PX4, 0, _STANDBY, 3)
+        values = (0, self._airframe.mav_type, PX4, 0, dialect.MAV_STATE_STANDBY, 3)
         self._endpoint.send(self._writer.frame(message_ids.HEARTBEAT, *values))
 
     def wait_for_step(self) -> SensorFrame | None:
@@ -272,9 +266,11 @@ class SimLink:
                 del self._early[:-MAX_SAMPLES]
             if frame.message_id == message_ids.COMMAND_LONG and decode.for_this_vehicle(frame):
                 request = decode.command_long(frame)
-                if request.command == _SHUTDOWN and request.params[1] == _POWER_OFF:
+                if request.command == CMD_REBOOT_SHUTDOWN and request.params[1] == _POWER_OFF:
                     self.shutdown = True
-                    ack = CommandAck(_SHUTDOWN, _ACCEPTED, frame.system_id, frame.component_id)
+                    ack = CommandAck(
+                        CMD_REBOOT_SHUTDOWN, ACCEPTED, frame.system_id, frame.component_id
+                    )
                     self._endpoint.send(self._ack_frame(ack))
 
     def _replies(self, texts: tuple[StatusText, ...]) -> list[bytes]:
@@ -295,10 +291,7 @@ class SimLink:
     def _mode(self, t_us: int, outputs: TickOutputs) -> bytes:
         """HEARTBEAT: the simulator sees whether its trajectory is being flown."""
         self._reported_us, self._reported_mode = t_us, outputs.mode
-        base_mode = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
-        status = _ACTIVE if outputs.armed else _STANDBY
-        kind = self._airframe.mav_type
-        values = (custom_mode(outputs.mode), kind, _PX4, base_mode, status, 3)
+        values = vehicle_heartbeat(outputs.mode, self._airframe.mav_type, armed=outputs.armed)
         return self._writer.frame(message_ids.HEARTBEAT, *values)
 
     def _ack_frame(self, ack: CommandAck) -> bytes:

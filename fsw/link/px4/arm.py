@@ -17,9 +17,8 @@ from fsw.autopilot.signals import CommandAck, JointVector, MessageSource, Mode, 
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.wire.decode import Numbers
-from fsw.link.wire.encode_standard import command_ack
-from fsw.link.wire.px4_mode import custom_mode
-from messages import message_ids
+from fsw.link.wire.encode_standard import command_ack, vehicle_heartbeat
+from messages import dialect, message_ids
 from messages.addresses import LinkAddress
 from messages.frames import FrameWriter, Losses
 from messages.joint_arrays import ENCODERS_AT, STATE_AT, base, joined, more
@@ -29,8 +28,6 @@ SILENT_US: Final = 100_000  # an arm that says nothing for so long is not there
 _BANDWIDTH: Final = 60.0  # rad/s, of rates that are found from angles
 _SERVO: Final = 15.0  # rad/s, with which a servo that says nothing is believed to follow
 _REPORT_US: Final = 200_000
-_ARMED, _CUSTOM_MODE = 128, 1  # MAV_MODE_FLAG
-_GENERIC, _PX4_MODES, _ACTIVE = 0, 12, 4  # MAV_TYPE, MAV_AUTOPILOT, MAV_STATE
 
 
 class Joints:
@@ -113,9 +110,9 @@ class ArmLink:
             self._send(message_ids.ARM_JOINT_SETPOINT, *values)
         if outputs.mode is not self._mode or t_us - self._reported_us >= _REPORT_US:
             self._mode, self._reported_us = outputs.mode, t_us
-            flags = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
-            values = (custom_mode(outputs.mode), _GENERIC, _PX4_MODES, flags, _ACTIVE, 3)
-            self._send(message_ids.HEARTBEAT, *values)
+            kind = dialect.MAV_TYPE_GENERIC
+            beat = vehicle_heartbeat(outputs.mode, kind, armed=outputs.armed)
+            self._send(message_ids.HEARTBEAT, *beat)
 
     def acknowledge(self, ack: CommandAck) -> None:
         """Answer a command that came here."""

@@ -22,12 +22,12 @@ from fsw.autopilot.signals import (
     TickOutputs,
     Vec3,
 )
-from fsw.link.wire.outgoing import TelemetryContext, WireValues
+from fsw.link.wire.outgoing import PX4, TelemetryContext, WireValues
 from fsw.link.wire.px4_mode import custom_mode, shown_mode
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1
-_AUTO, _GUIDED, _STABILISED, _MANUAL_INPUT = 4, 8, 16, 64
+_AUTO, _GUIDED, _STABILISED = 4, 8, 16
 _BY_ITSELF: Final = _CUSTOM_MODE | _AUTO | _GUIDED | _STABILISED
 _GUIDED_FROM_OUTSIDE: Final = _CUSTOM_MODE | _STABILISED
 # As PX4 sets them: 29 in its automatic modes, 17 where something outside steers.
@@ -167,6 +167,12 @@ def orbit_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireVal
     return (snapshot.t_us, radius, *place, _GLOBAL)
 
 
+def vehicle_heartbeat(mode: Mode, mav_type: int, *, armed: bool) -> WireValues:
+    """HEARTBEAT to who looks at the mode alone: the simulator, or an arm."""
+    state = _ACTIVE if armed else _STANDBY
+    return (custom_mode(mode), mav_type, PX4, _flags(armed), state, _MAVLINK_VERSION)
+
+
 def command_ack(ack: CommandAck) -> WireValues:
     """COMMAND_ACK: no progress, no detail."""
     return (ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
@@ -180,8 +186,12 @@ def hil_actuator_controls(airframe: Airframe, t_us: int, outputs: TickOutputs) -
     """
     thrust, torque = airframe.shares(outputs.actuators)
     unused = (0.0,) * (_CONTROLS - 1 - len(thrust) - len(torque))
-    mode = _CUSTOM_MODE | (_ARMED if outputs.armed else 0)
+    mode = _flags(outputs.armed)
     return (t_us, _LOCKSTEP, *thrust, *torque, *unused, outputs.gripper, mode)
+
+
+def _flags(armed: bool) -> int:
+    return _CUSTOM_MODE | (_ARMED if armed else 0)
 
 
 def as_asked(motion: MotionSetpoint) -> tuple[tuple[float, ...], int]:

@@ -127,7 +127,6 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (encode_standard, "_AUTO", "MAV_MODE_FLAG", "AUTO_ENABLED"),
     (encode_standard, "_GUIDED", "MAV_MODE_FLAG", "GUIDED_ENABLED"),
     (encode_standard, "_STABILISED", "MAV_MODE_FLAG", "STABILIZE_ENABLED"),
-    (encode_standard, "_MANUAL_INPUT", "MAV_MODE_FLAG", "MANUAL_INPUT_ENABLED"),
     (encode_standard, "_UNINIT", "MAV_STATE", "UNINIT"),
     (encode_standard, "_STANDBY", "MAV_STATE", "STANDBY"),
     (encode_standard, "_ACTIVE", "MAV_STATE", "ACTIVE"),
