@@ -12,7 +12,7 @@ from fsw.autopilot.signals import SensorFrame, TickInputs, frame_of_samples
 from fsw.log import topics
 from fsw.log.encoder import SAMPLES, TYPED
 from fsw.log.json_codec import JsonCodec
-from fsw.log.samples import TOPIC_NUMBERS, Samples
+from fsw.log.packed import TOPIC_NUMBERS, Samples
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, open_log, unpacker
 

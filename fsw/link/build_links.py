@@ -15,8 +15,7 @@ from fsw.link.link_choice import LinkChoice, addresses
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile, NoKeyFile
-from fsw.link.signing.signed_times import SignedTimes
-from fsw.link.signing.signing import Signing
+from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
 from fsw.link.wire.outgoing import TelemetryContext
 

@@ -43,9 +43,8 @@ from fsw.autopilot.signals import (
 )
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
-from fsw.log.packed import Every, Packed
+from fsw.log.packed import Every, Packed, Samples
 from fsw.log.px4_records import Px4Records, validity
-from fsw.log.samples import Samples
 from messages.ulog import logged_text
 
 TYPED: Final = "sensors"  # the inputs that have topics of their own

@@ -36,13 +36,12 @@ from fsw.link.inbox import Inbox
 from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.log.run_files import RunFiles
 from fsw.runtime.clock import unix_us
-from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.host_watch import HostWatch
 from fsw.runtime.planner_service import PlannerRecord
 from fsw.runtime.program import FlightProgram
 from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
 from fsw.runtime.realtime import rank_threads
-from fsw.runtime.releases import Release, ScheduledReleases, StepReleases
+from fsw.runtime.releases import DeadlineMonitor, Release, ScheduledReleases, StepReleases
 from fsw.runtime.tick_runner import TickRunner
 from fsw.runtime.timing import GroupTimer, Histogram
 

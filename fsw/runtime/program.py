@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from fsw.autopilot.ports import PlanningCycle, VehicleFacts
 from fsw.autopilot.signals import TickInputs, TickOutputs
-from fsw.link.events.event_log import EventLog
+from fsw.link.events.event_service import EventLog
 from fsw.link.services.mission_store import MissionStore
 
 if TYPE_CHECKING:

@@ -31,8 +31,7 @@ from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.time_service import TimeService
-from fsw.link.signing.signed_times import SignedTimes
-from fsw.link.signing.signing import Signing
+from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.link.wire.outgoing import TelemetryContext
 from fsw.runtime.assembly import vehicle_facts

@@ -100,7 +100,7 @@ from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.frozen import replace
 from fsw.link.inbox import Inbox
 from fsw.link.wire.decode_sensors import SampleDecoder
-from fsw.log.samples import Samples
+from fsw.log.packed import Samples
 from fsw.log.topics import NUMBERS
 from messages.frames import split
 from sitl.link.encode import StepEncoder

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import pytest
 
-from fsw.runtime.deadline_monitor import DeadlineMonitor
 from fsw.runtime.releases import (
     LEAD_US,
     MAX_STALE_TICKS,
+    DeadlineMonitor,
     Release,
     ReleaseSchedule,
     ScheduledReleases,

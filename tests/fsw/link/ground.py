@@ -27,8 +27,7 @@ from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
 from fsw.link.services.time_service import TimeService
 from fsw.link.signing.key_file import KeyFile, SigningKey
-from fsw.link.signing.signed_times import SignedTimes
-from fsw.link.signing.signing import Signing
+from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
 from fsw.storage.parameter_store import ParameterStore
 from messages.frames import Frame, split

@@ -21,8 +21,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.services.parameter_service import ParameterService
 from fsw.link.services.service import LinkService
 from fsw.link.signing.key_file import NoKeyFile
-from fsw.link.signing.signed_times import SignedTimes
-from fsw.link.signing.signing import Signing
+from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.streams import GROUND_RATES
 from fsw.storage.parameter_store import ParameterStore
 from messages import message_ids as ids

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fsw.runtime.deadline_monitor import DeadlineMonitor
+from fsw.runtime.releases import DeadlineMonitor
 
 
 def test_releases_in_a_row_are_one_interval() -> None:

@@ -23,8 +23,7 @@ from fsw.autopilot.signals import (
     StatusText,
     TickInputs,
 )
-from fsw.link.events.event_log import EventLog
-from fsw.link.events.event_service import EventService
+from fsw.link.events.event_service import EventLog, EventService
 from fsw.link.events.event_table import (
     ARGUMENTS,
     Event,

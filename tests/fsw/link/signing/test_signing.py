@@ -14,8 +14,7 @@ from fsw.link.build_links import build_links
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice
 from fsw.link.signing.key_file import KeyFile, SigningKey
-from fsw.link.signing.signed_times import SignedTimes
-from fsw.link.signing.signing import FrameTrust
+from fsw.link.signing.signing import FrameTrust, SignedTimes
 from fsw.link.udp_endpoint import LinkError
 from messages import dialect
 from messages import message_ids as ids
