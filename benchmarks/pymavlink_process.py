@@ -75,6 +75,7 @@ def step(sender: Any, readings: Any) -> bytes:
 def _swap_fsw() -> None:
     from fsw.link.sim_link import SimLink
     from fsw.link.wire.encode_standard import hil_actuator_controls
+    from messages.frames import Frame
 
     sender, receiver = _codec(1), _codec(1)
     general = SimLink._read
@@ -87,7 +88,11 @@ def _swap_fsw() -> None:
         odometry = (o.time_usec, o.x, o.y, o.z, *o.q, o.vx, o.vy, o.vz)
         arm = (a.time_usec, *a.position, *a.velocity)
         hil = (h.time_usec, h.xacc, h.yacc, h.zacc, h.xgyro, h.ygyro, h.zgyro)
-        return self._new(messages[-1].get_seq(), odometry, arm, hil)
+        frames = [
+            Frame(1, one.get_srcComponent(), one.get_seq(), one.get_msgId(), values)
+            for one, values in zip(messages, (odometry, arm, hil), strict=True)
+        ]
+        return self._new(frames[-1], *frames[:-1])
 
     def controls_of(self: Any, stamp_us: int, outputs: Any) -> bytes:
         t_us, flags, *controls, mode = hil_actuator_controls(self._airframe, stamp_us, outputs)

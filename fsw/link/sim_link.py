@@ -68,7 +68,8 @@ class SimLink:
         self.routed_acks: list[CommandAck] = []  # of the simulator to what was routed; the same
         self._endpoint = PeerSocket.connected(simulator, PATIENCE_S)
         self._inbox = inbox
-        self._for_inbox = inbox.message_ids - {message_ids.HEARTBEAT}
+        others = {message_ids.BATTERY_STATUS}
+        self._for_inbox = inbox.message_ids - {message_ids.HEARTBEAT} | others
         self._airframe = facts.airframe
         self._joints = self._airframe.bodies.joints
         self._decoder = SampleDecoder(inbox.locate, self._joints)
@@ -162,32 +163,30 @@ class SimLink:
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""
         frames = list(split(datagram))
-        payloads = {frame.message_id: cast(Numbers, frame.payload_values) for frame in frames}
-        barrier = payloads.get(message_ids.HIL_SENSOR)  # the last one
-        number = next((f.sequence for f in frames if f.message_id == message_ids.HIL_SENSOR), 0)
-        heartbeat = payloads.get(message_ids.HEARTBEAT)
-        if heartbeat is not None:
-            self._note_pacing(int(heartbeat[0]))
-        if barrier is None or barrier[_SENSOR_AT] != 0:
+        found = {frame.message_id: frame for frame in frames}  # of each kind the last one
+        if message_ids.HEARTBEAT in found:
+            self._note_pacing(cast(int, found[message_ids.HEARTBEAT].payload_values[0]))
+        barrier = found.get(message_ids.HIL_SENSOR)
+        if barrier is None or barrier.payload_values[_SENSOR_AT] != 0:
             self._read_between_steps(frames)
             return None
         if self.measured:
             samples = [one for frame in frames for one in self._decoder.samples(frame)]
-            sensors = self._new_measured(int(barrier[0]), samples, number)
+            sensors = self._new_measured(barrier, samples)
         else:
-            odometry = payloads.get(message_ids.ODOMETRY)
-            arm = payloads.get(message_ids.ARM_JOINT_STATE)
-            sensors = self._new(number, odometry, arm, barrier)
-        if message_ids.COMMAND_ACK in payloads:
-            self._note_answers((int(barrier[0]), number), frames)
-        if sensors is not None:
-            battery = payloads.get(message_ids.BATTERY_STATUS)
-            reading = None if battery is None else battery_reading(battery)
-            if reading is not None:
-                self._inbox.accept_battery(reading)
-            for frame in frames:
-                if frame.message_id in self._for_inbox:
-                    self._inbox.accept(frame, _source(frame))
+            odometry = found.get(message_ids.ODOMETRY)
+            sensors = self._new(barrier, odometry, found.get(message_ids.ARM_JOINT_STATE))
+        if message_ids.COMMAND_ACK in found:
+            self._note_answers((_stamp(barrier), barrier.sequence), frames)
+        if sensors is None or self._for_inbox.isdisjoint(found):
+            return sensors
+        for frame in frames:
+            if frame.message_id == message_ids.BATTERY_STATUS:
+                reading = battery_reading(cast(Numbers, frame.payload_values))
+                if reading is not None:
+                    self._inbox.accept_battery(reading)
+            elif frame.message_id in self._for_inbox:
+                self._inbox.accept(frame, _source(frame))
         return sensors
 
     def _note_answers(self, step: tuple[int, int], frames: list[Frame]) -> None:
@@ -219,21 +218,19 @@ class SimLink:
         self.pacing = Pacing(custom_mode & _LOCKSTEP_BIT)
         self.measured = bool(custom_mode & _MEASURED_BIT)
 
-    def _new(
-        self, number: int, odometry: Numbers | None, arm: Numbers | None, barrier: Numbers
-    ) -> SensorFrame | None:
+    def _new(self, barrier: Frame, odometry: Frame | None, arm: Frame | None) -> SensorFrame | None:
         """The sensors of a step that is whole and not known yet; a known one is answered again."""
-        t_us = int(barrier[0])
-        if odometry is None or arm is None or not self._is_next(t_us, number):
+        if odometry is None or arm is None or not self._is_next(barrier):
             return None
         frame = decode.sensor_frame(odometry, arm, barrier, self._joints)
         ahead_us = self._steps.ahead_us
-        return frame if not ahead_us else replace(frame, t_us=t_us - ahead_us)
+        return frame if not ahead_us else replace(frame, t_us=frame.t_us - ahead_us)
 
-    def _new_measured(self, t_us: int, samples: list[Sample], number: int) -> SensorFrame | None:
+    def _new_measured(self, barrier: Frame, samples: list[Sample]) -> SensorFrame | None:
         """The time of a new step, whose samples are in the inbox; a known one is answered again."""
-        if not self._is_next(t_us, number):
+        if not self._is_next(barrier):
             return None
+        t_us = _stamp(barrier)
         if self._early or self._steps.ahead_us:
             samples = self._steps.in_vehicle_time([*self._early, *samples])
             self._early.clear()
@@ -241,17 +238,15 @@ class SimLink:
         self._inbox.accept_samples(samples)
         return frame_of_samples(t_us, samples, self._joints)
 
-    def _is_next(self, t_us: int, number: int) -> bool:
+    def _is_next(self, barrier: Frame) -> bool:
         """Whether a step is a new one, which it is only once; a known one is answered again."""
-        if self._steps.follows(t_us, number):
+        t_us = _stamp(barrier)
+        if self._steps.follows(t_us, barrier.sequence):
             return True
-        self._repeat(t_us)
-        return False
-
-    def _repeat(self, t_us: int) -> None:
         if t_us == self._answer[0]:
             self.retransmissions += 1
             self._send(self._answer)
+        return False
 
     def _send(self, answer: tuple[int, list[bytes]]) -> None:
         self._answer = answer
@@ -296,6 +291,11 @@ class SimLink:
 
     def _ack_frame(self, ack: CommandAck) -> bytes:
         return self._writer.frame(message_ids.COMMAND_ACK, *command_ack(ack))
+
+
+def _stamp(barrier: Frame) -> int:
+    """By the sensors' clock [us]."""
+    return cast(int, barrier.payload_values[0])
 
 
 def _source(frame: Frame) -> MessageSource:

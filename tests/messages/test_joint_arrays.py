@@ -36,11 +36,12 @@ def test_what_is_sent_is_what_is_read(count: int) -> None:
     some = angles(count)
     assert joined((*base(some), *more(some)), 0, 4, count) == some
     datagram = StepEncoder(lockstep=True).datagram(readings(count), ())
-    frames = {one.message_id: one.payload_values for one in split(datagram)}
-    frame = sensor_frame(*(frames[k] for k in (331, ARM, 107)), count)  # type: ignore[arg-type]
+    sent = {one.message_id: one for one in split(datagram)}
+    frame = sensor_frame(*(sent[k] for k in (331, ARM, 107)), count)  # type: ignore[arg-type]
     assert (frame.q_arm, frame.qd_arm) == (some, tuple(-one for one in some))
-    assert frames[ARM][STATE_COUNT_AT] == count
-    assert joined(frames[ARM], *STATE_AT[2], count) == (0.5,) * count  # type: ignore[arg-type]
+    torques = sent[ARM].payload_values
+    assert torques[STATE_COUNT_AT] == count
+    assert joined(torques, *STATE_AT[2], count) == (0.5,) * count  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("count", COUNTS)

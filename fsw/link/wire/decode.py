@@ -78,13 +78,14 @@ def _target_at(message_id: int) -> tuple[int | None, int | None]:
     return at.get("target_system"), at.get("target_component")
 
 
-def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers, joints: int) -> SensorFrame:
+def sensor_frame(odometry: Frame, arm: Frame, hil_sensor: Frame, joints: int) -> SensorFrame:
     """Sensor readings of one step: ODOMETRY in local NED, ARM_JOINT_STATE and HIL_SENSOR.
 
     Of a vehicle with so many ``joints``.
     """
-    _, px, py, pz, qw, qx, qy, qz, vx, vy, vz = odometry[:11]
-    t_us, ax, ay, az, wx, wy, wz = hil_sensor[:7]
+    state, angles = cast(Numbers, odometry.payload_values), cast(Numbers, arm.payload_values)
+    _, px, py, pz, qw, qx, qy, qz, vx, vy, vz = state[:11]
+    t_us, ax, ay, az, wx, wy, wz = cast(Numbers, hil_sensor.payload_values)[:7]
     position, velocity, _ = STATE_AT
     return SensorFrame(
         cast(int, t_us),
@@ -93,8 +94,8 @@ def sensor_frame(odometry: Numbers, arm: Numbers, hil_sensor: Numbers, joints: i
         q_WB=(qw, qx, qy, qz),
         gyro_B=(wx, wy, wz),
         accel_B=(ax, ay, az),
-        q_arm=joined(arm, *position, joints),
-        qd_arm=joined(arm, *velocity, joints),
+        q_arm=joined(angles, *position, joints),
+        qd_arm=joined(angles, *velocity, joints),
     )
 
 
