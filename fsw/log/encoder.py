@@ -81,29 +81,6 @@ _TIMING: Final = Packed("loop_timing")
 _ESTIMATOR: Final = Packed("estimator_status", "estimator_innovations", "estimator_sensor_bias")
 
 
-class _Layout:
-    """Records that are as long as a vehicle has joints and rotors."""
-
-    def __init__(self, rotors: int, joints: int) -> None:
-        packed = partial(Packed, rotor=rotors, joint=joints)
-        self.samples = Samples(joints)
-        # What a replay needs and what it is compared by: every tick in every profile.
-        self.short_tick = packed("tick", "actuator_command")
-        self.whole_tick = packed("sensor_frame", "actuator_command")
-        # What follows from that, for reading.
-        self.detail = packed(
-            "vehicle_attitude",
-            "vehicle_local_position",
-            "actuator_motors",
-            "arm_joint_state",
-        )
-        self.in_flight = packed(
-            "vehicle_local_position_setpoint", "arm_joint_setpoint", "plan_input"
-        )
-        self.request = packed("mpc_request")
-        self.status = packed("vehicle_status", "vehicle_land_detected", "failure_detector_status")
-
-
 class LogEncoder:
     """Turns ticks into bytes; remembers what it has written, to write changes only."""
 
@@ -123,8 +100,27 @@ class LogEncoder:
             Every(1 if profile == FULL else us) for us in (_DETAIL_US, _FAST_US, _PLAN_US)
         )
         self._px4 = Px4Records(airframe, origin)
-        self._of = _Layout(airframe.rotors, airframe.bodies.joints)
-        self._joints = airframe.bodies.joints
+        joints = self._joints = airframe.bodies.joints
+        # Records that are as long as a vehicle has joints and rotors.
+        packed = partial(Packed, rotor=airframe.rotors, joint=joints)
+        self._samples = Samples(joints)
+        # What a replay needs and what it is compared by: every tick in every profile.
+        self._short_tick_records = packed("tick", "actuator_command")
+        self._whole_tick_records = packed("sensor_frame", "actuator_command")
+        # What follows from that, for reading.
+        self._detail_records = packed(
+            "vehicle_attitude",
+            "vehicle_local_position",
+            "actuator_motors",
+            "arm_joint_state",
+        )
+        self._in_flight_records = packed(
+            "vehicle_local_position_setpoint", "arm_joint_setpoint", "plan_input"
+        )
+        self._request_records = packed("mpc_request")
+        self._status_records = packed(
+            "vehicle_status", "vehicle_land_detected", "failure_detector_status"
+        )
         self._imu: ImuSample | None = None  # the last one
         self._took_over = False  # the pilot, from a failsafe whose condition still holds
         self.inputs = JsonCodec(TickInputs, {} if measured else {PlanTimings: _NO_TIMES})
@@ -144,7 +140,7 @@ class LogEncoder:
         snapshot = outputs.snapshot
         out += self._every_tick(inputs, outputs)
         for sample in inputs.samples:
-            out += self._of.samples.record(inputs.sensors.t_us, sample)
+            out += self._samples.record(inputs.sensors.t_us, sample)
         self._timed(snapshot, out)
         self._px4.add(snapshot, out)
         self._add_inputs(inputs, out)
@@ -155,7 +151,7 @@ class LogEncoder:
             out += self._mpc(snapshot)
         self._constraints, self._plan = constraints, plan
         if outputs.plan_request is not None:
-            out += _request(self._of.request, snapshot.t_us, outputs.plan_request)
+            out += _request(self._request_records, snapshot.t_us, outputs.plan_request)
         self._add_status(snapshot, out)
         for ack in outputs.acks:
             addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
@@ -200,17 +196,17 @@ class LogEncoder:
                 self._px4.vibration.add(sample.rate, sample.acceleration)
         if not inputs.samples:
             self._px4.vibration.add(one.gyro_B, one.accel_B)
-        of, command = self._of, (*sent.rotor_thrust, *sent.joint_torque, outputs.armed)
+        command = (*sent.rotor_thrust, *sent.joint_torque, outputs.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
         if self._imu and one == frame_of_samples(t_us, (self._imu,), self._joints):
-            return of.short_tick.pack(t_us, (), command)
+            return self._short_tick_records.pack(t_us, (), command)
         arm = (*one.q_arm, *one.qd_arm)
         frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)
-        return of.whole_tick.pack(t_us, frame, command)
+        return self._whole_tick_records.pack(t_us, frame, command)
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
         x, sent, ground = snapshot.estimate, snapshot.actuators, _sees_ground(snapshot)
-        return self._of.detail.pack(
+        return self._detail_records.pack(
             snapshot.t_us,
             quaternion_from_matrix(x.R_WB),
             (*x.p_WB, *x.v_WB, x.yaw, *validity(snapshot), -x.p_WB[2], ground),
@@ -226,7 +222,7 @@ class LogEncoder:
         )
         body = (*x.p, *x.v, *x.a, x.yaw, x.yaw_rate)
         arm = (*x.q_arm, *x.qd_arm, *qdd)
-        return self._of.in_flight.pack(snapshot.t_us, body, arm, (*a, yaw_acc))
+        return self._in_flight_records.pack(snapshot.t_us, body, arm, (*a, yaw_acc))
 
     def _add_inputs(self, inputs: TickInputs, out: bytearray) -> None:
         """Every input that is not what it was on the tick before."""
@@ -247,7 +243,7 @@ class LogEncoder:
         mode, failures, known = snapshot.mode, snapshot.failures, snapshot.actuators_found
         rotors = 1 << known.rotor >> 1  # from 1; 0: none
         joints = [round(kind) for kind in known.joints or (0.0,) * self._joints]
-        return self._of.status.pack(
+        return self._status_records.pack(
             snapshot.t_us,
             (
                 *(2 if snapshot.armed else 1, NAV_STATES[mode], bool(failures)),

@@ -15,9 +15,18 @@ from typing import Final, TypeAlias, cast
 from fsw.link.bounded_memory import renew
 from fsw.link.files import ftp_jobs
 from fsw.link.files.ftp_jobs import Job
-from fsw.link.files.ftp_message import Opcode, Refusal, Reply, Request, read, refused, write
-from fsw.link.files.ftp_tree import Directory, find, listing
-from fsw.link.files.served_file import OpenFile
+from fsw.link.files.ftp_message import (
+    MAX_DATA,
+    MAX_FILE,
+    Opcode,
+    Refusal,
+    Reply,
+    Request,
+    read,
+    refused,
+    write,
+)
+from fsw.link.files.served_file import Directory, Node, OpenFile
 from fsw.link.services.service import LinkService
 from fsw.link.wire.outgoing import PackedOutgoing
 from messages import message_ids
@@ -103,7 +112,7 @@ class FtpService(LinkService):
             return ()
         answer = _outgoing(reply, request, request.sequence + 1, client)
         if request.opcode in (Opcode.OPEN_FILE_RO, Opcode.TERMINATE_SESSION):
-            self._remember(client, _Answered(packed, answer, t_us))
+            renew(self._answered, client, _Answered(packed, answer, t_us), _MAX_REMEMBERED)
         return [answer]
 
     def poll(self, t_us: int) -> Sequence[PackedOutgoing]:
@@ -247,10 +256,45 @@ class FtpService(LinkService):
         self._stop(key)
         self._sessions.pop(key).file.close()
 
-    def _remember(self, client: Client, answered: _Answered) -> None:
-        renew(self._answered, client, answered, _MAX_REMEMBERED)
-
 
 def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> PackedOutgoing:
     payload = bytes((0, *client)) + write(reply, request, sequence)
     return PackedOutgoing(message_ids.FILE_TRANSFER_PROTOCOL, payload)
+
+
+def find(root: Directory, path: bytes) -> Node | None:
+    """Look a path up; None if there is nothing of that name.
+
+    No path of a client ever reaches the file system, and what is not in the tree does not exist: so
+    there is no way out of it, whatever a path is made of.
+    """
+    try:
+        parts = path.decode().split("/")
+    except UnicodeDecodeError:
+        return None
+    node: Node = root
+    for part in parts:
+        if part in ("", "."):
+            continue
+        if not isinstance(node, Mapping) or part not in node:
+            return None
+        node = node[part]
+    return node
+
+
+def listing(directory: Directory, first: int) -> bytes:
+    """Entries from number ``first`` on, as many as fit one message; empty when there are no more.
+
+    An entry is ``D``, name, NUL for a directory; ``F``, name, tab, size, NUL for a file.
+    """
+    entries = b""
+    for name in list(directory)[first:]:
+        node = directory[name]
+        if isinstance(node, Mapping):
+            entry = f"D{name}\0".encode()
+        else:
+            entry = f"F{name}\t{min(node.size(), MAX_FILE)}\0".encode()
+        if len(entries) + len(entry) > MAX_DATA:
+            break
+        entries += entry
+    return entries

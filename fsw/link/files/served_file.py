@@ -8,10 +8,10 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 _PATIENCE: Final = 100  # refused reads in a row, a tick apart, before one waits for the disk
 _READ_AHEAD: Final = 1 << 17  # bytes asked of the disk at once
@@ -129,3 +129,7 @@ OpenFile = _Bytes | _Descriptor
 
 It is read inside that size; None means that the disk has not delivered yet: ask at the next tick.
 """
+
+Node: TypeAlias = "ServedFile | Mapping[str, Node]"
+Directory: TypeAlias = Mapping[str, Node]
+"""A tree of names, as a ground station sees it over FTP."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fsw.autopilot.signals import FlightSnapshot
-from fsw.link.files.component_metadata import component_metadata
+from fsw.link.files.vehicle_files import component_metadata
 from fsw.link.services import mission_wire
 from fsw.link.wire import (
     encode_dialect,

@@ -77,6 +77,7 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
     """
     lost = context.health.losses
     battery = snapshot.battery
+    millivolts, centiamperes, percent = _shown(battery)
     sensing, ill = _sensors(snapshot.estimator)
     present = _PRESENT | sensing
     health = present & ~ill
@@ -103,12 +104,12 @@ def sys_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValue
         enabled,
         health,
         load,
-        _millivolts(battery),
-        _centiamperes(battery),
+        millivolts,
+        centiamperes,
         0,
         min(lost.damaged, _U16),
         *(min(n, _U16) for n in (lost.echoes, lost.refused, lost.unhandled, lost.overflowed)),
-        _percent(battery),
+        percent,
         *(0, 0, 0),
     )
 
@@ -135,18 +136,19 @@ def _is_well(one: SensorReport) -> bool:
 def battery_status(snapshot: FlightSnapshot, _: TelemetryContext) -> WireValues:
     """BATTERY_STATUS: one pack without voltages of its cells."""
     battery = snapshot.battery
+    millivolts, centiamperes, percent = _shown(battery)
     return (
         round(1000.0 * battery.consumed),
         _UNKNOWN_ENERGY,
         _UNKNOWN_TEMPERATURE,
-        _millivolts(battery),
+        millivolts,
         *(_UNKNOWN_CELL,) * 9,
-        _centiamperes(battery),
+        centiamperes,
         0,
         _FOR_EVERYTHING,
         _LIPO,
-        _percent(battery),
-        _seconds_left(battery),
+        percent,
+        round(battery.time_left) if battery.time_left < 1e6 else 0,  # not known
         _CHARGE_STATES[battery.charge],
         *(0, 0, 0, 0),
         0,
@@ -187,18 +189,10 @@ def vibration(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues
     return (snapshot.t_us, 0.0, gyro, accel, context.health.clipped & _U32, 0, 0)
 
 
-def _millivolts(battery: BatteryState) -> int:
-    return round(1000.0 * battery.voltage)
-
-
-def _centiamperes(battery: BatteryState) -> int:
-    return round(100.0 * battery.current)
-
-
-def _seconds_left(battery: BatteryState) -> int:
-    """Flight time that is left [s] as MAVLink counts it: 0 where it is not known."""
-    return round(battery.time_left) if battery.time_left < 1e6 else 0
-
-
-def _percent(battery: BatteryState) -> int:
-    return round(100.0 * battery.remaining)
+def _shown(battery: BatteryState) -> tuple[int, int, int]:
+    """Millivolts, hundredths of an ampere, and percent that are left."""
+    return (
+        round(1000.0 * battery.voltage),
+        round(100.0 * battery.current),
+        round(100.0 * battery.remaining),
+    )

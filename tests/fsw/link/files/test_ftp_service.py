@@ -14,13 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from fsw.link.files import component_metadata
 from fsw.link.files.flight_logs import MARK, FlightLogs
 from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal
 from fsw.link.files.ftp_service import FtpService
-from fsw.link.files.ftp_tree import Directory
-from fsw.link.files.served_file import DiskFile, MemoryFile
-from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.files.served_file import Directory, DiskFile, MemoryFile
+from fsw.link.files.vehicle_files import _parameters, vehicle_files
 from fsw.link.wire.outgoing import PackedOutgoing
 from messages import message_ids as ids
 from messages.frames import FrameWriter, split
@@ -536,7 +534,7 @@ def test_a_directory_of_flights_is_laid_out_once(
 def test_no_tick_makes_a_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first list of the root in flight wrote 66 kB of JSON, for 12 ms."""
     (tmp_path / "run").mkdir()
-    component_metadata._parameters.cache_clear()
+    _parameters.cache_clear()
     files = vehicle_files(FlightLogs(tmp_path / "run"))
     monkeypatch.setattr("fsw.autopilot.parameters.metadata.parameter_document", None)
     (listed,) = Client(FtpService(files)).send(Opcode.LIST_DIRECTORY, b"/")
