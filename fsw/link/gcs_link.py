@@ -270,7 +270,9 @@ class GcsLink:
             "datagrams_dropped": self.dropped,
             "echoes_dropped": self.echoes,
             "for_others": self.elsewhere,
-            "unhandled": {_message_name(id_): count for id_, count in self.unhandled.items()},
+            "unhandled": {
+                dialect.mavlink_map[id_].msgname: count for id_, count in self.unhandled.items()
+            },
             "refused": asdict(self.signing.counters),
             "signed": self.signing.active,
             "unrecorded": self._received.left_out + self._told.left_out,
@@ -372,7 +374,3 @@ class GcsLink:
                 self._endpoint.send(datagram, peer)
             if self._line is not None:
                 self._line.spend(len(datagram))
-
-
-def _message_name(message_id: int) -> str:
-    return str(dialect.mavlink_map[message_id].msgname)

@@ -23,12 +23,10 @@ from fsw.autopilot.measurements import (
 )
 from fsw.autopilot.signals import BatteryReading
 from fsw.link.wire.decode import Numbers
+from fsw.link.wire.mission_items import Locate
 from messages import message_ids
 from messages.frames import Frame
 from messages.joint_arrays import ENCODERS_AT, ENCODERS_COUNT_AT, joined
-
-Locate = Callable[[float, float, float], Vec3]
-"""North, east, down [m] of a latitude [deg], a longitude [deg] and an altitude [m]."""
 
 # HIL_SENSOR_UPDATED_FLAGS
 _INERTIAL: Final = 0x3F
