@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Final, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 from fsw.autopilot.geometry.geodesy import DEFAULT_ORIGIN, to_local
 from fsw.autopilot.measurements import Sample
@@ -63,7 +63,7 @@ Setpoint = MotionSetpoint | AttitudeSetpoint | JointSetpoint
 
 @dataclass(slots=True)
 class Received:
-    """What came since the last tick."""
+    """What came since the last tick; the names are those of ``TickInputs``."""
 
     commands: list[Command] = field(default_factory=list)  # in order of arrival
     targets: list[EndEffectorTarget] = field(default_factory=list)  # the same
@@ -73,11 +73,14 @@ class Received:
     joints: JointSetpoint | None = None
     refused_setpoints: int = 0  # that were of no use
     setpoint_problem: str = ""  # why the newest of them was; empty: it was for another vehicle
-    station_heard: bool = False  # a ground station's heartbeat
+    ground_station_heard: bool = False  # a ground station's heartbeat
     samples: list[Sample] = field(default_factory=list)  # of sensors, in order of arrival
     battery: BatteryReading | None = None  # the newest
     sensor_clock_jump_us: int = 0
     refused: list[str] = field(default_factory=list)  # why, of the first
+
+
+_RECEIVED: Final = tuple(one.name for one in fields(Received))
 
 
 class Inbox:
@@ -189,21 +192,10 @@ class Inbox:
             self._received.samples = []
             return inputs
         came = self.take()
-        return replace(
-            inputs,
-            commands=tuple(came.commands),
-            targets=tuple(came.targets),
-            announced=tuple([_begun(one, sensors.t_us) for one in came.announced]),
-            motion=came.motion,
-            attitude=came.attitude,
-            joints=came.joints,
-            refused_setpoints=came.refused_setpoints,
-            ground_station_heard=came.station_heard,
-            battery=came.battery,
-            sensor_clock_jump_us=came.sensor_clock_jump_us,
-            refused=tuple(came.refused),
-            setpoint_problem=came.setpoint_problem,
-        )
+        came.announced = [_begun(one, sensors.t_us) for one in came.announced]
+        news: dict[str, Any] = {name: getattr(came, name) for name in _RECEIVED}
+        news |= {name: tuple(values) for name, values in news.items() if isinstance(values, list)}
+        return replace(inputs, **news)
 
     def _command(self, read: Callable[[Frame], CommandRequest], frame: Frame) -> CommandAck | None:
         if not decode.for_this_vehicle(frame):
@@ -263,7 +255,7 @@ class Inbox:
 
     def _heartbeat(self, frame: Frame) -> None:
         if frame.payload_values[1] == _GROUND_STATION:
-            self._received.station_heard = True
+            self._received.ground_station_heard = True
 
     def _obstacle(
         self, read: Callable[[Numbers], decode.IndexedObstacle | None], frame: Frame

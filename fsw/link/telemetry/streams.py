@@ -34,8 +34,8 @@ class Stream:
     message_id: int
     ground_hz: float  # to ground stations
     api_hz: float  # to programs
-    component: int
     encode: Encoder
+    component: int = AUTOPILOT
 
     @property
     def vital(self) -> bool:
@@ -55,56 +55,52 @@ _VITAL: Final = frozenset(
     )
 )
 
-HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, 1, AUTOPILOT, encode_standard.heartbeat)
-_CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, AUTOPILOT, encode_identity.current_mode)
-_EXTENDED_STATE = Stream(
-    message_ids.EXTENDED_SYS_STATE, 1, 5, AUTOPILOT, encode_standard.extended_sys_state
-)
+HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, 1, encode_standard.heartbeat)
+_CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, encode_identity.current_mode)
+_EXTENDED_STATE = Stream(message_ids.EXTENDED_SYS_STATE, 1, 5, encode_standard.extended_sys_state)
 
 STREAMS: Final = (
     HEARTBEAT,
-    Stream(message_ids.SYS_STATUS, 2, 2, AUTOPILOT, encode_health.sys_status),
+    Stream(message_ids.SYS_STATUS, 2, 2, encode_health.sys_status),
     _EXTENDED_STATE,
-    Stream(message_ids.ATTITUDE, 50, 50, AUTOPILOT, encode_standard.attitude),
-    Stream(message_ids.ATTITUDE_QUATERNION, 10, 50, AUTOPILOT, encode_standard.attitude_quaternion),
-    Stream(message_ids.LOCAL_POSITION_NED, 30, 50, AUTOPILOT, encode_standard.local_position),
-    Stream(message_ids.GLOBAL_POSITION_INT, 5, 10, AUTOPILOT, encode_place.global_position),
-    Stream(
-        message_ids.POSITION_TARGET_LOCAL_NED, 10, 10, AUTOPILOT, encode_standard.position_target
-    ),
-    Stream(message_ids.ATTITUDE_TARGET, 10, 10, AUTOPILOT, encode_standard.attitude_target),
-    Stream(message_ids.VFR_HUD, 4, 4, AUTOPILOT, encode_place.vfr_hud),
-    Stream(message_ids.ALTITUDE, 1, 2, AUTOPILOT, encode_place.altitude),
-    Stream(message_ids.MISSION_CURRENT, 1, 1, AUTOPILOT, mission_wire.mission_current),
-    Stream(message_ids.HOME_POSITION, 0.5, 1, AUTOPILOT, encode_place.home_position),
-    Stream(message_ids.BATTERY_STATUS, 1, 1, AUTOPILOT, encode_health.battery_status),
-    Stream(message_ids.ESTIMATOR_STATUS, 1, 1, AUTOPILOT, encode_health.estimator_status),
-    Stream(message_ids.SYSTEM_TIME, 1, 1, AUTOPILOT, encode_standard.system_time),
+    Stream(message_ids.ATTITUDE, 50, 50, encode_standard.attitude),
+    Stream(message_ids.ATTITUDE_QUATERNION, 10, 50, encode_standard.attitude_quaternion),
+    Stream(message_ids.LOCAL_POSITION_NED, 30, 50, encode_standard.local_position),
+    Stream(message_ids.GLOBAL_POSITION_INT, 5, 10, encode_place.global_position),
+    Stream(message_ids.POSITION_TARGET_LOCAL_NED, 10, 10, encode_standard.position_target),
+    Stream(message_ids.ATTITUDE_TARGET, 10, 10, encode_standard.attitude_target),
+    Stream(message_ids.VFR_HUD, 4, 4, encode_place.vfr_hud),
+    Stream(message_ids.ALTITUDE, 1, 2, encode_place.altitude),
+    Stream(message_ids.MISSION_CURRENT, 1, 1, mission_wire.mission_current),
+    Stream(message_ids.HOME_POSITION, 0.5, 1, encode_place.home_position),
+    Stream(message_ids.BATTERY_STATUS, 1, 1, encode_health.battery_status),
+    Stream(message_ids.ESTIMATOR_STATUS, 1, 1, encode_health.estimator_status),
+    Stream(message_ids.SYSTEM_TIME, 1, 1, encode_standard.system_time),
     _CURRENT_MODE,
-    Stream(message_ids.SERVO_OUTPUT_RAW, 5, 5, AUTOPILOT, encode_standard.servo_outputs),
-    Stream(message_ids.VIBRATION, 0.5, 0.5, AUTOPILOT, encode_health.vibration),
-    Stream(message_ids.ORBIT_EXECUTION_STATUS, 2, 2, AUTOPILOT, encode_standard.orbit_status),
-    Stream(message_ids.ODOMETRY, 0, 30, AUTOPILOT, encode_place.odometry),
-    Stream(message_ids.HIGHRES_IMU, 0, 50, AUTOPILOT, encode_standard.highres_imu),
-    Stream(message_ids.PROTOCOL_VERSION, 0, 0, AUTOPILOT, encode_identity.protocol_version),
-    Stream(message_ids.GPS_GLOBAL_ORIGIN, 0, 0, AUTOPILOT, encode_place.global_origin),
-    Stream(message_ids.AUTOPILOT_VERSION, 0, 0, AUTOPILOT, encode_identity.autopilot_version),
-    Stream(message_ids.ARM_JOINT_STATE, 30, 50, PANDION, encode_dialect.arm_joint_state),
-    Stream(message_ids.ARM_JOINT_SETPOINT, 10, 10, PANDION, encode_dialect.arm_joint_setpoint),
-    Stream(message_ids.END_EFFECTOR_TARGET, 10, 10, PANDION, encode_dialect.end_effector_target),
-    Stream(message_ids.SETPOINT_STATUS, 5, 5, PANDION, encode_dialect.setpoint_status),
-    Stream(message_ids.BARRIER_MARGIN, 10, 10, PANDION, encode_dialect.barrier_margin),
-    Stream(message_ids.MPC_STATUS, 10, 10, PANDION, encode_dialect.mpc_status),
+    Stream(message_ids.SERVO_OUTPUT_RAW, 5, 5, encode_standard.servo_outputs),
+    Stream(message_ids.VIBRATION, 0.5, 0.5, encode_health.vibration),
+    Stream(message_ids.ORBIT_EXECUTION_STATUS, 2, 2, encode_standard.orbit_status),
+    Stream(message_ids.ODOMETRY, 0, 30, encode_place.odometry),
+    Stream(message_ids.HIGHRES_IMU, 0, 50, encode_standard.highres_imu),
+    Stream(message_ids.PROTOCOL_VERSION, 0, 0, encode_identity.protocol_version),
+    Stream(message_ids.GPS_GLOBAL_ORIGIN, 0, 0, encode_place.global_origin),
+    Stream(message_ids.AUTOPILOT_VERSION, 0, 0, encode_identity.autopilot_version),
+    Stream(message_ids.ARM_JOINT_STATE, 30, 50, encode_dialect.arm_joint_state, PANDION),
+    Stream(message_ids.ARM_JOINT_SETPOINT, 10, 10, encode_dialect.arm_joint_setpoint, PANDION),
+    Stream(message_ids.END_EFFECTOR_TARGET, 10, 10, encode_dialect.end_effector_target, PANDION),
+    Stream(message_ids.SETPOINT_STATUS, 5, 5, encode_dialect.setpoint_status, PANDION),
+    Stream(message_ids.BARRIER_MARGIN, 10, 10, encode_dialect.barrier_margin, PANDION),
+    Stream(message_ids.MPC_STATUS, 10, 10, encode_dialect.mpc_status, PANDION),
     *(
-        Stream(message_ids.LOOP_TIMING, 1, 1, PANDION, encode_dialect.loop_timing(group))
+        Stream(message_ids.LOOP_TIMING, 1, 1, encode_dialect.loop_timing(group), PANDION)
         for group in range(4)
     ),
     # Behind the others, whose places decide when each is sent.
-    Stream(message_ids.GPS_RAW_INT, 1, 5, AUTOPILOT, encode_place.gps_raw),
-    Stream(message_ids.MPC_HORIZON, 0, 0, PANDION, encode_dialect.mpc_horizon),
-    Stream(message_ids.MPC_HORIZON_ARM, 0, 0, PANDION, encode_dialect.mpc_horizon_arm),
-    Stream(message_ids.TOOL_CONTACT, 10, 20, PANDION, encode_dialect.tool_contact),
-    Stream(message_ids.PAYLOAD_STATUS, 2, 10, PANDION, encode_dialect.payload_status),
+    Stream(message_ids.GPS_RAW_INT, 1, 5, encode_place.gps_raw),
+    Stream(message_ids.MPC_HORIZON, 0, 0, encode_dialect.mpc_horizon, PANDION),
+    Stream(message_ids.MPC_HORIZON_ARM, 0, 0, encode_dialect.mpc_horizon_arm, PANDION),
+    Stream(message_ids.TOOL_CONTACT, 10, 20, encode_dialect.tool_contact, PANDION),
+    Stream(message_ids.PAYLOAD_STATUS, 2, 10, encode_dialect.payload_status, PANDION),
 )
 
 # These leave at once when mode, arming, landing or health change.

@@ -145,9 +145,9 @@ def test_only_a_signed_heartbeat_is_a_sign_of_life(ground: Ground) -> None:
     ground.inbox.take()
     ground.polled(unsigned(ids.HEARTBEAT, 6, 8, 0, 0, 4, 3), station_socket())
     ground.polled(unsigned(ids.HEARTBEAT, 0, 6, 8, 0, 4, 3), station_socket())
-    assert not ground.inbox.take().station_heard
+    assert not ground.inbox.take().ground_station_heard
     ground.polled(Client(ground).beat())
-    assert ground.inbox.take().station_heard
+    assert ground.inbox.take().ground_station_heard
 
 
 @pytest.mark.requirement("REQ-LINK-3")

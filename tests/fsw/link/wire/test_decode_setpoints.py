@@ -249,10 +249,10 @@ def test_the_newest_of_motion_and_attitude_counts_and_joints_stand_beside_it() -
 def test_only_a_ground_station_s_heartbeat_is_one() -> None:
     inbox = Inbox()
     inbox.accept(frame(ids.HEARTBEAT, type=18))
-    assert not inbox.take().station_heard
+    assert not inbox.take().ground_station_heard
     inbox.accept(frame(ids.HEARTBEAT, type=6))
-    assert inbox.take().station_heard
-    assert not inbox.take().station_heard
+    assert inbox.take().ground_station_heard
+    assert not inbox.take().ground_station_heard
 
 
 @pytest.mark.parametrize("message_id", [82, 84, 86, 60201, 60202])
