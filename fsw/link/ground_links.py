@@ -6,7 +6,6 @@ import select
 import time
 from collections.abc import Sequence
 from dataclasses import astuple
-from operator import attrgetter
 from typing import Final
 
 from fsw.autopilot.ports import Clock, LinkLosses
@@ -22,8 +21,6 @@ _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 _ENCODES: Final = 2
 _SENDS: Final = 3
 _ONE: Final = 1  # byte of budget: one frame
-# What may have to be told at once, of a snapshot.
-_TOLD_AT_ONCE: Final = attrgetter("mode", "intended_mode", "armed", "landed", "failures", "mission")
 _GUARD_US: Final = 200  # before a tick: the dearest frame takes less
 # Of files, a tick and link: some 3 MB/s in real time, if the client asks as fast.
 _BULK_DATAGRAMS: Final = 6
@@ -38,8 +35,7 @@ class GroundLinks:
         self._tick_us = tick_period_us
         self._slot_ticks = SLOT_US // tick_period_us
         self._tick = 0
-        self._told: FlightSnapshot | None = None  # the last one that had something to tell at once
-        self._told_values: object = None
+        self._told: tuple[object, object] | None = None  # of the last tick: heartbeat and mission
         self._t_us = 0  # of the last tick
         self._attends = False
 
@@ -125,13 +121,11 @@ class GroundLinks:
 
         One step of a mission may follow another by a tick, and each is told.
         """
-        values = _TOLD_AT_ONCE(now)
-        if values == self._told_values:
-            return False, False
-        before, self._told, self._told_values = self._told, now, values
+        before, self._told = self._told, (_heartbeat(now), now.mission)
         if before is None:
             return True, now.mission is not None
-        return _heartbeat(now) != _heartbeat(before), now.mission is not before.mission
+        heartbeat, mission = before
+        return self._told[0] != heartbeat, now.mission is not mission and now.mission != mission
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command on the link it came from; on all where that is not known."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeAlias
@@ -19,17 +19,17 @@ _READ_AHEAD: Final = 1 << 17  # bytes asked of the disk at once
 
 @dataclass(frozen=True, slots=True)
 class MemoryFile:
-    """What a function returns, fixed when the file is opened."""
+    """What the program has made."""
 
-    content: Callable[[], bytes]
+    content: bytes
 
     def size(self) -> int:
-        """Bytes it has now."""
-        return len(self.content())
+        """Bytes it has."""
+        return len(self.content)
 
     def open(self) -> OpenFile:
-        """Take the content of this moment."""
-        return _Bytes(self.content())
+        """Open it for reading."""
+        return _Bytes(self.content)
 
 
 class _Bytes:

@@ -89,12 +89,11 @@ def _can_be_listed(name: str) -> bool:
 
 def _metadata_files() -> dict[str, Node]:
     """The documents, by their names in the root of the tree."""
-    for make in (_general, _parameters, event_document):
-        make()  # now, so that no tick has to: it takes longer than six of them
+    # Made now, so that no tick has to: it takes longer than six of them.
     return {
-        _GENERAL: MemoryFile(lambda: _general()[0]),
-        _PARAMETERS: MemoryFile(_parameters),
-        _EVENTS: MemoryFile(event_document),
+        _GENERAL: MemoryFile(_general()[0]),
+        _PARAMETERS: MemoryFile(_parameters()),
+        _EVENTS: MemoryFile(event_document()),
     }
 
 

@@ -134,7 +134,7 @@ class Client:
 
 
 def serve(**files: bytes) -> Directory:
-    return {name: MemoryFile(lambda content=content: content) for name, content in files.items()}
+    return {name: MemoryFile(content) for name, content in files.items()}
 
 
 CONTENT = random.Random(3).randbytes(100_000)
@@ -142,7 +142,7 @@ CONTENT = random.Random(3).randbytes(100_000)
 
 @pytest.fixture
 def client() -> Client:
-    return Client(FtpService({"files": serve(a=CONTENT, b=b"b"), "top": MemoryFile(lambda: b"t")}))
+    return Client(FtpService({"files": serve(a=CONTENT, b=b"b"), "top": MemoryFile(b"t")}))
 
 
 @pytest.mark.parametrize("root", ["/", "", ".", "//", "/./"])
@@ -151,7 +151,7 @@ def test_the_root_is_listed(client: Client, root: str) -> None:
 
 
 def test_a_long_directory_is_listed_piece_by_piece() -> None:
-    files = {f"file{n:03}": MemoryFile(lambda: b"x") for n in range(300)}
+    files = {f"file{n:03}": MemoryFile(b"x") for n in range(300)}
     assert Client(FtpService({"d": files})).names("/d") == [f"F{name}\t1" for name in files]
 
 
