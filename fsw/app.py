@@ -61,8 +61,6 @@ if TYPE_CHECKING:
 
 DONE: Final = 0  # exit code
 
-NO_PERMISSION = "no permission for {}: ticks may be late on a busy machine"
-
 ProgramLoader = Callable[[FswOptions], FlightProgram]
 
 
@@ -112,22 +110,20 @@ class _Session:
             if where is None
             else open_px4(where, inbox, facts, clock.now_us, servos=options.arm_servos)
         )
-        autopilot = AUTOPILOTS[chosen.autopilot]
         context = TelemetryContext(
             facts,
             record.health,
-            autopilot,
+            AUTOPILOTS[chosen.autopilot],
             chosen.origin,
             start_unix_us=start_us,
             plan_ids=program.missions.ids,
         )
         logs = FlightLogs(directory, options.params)
-        clocks = (clock.now_us, clock.unix_us)
         ground = build_links(
             chosen,
             inbox,
             context,
-            clocks,
+            (clock.now_us, clock.unix_us),
             files.tlog.add,
             lambda: self._services(program, logs),
             beside=options.above_px4,
@@ -178,13 +174,10 @@ class _Session:
         # Its table of parameters knows all that flies, as the program does.
         from fsw.link.services.parameter_service import ParameterService
 
-        parameters = ParameterService(program.parameters)
-        missions = MissionService(program.missions)
-        events = EventService(program.events)
         return (
-            parameters,
-            missions,
-            events,
+            ParameterService(program.parameters),
+            MissionService(program.missions),
+            EventService(program.events),
             LogService(logs),
             LogStreamService(logs),
             FtpService(vehicle_files(logs)),
@@ -251,7 +244,8 @@ class _Session:
         refused = claim_real_time(TICK_PRIORITY)
         record.scheduler = scheduler()
         if refused:
-            self._warn(NO_PERMISSION.format(" and ".join(refused)))
+            what = " and ".join(refused)
+            self._warn(f"no permission for {what}: ticks may be late on a busy machine")
         settle_memory()
         try:
             return loop.fly(first, planner)
