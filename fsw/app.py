@@ -73,8 +73,6 @@ def run(options: FswOptions, load: ProgramLoader | None = None) -> int:
 
 @dataclass
 class _Session:
-    """One start of the program."""
-
     _options: FswOptions
     _events: Events
     _load: ProgramLoader
@@ -288,7 +286,6 @@ def load_flight_software(options: FswOptions, events: Events) -> FlightProgram:
 
 
 def _subject(options: FswOptions, program: FlightProgram) -> LogSubject:
-    """What the flight log says about the flight."""
     from vehicles.vehicle_file import load_vehicle
 
     facts: dict[str, str | int] = {

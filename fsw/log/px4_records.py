@@ -57,7 +57,6 @@ class Px4Records:
     """Remembers when each was written last, and how much the inertial unit shakes."""
 
     def __init__(self, airframe: Airframe, origin: Origin) -> None:
-        """Start a log of a vehicle."""
         # Of each rotor's thrust [1/N], the share of the largest torque about x, y and z, and of
         # the largest thrust.
         rows = [airframe.wrench[6 * i : 6 * i + 6] for i in range(airframe.rotors)]

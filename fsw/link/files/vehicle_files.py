@@ -52,7 +52,6 @@ class _LaidOut(Mapping[str, Node]):
 
 
 def _by_name(flights: Sequence[LoggedFlight]) -> Directory:
-    """A directory for each flight."""
     return {
         one.flight: {file.path.name: file for file in one.files}
         for one in flights

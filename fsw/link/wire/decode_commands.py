@@ -299,7 +299,6 @@ def _north_east(
 
 
 def _place(request: CommandRequest, locate: Locate, refused: str) -> Place:
-    """The place that parameters 5 to 7 name."""
     height = _height(request, locate, refused)
     return Place(_north_east(request, locate, refused), height.height, height.above_home)
 
