@@ -22,13 +22,12 @@ from fsw.link.arrivals import Arrivals
 from fsw.link.bounded_memory import BoundedRecord, RecordFrame, SentFrames, renew
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
-from fsw.link.line_budget import TELEMETRY, LineBudget
 from fsw.link.outbox import Outbox, packed
 from fsw.link.peers import Peers
 from fsw.link.services.service import Dispatch, LinkService
 from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands
-from fsw.link.telemetry.stream_rates import StreamRates
+from fsw.link.telemetry.stream_rates import TELEMETRY, LineBudget, StreamRates
 from fsw.link.telemetry.streams import AT_ONCE, HEARTBEAT, STREAMS, Stream
 from fsw.link.wire.decode import for_this_vehicle
 from fsw.link.wire.encode_standard import command_ack

@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from fsw.autopilot.ports import Clock
 from fsw.link.bounded_memory import renew
 from fsw.link.telemetry.streams import Stream
 from messages.frames import whole_size
@@ -22,6 +23,10 @@ _NOTICED: Final = 0.02  # change of the share
 _MIN_SHARE: Final = 0.1  # of a line
 _MAX_ASKERS: Final = 8  # whose wishes are remembered: more than a link has peers
 _MAX_PER_SECOND: Final = 1500  # of all messages on a link: 3 % of a core
+_FULL: Final = 0.8  # of what a line carries
+TELEMETRY: Final = 0.6  # of the same
+_BURST_S: Final = 0.1  # of that share may leave at once
+_LONGEST: Final = 1400  # bytes of what can wait, which are sent as one
 
 
 @dataclass(slots=True)
@@ -45,6 +50,46 @@ class _Timetable:
         if self.stream.vital or any(one not in self.wishes for one in listeners):
             wishes.append(self.default_us)
         self.wanted_us = min((wish for wish in wishes if wish != OFF), default=OFF)
+
+
+class LineBudget:
+    """What a line of limited speed may be given, so that nothing important waits behind the rest.
+
+    The line is never planned more than 80 % full: its clock, and the radio behind it, are slower
+    now and then. Telemetry is planned for 60 %; answers, parameters and files have the rest. What
+    was sent counts against wall time, however fast the vehicle's time goes.
+    """
+
+    def __init__(self, bytes_per_s: float, clock: Clock) -> None:
+        """Begin with an empty line that carries ``bytes_per_s``; the clock is wall time [us]."""
+        self._rate = _FULL * bytes_per_s
+        self._most = self._level = _BURST_S * self._rate
+        self._clock = clock
+        self._counted_us = clock()
+
+    def spend(self, size: int) -> None:
+        """Count ``size`` [bytes] that are sent; what is urgent may overdraw."""
+        self._count()
+        self._level -= size
+
+    def has_room(self) -> bool:
+        """Whether what can wait may be sent now: parameters, files."""
+        self._count()
+        return self._level > 0.0
+
+    def takes_telemetry(self) -> bool:
+        """Whether telemetry may be sent now; what was sent before it of what can wait is no reason.
+
+        In real time it always may. Where the vehicle's time goes faster, some of it is left out.
+        """
+        self._count()
+        return self._level > -self._most - _LONGEST
+
+    def _count(self) -> None:
+        now_us = self._clock()
+        earned = 1e-6 * (now_us - self._counted_us) * self._rate
+        self._level = min(self._level + earned, self._most)
+        self._counted_us = now_us
 
 
 class StreamRates:
