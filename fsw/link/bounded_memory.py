@@ -12,6 +12,9 @@ RecordFrame = Callable[[int, bytes], None]
 
 # Some six times what a ground station and all telemetry at its highest rates need.
 BYTES_PER_S: Final = 128_000
+# Half of what is remembered. A link sends 1500 messages a second at most, and usually 200: a frame
+# that a router holds back for five seconds is still known.
+_HALF: Final = 8192
 
 
 class BoundedRecord:
@@ -36,11 +39,6 @@ class BoundedRecord:
             return
         self._room -= len(frame)
         self._record(t_us, frame)
-
-
-# Half of what is remembered. A link sends 1500 messages a second at most, and usually 200: a frame
-# that a router holds back for five seconds is still known.
-_HALF: Final = 8192
 
 
 class SentFrames:

@@ -47,6 +47,9 @@ from fsw.runtime.timing import GroupTimer, Histogram
 
 LINK_TIMEOUT_S: Final = 1.2  # silence that ends the flight; both processes end within 2 s
 START_US: Final = 1_000_000  # time stamp of the simulator's step 0
+# A release waits for less; longer gaps mean this process was suspended. After a suspension of the
+# whole machine the simulator goes on as well, so such a gap must not end the flight.
+_LONGEST_GAP_US: Final = 250_000
 
 
 def to_route(commands: tuple[Command, ...], acks: tuple[CommandAck, ...]) -> list[CommandRequest]:
@@ -106,11 +109,6 @@ class Cycle:
     planner: PlanService
     inputs: TickInputs = field(init=False)  # from RECEIVE on
     outputs: TickOutputs = field(init=False)  # from TICK on; whole from CONCLUDE on
-
-
-# A release waits for less; longer gaps mean this process was suspended. After a suspension of the
-# whole machine the simulator goes on as well, so such a gap must not end the flight.
-_LONGEST_GAP_US: Final = 250_000
 
 
 class LinkWatchdog:

@@ -28,6 +28,7 @@ from fsw.runtime.process import die_with_parent
 from fsw.runtime.realtime import PLANNER_PRIORITY, claim_real_time
 
 _RESTART_DELAY_S: Final = 0.02  # the next worker might die at once as well
+_MAX_BYTES: Final = 1 << 17  # of one value; a request has about 2 kB
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +53,6 @@ class WorkerExited:
     """A worker has ended without being asked to."""
 
     exit_code: int  # negative: the signal
-
-
-_MAX_BYTES: Final = 1 << 17  # of one value; a request has about 2 kB
 
 
 class PeerGone(Exception):

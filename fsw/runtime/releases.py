@@ -30,6 +30,12 @@ _PROBE_US: Final = LEAD_US + 300  # before the release
 _MAX_SHIFT_US: Final = 25.0  # a measurement; 500 us/s is more than clocks differ
 _GAIN: Final = 0.25
 _REMATCH_FRAMES: Final = 3  # in a row behind or ahead of their release, until it is another's
+WARNING_INTERVAL_US: Final = 10_000_000  # vehicle time
+# New ones in an interval, of 5000 ticks and 100 plans. Fewer do not concern an operator; they are
+# counted in LOOP_TIMING, MPC_STATUS, the log and the result all the same.
+WARNING_LIMITS: Final = {"late": 50, "skipped": 50, "without sensors": 50, "plans late": 5}
+_MAX_INTERVALS: Final = 2_000  # bounds memory
+_JOINED_US: Final = 3_000  # one and a half periods of the inner loop
 
 
 @dataclasses.dataclass(slots=True)
@@ -61,16 +67,6 @@ class ReleaseSchedule:
     def shift(self, shift_us: float) -> None:
         """Move all coming releases by ``shift_us`` [us]: the sensors' clock differs from ours."""
         self.start_us += shift_us
-
-
-WARNING_INTERVAL_US: Final = 10_000_000  # vehicle time
-
-# New ones in an interval, of 5000 ticks and 100 plans. Fewer do not concern an operator; they are
-# counted in LOOP_TIMING, MPC_STATUS, the log and the result all the same.
-WARNING_LIMITS: Final = {"late": 50, "skipped": 50, "without sensors": 50, "plans late": 5}
-
-_MAX_INTERVALS: Final = 2_000  # bounds memory
-_JOINED_US: Final = 3_000  # one and a half periods of the inner loop
 
 
 class DeadlineMonitor:
