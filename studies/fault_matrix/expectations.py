@@ -5,55 +5,27 @@ from __future__ import annotations
 import math
 import re
 import typing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
+from command_line.ranges import Range
 from sitl.faults.keys import Fault, Kind, Unit, instances
 from sitl.scenario_file import SUITE_NAMES, build_table
+from sitl.sensors.keys import SuiteName
 from studies.fault_matrix.flights import SITUATIONS, FaultFlight, is_believed
 from vehicles.vehicle_file import load_vehicle
 
 EXPECTATIONS: Final = Path(__file__).with_suffix(".toml")
-ACTIONS: Final = ("goes on", "hold", "return", "land", "descend", "terminate", "ended")
 
 NotFlown = dict[str, dict[str, str]]  # reasons by mode and suite
-Contact = Literal["none", "ground", "any"]
-_CONTACTS: Final[tuple[str, ...]] = typing.get_args(Contact)
+Action: TypeAlias = Literal["goes on", "hold", "return", "land", "descend", "terminate", "ended"]
+ACTIONS: Final[tuple[Action, ...]] = typing.get_args(Action)
 _UNITS: Final[tuple[str, ...]] = typing.get_args(Unit)
-_KINDS: Final[tuple[str, ...]] = typing.get_args(Kind)
 _MAX_BYTES: Final = 1 << 20
-_SHOWN: Final = 60  # characters of a wrong value
-_MAX_MM: Final = 1e6  # of a margin
-_MAX_FORCE: Final = 100.0  # over what a surface allows
-_MAX_S: Final = 86400.0  # of a time
-_NUMBERS: Final = ("duration_s", "share", "size", "axis", "delay_ms", "rate_hz", "jump_s")
-_EXPECTED: Final = (
-    "told_within_s",
-    "names",
-    "then",
-    "last",
-    "contact",
-    "margin_mm",
-    "force",
-    "why",
-)
 _SIGNED: Final = ("wrong", "drifting", "turning", "tilting")  # kinds whose size has a direction
-_KNOWN: Final = (
-    "name",
-    "units",
-    "kinds",
-    "instances",
-    "with",
-    "suites",
-    "mirrored",
-    "link",
-    "in",
-    *_NUMBERS,
-    *_EXPECTED,
-)
 
 
 class ExpectationError(ValueError):
@@ -62,16 +34,38 @@ class ExpectationError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """What must follow a fault."""
+    """What must follow a fault: keys of a table, which a mode may change."""
 
-    then: tuple[str, ...]
-    told_within_s: float | None = None  # None: it may be silent
+    then: tuple[Action, ...]
+    # None, of inf: it may be silent.
+    told_within_s: Annotated[float, Range(0.001, 86400.0, or_inf=True)] | None = None
     names: str = ""  # what a text must name, a regular expression
-    contact: Contact = "none"  # that cannot be helped
-    margin_mm: float = 0.0  # least margin to the safe set; where contact is allowed it is not asked
-    force: float = 1.0  # at most, on the tool, over what its surface allows
+    contact: Literal["none", "ground", "any"] = "none"  # that cannot be helped
+    # Least margin to the safe set; where contact is allowed it is not asked.
+    margin_mm: Annotated[float, Range(-1e6, 1e6)] = 0.0
+    force: Annotated[float, Range(1.0, 100.0)] = 1.0  # at most, over what the surface allows
     why: str = ""
-    last: tuple[str, ...] = ()  # of which the last action must be one; empty: any of ``then``
+    last: tuple[Action, ...] = ()  # of which the last action must be one; empty: any of ``then``
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """The other keys of a table, but for ``with``, ``in`` and the numbers of a fault."""
+
+    units: tuple[Unit, ...] = ()
+    kinds: tuple[Kind, ...] = ()
+    # Which of a unit fail, each in a flight of its own; 0: all.
+    instances: tuple[Annotated[float, Range(0.0, 8.0, step=1.0)], ...] = (0.0,)
+    name: str = ""
+    suites: tuple[SuiteName, ...] = ("perfect",)
+    mirrored: bool = False
+    link: bool = False
+
+
+_NUMBERS: Final = ("duration_s", "share", "size", "axis", "delay_ms", "rate_hz", "jump_s")
+_EXPECTED: Final = tuple(one.name for one in fields(Expectation))
+_OWN: Final = tuple(one.name for one in fields(_Table))
+_KNOWN: Final = (*_OWN, "with", "in", *_NUMBERS, *_EXPECTED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,11 +147,11 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
     for key in table:
         if key not in _KNOWN:
             raise ExpectationError(f'unknown key "{key}" (known: {", ".join(_KNOWN)})')
-    suites = _words(table, "suites", SUITE_NAMES, ("perfect",))
-    link, found = _truth(table, "link"), []
-    for faults, name in _faults(table):
+    own: _Table = build_table(_Table, {k: table[k] for k in _OWN if k in table}, "")
+    found = []
+    for faults, name in _faults(own, table):
         modes = _modes(table, _names(faults, names))
-        for suite in suites:
+        for suite in own.suites:
             if any(is_believed(one, suite) for one in faults):
                 raise ExpectationError(
                     f"{name}: with {suite} what a sensor says is believed, unless it is silent "
@@ -165,37 +159,25 @@ def _read(table: Any, without: NotFlown, names: dict[str, str]) -> list[Expected
                 )
             full = name if suite == "perfect" else f"{name}-{suite}"
             flown = {one: it for one, it in modes.items() if suite not in without.get(one, {})}
-            found.append(Expected(full, faults, suite, link, flown))
+            found.append(Expected(full, faults, suite, own.link, flown))
     return found
 
 
-def _truth(table: dict[str, Any], key: str) -> bool:
-    value = table.get(key, False)
-    if not isinstance(value, bool):
-        raise ExpectationError(f"{key} = {_shown(value)}: must be true or false")
-    return value
-
-
-def _faults(table: dict[str, Any]) -> list[tuple[tuple[Fault, ...], str]]:
+def _faults(own: _Table, table: dict[str, Any]) -> list[tuple[tuple[Fault, ...], str]]:
     """The faults of each flight, and its name."""
-    units = _words(table, "units", _UNITS, ())
-    kinds = _words(table, "kinds", _KINDS, ())
     numbers: dict[str, Any] = {key: table[key] for key in _NUMBERS if key in table}
-    given = table.get("name")
-    if given is not None and not (isinstance(given, str) and given):
-        raise ExpectationError(f"name = {_shown(given)}: must be a text")
-    more, found = _more(table), []
-    if not units:
-        return [((), given or "none")]
-    for unit in units:
-        instances = _instances(table, typing.cast(Unit, unit))
-        for kind in kinds:
-            for instance in instances:
+    more, found = _more(own, table), []
+    if not own.units:
+        return [((), own.name or "none")]
+    for unit in own.units:
+        _check_instances(own, unit)
+        for kind in own.kinds:
+            for instance in own.instances:
                 keys: dict[str, Any] = {"unit": unit, "kind": kind, "instance": instance, **numbers}
                 fault: Fault = build_table(Fault, keys, "")
-                name = f"{unit}-{kind}" + (f"-{instance}" if instance else "")
-                found.append(((fault, *more), (given or name).replace(" ", "-")))
-    if not _truth(table, "mirrored"):
+                name = f"{unit}-{kind}" + (f"-{instance:g}" if instance else "")
+                found.append(((fault, *more), (own.name or name).replace(" ", "-")))
+    if not own.mirrored:
         return found
     others = [(_mirrored(faults), f"{name}-mirrored") for faults, name in found]
     others = [other for other, one in zip(others, found, strict=True) if other[0] != one[0]]
@@ -209,10 +191,10 @@ def _mirrored(faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
     return tuple([replace(one, size=-one.size) if one.kind in _SIGNED else one for one in faults])
 
 
-def _more(table: dict[str, Any]) -> tuple[Fault, ...]:
+def _more(own: _Table, table: dict[str, Any]) -> tuple[Fault, ...]:
     """Faults in the same flight; their ``start_s`` counts from the first one."""
     tables = table.get("with", [])
-    if not isinstance(tables, list) or (tables and not (table.get("units") and table.get("name"))):
+    if not isinstance(tables, list) or (tables and not (own.units and own.name)):
         raise ExpectationError(
             "with must be an array of tables, each a fault beside that of units and kinds, and "
             "needs a name"
@@ -220,26 +202,12 @@ def _more(table: dict[str, Any]) -> tuple[Fault, ...]:
     return tuple(build_table(Fault, one, f"with[{k}]") for k, one in enumerate(tables))
 
 
-def _instances(table: dict[str, Any], unit: Unit) -> list[int]:
-    """Which of a unit fail, each in a flight of its own."""
-    found, most = table.get("instances", [0]), instances(unit, load_vehicle("paper"))
-    allowed = f"whole numbers from 0 (all) to {most}" if most else "0 alone: there is one"
-    if not isinstance(found, list):
-        raise ExpectationError(
-            f"instances = {_shown(found)}: must be an array; of a {unit} {allowed}"
-        )
-    for k, one in enumerate(found):
-        if isinstance(one, bool) or not isinstance(one, int) or not 0 <= one <= most:
-            raise ExpectationError(
-                f"instances[{k}] = {_shown(one)}: must be, of a {unit}, {allowed}"
-            )
-    return found
-
-
-def _shown(value: Any) -> str:
-    """A value of the file as far as a sentence has room for it."""
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+def _check_instances(own: _Table, unit: Unit) -> None:
+    most = instances(unit, load_vehicle("paper"))
+    for k, one in enumerate(own.instances):
+        if one > most:
+            allowed = f"0 (all) to {most}" if most else "0 alone: there is one"
+            raise ExpectationError(f"instances[{k}] = {one:g}: must be, of a {unit}, {allowed}")
 
 
 def _names(faults: tuple[Fault, ...], names: dict[str, str]) -> str:
@@ -262,87 +230,36 @@ def _modes(table: dict[str, Any], names: str) -> dict[str, Expectation]:
 
 
 def _expectation(keys: dict[str, Any]) -> Expectation:
-    then, last = _actions(keys)
-    contact = keys.get("contact", "none")
-    if contact not in _CONTACTS:
-        raise ExpectationError(
-            f"contact = {_shown(contact)}: must be one of {', '.join(_CONTACTS)}"
-        )
-    if contact != "none" and not keys.get("why"):
-        raise ExpectationError(f'contact = "{contact}" needs a reason: why')
-    margin_mm, force, within_s = _margin_mm(keys), _force(keys), _told_within_s(keys)
-    names = keys["names"]
-    if not isinstance(names, str):
-        raise ExpectationError(f"names = {_shown(names)}: must be a regular expression")
-    why = keys.get("why", "")
-    if not isinstance(why, str):
-        raise ExpectationError(f"why = {_shown(why)}: must be a text")
-    if within_s is not None and not names:
+    found: Expectation = build_table(Expectation, keys, "")
+    for wrong, sentence in (
+        (not found.then, f"then must name at least one of {', '.join(ACTIONS)}"),
+        (
+            not set(found.last) <= set(found.then),
+            f"last = {list(found.last)}: must be among then, {', '.join(found.then)}",
+        ),
+        (
+            found.contact != "none" and not found.why,
+            f'contact = "{found.contact}" needs a reason: why',
+        ),
+        (
+            found.margin_mm < 0.0 and not found.why,
+            f"margin_mm = {found.margin_mm:g} needs a reason: why",
+        ),
+        (found.force > 1.0 and not found.why, f"force = {found.force:g} needs a reason: why"),
+    ):
+        if wrong:
+            raise ExpectationError(sentence)
+    if found.told_within_s == math.inf:
+        found = replace(found, told_within_s=None)
+    if found.told_within_s is not None and not found.names:
         raise ExpectationError("what must be told needs names: what a text must name")
     try:
-        re.compile(names)
+        re.compile(found.names)
     except re.error as error:
-        raise ExpectationError(f"names = {names!r} is no regular expression: {error}") from None
-    return Expectation(then, within_s, names, contact, margin_mm, force, why, last)
-
-
-def _margin_mm(keys: dict[str, Any]) -> float:
-    margin = keys.get("margin_mm", 0.0)
-    if not _is_number(margin) or not -_MAX_MM <= margin <= _MAX_MM:
         raise ExpectationError(
-            f"margin_mm = {_shown(margin)}: must be a length in mm, from {-_MAX_MM:g} to "
-            f"{_MAX_MM:g}"
-        )
-    if margin < 0.0 and not keys.get("why"):
-        raise ExpectationError(f"margin_mm = {margin:g} needs a reason: why")
-    return float(margin)
-
-
-def _force(keys: dict[str, Any]) -> float:
-    force = keys.get("force", 1.0)
-    if not _is_number(force) or not 1.0 <= force <= _MAX_FORCE:
-        raise ExpectationError(
-            f"force = {_shown(force)}: must be a share of the largest, from 1 to {_MAX_FORCE:g}"
-        )
-    if force > 1.0 and not keys.get("why"):
-        raise ExpectationError(f"force = {force:g} needs a reason: why")
-    return float(force)
-
-
-def _told_within_s(keys: dict[str, Any]) -> float | None:
-    told = keys.get("told_within_s", math.inf)
-    if not _is_number(told) or not (0.0 < told <= _MAX_S or told == math.inf):
-        raise ExpectationError(
-            f"told_within_s = {_shown(told)}: must be a time above 0, in seconds, up to {_MAX_S:g}"
-            " or inf"
-        )
-    return float(told) if told < math.inf else None
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _actions(keys: dict[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Actions that may follow, and those of which the last must be one."""
-    then, last = _words(keys, "then", ACTIONS, ()), _words(keys, "last", ACTIONS, ())
-    if not then:
-        raise ExpectationError(f"then must name at least one of {', '.join(ACTIONS)}")
-    if not set(last) <= set(then):
-        raise ExpectationError(f"last = {list(last)}: must be among then, {', '.join(then)}")
-    return then, last
-
-
-def _words(
-    table: dict[str, Any], key: str, known: tuple[str, ...], default: tuple[str, ...]
-) -> tuple[str, ...]:
-    words = table.get(key, list(default))
-    if not isinstance(words, list):
-        raise ExpectationError(f"{key} = {_shown(words)}: must be an array, of {', '.join(known)}")
-    for word in words:
-        if word not in known:
-            raise ExpectationError(f"{key}: {_shown(word)} is not one of {', '.join(known)}")
-    return tuple(words)
+            f"names = {found.names!r} is no regular expression: {error}"
+        ) from None
+    return found
 
 
 def differences(mode: str, expected: Expectation, seen: FaultFlight) -> tuple[str, ...]:
