@@ -37,7 +37,6 @@ RATE_TOLERANCE: Final = 0.10
 LATENESS_FACTOR: Final = 1.25
 LATENESS_SLACK_US: Final = 50.0
 _ACCEPTED: Final = 0  # MAV_RESULT
-_HEARTBEAT: Final = 0
 _COUNTED_HZ: Final = 4.0  # slower streams are too few to count in a minute
 
 

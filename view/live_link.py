@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import select
 import threading
 import time
@@ -37,7 +36,6 @@ _POSITION_ONLY: Final = 0x0DF8  # type mask: position, no heading
 _LOCAL_NED: Final = 1
 _CLEARANCE: Final = 0.1  # m, of a ball
 _HEAR_S: Final = 0.01  # at a time
-_NAN: Final = math.nan
 _PLAN_US: Final = 200_000.0  # between two plans
 _SET_INTERVAL, _REQUEST_MESSAGE = 511, 512
 _ASK_S: Final = 2.0  # between two requests of what is not sent by itself

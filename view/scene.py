@@ -32,13 +32,6 @@ class Margin(NamedTuple):
     barrier: float  # m/s, h; the barrier acts at or below 0
 
 
-class Rotor(NamedTuple):
-    """What one rotor was told."""
-
-    thrust: float  # N
-    most: float  # N
-
-
 class Battery(NamedTuple):
     """What is left."""
 

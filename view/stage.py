@@ -24,7 +24,6 @@ from view.zone_meshes import Mesh, moved, zone_mesh
 Array = NDArray[Any]
 
 _UP: Final[Vec4] = (0.0, 1.0, 0.0, 0.0)  # z of a part points up: half a turn about x
-_STRAIGHT: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 _ARROW: Final = 0.32  # m, of a rotor's full thrust
 _FORCE: Final = 0.03  # m/N, of the arrow on the tool
 _PAYLOAD: Final = 0.06  # m, of the box that stands for what is held

@@ -27,8 +27,6 @@ from fsw.autopilot.tick_record import Multibody
 from vehicles.vehicle_file import VehicleError, parse_vehicle
 from view.scene import Horizon, Posture
 
-_STILL: Vec3 = (0.0, 0.0, 0.0)
-
 
 def chain(posture: Posture, airframe: Airframe) -> list[Vec3]:
     """Each joint's origin and the end-effector [m, NED] of a ``posture`` [m, rad, NED]."""

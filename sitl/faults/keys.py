@@ -6,12 +6,12 @@ Units and kinds are those of MAVLink's FAILURE_UNIT and FAILURE_TYPE where it ha
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias, get_args
 
 from command_line.ranges import Range
 from vehicles.description import Vehicle
 
-Unit: TypeAlias = Literal[
+Sensor: TypeAlias = Literal[
     "gyro",
     "accel",
     "mag",
@@ -22,6 +22,9 @@ Unit: TypeAlias = Literal[
     "attitude",
     "distance",
     "encoder",
+]
+Unit: TypeAlias = Literal[
+    Sensor,
     "battery",
     "motor",
     "joint",
@@ -101,20 +104,8 @@ class Fault:
         return f"{self.unit}{which} {self.kind}"
 
 
-SENSORS: Final = (
-    "gyro",
-    "accel",
-    "mag",
-    "baro",
-    "gps",
-    "optical flow",
-    "vio",
-    "attitude",
-    "distance",
-    "encoder",
-)
+SENSORS: Final[tuple[Sensor, ...]] = get_args(Sensor)
 LINKS: Final = ("to vehicle", "to simulator")
-PROCESSES: Final = ("simulator", "flight software", "planner", "disk")
 
 _RANDOM: Final = ("garbage", "intermittent", "noisy", "duplicated", "reordered")
 _SIGNAL: Final = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")

@@ -22,12 +22,10 @@ from studies.flight.job import PlantName
 from studies.flight.own_parts import with_parts
 
 Case = Literal["I", "II"]
-Family = Literal["walls", "dash"]
+Family = Literal["walls", "dash"]  # of scenarios, one a case: slow, and fast
 Comparison = Literal["paper", "like-for-like"]
 
 CASES: tuple[Case, ...] = ("I", "II")
-FAMILIES: tuple[Family, ...] = ("walls", "dash")  # of scenarios, one a case: slow, and fast
-PLANTS: tuple[PlantName, ...] = ("double-integrator", "full")
 TUNING_SEEDS = range(30)
 REPORTING_FROM = 100
 
