@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import tempfile
@@ -16,12 +15,13 @@ from typing import Any, Final
 
 from benchmarks.download_client import DownloadClient, NothingCame
 from benchmarks.machine_watch import version_and_machine
+from benchmarks.two_processes import figures, fly
 from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import number
 from fsw.link.files.flight_logs import MARK
 from pandion.display import Display
-from pandion.supervisor import ProcessFailed, Supervisor
+from pandion.supervisor import ProcessFailed
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 MIN_MB_PER_S: Final = 2.0
@@ -126,24 +126,15 @@ def measure(size: int, display: Display) -> Downloads:
         failures: list[NothingCame] = []
         helper = threading.Thread(target=_fetch, args=(client, log, found, failures), daemon=True)
         helper.start()
-        flown = Supervisor(display, out).run(
-            ["ground", "--realtime", f"--duration={duration_s!r}", "--listen=udp:127.0.0.1:0"]
-            + ["--wait=600", f"--out={out}"],
-            lambda port: [
-                f"--sim=udp:127.0.0.1:{port}",
-                *(f"--gcs={client.address}", "--api=none", f"--keys={out}"),
-                *("--wait=600", f"--out={out}", f"--params={parameters}"),
-            ],
-        )
+        sitl = ["ground", "--realtime", f"--duration={duration_s!r}"]
+        fsw = [f"--gcs={client.address}", "--api=none", f"--keys={out}", f"--params={parameters}"]
+        flown = fly(display, out, sitl, fsw)
         helper.join(timeout=30.0)
         if failures:
             raise failures[0]
-        try:
-            vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
-            logged = (out / "flight.ulg").stat().st_size
-        except (OSError, ValueError):
-            raise ProcessFailed(flown.failure or "the flight left no figures") from None
-    return Downloads(tuple(found), logged / duration_s / _MB, client.asked_again, vehicle["inner"])
+        inner = figures(flown)["inner"]
+        logged = (out / "flight.ulg").stat().st_size
+    return Downloads(tuple(found), logged / duration_s / _MB, client.asked_again, inner)
 
 
 def _fetch(

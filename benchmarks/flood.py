@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import subprocess
 import sys
@@ -20,12 +19,13 @@ from benchmarks.flood_monitor import Heard, Monitor
 from benchmarks.flood_traffic import SYSTEM
 from benchmarks.machine_watch import version_and_machine
 from benchmarks.requirement import Requirement, print_requirements
+from benchmarks.two_processes import figures, fly
 from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import seconds
 from fsw.link.telemetry.streams import STREAMS
 from pandion.display import Display
-from pandion.supervisor import ProcessFailed, Supervisor
+from pandion.supervisor import ProcessFailed
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 RATE_HZ: Final = 5000.0
@@ -95,20 +95,10 @@ def measure(duration_s: float, *, flooded: bool, display: Display) -> Flight:
         )
         helper.start()
         sitl = ["walls", "--realtime", f"--duration={duration_s + SETTLE_S + 1.0!r}"]
-        sitl += ["--listen=udp:127.0.0.1:0", "--wait=600", f"--out={out}"]
-        flown = Supervisor(display, out).run(
-            sitl,
-            lambda port: [
-                f"--sim=udp:127.0.0.1:{port}",
-                *(f"--gcs={monitor.address}", "--api=none", f"--keys={out}"),
-                *("--wait=600", f"--out={out}"),
-            ],
-        )
+        fsw = [f"--gcs={monitor.address}", "--api=none", f"--keys={out}"]
+        flown = fly(display, out, sitl, fsw)
         helper.join(timeout=5.0)
-        try:
-            vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            raise ProcessFailed(flown.failure or "the flight left no figures") from None
+        vehicle = figures(flown)
         if flown.interrupted or flown.sitl is None:
             raise ProcessFailed(flown.failure or "interrupted", exit_code=NOT_PASSED)
     sent, sent_valid = (int(count) for count in counts) if counts else (0, 0)
@@ -148,18 +138,17 @@ def correctness(flight: Flight) -> list[Requirement]:
     accepted = [ack for ack in heard.others if ack[1] == _ACCEPTED]
     own = heard.asked + len(heard.heartbeats) + 60  # commands and heartbeats of the monitor
     return [
-        Requirement("commands of the flood that were accepted", len(accepted), 0, ""),
-        Requirement("acknowledgements to strangers", _strangers(heard), 0, ""),
+        Requirement("commands of the flood that were accepted", len(accepted), 0),
+        Requirement("acknowledgements to strangers", _strangers(heard), 0),
         Requirement(
             "frames believed beyond the valid ones",
             link["frames_accepted"] - own - flight.sent_valid,
             0,
-            "",
         ),
         # The monitor, and the one socket of the flood that sent valid frames.
-        Requirement("peers", link["peers"], 2, ""),
-        Requirement("services that failed", link["service_failures"], 0, ""),
-        Requirement("messages that could not be encoded", link["encode_failures"], 0, ""),
+        Requirement("peers", link["peers"], 2),
+        Requirement("services that failed", link["service_failures"], 0),
+        Requirement("messages that could not be encoded", link["encode_failures"], 0),
     ]
 
 
@@ -175,10 +164,10 @@ def timing(flight: Flight, calm: Flight) -> list[Requirement]:
             MAX_ACK_S,
             "s",
         ),
-        Requirement("changes of mode", max(len(heard.modes) - 1, 0), 0, ""),
+        Requirement("changes of mode", max(len(heard.modes) - 1, 0), 0),
         Requirement("heartbeat, largest gap", max(gaps, default=float("nan")), MAX_GAP_S, "s"),
-        Requirement("commands without an answer", heard.asked - len(heard.acknowledged_s), 1, ""),
-        Requirement("telemetry rate, largest deviation", rate_deviation(heard), RATE_TOLERANCE, ""),
+        Requirement("commands without an answer", heard.asked - len(heard.acknowledged_s), 1),
+        Requirement("telemetry rate, largest deviation", rate_deviation(heard), RATE_TOLERANCE),
     ]
     for name in ("lateness_p50_us", "lateness_p99_us"):
         bound = max(LATENESS_FACTOR * before[name], before[name] + LATENESS_SLACK_US)
@@ -208,7 +197,7 @@ def _strangers(heard: Heard) -> int:
 def _write(target: str | None, rows: list[Requirement], calm: Flight, flooded: Flight) -> None:
     if target is None:
         return
-    figures = {
+    found = {
         "rows": [row.as_json() for row in rows],
         "datagrams_sent": flooded.sent,
         "valid_frames_sent": flooded.sent_valid,
@@ -217,7 +206,7 @@ def _write(target: str | None, rows: list[Requirement], calm: Flight, flooded: F
         "without": _facts(calm),
         "with": _facts(flooded),
     }
-    write_text(target, json_text(figures, 1) + "\n")
+    write_text(target, json_text(found, 1) + "\n")
 
 
 def _facts(flight: Flight) -> dict[str, Any]:

@@ -7,7 +7,6 @@ with exact states. The two take turns: a busy machine slows both.
 
 from __future__ import annotations
 
-import json
 import os
 import statistics
 import sys
@@ -16,15 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TextIO
 
+from benchmarks.two_processes import figures, fly
 from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.values import number, one_of, whole
 from command_line.version import version
-from pandion.child import Event
 from pandion.display import Display
 from pandion.processor import Places, lockstep_places
-from pandion.supervisor import ProcessFailed, Supervisor
+from pandion.supervisor import ProcessFailed
 from sitl.scenario_file import PERFECT, SUITE_NAMES, ScenarioError, load_scenario
 
 DONE, SLOW = 0, 1  # exit codes
@@ -149,26 +148,13 @@ def _measure_one(options: LockstepOptions, kind: _Kind) -> dict[str, Any]:
     """
     with tempfile.TemporaryDirectory(prefix="pandion-bench-") as name:
         out, places = Path(name), _places(options.processors)
-        sitl = [
-            options.scenario,
-            "--listen=udp:127.0.0.1:0",
-            f"--sensors={kind.sensors}",
-            f"--duration={options.duration_s!r}",
-            "--wait=600",
-            f"--out={out}",
-        ]
-        body = load_scenario(options.scenario).body  # as pandion fly has it
-        fsw = [f"--body={body}", f"--out={out}", "--wait=600"]
-        flown = Supervisor(_Silent(sys.stderr), out, places, kind.runner).run(
-            sitl, lambda port: [f"--sim=udp:127.0.0.1:{port}", *fsw]
-        )
+        sitl = [options.scenario, f"--sensors={kind.sensors}"]
+        sitl += [f"--duration={options.duration_s!r}"]
+        fsw = [f"--body={load_scenario(options.scenario).body}"]  # as pandion fly has it
+        flown = fly(_Silent(sys.stderr), out, sitl, fsw, places, kind.runner)
         if flown.failure is not None or flown.sitl is None or flown.interrupted:
             raise ProcessFailed(flown.failure or "the flight was interrupted", exit_code=1)
-        written = out / "fsw.json"
-        if not written.exists():
-            raise ProcessFailed("the flight software was ended before it wrote its result", 1)
-        vehicle: Event = json.loads(written.read_text(encoding="utf-8"))
-        return {"sitl": flown.sitl, "fsw": vehicle, "places": _described(places)}
+        return {"sitl": flown.sitl, "fsw": figures(flown), "places": _described(places)}
 
 
 def _places(processors: int | None) -> Places:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import statistics
@@ -17,6 +16,7 @@ from typing import Any, TextIO
 from benchmarks.bare_loop import BareLoops
 from benchmarks.budgets import BudgetRow, Budgets, judge, load_budgets, result
 from benchmarks.machine_watch import Watch
+from benchmarks.two_processes import figures, fly
 from benchmarks.values import several
 from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
@@ -24,7 +24,7 @@ from command_line.parser import COULD_NOT_START
 from command_line.values import seconds, whole
 from command_line.version import version
 from pandion.display import Display
-from pandion.supervisor import ProcessFailed, Supervisor
+from pandion.supervisor import ProcessFailed
 from sitl.scenario_file import ScenarioError, load_scenario
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
@@ -76,8 +76,8 @@ def main(argv: list[str]) -> int:
     machine["load_after"] = round(os.getloadavg()[0], 2)
     for measured in flown:
         print("\n".join(_lines(measured)), file=console)
-    figures = {"machine": machine, "flights": [_as_json(one) for one in flown]}
-    write_text(options.json, json_text(figures, 2) + "\n")
+    found = {"machine": machine, "flights": [_as_json(one) for one in flown]}
+    write_text(options.json, json_text(found, 2) + "\n")
     return PASSED if all(one.result == "pass" for one in flown) else NOT_PASSED
 
 
@@ -95,25 +95,11 @@ def _measure(options: LoopOptions, hogs: int, budgets: Budgets, console: TextIO)
         bare = stack.enter_context(BareLoops())
         for _ in range(hogs):
             stack.enter_context(Hog())
-        sitl = [
-            options.scenario,
-            "--realtime",
-            f"--duration={options.duration_s!r}",
-            *("--listen=udp:127.0.0.1:0", "--wait=600", f"--out={out}"),
-        ]
-        flown = Supervisor(Display(console), out).run(
-            sitl,
-            # Telemetry goes where nothing listens: it is encoded and sent all the same.
-            lambda port: [
-                f"--sim=udp:127.0.0.1:{port}",
-                f"--body={body}",
-                *("--gcs=udp:127.0.0.1:9", "--wait=600", f"--out={out}"),
-            ],
-        )
-        try:
-            vehicle = json.loads((out / "fsw.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            raise ProcessFailed(flown.failure or "the flight left no figures") from None
+        sitl = [options.scenario, "--realtime", f"--duration={options.duration_s!r}"]
+        # Telemetry goes where nothing listens: it is encoded and sent all the same.
+        fsw = [f"--body={body}", "--gcs=udp:127.0.0.1:9"]
+        flown = fly(Display(console), out, sitl, fsw)
+        vehicle = figures(flown)
     assert watch.noise is not None
     inner, stops = vehicle["inner"], bare.stops
     flight = inner["begun_us"], inner["ticks"] + inner["skipped"]

@@ -14,7 +14,7 @@ class Requirement:
     name: str
     measured: float
     bound: float
-    unit: str
+    unit: str = ""
 
     @property
     def passed(self) -> bool:

@@ -24,11 +24,12 @@ from benchmarks.machine_watch import descendants, version_and_machine
 from benchmarks.requirement import Requirement, print_requirements
 from benchmarks.soak_client import ANSWER_S, COMPONENT, GAP_S, SYSTEM, Client
 from benchmarks.soak_faults import scenario
+from benchmarks.two_processes import fly
 from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import number, whole
 from pandion.display import Display
-from pandion.supervisor import Flown, ProcessFailed, Supervisor
+from pandion.supervisor import Flown, ProcessFailed
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 _GLANCE_S: Final = 5.0
@@ -128,7 +129,7 @@ def main(argv: list[str]) -> int:
     ends_s = time.monotonic() + 60.0 * options.minutes
     try:
         while (left_s := ends_s - time.monotonic()) > _GLANCE_S:
-            one = fly(options, len(flights), left_s, display)
+            one = soak(options, len(flights), left_s, display)
             flights.append(one)
             display.say(f"flight {len(flights)}: {one.flown_s:.0f} s, {one.ended}")
     except ProcessFailed as error:
@@ -146,7 +147,7 @@ def main(argv: list[str]) -> int:
     return PASSED if all(row.passed for row in rows) else NOT_PASSED
 
 
-def fly(options: SoakOptions, flight: int, left_s: float, display: Display) -> Soaked:
+def soak(options: SoakOptions, flight: int, left_s: float, display: Display) -> Soaked:
     """One flight, until the time is over or the vehicle is.
 
     Raises:
@@ -162,16 +163,11 @@ def fly(options: SoakOptions, flight: int, left_s: float, display: Display) -> S
         failing = out / "failing.toml"
         failing.write_text(scenario(1000 * options.seed + flight, left_s), encoding="ascii")
         sitl = [str(failing), "--realtime", f"--duration={left_s!r}", f"--seed={flight}"]
-        sitl += [f"--sensors={options.sensors}", "--listen=udp:127.0.0.1:0", "--wait=600"]
+        sitl += [f"--sensors={options.sensors}"]
+        fsw = [f"--gcs=udp:127.0.0.1:{client.port}", "--api=none", f"--keys={out}"]
+        fsw += [f"--params={parameters}", "--body=full"]
         try:
-            flown = Supervisor(display, out).run(
-                [*sitl, f"--out={out}"],
-                lambda port: [
-                    f"--sim=udp:127.0.0.1:{port}",
-                    *(f"--gcs=udp:127.0.0.1:{client.port}", "--api=none", f"--keys={out}"),
-                    *("--wait=600", f"--params={parameters}", "--body=full", f"--out={out}"),
-                ],
-            )
+            flown = fly(display, out, sitl, fsw)
         finally:
             used.stop()
             dropped = client.dropped
@@ -208,21 +204,20 @@ def judge(flights: list[Soaked]) -> list[Requirement]:
     aloft_s = sum(one.heard["airborne_s"] for one in flights)
     hours = flown_s / 3600.0
     rows = [
-        Requirement("commands without an answer within 1 s", unanswered, 0, ""),
+        Requirement("commands without an answer within 1 s", unanswered, 0),
         Requirement("command to answer, longest", max(answers, default=9.9), ANSWER_S, "s"),
-        Requirement("commands that were read and not answered", lost, 0, ""),
+        Requirement("commands that were read and not answered", lost, 0),
         Requirement(
             "parameters without an answer",
             sum(one.heard["parameters_missing"] for one in flights),
             0,
-            "",
         ),
-        Requirement("flights an hour", len(flights) / max(hours, 1.0), _MAX_FLIGHTS, ""),
-        Requirement("share of the time on the ground", 1.0 - aloft_s / flown_s, _MAX_GROUNDED, ""),
+        Requirement("flights an hour", len(flights) / max(hours, 1.0), _MAX_FLIGHTS),
+        Requirement("share of the time on the ground", 1.0 - aloft_s / flown_s, _MAX_GROUNDED),
     ]
     # What did not live for long enough is not judged, and says nothing.
     unjudged = sum(f"{name}: memory" not in growth for name in ("fsw", "planner", "sitl"))
-    rows.append(Requirement("processes that were not seen for long enough", unjudged, 0, ""))
+    rows.append(Requirement("processes that were not seen for long enough", unjudged, 0))
     for name, (value, most) in sorted(growth.items()):
         unit = "MB/h" if "memory" in name else ""
         rows.append(Requirement(f"{name}, growth", value, most, unit))

@@ -139,6 +139,14 @@ def try_write(target: str | Path | None, text: str) -> list[str]:
     return []
 
 
+def written(program: str, *texts: tuple[str | Path | None, str]) -> bool:
+    """Write each text to its target; False, and a sentence for each, where that cannot be done."""
+    lost = [what for target, text in texts for what in try_write(target, text)]
+    for what in lost:
+        print_error(program, f"cannot write {what}")
+    return not lost
+
+
 def unwritable(error: Exception) -> str:
     """Why something could not be started, without the system's number of the error."""
     named = isinstance(error, OSError) and error.strerror and error.filename

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from command_line.junit import junit_xml
 from command_line.options import as_words, group, json_file, option, read, switch
-from command_line.output import command_name, console_beside, json_text, print_error, say, try_write
+from command_line.output import command_name, console_beside, json_text, print_error, say, written
 from command_line.parser import COULD_NOT_START
 from command_line.run_directory import new_run_directory
 from command_line.values import whole
@@ -173,16 +173,17 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
     for passed, sentence in shown or [verdict(rows, result.asked)]:
         display.say(f"{'PASS' if passed else 'FAIL'} {sentence}")
     display.say(f"page {folder / PAGE}")
-    lost = try_write(options.json, json_text(facts, 1) + "\n")
-    lost += try_write(options.junit, junit_xml(result.plan.name, junit_cases(result, judged)))
-    for what in lost:
-        print_error("pandion campaign", f"cannot write {what}")
+    kept = written(
+        "pandion campaign",
+        (options.json, json_text(facts, 1) + "\n"),
+        (options.junit, junit_xml(result.plan.name, junit_cases(result, judged))),
+    )
     for row in rows:
         if row.error:
             print_error("pandion campaign", f"flight {row.flight} broke: {row.reason}")
             break
     met = all(passed for passed, _ in shown)
-    return FLOWN if met and not (lost or more["errors"]) else BROKEN
+    return FLOWN if kept and met and not more["errors"] else BROKEN
 
 
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
@@ -221,7 +222,5 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     say(f"trace {trace}", console)
     command = fly_command(command_name(), job, flight.case.controller, scenario, params)
     say(f"with its log: {command}", console)
-    lost = try_write(options.json, json_text(traced["row"], 1) + "\n")
-    for what in lost:
-        print_error("pandion campaign", f"cannot write {what}")
-    return BROKEN if row.error or lost else FLOWN
+    kept = written("pandion campaign", (options.json, json_text(traced["row"], 1) + "\n"))
+    return FLOWN if kept and not row.error else BROKEN

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
-from command_line.output import console_beside, print_error, try_write
+from command_line.output import console_beside, print_error, written
 from command_line.parser import COULD_NOT_START
 from command_line.run_directory import new_run_directory
 from command_line.version import version
@@ -20,22 +20,6 @@ if TYPE_CHECKING:
     from studies.campaign.plan import CampaignPlan
 
 _INTERRUPTED: Final = 1  # exit code
-
-
-class CampaignRunOptions(Protocol):
-    """The options that these verbs share."""
-
-    @property
-    def cluster(self) -> ClusterOptions:
-        """Where is flown."""
-
-    @property
-    def out(self) -> Path | None:
-        """Where files go; None: to a new directory."""
-
-    @property
-    def json(self) -> str | None:
-        """Where the answer goes as well."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,31 +40,35 @@ class CampaignRun:
 
     def written(self, text: str) -> bool:
         """Write what ``--json`` asks for; False, and a sentence, if that cannot be done."""
-        lost = try_write(self.json, text)
-        for what in lost:
-            print_error(f"pandion {self.verb}", f"cannot write {what}")
-        return not lost
+        return written(f"pandion {self.verb}", (self.json, text))
 
 
-def begin(verb: str, options: CampaignRunOptions, plan: CampaignPlan, work: str) -> CampaignRun:
+def begin(
+    verb: str,
+    plan: CampaignPlan,
+    work: str,
+    cluster: ClusterOptions,
+    out: Path | None,
+    json: str | None,
+) -> CampaignRun:
     """Make the directory and say what is flown, ``work`` being how many flights, in words.
+
+    Files go to ``out``, or to a new directory; the answer goes to ``json`` as well.
 
     Raises:
         CampaignError: The directory is that of a campaign, whose rows would be mixed with these.
     """
     from studies.campaign.store import JOURNAL, refuse_campaign
 
-    folder = options.out or new_run_directory(Path("runs"), f"{verb}-{plan.name}")
+    folder = out or new_run_directory(Path("runs"), f"{verb}-{plan.name}")
     refuse_campaign(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    display = Display(console_beside(options.json))
-    display.say(
-        f"Pandion {version()}: {plan.name}, {work}, {options.cluster.words}, written to {folder}"
-    )
+    display = Display(console_beside(json))
+    display.say(f"Pandion {version()}: {plan.name}, {work}, {cluster.words}, written to {folder}")
     campaign = campaign_of(
-        options.cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
+        cluster, folder / JOURNAL, say=display.say, time_limit_s=plan.time_limit_s
     )
-    return CampaignRun(verb, folder, display, campaign, options.json)
+    return CampaignRun(verb, folder, display, campaign, json)
 
 
 def exit_code(verb: str, answer: Callable[[], int]) -> int:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from command_line.bounded_file import read_bounded
 from command_line.bounded_json import JsonError
 from command_line.options import group, json_file, option, read
-from command_line.output import console_beside, json_text, print_error, try_write
+from command_line.output import console_beside, json_text, print_error, written
 from command_line.parser import COULD_NOT_START
 from command_line.toml_tables import shown
 from command_line.values import number, whole
@@ -114,8 +114,8 @@ def _flown_again(options: CertifyOptions, result: CampaignResult) -> bool:
     campaign = campaign_of(
         options.cluster,
         None,
-        partial(display.report, "flown again"),
-        display.say,
+        report=partial(display.report, "flown again"),
+        say=display.say,
         time_limit_s=result.plan.time_limit_s,
     )
     with display.progress():
@@ -152,14 +152,11 @@ def _certify(options: CertifyOptions, result: CampaignResult) -> int:
         display.say(sentence)
     if result.left_out:
         display.say(left_out(result.left_out))
-    written = options.html or options.campaign / PAGE
-    lost = try_write(options.json, json_text(stated, 1) + "\n")
-    lost += try_write(written, page(stated, result))
-    display.say(f"page {written}; pandion certify {options.campaign} --verify {written}")
-    for what in lost:
-        print_error("pandion certify", f"cannot write {what}")
+    html = options.html or options.campaign / PAGE
+    display.say(f"page {html}; pandion certify {options.campaign} --verify {html}")
     met = all(one["met"] for one in stated.get("required", ()))
-    return CERTIFIED if met and not lost else DIFFERS
+    texts = (options.json, json_text(stated, 1) + "\n"), (html, page(stated, result))
+    return CERTIFIED if written("pandion certify", *texts) and met else DIFFERS
 
 
 def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
@@ -179,8 +176,7 @@ def _verify(options: CertifyOptions, result: CampaignResult, path: Path) -> int:
     if not wrong:
         display.say(f"{path} is what {options.campaign} shows, digest {stated['digest']}")
     said = json_text({"same": not wrong, "differences": wrong}, 1) + "\n"
-    for what in try_write(options.json, said):
-        print_error("pandion certify", f"cannot write {what}")
+    written("pandion certify", (options.json, said))
     return DIFFERS if wrong else CERTIFIED
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -12,7 +11,7 @@ from command_line.options import ContradictionError, OneOf, option
 from command_line.values import existing_file, whole
 
 if TYPE_CHECKING:
-    from studies.campaign.campaign import Campaign, ProgressReport
+    from studies.campaign.campaign import Campaign
 
 _WHERE: Final = OneOf()
 
@@ -71,15 +70,9 @@ class ClusterOptions:
         return f"{self.workers} workers" if self.workers != 1 else "1 worker"
 
 
-def campaign_of(
-    options: ClusterOptions,
-    journal: Path | None,
-    report: ProgressReport | None = None,
-    say: Callable[[str], None] | None = None,
-    **more: Any,
-) -> Campaign[Any]:
+def campaign_of(options: ClusterOptions, journal: Path | None, **more: Any) -> Campaign[Any]:
     """What flies where the options say; ``more`` are fields of ``Campaign``."""
-    from studies.campaign.campaign import Campaign, mute, silent
+    from studies.campaign.campaign import Campaign
     from studies.campaign.ports import Scheduler
 
     scheduler = Scheduler(
@@ -92,8 +85,6 @@ def campaign_of(
     return Campaign(
         workers=options.workers,
         journal=journal,
-        report=report or silent,
         scheduler=scheduler if options.running else None,
-        say=say or mute,
         **more,
     )

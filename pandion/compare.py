@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from command_line.junit import Case, junit_xml
 from command_line.options import json_file, option, read
-from command_line.output import console_beside, json_text, print_error, say, try_write
+from command_line.output import console_beside, json_text, print_error, say, written
 from command_line.parser import COULD_NOT_START
 from command_line.values import number
 from pandion.gate_options import junit
@@ -76,11 +76,12 @@ def main(argv: list[str]) -> int:
         )
         for one in found
     ]
-    lost = try_write(options.json, json_text(record, 1) + "\n")
-    lost += try_write(options.junit, junit_xml("compare", cases))
-    for what in lost:
-        print_error("pandion compare", f"cannot write {what}")
-    return WORSE if worse else _UNFIT if lost else NOT_WORSE
+    kept = written(
+        "pandion compare",
+        (options.json, json_text(record, 1) + "\n"),
+        (options.junit, junit_xml("compare", cases)),
+    )
+    return WORSE if worse else NOT_WORSE if kept else _UNFIT
 
 
 def _sentence(one: Difference, confidence: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,10 +18,7 @@ from pandion.display import Display
 if TYPE_CHECKING:
     from messages.ulog import Topic
     from messages.ulog_reader import UlogFile
-    from pandion.csv_export import CsvSink
     from pandion.mcap_export import McapSink
-
-    Sink = CsvSink | McapSink
 
 DONE: Final = 0  # exit code
 
@@ -56,7 +54,7 @@ def main(argv: list[str]) -> int:
     try:
         log = open_log(path)
         with contextlib.ExitStack() as stack:
-            sink = _sink(options.csv, options.mcap, log, stack)
+            sink = _sink(options, log, stack)
             display = Display(sys.stdout, lines=0)
             stack.enter_context(display.progress())
             count = _export(log, sink, display)
@@ -111,19 +109,42 @@ def _draw(path: Path, sink: Any) -> None:
         sink.add_drawn(shown.topic, shown.schema, round(1e6 * shown.t), shown.value)
 
 
-def _sink(csv: Path | None, mcap: Path | None, log: UlogFile, stack: contextlib.ExitStack) -> Sink:
-    if csv is not None:
-        from pandion.csv_export import CsvSink
+class CsvSink(contextlib.ExitStack):
+    """Writes ``TOPIC.csv`` files into a directory."""
 
-        return stack.enter_context(CsvSink(csv))
-    assert mcap is not None
+    def __init__(self, directory: Path) -> None:
+        """Make the directory.
+
+        Raises:
+            OSError: It cannot be made.
+        """
+        super().__init__()
+        directory.mkdir(parents=True, exist_ok=True)
+        self._directory = directory
+        self._tables: dict[str, Any] = {}
+
+    def add(self, topic: str, t_us: int, names: tuple[str, ...], values: tuple[Any, ...]) -> None:
+        """Append a row, behind a first one with the names."""
+        table = self._tables.get(topic)
+        if table is None:
+            path = self._directory / f"{topic}.csv"
+            table = csv.writer(self.enter_context(path.open("w", newline="", encoding="utf-8")))
+            table.writerow(names)
+            self._tables[topic] = table
+        table.writerow(values)
+
+
+def _sink(options: ExportOptions, log: UlogFile, stack: contextlib.ExitStack) -> CsvSink | McapSink:
+    if options.csv is not None:
+        return stack.enter_context(CsvSink(options.csv))
+    assert options.mcap is not None
     from pandion.mcap_export import McapSink
 
     facts = {name: str(value) for name, value in log.information.items()}
-    return stack.enter_context(McapSink(mcap, facts))
+    return stack.enter_context(McapSink(options.mcap, facts))
 
 
-def _export(log: UlogFile, sink: Sink, display: Display) -> int:
+def _export(log: UlogFile, sink: CsvSink | McapSink, display: Display) -> int:
     count = 0
     for topic, t_us, names, values in _rows(log):
         sink.add(topic, t_us, names, values)

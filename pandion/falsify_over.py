@@ -11,7 +11,7 @@ from pandion.campaign_run import begin, exit_code
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from pandion.falsify_options import FalsifyOptions
+    from pandion.falsify import FalsifyOptions
     from studies.search.worst_flights import Find, Searched
 
 HOLDS, BROKEN = 0, 1  # exit codes
@@ -34,7 +34,8 @@ def _search(options: FalsifyOptions, file: Path) -> int:
     if options.params is not None:
         raise CampaignError("with --over parameters are set by [parameters] of the file")
     plan = load_plan(file, options.own.names)
-    run = begin("falsify", options, plan, f"{options.evaluations} flights")
+    work = f"{options.evaluations} flights"
+    run = begin("falsify", plan, work, options.cluster, options.out, options.json)
     folder, display = run.folder, run.display
 
     def report(done: int, least: float) -> None:

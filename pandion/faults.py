@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from command_line.junit import Case, junit_xml
 from command_line.options import group, json_file, option, read, switch
-from command_line.output import console_beside, json_text, print_error, say, try_write
+from command_line.output import console_beside, json_text, print_error, say, written
 from command_line.parser import COULD_NOT_START, unknown_name
 from command_line.values import output_file, whole
 from command_line.version import version
@@ -184,14 +184,14 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     for name, count in Counter(one for row in rows for one in row.known).items():
         display.say(f"known limit {name}: {count}")
     display.say(f"{len(rows) - wrong} of {len(rows)} as they must be")
-    text = json_text([row.as_json() for row in rows], 1) + "\n"
-    lost = try_write(options.json, text)
-    lost += try_write(options.junit, junit_xml("faults", [_case(row) for row in rows]))
+    texts: list[tuple[str | None, str]] = [
+        (options.json, json_text([row.as_json() for row in rows], 1) + "\n"),
+        (options.junit, junit_xml("faults", [_case(row) for row in rows])),
+    ]
     if options.html is not None:
-        lost += try_write(options.html, page(rows, (f"Pandion {version()}, seed {seed}",)))
-    for what in lost:
-        print_error("pandion faults", f"cannot write {what}")
-    return DIFFERS if wrong or lost else AS_EXPECTED
+        texts.append((options.html, page(rows, (f"Pandion {version()}, seed {seed}",))))
+    all_written = written("pandion faults", *texts)
+    return AS_EXPECTED if all_written and not wrong else DIFFERS
 
 
 def _case(row: Judged) -> Case:
@@ -215,8 +215,10 @@ def _flown(cells: list[Cell], options: FaultsOptions, display: Display) -> list[
 
     where = here if len(inside) == 1 else options.cluster
     more = {"time_limit_s": _LIMIT_S} if options.pairs is not None else {}
-    of_processes = campaign_of(where, options.journal, partial(report, 0), display.say, **more)
-    one_by_one = campaign_of(here, options.journal, partial(report, len(inside)))
+    of_processes = campaign_of(
+        where, options.journal, report=partial(report, 0), say=display.say, **more
+    )
+    one_by_one = campaign_of(here, options.journal, report=partial(report, len(inside)))
     found = of_processes.run(inside) + one_by_one.run(linked)
     flights = dict(zip((*inside, *linked), found, strict=True))
     if options.pairs is None and options.pair is None:

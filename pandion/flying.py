@@ -38,7 +38,7 @@ from sitl.touch import TouchUse
 from sitl.truth_log import TruthLog
 from studies.flight.closed_loop import simulate
 from studies.flight.fly_again import changed_parameters, fly_words
-from studies.flight.job import Job, score
+from studies.flight.job import INNER, Job, score
 from studies.flight.kernels import compile_first
 from studies.flight.own_parts import OwnLaw, OwnParts, PushLaw
 from studies.flight.result import FlightResult
@@ -46,7 +46,6 @@ from studies.flight.result import FlightResult
 Tracking = Literal["lqr", "pid"]
 Word = TypeVar("Word", bound=str)
 _MAX_BYTES: Final = 16 * 1024 * 1024  # of a result that is read
-_INNER: Final[dict[str, Literal["tracking", "pid"]]] = {"lqr": "tracking", "pid": "pid"}
 
 
 def fly(
@@ -127,7 +126,7 @@ def fly(
     name = "blf" if own else str(controller)
     config = flight_config(
         name,
-        _INNER[_known("tracking", tracking, _INNER)],
+        INNER[_known("tracking", tracking, INNER)],
         body=_known("body", body or flown.body, get_args(Body)),
         soft=allow_inconsistent,
         vehicle=vehicle_of(flown),

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from command_line.actions import read_action
-from command_line.options import option
-from command_line.output import print_error, try_write
+from command_line.options import declared, option
+from command_line.output import print_error, written
 from command_line.parser import COULD_NOT_START
-from command_line.values import known, one_of, place, seconds
+from command_line.values import known, one_of, seconds
 from messages.addresses import LinkError, parse_link_address
-from sitl.arguments import rate
-from sitl.earth import DEFAULT_ORIGIN, Place
+from sitl.arguments import ORIGIN, rate
+from sitl.earth import Place
 from sitl.scenario_file import (
     PERFECT,
     SUITE_NAMES,
@@ -58,13 +58,7 @@ class _Params(_Plant):
         "--vehicle ADDRESS",
         "set them in the PX4 at udp:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD, and the origin",
     )
-    origin: Place = option(
-        "--origin LAT,LON,ALT",
-        "origin of the local frame, in degrees and metres above sea level",
-        lambda text: Place(*place(text)),
-        default=DEFAULT_ORIGIN,
-        text=lambda origin: ",".join(map(repr, origin)),
-    )
+    origin: Place = declared(ORIGIN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,8 +124,7 @@ def _print_parameters(options: _Params) -> int:
         from fsw.storage.parameter_file import as_params
 
         text = as_params(values).replace("Stack: Pandion", "Stack: PX4 Pro")
-        for problem in try_write(options.out, text):
-            print_error("pandion px4", f"cannot write {problem}")
+        if not written("pandion px4", (options.out, text)):
             return FAILED
     return DONE if options.vehicle is None else _set_all(options, values)
 
@@ -183,10 +176,7 @@ def _identify(options: _Identify) -> int:
     values, sentences = report(found, config)
     for sentence in sentences:
         tell(sentence)
-    for problem in try_write(options.out, as_params(values)):
-        print_error("pandion px4", f"cannot write {problem}")
-        return FAILED
-    return DONE
+    return DONE if written("pandion px4", (options.out, as_params(values))) else FAILED
 
 
 _USAGE: Final = "[SCENARIO] [options]"

@@ -169,7 +169,7 @@ def _run(options: ReproduceOptions) -> int:
         with display.progress():
             report = partial(display.report, "flown")
             journal = folder / "journal.jsonl"
-            with campaign_of(options.cluster, journal, report, display.say) as campaign:
+            with campaign_of(options.cluster, journal, report=report, say=display.say) as campaign:
                 found = study(options.what)(settings, campaign)
     except KeyboardInterrupt:
         print_error("pandion reproduce", f"interrupted; --out {folder} resumes")
@@ -185,13 +185,14 @@ def _run(options: ReproduceOptions) -> int:
 
 
 def _settings(options: ReproduceOptions) -> Settings:
+    from studies.flight.job import INNER
     from studies.paper.settings import Settings
 
     return Settings(
         plant="full" if options.plant == "full" else "double-integrator",
         seeds=options.seeds,
         duration_s=options.duration_s,
-        inner="pid" if options.tracking == "pid" else "tracking",
+        inner=INNER[options.tracking],
         family="dash" if options.scenario == "dash" else "walls",
         suite=options.suite,
         only=options.only,

@@ -33,7 +33,7 @@ def _search(options: SearchTaskOptions, file: Path) -> int:
 
     task = load_task(file)
     work = f"{task.candidates} candidates, {len(task.marks)} controllers"
-    run = begin("search", options, task.plan, work)
+    run = begin("search", task.plan, work, options.cluster, options.out, options.json)
 
     def report(done: int, least: float) -> None:
         state = f"{done} candidates, the best falls short by {1e3 * least:.1f} mm"

@@ -66,7 +66,7 @@ def _estimate(options: SplittingOptions) -> int:
     effort = Effort(particles=options.particles, runs=options.runs, levels=options.levels)
     flights = only_case(plan)
     work = f"{effort.runs} runs of {effort.particles} flights a level"
-    run = begin("splitting", options, plan, work)
+    run = begin("splitting", plan, work, options.cluster, options.out, options.json)
     score = FlightScore(flights, run.campaign, 1e-3 * options.threshold_mm)
     # About: each level refills nine tenths.
     most = effort.runs * effort.particles * (1.0 + 0.9 * effort.levels)

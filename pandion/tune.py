@@ -43,7 +43,7 @@ def _tune(options: TuneOptions, file: Path) -> int:
 
     task = load_task(file, options.own.names)
     work = f"{task.candidates} candidates of {task.plan.count} flights"
-    run = begin("tune", options, task.plan, work)
+    run = begin("tune", task.plan, work, options.cluster, options.out, options.json)
 
     def report(done: int, least: float) -> None:
         state = f"{done} candidates, least cost {least:.4f} of {sum(w for _, w in task.cost):g}"

@@ -7,13 +7,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from command_line.options import ContradictionError, events, json_file, option, switch
+from command_line.options import (
+    ContradictionError,
+    Option,
+    declared,
+    events,
+    json_file,
+    option,
+    switch,
+)
 from command_line.values import known, number, one_of, place, seconds, whole
 from sitl.earth import DEFAULT_ORIGIN, Place
 from sitl.scenario_file import PERFECT, SUITE_NAMES, scenario_names
 
 SLOWEST: Final = 0.05  # below it a step in lockstep would take longer than the stall time allows
 _FASTEST: Final = 1e6
+ORIGIN: Final = Option(
+    "--origin LAT,LON,ALT",
+    "origin of the local frame, in degrees and metres above sea level, for satellites and "
+    "barometer; a negative latitude needs --origin=LAT,LON,ALT",
+    lambda text: Place(*place(text)),
+    default=DEFAULT_ORIGIN,
+    text=lambda origin: ",".join(map(repr, origin)),
+)
 
 
 def speed(text: str) -> float | None:
@@ -90,14 +106,7 @@ class SitlOptions(RunOptions):
     wait_s: float = option(
         "--wait S", "how long to wait for the flight software, in seconds", seconds, default=60.0
     )
-    origin: Place = option(
-        "--origin LAT,LON,ALT",
-        "origin of the local frame, in degrees and metres above sea level, for satellites and "
-        "barometer; a negative latitude needs --origin=LAT,LON,ALT",
-        lambda text: Place(*place(text)),
-        default=DEFAULT_ORIGIN,
-        text=lambda origin: ",".join(map(repr, origin)),
-    )
+    origin: Place = declared(ORIGIN)
     json: str | None = json_file("the result")
     out: Path | None = option("--out DIR", "directory for sitl.json", Path)
     events: str = events()

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
 from command_line.ranges import Range
+from command_line.toml_tables import nearest
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import tuned
@@ -92,12 +92,6 @@ def rounded(key: str, value: float, allowed: Range) -> float:
     if allowed.step is None:
         return value
     return min(max(round(value / allowed.step) * allowed.step, allowed.low), allowed.high)
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """What a sentence adds that names something unknown."""
-    match = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
-    return f', did you mean "{match[0]}"?' if match else ""
 
 
 def _later(scenario: Scenario, latency_ms: float, _: float) -> Scenario:

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple, TypeAlias, cast
 from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.ranges import Range
+from command_line.toml_tables import nearest
 from fsw.autopilot.parameters.contradictions import contradictions
 from fsw.autopilot.parameters.flight_config import FlightConfig, flight_config
 from fsw.autopilot.parameters.registry import BY_NAME, tuning_of
@@ -38,7 +39,6 @@ from studies.campaign.keys import (
     CampaignError,
     Flown,
     applied,
-    nearest,
     range_of,
     rounded,
 )
@@ -56,14 +56,13 @@ from studies.campaign.values import (
     grid_size,
     seed_of,
 )
-from studies.flight.job import Job
+from studies.flight.job import INNER, Job
 from studies.flight.own_parts import OwnPartError, with_parts
 
 EXAMPLE: Final = Path(__file__).parent / "example.toml"
 Values: TypeAlias = tuple[tuple[str, float], ...]  # of the varied keys, in their order
 Controller: TypeAlias = Literal["blf", "hc", "sc", "naive"]
 Tracking: TypeAlias = Literal["lqr", "pid"]
-_INNER: Final[dict[str, Literal["tracking", "pid"]]] = {"lqr": "tracking", "pid": "pid"}
 # What can fail without processes, links and a battery that is read.
 _FAILING: Final = (*SENSORS, "motor", "joint")
 _MAX_BYTES: Final = 256 * 1024
@@ -386,7 +385,7 @@ def _config(
 ) -> FlightConfig:
     config = flight_config(
         controller,
-        _INNER[keys.tracking],
+        INNER[keys.tracking],
         body=flown.body,
         soft=keys.allow_inconsistent,
         vehicle=vehicle_of(flown),

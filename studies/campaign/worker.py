@@ -10,31 +10,22 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from fsw.runtime.process import pin_numerics_to_one_thread
 from studies.campaign.identity import Identity, identity
+from studies.campaign.ports import Flight
 
 TIME_LIMIT_S: Final = 3600.0  # of a flight, if nothing else is said
 _TO_END_S: Final = 10.0  # beyond the limit, for Python to end the flight; then the process ends
 _ONE: Final = threading.Lock()  # a flight at a time, whatever threads a worker was given
 
 
-class Flyable(Protocol):
-    """The part of a flight that flies."""
-
-    def row(self) -> Any:
-        """See :class:`studies.campaign.ports.Flight`."""
-
-    def broken(self, reason: str) -> Any:
-        """See :class:`studies.campaign.ports.Flight`."""
-
-
 class TimeLimitError(BaseException):
     """Ends a flight that takes too long; not an Exception, which a flight would answer itself."""
 
 
-def fly_one(flight: Flyable, limit_s: float, *, hard: bool = True) -> Any:
+def fly_one(flight: Flight[Any], limit_s: float, *, hard: bool = True) -> Any:
     """The row of a flight that may take ``limit_s`` of this machine's time [s].
 
     Where Python cannot end it, a ``hard`` limit ends the process.

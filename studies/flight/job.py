@@ -33,6 +33,8 @@ from studies.flight.result import FlightResult
 from studies.flight.sensor_faults import Fault
 
 PlantName = Literal["double-integrator", "full"]
+# What a configuration calls the inner loop that ``--tracking`` names.
+INNER: Final[dict[str, Literal["tracking", "pid"]]] = {"lqr": "tracking", "pid": "pid"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,25 +98,17 @@ class Found:
     force_share: float = 0.0  # of what the surface allows; 0: nothing was touched
 
 
-Objective = Callable[[Found], float]
-"""What a search makes as large as it can."""
-
-
-def _off_plan(found: Found) -> float:
-    return found.share
-
-
-def _force(found: Found) -> float:
-    return found.force_share
-
-
 @dataclass(frozen=True, slots=True)
 class Aim:
     """What a search looks for, and what the tool meets meanwhile."""
 
-    objective: Objective = _off_plan
     met: Met | None = None
     start: Start | None = None  # None: anywhere
+    of_force: bool = False  # for as large a force as it can find, not a deviation
+
+    def reached(self, found: Found) -> float:
+        """What the search makes as large as it can."""
+        return found.force_share if self.of_force else found.share
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,26 +333,10 @@ def _rank(name: str, found: Found) -> float:
 
 
 def _kind(disturbance: Disturbance) -> str:
-    kind = {0: "adversary", 1: STEP}.get(len(disturbance.table), "sequence")
-    if kind == STEP:
+    rows = len(disturbance.table)
+    if rows == 1:
         return STEP
-    return f"{kind}, held {disturbance.every * 2} ms"
-
-
-def search(
-    scenario: Scenario,
-    config: FlightConfig,
-    amplitude: float,
-    evaluations: int,
-    seed: int,
-    report: Report,
-) -> Outcome:
-    """Look for the worst disturbance within ``amplitude`` [m/s²]; ``report`` shows progress.
-
-    Raises:
-        TooShortError: There is no plan to push the vehicle off.
-    """
-    return _searched(scenario, config, amplitude, evaluations, seed, report).outcome()
+    return f"{'sequence' if rows else 'adversary'}, held {disturbance.every * 2} ms"
 
 
 def search_and_fly(
@@ -374,11 +350,11 @@ def search_and_fly(
     """As ``search`` within ``amplitude`` [m/s²], but a tenth are stretches of the whole stack."""
     whole = max(round(WHOLE_SHARE * evaluations), 1)
     tracked = max(evaluations - whole, 1)
-    hunt = _searched(scenario, config, amplitude, tracked, seed, report)
+    hunt = search(scenario, config, amplitude, tracked, seed, report)
     return hunt.outcome(), _fly_whole(scenario, config, hunt, whole, seed, report)
 
 
-def _searched(
+def search(
     scenario: Scenario,
     config: FlightConfig,
     amplitude: float,
@@ -386,6 +362,11 @@ def _searched(
     seed: int,
     report: Report,
 ) -> Search:
+    """Look for the worst disturbance within ``amplitude`` [m/s²]; ``report`` shows progress.
+
+    Raises:
+        TooShortError: There is no plan to push the vehicle off.
+    """
     flown = record(scenario, config, lambda done, total: report("calm flight", done, total))
     if not flown.starts:
         raise TooShortError(
@@ -432,7 +413,7 @@ def _drawn_aim(hunt: Search, random: np.random.Generator) -> Aim:
     hard = hunt.hard(8, free=met is not None)
     if not hard or random.random() < 0.5:
         return Aim(met=met)
-    return Aim(_force, met, hard[int(random.integers(len(hard)))].start)
+    return Aim(met, hard[int(random.integers(len(hard)))].start, of_force=True)
 
 
 def _fly_whole(
@@ -548,7 +529,7 @@ def _improve_adversary(
     _improve(
         optimiser,
         budget,
-        lambda z: aim.objective(
+        lambda z: aim.reached(
             hunt.adversary(start, every, z.reshape(3, -1) * _SCALE * axes[:, None], aim.met)
         ),
         told,
@@ -572,7 +553,7 @@ def _improve_sequence(
     _improve(
         optimiser,
         budget,
-        lambda z: aim.objective(
+        lambda z: aim.reached(
             hunt.sequence(start, axes * np.where(z.reshape(-1, 3) >= 0.0, 1.0, -1.0), aim.met)
         ),
         told,

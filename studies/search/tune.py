@@ -20,12 +20,13 @@ from cmaes import CMA
 from scipy.special import bdtrc, stdtrit
 
 from command_line.ranges import Range
+from command_line.toml_tables import nearest
 from fsw.autopilot.parameters.registry import BY_NAME, Parameter
 from fsw.autopilot.tuning import tuned
 from sitl.scenario_file import ScenarioError, build_table
 from studies.campaign.campaign import Campaign
 from studies.campaign.flight import CampaignFlight, CampaignRow
-from studies.campaign.keys import PARAMETERS, CampaignError, Flown, nearest
+from studies.campaign.keys import PARAMETERS, CampaignError, Flown
 from studies.campaign.plan import OURS, CampaignPlan, OwnNames, load_tables
 from studies.campaign.randomness import seeded, spread
 from studies.statistics.binomial import bounds, flights_for
@@ -38,6 +39,8 @@ TABLE: Final = "tune"
 COSTS: Final = ("te_m", "te_max_m", "cs_mean", "ce_mean")
 _FIRST_STEP: Final = 0.25  # of half a range
 _MIN_PAIRS: Final = 10
+_REFUSED: Final = (2.0,)  # rank of values that the flight software does not take
+_NOTHING: Final = "nothing better than today's values was found: "
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,15 +280,17 @@ def tune(
     flights = range(task.plan.count)
     rows = campaign.run([CampaignFlight(task.plan, k) for k in flights])
     units = _units(task, rows)
-    today = Candidate(task.today, _score(task, rows, units))
+    today = _score(task, rows, units)
     flown, refused = _search(task, campaign, seed, units, report)
-    best = min((one for one in flown if one.score.feasible), key=_key, default=None)
+    best = min(
+        (one for one in flown if one.score.feasible), key=lambda one: one.score.cost, default=None
+    )
     judged = None
-    if best is not None and (not today.score.feasible or _key(best) < _key(today)):
+    if best is not None and _rank(best.score) < _rank(today):
         judged = _judged(task, campaign, best, units)
     return Outcome(
         task=task,
-        today=today.score,
+        today=today,
         best=best,
         judged=judged,
         candidates=len(flown) + refused,
@@ -317,7 +322,7 @@ def _search(
         ]
         flown += found
         refused += len(points) - len(found)
-        ranks = [_refused() if one is None else _rank(one) for one in scores]
+        ranks = [_REFUSED if one is None else _rank(one) for one in scores]
         order = sorted(range(len(points)), key=lambda k: ranks[k])
         places = {k: float(place) for place, k in enumerate(order)}
         optimiser.tell([(point, places[k]) for k, point in enumerate(points)])
@@ -407,14 +412,6 @@ def _rank(score: Score) -> tuple[float, ...]:
     return (1.0, float(score.violations), -least)
 
 
-def _refused() -> tuple[float, ...]:
-    return (2.0,)
-
-
-def _key(candidate: Candidate) -> tuple[float, ...]:
-    return _rank(candidate.score)
-
-
 def _judged(
     task: Task, campaign: Campaign[CampaignRow], best: Candidate, units: dict[str, float]
 ) -> Judged:
@@ -473,23 +470,22 @@ def sentences(found: Outcome) -> Iterator[str]:
     )
     yield f"today, on the tuning flights: {_said(found.today)}"
     if found.best is None:
-        yield _nothing(found, "no candidate is shown to keep the constraint on the tuning flights")
+        yield f"{_NOTHING}no candidate is shown to keep the constraint on the tuning flights"
         return
     for one, value, before in zip(task.parameters, found.best.values, task.today, strict=True):
         yield f"  {one.parameter.name} = {value:g} {one.parameter.unit} (today {before:g})"
     yield f"best candidate, on the tuning flights: {_said(found.best.score)}"
     judged = found.judged
     if judged is None:
-        yield _nothing(found, "no candidate costs less than today's values on the tuning flights")
+        yield f"{_NOTHING}no candidate costs less than today's values on the tuning flights"
         return
     yield f"today, on {task.judge_flights} other flights: {_said(judged.today)}"
     yield f"best candidate, on the same: {_said(judged.found)}"
     low, high = judged.interval
-    change = (
+    yield (
         f"the cost changes by {judged.difference:+.4f}, {100 * task.confidence:g} % interval "
         f"{low:+.4f} to {high:+.4f} ({judged.pairs} pairs of flights)"
     )
-    yield change
     if judged.only_today or judged.only_found:
         yield (
             f"{judged.only_today} flights violate with today's values only, {judged.only_found} "
@@ -503,19 +499,11 @@ def sentences(found: Outcome) -> Iterator[str]:
             f"doubt{shown}"
         )
     elif not judged.found.feasible:
-        yield _nothing(
-            found, "the best candidate is not shown to keep the constraint on other flights"
-        )
+        yield f"{_NOTHING}the best candidate is not shown to keep the constraint on other flights"
     else:
         also = "" if judged.today.feasible else ", nor violates less often"
-        yield _nothing(
-            found,
-            f"on other flights the best candidate does not cost less beyond doubt{also}{shown}",
-        )
-
-
-def _nothing(found: Outcome, why: str) -> str:
-    return f"nothing better than today's values was found: {why}"
+        why = "on other flights the best candidate does not cost less beyond doubt"
+        yield f"{_NOTHING}{why}{also}{shown}"
 
 
 def _said(score: Score) -> str:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from pandion import search
-from pandion.campaign_run import begin, exit_code
-from pandion.search_task import SearchTaskOptions
+from pandion.campaign_run import CampaignRun, begin, exit_code
+from pandion.cluster_options import ClusterOptions
 from studies.campaign.keys import CampaignError
 from studies.campaign.plan import parse_plan
 from studies.campaign.ports import SchedulerGoneError
@@ -64,21 +64,23 @@ def test_a_directory_of_that_name_is_made_where_none_is_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    run = begin("tune", SearchTaskOptions(), parse_plan(PLAN, "tiny", tmp_path), "2 flights")
+    plan, cluster = parse_plan(PLAN, "tiny", tmp_path), ClusterOptions()
+    run = begin("tune", plan, "2 flights", cluster, None, None)
     assert run.folder.is_dir()
     assert run.folder.parent == Path("runs")
     assert "tune-tiny" in run.folder.name
-    assert f"tiny, 2 flights, {SearchTaskOptions().cluster.words}" in capsys.readouterr().out
+    assert f"tiny, 2 flights, {cluster.words}" in capsys.readouterr().out
 
 
 def test_an_answer_that_cannot_be_written_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plan = parse_plan(PLAN, "tiny", tmp_path)
-    target = tmp_path / "there.json"
-    options = SearchTaskOptions(out=tmp_path / "out", json=str(target))
-    assert begin("tune", options, plan, "2 flights").written("{}")
-    assert target.read_text() == "{}"
-    options = SearchTaskOptions(out=tmp_path / "out", json=str(tmp_path / "none" / "there.json"))
-    assert not begin("tune", options, plan, "2 flights").written("{}")
+
+    def run(json: Path) -> CampaignRun:
+        return begin("tune", plan, "2 flights", ClusterOptions(), tmp_path / "out", str(json))
+
+    assert run(tmp_path / "there.json").written("{}")
+    assert (tmp_path / "there.json").read_text() == "{}"
+    assert not run(tmp_path / "none" / "there.json").written("{}")
     assert "pandion tune: cannot write" in capsys.readouterr().err

@@ -70,7 +70,7 @@ def _flown() -> PlanRecord:
 
 @cache
 def _found() -> Outcome:
-    return search(SCENARIO, NOW, 0.8, 120, 3, _silent)
+    return search(SCENARIO, NOW, 0.8, 120, 3, _silent).outcome()
 
 
 def _chase(config: FlightConfig, amplitude: float, axes: tuple[int, int, int]) -> Outcome:
@@ -119,7 +119,7 @@ def test_a_search_finds_nothing_beyond_the_bound_and_repeats_itself() -> None:
     assert outcome.worst_of_one_axis is not None
     assert outcome.worst_of_one_axis.axes == 1
     assert max(outcome.worst.off_m) > 0.7 * _of_the_push(outcome)
-    again = search(SCENARIO, NOW, 0.8, 120, 3, _silent)
+    again = search(SCENARIO, NOW, 0.8, 120, 3, _silent).outcome()
     assert again.worst.off_m == outcome.worst.off_m
 
 
@@ -149,7 +149,7 @@ def test_the_margins_are_those_of_the_referee(name: str, vehicle: str | None) ->
     """Of a full body, and of another vehicle."""
     scenario = replace(load_scenario(name, None, vehicle), duration_s=7.0)
     config = _of_one_plan(flight_config(body=scenario.body, vehicle=vehicle_of(scenario)))
-    worst = search(scenario, config, 0.8, 8, 1, _silent).min_margin
+    worst = search(scenario, config, 0.8, 8, 1, _silent).outcome().min_margin
     flown = replay(scenario, config, worst.start.step, worst.pushes, _silent)
     assert flown.off_m == pytest.approx(worst.off_m, abs=1e-4)
     assert flown.margin_m == pytest.approx(worst.margin_m, abs=1e-3)
@@ -218,7 +218,7 @@ def _pressing() -> Scenario:
 
 @cache
 def _hardest() -> Outcome:
-    return search(_pressing(), _config_of(_pressing()), 0.8, 60, 3, _silent)
+    return search(_pressing(), _config_of(_pressing()), 0.8, 60, 3, _silent).outcome()
 
 
 def _config_of(scenario: Scenario) -> FlightConfig:
@@ -234,7 +234,7 @@ def test_no_push_and_no_surface_in_the_range_makes_the_tool_press_too_hard() -> 
     assert 0.55 < worst.force_share <= 1.0  # 5.5 N of 10 N: an adversary finds more than is asked
     assert not outcome.breaks_force
     assert replace(outcome, worst_force=replace(worst, force_share=1.01)).breaks_force
-    none = search(SCENARIO, NOW, 0.8, 20, 3, _silent)
+    none = search(SCENARIO, NOW, 0.8, 20, 3, _silent).outcome()
     assert none.worst_force is None  # nothing is to be touched
 
 
