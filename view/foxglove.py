@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.signals import Vec3, Zone
 from view.flight_data import FlightData, Table, UlogError
-from view.scene import Posture
+from view.scene import Posture, vec3
 from view.vehicle import airframe_of, chain, rotor_hubs, sizes_of
 from view.zone_meshes import Mesh, zone_mesh
 
@@ -188,7 +188,7 @@ def _zones(flight: FlightData, places: Array) -> Iterator[Shown]:
     """The zones, whenever others than before are announced; none in a log of another build."""
     seen = places[np.isfinite(places).all(axis=1)]
     low, high = seen.min(axis=0) - _AROUND_M, seen.max(axis=0) + _AROUND_M
-    region = _triple(low), _triple(high)
+    region = vec3(low), vec3(high)
     try:
         announced = flight.decoded("announced")
     except UlogError:
@@ -219,10 +219,6 @@ def _triangles(mesh: Mesh, colour: dict[str, float]) -> dict[str, Any]:
         "pose": _pose((0.0, 0.0, 0.0)), "points": [_xyz(p) for p in mesh.vertices],
         "color": colour, "colors": [], "indices": mesh.faces.reshape(-1).tolist(),
     }  # fmt: skip
-
-
-def _triple(values: Array) -> Vec3:
-    return float(values[0]), float(values[1]), float(values[2])
 
 
 def _object(**properties: Any) -> dict[str, Any]:

@@ -18,8 +18,9 @@ from fsw.link.wire.zone_transfer import shape_values
 from messages import message_ids as ids
 from messages.addresses import LinkAddress, address_text
 from messages.frames import FrameWriter, Losses
+from view.flight_events import command_name, result_name
 from view.scene import Scene
-from view.telemetry import HORIZON_JOINTS, Telemetry, command_name, first_line, result_name
+from view.telemetry import HORIZON_JOINTS, Telemetry, first_line
 
 Answer = TypeVar("Answer")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -27,7 +28,6 @@ from view.flight import Curve, Trail
 from view.flight_data import FlightData, Table, UlogError, read_flight
 from view.flight_events import events
 from view.scene import (
-    Event,
     Held,
     Horizon,
     Margin,
@@ -38,8 +38,9 @@ from view.scene import (
     Timing,
     Tool,
     Worst,
+    vec3,
 )
-from view.vehicle import airframe_of, horizon
+from view.vehicle import airframe_of, horizon, tilts
 
 Array = NDArray[Any]
 
@@ -76,7 +77,7 @@ class LogFlight:
         self._plan_times = [t for t, _ in self._plans]
         self._sets = self._safe_sets()
         self._set_times = [t for t, _ in self._sets]
-        self.events = _events(data)
+        self.events = events(data)
         self.worst = _worst(data, self._name)
         self._horizon: tuple[int, Horizon | None] = (-1, None)
 
@@ -97,7 +98,7 @@ class LogFlight:
             t=t,
             estimate=estimate,
             truth=self._posture(t, (truth, "p_WB"), (truth, "q_WB"), (truth, "q_arm")),
-            velocity=None if at is None else (float(at["vx"]), float(at["vy"]), float(at["vz"])),
+            velocity=None if at is None else vec3((at["vx"], at["vy"], at["vz"])),
             thrust=None if told is None else _numbers(told["rotor_thrust"]),
             torque=None if told is None else _numbers(told["joint_torque"]),
             joint_rates=None if joints is None else _numbers(joints["qd"]),
@@ -152,27 +153,25 @@ class LogFlight:
         points = np.concatenate((points, self.trail().points))
         points = points[np.isfinite(points).all(axis=1)]
         low, high = points.min(axis=0) - 0.8, points.max(axis=0) + 0.8
-        return (
-            (float(low[0]), float(low[1]), float(low[2])),
-            (float(high[0]), float(high[1]), max(float(high[2]), 0.0)),
-        )
+        return vec3(low), vec3((*high[:2], max(high[2], 0.0)))
 
     def curves(self) -> tuple[Curve, ...]:
         """What is drawn over time."""
-        wanted = (
-            self._margin_curve(),
-            self._tracking_curve(),
-            self._solver_curve(),
-            self._thrust_curve(),
-            self._joint_curve(),
-            self._tilt_curve(),
-            self._error_curve(),
+        drawn: tuple[tuple[str, Callable[[Table], Curve | None]], ...] = (
+            ("barrier_margin", self._margin_curve),
+            ("end_effector", _tracking_curve),
+            ("mpc_status", _solver_curve),
+            ("actuator_command", self._thrust_curve),
+            ("arm_joint_state", self._joint_curve),
+            ("vehicle_attitude", self._tilt_curve),
+            ("sim_ground_truth", self._error_curve),
         )
-        return tuple(curve for curve in wanted if curve is not None)
+        tables = ((self._table(topic), draw) for topic, draw in drawn)
+        curves = (draw(table) for table, draw in tables if len(table))
+        return tuple(curve for curve in curves if curve is not None)
 
-    def _margin_curve(self) -> Curve | None:
-        table = self._table("barrier_margin")
-        if not len(table) or not (table["count"] > 0).any():
+    def _margin_curve(self, table: Table) -> Curve | None:
+        if not (table["count"] > 0).any():
             return None
         count = int(table["count"].max())
         rows = [np.where(table["count"] > 0, table["minimum"], np.nan)]
@@ -182,53 +181,23 @@ class LogFlight:
             names += [self._name(k) for k in range(count)]
         return _curve("margin [m]", table.t, names, rows, (0.0,))
 
-    def _tracking_curve(self) -> Curve | None:
-        table = self._table("end_effector")
-        if not len(table):
-            return None
-        off = np.linalg.norm(table["p"] - table["p_ref"], axis=1)
-        return _curve("end-effector off its reference [m]", table.t, ["error"], [off])
-
-    def _solver_curve(self) -> Curve | None:
-        table = self._table("mpc_status")
-        if not len(table):
-            return None
-        took = 1e-3 * table["total_us"]
-        if not np.isfinite(took).any():
-            cost = table["cost"]
-            return _curve("cost of the plan (no times in lockstep)", table.t, ["cost"], [cost])
-        solve = 1e-3 * table["solve_us"]
-        return _curve("planning cycle [ms]", table.t, ["cycle", "solver"], [took, solve], (100.0,))
-
-    def _thrust_curve(self) -> Curve | None:
-        table = self._table("actuator_command")
-        if not len(table):
-            return None
+    def _thrust_curve(self, table: Table) -> Curve:
         rows, limits = list(table["rotor_thrust"].T), (0.0, self.airframe.strongest_thrust)
         return _curve("rotor thrust [N]", table.t, rotor_names(self.airframe), rows, limits)
 
-    def _joint_curve(self) -> Curve | None:
-        table = self._table("arm_joint_state")
-        if not len(table):
-            return None
+    def _joint_curve(self, table: Table) -> Curve:
         limits = angle_rows(self.airframe.angle_limits, table["q"].shape[1])
         lines = [math.degrees(limit) for one in limits for limit in (one.low, one.high)]
         rows = [np.degrees(table["q"] @ one.row) for one in limits]
         shown = tuple(line for line in lines if math.isfinite(line))
         return _curve("arm [deg]", table.t, [one.name for one in limits], rows, shown)
 
-    def _tilt_curve(self) -> Curve | None:
-        table = self._table("vehicle_attitude")
-        w, x, y, z = (table["q"][:, k].astype(np.float64) for k in range(4))
-        lean = np.degrees(np.arccos(np.clip(w * w - x * x - y * y + z * z, -1.0, 1.0)))
-        return _curve(
-            "tilt [deg]", table.t, ["tilt"], [lean], (math.degrees(self.airframe.tilt_max),)
-        )
+    def _tilt_curve(self, table: Table) -> Curve:
+        most = math.degrees(self.airframe.tilt_max)
+        return _curve("tilt [deg]", table.t, ["tilt"], [tilts(table["q"])], (most,))
 
-    def _error_curve(self) -> Curve | None:
-        truth, place = self._table("sim_ground_truth"), self._table("vehicle_local_position")
-        if not len(truth):
-            return None
+    def _error_curve(self, truth: Table) -> Curve:
+        place = self._table("vehicle_local_position")
         at = np.clip(np.searchsorted(truth.t, place.t), 0, len(truth) - 1)
         said = np.stack([place[axis] for axis in "xyz"], axis=1)
         off = np.linalg.norm(said - truth["p_WB"][at], axis=1)
@@ -415,8 +384,18 @@ class LogFlight:
         return tuple(f"{zone.shape.kind} {k}" for k, zone in enumerate(zones, start=1))
 
 
-def _events(data: FlightData) -> tuple[Event, ...]:
-    return tuple(Event(one.t, one.kind.value, one.text) for one in events(data))
+def _tracking_curve(table: Table) -> Curve:
+    off = np.linalg.norm(table["p"] - table["p_ref"], axis=1)
+    return _curve("end-effector off its reference [m]", table.t, ["error"], [off])
+
+
+def _solver_curve(table: Table) -> Curve:
+    took = 1e-3 * table["total_us"]
+    if not np.isfinite(took).any():
+        cost = table["cost"]
+        return _curve("cost of the plan (no times in lockstep)", table.t, ["cost"], [cost])
+    solve = 1e-3 * table["solve_us"]
+    return _curve("planning cycle [ms]", table.t, ["cycle", "solver"], [took, solve], (100.0,))
 
 
 def _worst(data: FlightData, name_of: Any) -> Worst | None:
@@ -472,5 +451,4 @@ def _four(values: Array) -> Vec4:
 
 
 def _finite(values: Array) -> Vec3 | None:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z) if math.isfinite(x + y + z) else None
+    return vec3(values) if np.isfinite(values).all() else None

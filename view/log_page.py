@@ -12,16 +12,16 @@ import viser
 from command_line.printable import printable
 from view import panels
 from view.flight import Flight
-from view.flight_events import EventKind
 from view.page import Server
 from view.plots import Plot
+from view.scene import EventKind
 from view.stage import Stage
 from view.timeline import Timeline
 
 _FRAME_S: Final = 1.0 / 30.0
 _TEXT_S: Final = 0.12  # between two texts, which a browser lays out anew
 _PLOT_S: Final = 0.3
-_MARKED: Final = (EventKind.MODE.value, EventKind.FAULT.value)
+_MARKED: Final = (EventKind.MODE, EventKind.FAULT)
 _MARKS: Final = 60  # most of the slider
 _ANY: Final = "all events"
 _PLAY, _WORST, _BACK, _ON = "▶ play / pause", "worst margin", "◀ event", "event ▶"
@@ -97,9 +97,7 @@ class LogPage:
             self._slider.on_update(self._slid)
             buttons = gui.add_button_group("", (_BACK, _PLAY, _ON, _WORST))
             buttons.on_click(lambda event: self._press(event.target.value))
-            kinds = gui.add_dropdown(
-                "event ◀ ▶", (_ANY, *(kind.value for kind in EventKind)), initial_value=_ANY
-            )
+            kinds = gui.add_dropdown("event ◀ ▶", (_ANY, *EventKind), initial_value=_ANY)
             kinds.on_update(lambda _: self._choose(kinds.value))
             speed = gui.add_dropdown("speed", tuple(_SPEEDS), initial_value="1 ×")
             speed.on_update(lambda _: self._set_speed(_SPEEDS[speed.value]))

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import StrEnum
+from typing import Any, NamedTuple
 
 from fsw.autopilot.signals import JointVector, RotorVector, SafeSet, Vec3, Vec4
+
+
+def vec3(values: Iterable[Any]) -> Vec3:
+    """Three ``values`` [any unit, any frame], whatever holds them."""
+    x, y, z = map(float, values)
+    return x, y, z
 
 
 class Posture(NamedTuple):
@@ -126,11 +134,22 @@ class Scene:
     held: Held | None = None  # None: the gripper was never told anything
 
 
+class EventKind(StrEnum):
+    """What an event is about."""
+
+    MODE = "mode"
+    ARMING = "arming"
+    FAULT = "fault"
+    COMMAND = "command"
+    WARNING = "warning"
+    TEXT = "text"
+
+
 class Event(NamedTuple):
     """Something to jump to."""
 
     t: float  # s, sensor time
-    kind: str  # a value of view.flight_events.EventKind
+    kind: EventKind
     text: str
 
 

@@ -9,17 +9,16 @@ from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
 from fsw.autopilot.flight.failsafe.conditions import Condition
+from fsw.autopilot.geometry.rotation import quaternion_from_euler
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.parameters.param_type import value_of
 from fsw.autopilot.signals import (
-    CommandResult,
     JointVector,
     PlanInput,
     PredictionState,
     RotorVector,
     SafeSet,
     Vec3,
-    Vec4,
     Zone,
 )
 from fsw.link.events.event_table import condition_of
@@ -30,11 +29,12 @@ from messages import dialect
 from messages import message_ids as ids
 from messages.frames import Frame, wire_fields
 from messages.joint_arrays import STATE_AT, STATE_COUNT_AT, joined
-from view.flight_events import EventKind
+from view.flight_events import command_name, result_name
 from view.log_flight import GROUPS, status_name
 from view.scene import (
     Battery,
     Event,
+    EventKind,
     Held,
     Horizon,
     Margin,
@@ -44,6 +44,7 @@ from view.scene import (
     Solver,
     Timing,
     Tool,
+    vec3,
 )
 from view.vehicle import horizon
 
@@ -186,7 +187,7 @@ class Telemetry:
         return Scene(
             t=self.t,
             estimate=self._posture(said),
-            velocity=None if position is None else _vec3(position[4:7]),
+            velocity=None if position is None else vec3(position[4:7]),
             thrust=self._thrust(said.get(ids.SERVO_OUTPUT_RAW)),
             torque=None if arm is None else _arm(arm, 2),
             joint_rates=None if arm is None else _arm(arm, 1),
@@ -250,7 +251,7 @@ class Telemetry:
         q_arm = (0.0,) * self.airframe.bodies.joints if arm is None else _arm(arm, 0)
         if not all(map(math.isfinite, (*position[1:4], *attitude[1:4], *q_arm))):
             return None  # an estimate that is lost, or somebody's frame
-        return Posture(_vec3(position[1:4]), quaternion(*attitude[1:4]), q_arm)
+        return Posture(vec3(position[1:4]), quaternion_from_euler(vec3(attitude[1:4])), q_arm)
 
     def _thrust(self, servos: tuple[Any, ...] | None) -> RotorVector | None:
         if servos is None:
@@ -276,7 +277,7 @@ class Telemetry:
 
     def note(self, kind: EventKind, text: str) -> None:
         """Add an event of now."""
-        self.events.append(Event(self.t, kind.value, text))
+        self.events.append(Event(self.t, kind, text))
 
     def read_clock(self, values: tuple[Any, ...]) -> None:
         """Take the vehicle's time of an ATTITUDE; it goes back only if the vehicle starts again.
@@ -449,31 +450,6 @@ def _arm(values: tuple[Any, ...], which: int) -> JointVector:
     return joined(values, *STATE_AT[which], int(values[STATE_COUNT_AT]))
 
 
-def quaternion(roll: float, pitch: float, yaw: float) -> Vec4:
-    """Unit quaternion [w, x, y, z] of ZYX angles ``roll``, ``pitch``, ``yaw`` [rad]."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-
-
-def command_name(command: int) -> str:
-    """As MAVLink names it."""
-    known = dialect.enums["MAV_CMD"].get(command)
-    return f"command {command}" if known is None else known.name.removeprefix("MAV_CMD_")
-
-
-def result_name(result: int) -> str:
-    """What became of a command."""
-    known = result in list(CommandResult)
-    return CommandResult(result).name.lower().replace("_", " ") if known else f"result {result}"
-
-
 def _margin_name(k: int, count: int, safe_set: SafeSet | None, points: tuple[str, ...]) -> str:
     zones = safe_set.zones if safe_set is not None else ()
     if zones and count == len(zones):
@@ -496,11 +472,6 @@ def _solver(values: tuple[Any, ...]) -> Solver:
         missed=int(values[6]),
         fallbacks=int(values[7]),
     )
-
-
-def _vec3(values: tuple[Any, ...]) -> Vec3:
-    x, y, z = values
-    return float(x), float(y), float(z)
 
 
 def first_line(error: Exception) -> str:
@@ -537,7 +508,7 @@ def _pulses(servos: tuple[Any, ...]) -> tuple[int, ...]:
 def _place(values: tuple[Any, ...] | None, mask_at: int) -> Vec3 | None:
     if values is None or values[mask_at] & _IGNORE_POSITION:
         return None
-    return _vec3(values[1:4]) if all(map(math.isfinite, values[1:4])) else None
+    return vec3(values[1:4]) if all(map(math.isfinite, values[1:4])) else None
 
 
 def _sigma(values: tuple[Any, ...] | None) -> Vec3 | None:
@@ -562,7 +533,7 @@ def _tool(values: tuple[Any, ...] | None) -> Tool | None:
     if values is None or not all(map(math.isfinite, values[1:8])):
         return None
     pressed, asked, most = (float(values[k]) for k in (4, 7, 8))
-    return Tool(_vec3(values[1:4]), pressed, asked, most, bool(values[10]))
+    return Tool(vec3(values[1:4]), pressed, asked, most, bool(values[10]))
 
 
 def _horizon_of(plan: tuple[Any, ...], arm: tuple[Any, ...], airframe: Airframe) -> Horizon | None:

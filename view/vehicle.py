@@ -25,7 +25,7 @@ from fsw.autopilot.model.prediction import P, condense, to_vector
 from fsw.autopilot.signals import PlanInput, PredictionState, Vec3
 from fsw.autopilot.tick_record import Multibody
 from vehicles.vehicle_file import VehicleError, parse_vehicle
-from view.scene import Horizon, Posture
+from view.scene import Horizon, Posture, vec3
 
 
 def chain(posture: Posture, airframe: Airframe) -> list[Vec3]:
@@ -86,6 +86,12 @@ def tilt(posture: Posture) -> float:
     return float(np.arccos(np.clip(R[8], -1.0, 1.0)))
 
 
+def tilts(q: NDArray[Any]) -> NDArray[np.float64]:
+    """The same [deg] of unit quaternions ``q`` (n, 4) [1]."""
+    x, y = np.asarray(q[:, 1], "f8"), np.asarray(q[:, 2], "f8")
+    return np.asarray(np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))))
+
+
 def horizon(
     start: PredictionState,
     inputs: tuple[PlanInput, ...],
@@ -99,7 +105,7 @@ def horizon(
     model = condense_once(airframe, len(inputs), period)
     u = np.array([(*one.a, one.yaw_acc, *one.qdd_arm) for one in inputs]).ravel()
     nodes = model.phi @ to_vector(start) + model.gamma @ u
-    base = tuple(_vec3(node[P : P + 3]) for node in nodes)
+    base = tuple(vec3(node[P : P + 3]) for node in nodes)
     return Horizon(base, tuple(predicted_end_effector(airframe.bodies, node)[0] for node in nodes))
 
 
@@ -136,8 +142,3 @@ def _filled(value: Any, name: str, known: Mapping[str, Any]) -> Any:
             _filled(known.get(name, one), f"{name}.{k}", known) for k, one in enumerate(value)
         )
     return value if value is None else type(value)(known.get(name, value))
-
-
-def _vec3(row: NDArray[np.float64]) -> Vec3:
-    x, y, z = row.tolist()
-    return x, y, z

@@ -36,12 +36,12 @@ from tests.view.flights import (
     write_flight,
 )
 from view.flight_data import FlightData, Table
-from view.flight_events import EventKind, FlightEvent
 from view.log_flight import LogFlight
 from view.report.chart import thinned
 from view.report.charts import event_marks, force
 from view.report.page import difference
 from view.report.reported import Reported
+from view.scene import Event, EventKind
 
 TIME_AXES = ("margins", "tracking", "inputs", "plan_inputs", "motion", "loop_timing", "estimator",
              "worst_second")  # fmt: skip
@@ -217,8 +217,8 @@ def test_every_axis_of_time_has_every_event(drawn: dict[str, Any]) -> None:
 
 def test_of_many_events_the_axes_show_the_failsafes_first() -> None:
     begin = 1e-6 * flights.BEGIN_US
-    found = [FlightEvent(begin + k + 1.0, EventKind.WARNING, "windy") for k in range(200)]
-    found += [FlightEvent(begin + 500.0, EventKind.FAULT, "no plan")]
+    found = [Event(begin + k + 1.0, EventKind.WARNING, "windy") for k in range(200)]
+    found += [Event(begin + 500.0, EventKind.FAULT, "no plan")]
     data = FlightData(Path(), {}, {}, {"any": Table("any", np.array([begin]), {})}, (), (), 0, "")
     marks = event_marks(
         Reported(label="", data=data, margins=None, events=tuple(found), numbers={})

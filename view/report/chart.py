@@ -20,6 +20,7 @@ _ROW_PX: Final = 200  # of one pair of axes
 _LEGEND_PX: Final = 40  # above each row
 _EVENTS_PX: Final = 18  # above the first row, below its legend
 _MARGIN: Final = {"l": 70, "r": 34, "t": _LEGEND_PX + _EVENTS_PX + 6, "b": 44}
+_OF_EVENTS: Final = {"color": "#afb8c1", "width": 1}
 _BAND = "rgba(87,96,106,0.25)"
 
 
@@ -156,7 +157,7 @@ def over_time(
         data += [{**one, "yaxis": f"y{_n(k)}", "legend": f"legend{_n(k)}"} for one in row.traces]
         layout["shapes"] += [_across(limit, f"y{_n(k)}") for limit in row.limits]
     for t, number in marks:
-        layout["shapes"].append(_upright(t))
+        layout["shapes"].append({**_upright(t, _OF_EVENTS), "layer": "below"})
         layout["annotations"].append(_number(t, number))
     return Chart(name, title, note, data, layout)
 
@@ -165,18 +166,25 @@ def _n(k: int) -> str:
     return "" if k == 1 else str(k)
 
 
+_OF_LIMITS: Final = {"color": LIMIT, "width": 1, "dash": "dash"}
+
+
 def _across(value: float, axis: str) -> dict[str, Any]:
     return {
         "type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": axis, "y0": value, "y1": value,
-        "line": {"color": LIMIT, "width": 1, "dash": "dash"},
+        "line": _OF_LIMITS,
     }  # fmt: skip
 
 
-def _upright(t: float) -> dict[str, Any]:
+def _upright(x: float, look: dict[str, Any]) -> dict[str, Any]:
     return {
-        "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": t, "x1": t, "layer": "below",
-        "line": {"color": "#afb8c1", "width": 1},
+        "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": x, "x1": x, "line": look,
     }  # fmt: skip
+
+
+def upright_limit(x: float) -> dict[str, Any]:
+    """A limit at ``x`` [the axis' unit], from the bottom to the top."""
+    return _upright(x, _OF_LIMITS)
 
 
 _LEGEND: Final = {

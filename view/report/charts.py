@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import cycle
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +14,6 @@ from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.rotors import rotor_names
 from sitl.body import spoken
 from view.flight_data import Table
-from view.flight_events import EventKind
 from view.report.chart import (
     COLOURS,
     ESTIMATE,
@@ -28,9 +28,11 @@ from view.report.chart import (
     over_time,
     rounded,
     spread,
+    upright_limit,
 )
 from view.report.reported import Reported
-from view.vehicle import airframe_of
+from view.scene import EventKind
+from view.vehicle import airframe_of, tilts
 
 Array = NDArray[Any]
 
@@ -53,10 +55,12 @@ def charts(flights: Sequence[Reported]) -> list[Chart]:
     """Every figure that these flights have the numbers for."""
     from view.report.paths import paths
 
+    (one,) = flights if len(flights) == 1 else (None,)  # of several `limits` compares the inputs
     made = (
         paths(flights), margins(flights), parts(flights), tracking(flights), force(flights),
-        inputs(flights), plan_inputs(flights), motion(flights), limits(flights), solver(flights),
-        stages(flights), loop_timing(flights), estimator(flights), worst_second(flights),
+        *((inputs(one), plan_inputs(one), motion(one)) if one is not None else ()),
+        limits(flights), solver(flights), stages(flights), loop_timing(flights),
+        estimates(flights) if one is None else estimator(one), worst_second(flights),
     )  # fmt: skip
     return [chart for chart in made if chart is not None and chart.data]
 
@@ -76,15 +80,15 @@ def event_marks(flight: Reported) -> list[tuple[float, str]]:
 def margins(flights: Sequence[Reported]) -> Chart:
     """Margins over time, by the truth and by the vehicle's own estimate."""
     traces, lowest, least = [], 0.0, 0.0
-    for k, flight in enumerate(flights):
-        traces += _margin_lines(flight, COLOURS[k % len(COLOURS)], alone=len(flights) == 1)
+    for flight, colour in _coloured(flights):
+        traces += _margin_lines(flight, colour, alone=len(flights) == 1)
         worst = flight.worst
         if worst is not None:
             lowest, least = min(lowest, _MM * worst.margin), max(least, _MM * worst.margin)
             said = f"{worst.key}: {_MM * worst.margin:.1f} mm"
-            colour = LIMIT if len(flights) == 1 else COLOURS[k % len(COLOURS)]
+            shade = LIMIT if len(flights) == 1 else colour
             traces.append(mark(_named(flight, flights, "minimum"), worst.t, _MM * worst.margin,
-                               colour, said))  # fmt: skip
+                               shade, said))  # fmt: skip
     tops = [max((v for v in one["y"] if v is not None), default=0.0) for one in traces]
     top = min(max(_SHOWN_MM, 2.0 * least), 1.2 * max(tops, default=_SHOWN_MM))
     note = (
@@ -130,22 +134,13 @@ def parts(flights: Sequence[Reported]) -> Chart:
     """The least margin of every zone and part, as in the result."""
     traces = []
     height = 0
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         found = flight.result.get("margins_m", {})
         keys = sorted(found, key=lambda key: -found[key])[-24:]
         height = max(height, len(keys) * len(flights))
-        traces.append({
-            "type": "bar", "orientation": "h", "name": flight.label, "y": keys,
-            "x": [_MM * found[key] for key in keys],
-            "marker": {"color": COLOURS[k % len(COLOURS)]},
-        })  # fmt: skip
-    traces = [trace for trace in traces if trace["y"]]
-    layout = {
-        "height": 18 * height + 110,
-        "xaxis": {"title": {"text": "minimum margin [mm]"}, "rangemode": "tozero"},
-        "yaxis": {"automargin": True},
-        "bargap": 0.25,
-    }
+        if keys:
+            traces.append(_bars(flight, colour, keys, [_MM * found[key] for key in keys]))
+    layout = _of_bars(height, "minimum margin [mm]")
     note = "Minimum over the flight of each zone and part of the vehicle, as in result.json."
     return Chart("parts", "Minimum margin of each part", note, traces, layout)
 
@@ -154,7 +149,7 @@ def tracking(flights: Sequence[Reported]) -> Chart:
     """Distance of the end-effector from its reference."""
     traces, means = [], []
     own_only: list[str] = []
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         truth, own = flight.table("sim_tracking"), flight.table("end_effector")
         if truth is not None:
             t, error = flight.since(truth.t), truth["p_WE"] - truth["target"]
@@ -162,7 +157,6 @@ def tracking(flights: Sequence[Reported]) -> Chart:
             t, error = flight.since(own.t), own["p"].astype("f8") - own["p_ref"]
         else:
             continue
-        colour = COLOURS[k % len(COLOURS)]
         size = _MM * np.linalg.norm(error, axis=1)
         if truth is None:
             own_only.append(flight.label)
@@ -197,7 +191,7 @@ def _whose(own_only: Sequence[str], flights: Sequence[Reported]) -> str:
 def force(flights: Sequence[Reported]) -> Chart | None:
     """The normal force on the tool: true, observed, asked for and allowed."""
     traces, bounds = [], set[float]()
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         truth, own = flight.table("sim_contact"), flight.table("tool_contact")
         if own is None or not len(own.t):
             continue
@@ -207,9 +201,9 @@ def force(flights: Sequence[Reported]) -> Chart | None:
             traces.append(line("observed", t, own["pressed"], ESTIMATE, width=0.8))
             traces.append(line("asked for", t, own["asked"], REFERENCE))
         if truth is not None:
-            colour = TRUTH if alone else COLOURS[k % len(COLOURS)]
+            shade = TRUTH if alone else colour
             name = "true" if alone else flight.label
-            traces.append(line(name, flight.since(truth.t), truth["normal"], colour))
+            traces.append(line(name, flight.since(truth.t), truth["normal"], shade))
     if not traces:
         return None
     return over_time(
@@ -222,11 +216,8 @@ def force(flights: Sequence[Reported]) -> Chart | None:
     )
 
 
-def inputs(flights: Sequence[Reported]) -> Chart | None:
+def inputs(flight: Reported) -> Chart | None:
     """Thrusts and torques as sent, with their limits."""
-    if len(flights) > 1:
-        return None  # `limits` compares
-    (flight,) = flights
     sent = flight.table("actuator_command")
     if sent is None:
         return None
@@ -249,15 +240,12 @@ def inputs(flights: Sequence[Reported]) -> Chart | None:
             Row("thrust [N]", thrusts, (0.0, most), (-0.5, 1.08 * most)),
             Row("torque [N m]", torques, (-torque, torque)),
         ],
-        _marks(flights),
+        event_marks(flight),
     )
 
 
-def plan_inputs(flights: Sequence[Reported]) -> Chart | None:
+def plan_inputs(flight: Reported) -> Chart | None:
     """The planner's u with its box."""
-    if len(flights) > 1:
-        return None
-    (flight,) = flights
     table, arm = flight.table("plan_input"), flight.table("arm_joint_setpoint")
     if table is None or arm is None:
         return None
@@ -277,15 +265,12 @@ def plan_inputs(flights: Sequence[Reported]) -> Chart | None:
             Row("acceleration [m/s²]", shown, (-most, most), _about_zero(table["a"], most)),
             Row("joints [rad/s²]", joints, (-joint, joint), _about_zero(arm["qdd"], joint)),
         ],
-        _marks(flights),
+        event_marks(flight),
     )
 
 
-def motion(flights: Sequence[Reported]) -> Chart | None:
+def motion(flight: Reported) -> Chart | None:
     """Tilt, joints and their rates with their limits, by the best that the log has."""
-    if len(flights) > 1:
-        return None
-    (flight,) = flights
     truth = flight.table("sim_ground_truth")
     state, attitude = flight.table("arm_joint_state"), flight.table("vehicle_attitude")
     if truth is not None:
@@ -310,7 +295,7 @@ def motion(flights: Sequence[Reported]) -> Chart | None:
         f"By the {'true' if truth is not None else 'estimated'} state. Dashed: tilt {tilt_max:.0f} "
         f"deg, {said}, ±{fastest:g} rad/s.",
         [
-            Row("tilt [deg]", [line("tilt", t, tilt_deg(q), COLOURS[0])], (tilt_max,),
+            Row("tilt [deg]", [line("tilt", t, tilts(q), COLOURS[0])], (tilt_max,),
                 (0.0, 1.08 * tilt_max)),
             Row("angles [deg]", [
                 line(one.name, t_arm, _DEG * (angles @ one.row), _of_joint(k))
@@ -321,7 +306,7 @@ def motion(flights: Sequence[Reported]) -> Chart | None:
                 for k in range(rates.shape[1])
             ], (-fastest, fastest)),
         ],
-        _marks(flights),
+        event_marks(flight),
     )  # fmt: skip
 
 
@@ -331,41 +316,43 @@ def _about_zero(values: Array, most: float) -> tuple[float, float]:
     return -reach, reach
 
 
-def tilt_deg(q: Array) -> Array:
-    """Angle [deg] between the body's z axis and the vertical, of quaternions ``q`` (n, 4) [1]."""
-    x, y = np.asarray(q[:, 1], "f8"), np.asarray(q[:, 2], "f8")
-    return np.asarray(_DEG * np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
-
-
 def limits(flights: Sequence[Reported]) -> Chart:
     """How much of each limit was used."""
     traces = []
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         uses = flight.result.get("limits", {})
         if uses:
-            traces.append({
-                "type": "bar", "orientation": "h", "name": flight.label,
-                "y": [name.replace("_", " ") for name in uses],
-                "x": [_percent(use["largest"], use["most"]) for use in uses.values()],
-                "hovertext": [
-                    f"{use['largest']:.3g} of {use['most']:.3g} {use['unit']}, {use['at_s']:.2f} s"
-                    for use in uses.values()
-                ],
-                "marker": {"color": COLOURS[k % len(COLOURS)]},
-            })  # fmt: skip
+            names = [name.replace("_", " ") for name in uses]
+            shares = [_percent(use["largest"], use["most"]) for use in uses.values()]
+            said = [
+                f"{use['largest']:.3g} of {use['most']:.3g} {use['unit']}, {use['at_s']:.2f} s"
+                for use in uses.values()
+            ]
+            traces.append(_bars(flight, colour, names, shares) | {"hovertext": said})
     bars = sum(len(trace["y"]) for trace in traces)
-    layout = {
-        "height": 18 * bars + 110,
-        "xaxis": {"title": {"text": "largest use [%]"}, "rangemode": "tozero"},
-        "yaxis": {"automargin": True, "autorange": "reversed"},
-        "bargap": 0.25,
-        "shapes": [{
-            "type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": 100, "x1": 100,
-            "line": {"color": LIMIT, "width": 1, "dash": "dash"},
-        }],
-    }  # fmt: skip
+    layout = _of_bars(bars, "largest use [%]") | {"shapes": [upright_limit(100)]}
+    layout["yaxis"] = {"automargin": True, "autorange": "reversed"}
     note = "Largest value over the whole flight, true state, 1 kHz, as in result.json."
     return Chart("limits", "Use of each limit", note, traces, layout)
+
+
+def _bars(
+    flight: Reported, colour: str, names: Sequence[str], lengths: Sequence[float | None]
+) -> Trace:
+    return {
+        "type": "bar", "orientation": "h", "name": flight.label, "y": names, "x": lengths,
+        "marker": {"color": colour},
+    }  # fmt: skip
+
+
+def _of_bars(count: int, title: str) -> dict[str, Any]:
+    """The layout of so many bars."""
+    return {
+        "height": 18 * count + 110,
+        "xaxis": {"title": {"text": title}, "rangemode": "tozero"},
+        "yaxis": {"automargin": True},
+        "bargap": 0.25,
+    }
 
 
 def _percent(largest: float, most: float) -> float | None:
@@ -376,11 +363,10 @@ def solver(flights: Sequence[Reported]) -> Chart:
     """Distribution of the planning cycle's time, and of the optimiser's iterations."""
     traces: list[Trace] = []
     measured = []
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         status = flight.table("mpc_status")
         if status is None:
             continue
-        colour = COLOURS[k % len(COLOURS)]
         took = 1e-3 * status["total_us"][np.isfinite(status["total_us"])]
         if len(took):
             measured.append(flight.label)
@@ -397,11 +383,7 @@ def solver(flights: Sequence[Reported]) -> Chart:
                   "range": [-1, 2.2]},
         "xaxis2": {"title": {"text": "iterations"}, "domain": [0.66, 1.0]},
         "yaxis": {"title": {"text": "share of cycles"}, "range": [0, 1.02]},
-        "shapes": [
-            {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": at, "x1": at,
-             "line": {"color": LIMIT, "width": 1, "dash": "dash"}}
-            for at in (_DEADLINE_MS, _PERIOD_MS)
-        ],
+        "shapes": [upright_limit(at) for at in (_DEADLINE_MS, _PERIOD_MS)],
     }  # fmt: skip
     note = (
         "Of the complete planning cycle and of the optimiser. "
@@ -440,7 +422,7 @@ def _quantiles(flight: Reported, colour: str) -> list[Trace]:
 def stages(flights: Sequence[Reported]) -> Chart:
     """What a tick is spent on."""
     traces = []
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         found = flight.data.beside.get("fsw", {}).get("stages", {})
         for key, what, symbol in _STAGES:
             if not found:
@@ -449,8 +431,8 @@ def stages(flights: Sequence[Reported]) -> Chart:
                 "type": "scatter", "mode": "markers",
                 "name": f"{flight.label}, {what}" if len(flights) > 1 else what,
                 "y": list(found), "x": [part[key] for part in found.values()],
-                "marker": {"color": COLOURS[k % len(COLOURS)], "symbol": symbol, "size": 10,
-                           "line": {"width": 1, "color": COLOURS[k % len(COLOURS)]}},
+                "marker": {"color": colour, "symbol": symbol, "size": 10,
+                           "line": {"width": 1, "color": colour}},
             })  # fmt: skip
     layout = {
         "height": 330,
@@ -464,7 +446,7 @@ def stages(flights: Sequence[Reported]) -> Chart:
 def loop_timing(flights: Sequence[Reported]) -> Chart | None:
     """Execution and lateness of the fast tick, of each second; in real time only."""
     rows: tuple[list[Trace], list[Trace]] = ([], [])
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         table = flight.table("loop_timing")
         if table is None or str(flight.data.information.get("pacing")) != "realtime":
             continue
@@ -474,7 +456,7 @@ def loop_timing(flights: Sequence[Reported]) -> Chart | None:
             for part, dash in (("p50", "solid"), ("p99", "dash"), ("max", "dot")):
                 row.append(line(
                     _named(flight, flights, f"{what} {part}"), t, table[f"{what}_{part}_us"][inner],
-                    COLOURS[k % len(COLOURS)], line={"dash": dash},
+                    colour, line={"dash": dash},
                 ))  # fmt: skip
     if not rows[0]:
         return None
@@ -487,11 +469,8 @@ def loop_timing(flights: Sequence[Reported]) -> Chart | None:
     )
 
 
-def estimator(flights: Sequence[Reported]) -> Chart | None:
+def estimator(flight: Reported) -> Chart | None:
     """The estimate's error, with the accuracy that the vehicle believes in."""
-    (flight,) = flights if len(flights) == 1 else (None,)
-    if flight is None:
-        return _estimates(flights)
     found = _errors(flight)
     if found is None:
         return None
@@ -526,7 +505,7 @@ def estimator(flights: Sequence[Reported]) -> Chart | None:
         "innovations far beyond their limit are outside the axis at first: a double click shows "
         "all.",
         rows,
-        _marks(flights),
+        event_marks(flight),
     )
 
 
@@ -540,14 +519,15 @@ _RATIOS: Final = (("pos", "position"), ("hgt", "height"), ("vel", "velocity"), (
                   ("hagl", "range"))  # fmt: skip
 
 
-def _estimates(flights: Sequence[Reported]) -> Chart:
+def estimates(flights: Sequence[Reported]) -> Chart:
+    """The estimate's error of several flights."""
     traces = []
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         found = _errors(flight)
         if found is not None:
             t, error = found
             size = _MM * np.linalg.norm(error, axis=1)
-            traces.append(line(flight.label, t, size, COLOURS[k % len(COLOURS)]))
+            traces.append(line(flight.label, t, size, colour))
     note = "Distance between the estimated and the true position of the body."
     return over_time("estimator", "Estimator", note, [Row("error [mm]", traces)])
 
@@ -566,13 +546,12 @@ def worst_second(flights: Sequence[Reported]) -> Chart | None:
     """What happened about the smallest margin, as finely as the log has it."""
     rows: tuple[list[Trace], ...] = ([], [], [], [])
     said = []
-    for k, flight in enumerate(flights):
+    for flight, colour in _coloured(flights):
         worst = flight.worst
         if worst is None:
             continue
         alone = len(flights) == 1
         zero = 0.0 if alone else worst.t
-        colour = COLOURS[k % len(COLOURS)]
         said.append(f"{_named(flight, flights, worst_sentence(flight))}")
         _worst_margins(flight, rows[0], zero, None if alone else colour)
         rows[0].append(mark(_named(flight, flights, "minimum"), worst.t - zero,
@@ -655,7 +634,7 @@ def _about(flight: Reported) -> list[tuple[str, Array, Array]]:
         found[1] = ("tracking error", flight.since(tracked.t), size)
     if truth is not None:
         q = truth["q_WB"] if "q_WB" in truth.columns else truth["q"]
-        found[2] = ("tilt", flight.since(truth.t), tilt_deg(q))
+        found[2] = ("tilt", flight.since(truth.t), tilts(q))
     return found
 
 
@@ -672,7 +651,9 @@ def _marks(flights: Sequence[Reported]) -> list[tuple[float, str]]:
     return event_marks(flights[0]) if len(flights) == 1 else []
 
 
-__all__ = ["TRUTH", "charts", "event_marks", "worst_sentence"]
+def _coloured(flights: Sequence[Reported]) -> Iterator[tuple[Reported, str]]:
+    """Each flight with its colour."""
+    return zip(flights, cycle(COLOURS), strict=False)
 
 
 def _of_joint(k: int) -> str:

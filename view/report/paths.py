@@ -13,6 +13,7 @@ from fsw.autopilot.signals import Vec3, Zone
 from view.flight_data import UlogError
 from view.report.chart import COLOURS, LIMIT, REFERENCE, Chart, Trace
 from view.report.reported import Reported
+from view.scene import vec3
 from view.zone_meshes import Mesh, zone_mesh
 
 Array = NDArray[Any]
@@ -43,7 +44,7 @@ def paths(flights: Sequence[Reported]) -> Chart:
     if seen:
         every = np.concatenate(seen)
         low, high = np.nanmin(every, axis=0) - _AROUND_M, np.nanmax(every, axis=0) + _AROUND_M
-        traces += _zones(flights[0], (_triple(low), _triple(high)))
+        traces += _zones(flights[0], (vec3(low), vec3(high)))
     layout = {
         "height": 560,
         "scene": {
@@ -142,7 +143,7 @@ def _target_at_worst(flight: Reported) -> Vec3 | None:
     tracked, worst = flight.table("sim_tracking"), flight.worst
     if tracked is None or worst is None:
         return None
-    return _triple(tracked["target"][int(np.abs(flight.since(tracked.t) - worst.t).argmin())])
+    return vec3(tracked["target"][int(np.abs(flight.since(tracked.t) - worst.t).argmin())])
 
 
 def _surface(shown: Mesh, opacity: float, name: str) -> Trace:
@@ -160,7 +161,3 @@ def _enu(places: Array) -> dict[str, list[float | None]]:
         return [round(float(v), 4) if np.isfinite(v) else None for v in values]
 
     return {"x": listed(places[:, 1]), "y": listed(places[:, 0]), "z": listed(-places[:, 2])}
-
-
-def _triple(values: Array) -> Vec3:
-    return (float(values[0]), float(values[1]), float(values[2]))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from command_line.bounded_json import JsonError, json_numbers
 from view.flight_data import FlightData, Table, UlogError, read_flight
-from view.flight_events import FlightEvent, events
+from view.flight_events import events
+from view.scene import Event
 from view.true_margins import TrueMargins, scenario_of, true_margins
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ class Reported:
     label: str  # short, another one for each flight of a page
     data: FlightData
     margins: TrueMargins | None  # None without the scenario or without truth
-    events: tuple[FlightEvent, ...]
+    events: tuple[Event, ...]
     numbers: Mapping[str, float]  # of the configuration, exactly, by dotted name
 
     @property

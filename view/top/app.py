@@ -19,8 +19,7 @@ from command_line.printable import printable
 from fsw.autopilot.model.airframe import Airframe
 from messages.frames import Frame
 from messages.message_ids import SYSTEM_ID
-from view.flight_events import EventKind
-from view.scene import Event, Scene
+from view.scene import Event, EventKind, Scene
 from view.telemetry import Heard, Telemetry
 from view.top.peer import Value, fields, meaning, unit
 
@@ -32,7 +31,7 @@ _BAR_M: Final = 0.5  # margin that fills it
 _STALE_S: Final = 3.0
 _LOST_S: Final = 2.0
 _NAMED: Final = 5  # systems, in the headline
-_ALARMING: Final = (EventKind.WARNING.value, EventKind.FAULT.value)
+_ALARMING: Final = (EventKind.WARNING, EventKind.FAULT)
 
 
 class Peer(Protocol):
