@@ -136,10 +136,11 @@ def correctness(flight: Flight) -> list[Requirement]:
     link = flight.vehicle["links"]["gcs"]
     heard = flight.heard
     accepted = [ack for ack in heard.others if ack[1] == _ACCEPTED]
+    strangers = [ack for ack in heard.others if ack[2:] != (SYSTEM, SYSTEM)]
     own = heard.asked + len(heard.heartbeats) + 60  # commands and heartbeats of the monitor
     return [
         Requirement("commands of the flood that were accepted", len(accepted), 0),
-        Requirement("acknowledgements to strangers", _strangers(heard), 0),
+        Requirement("acknowledgements to strangers", len(strangers), 0),
         Requirement(
             "frames believed beyond the valid ones",
             link["frames_accepted"] - own - flight.sent_valid,
@@ -188,10 +189,6 @@ def rate_deviation(heard: Heard) -> float:
         if stream.ground_hz >= _COUNTED_HZ and (stream.component, stream.message_id) in heard.counts
     ]
     return max(deviations, default=float("nan")) if seconds > 0.0 else float("nan")
-
-
-def _strangers(heard: Heard) -> int:
-    return sum((system, component) != (SYSTEM, SYSTEM) for _, _, system, component in heard.others)
 
 
 def _write(target: str | None, rows: list[Requirement], calm: Flight, flooded: Flight) -> None:

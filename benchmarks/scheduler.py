@@ -11,7 +11,7 @@ import math
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -50,10 +50,6 @@ class EmptyRow:
 
     number: int
     error: bool = False
-
-    def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.ports.Row`."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

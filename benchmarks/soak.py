@@ -29,7 +29,7 @@ from command_line.options import json_file, option, read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.values import number, whole
 from pandion.display import Display
-from pandion.supervisor import Flown, ProcessFailed
+from pandion.supervisor import ProcessFailed
 
 PASSED, NOT_PASSED = 0, 1  # exit codes
 _GLANCE_S: Final = 5.0
@@ -183,7 +183,7 @@ def soak(options: SoakOptions, flight: int, left_s: float, display: Display) -> 
         written=answered,
         # Compiling kernels, which the first flight may begin with, is no part of a flight.
         glances=used.since(client.first_heard_s),
-        ended=_ended(flown),
+        ended=flown.failure or str(flown.sitl["end_reason"]),
         flown_s=float(flown.sitl["duration_s"]),
     )
 
@@ -326,8 +326,3 @@ def _half(process: int) -> str:
     """Which of the two programs a process belongs to, by its command line."""
     words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
     return next((word.decode() for word in words if word in (b"fsw", b"sitl")), "other")
-
-
-def _ended(flown: Flown) -> str:
-    assert flown.sitl is not None
-    return flown.failure or str(flown.sitl["end_reason"])

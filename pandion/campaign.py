@@ -149,7 +149,7 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
         "violations": sum(row.violated for row in rows),
         "refused": sum(row.refused for row in rows),
         "errors": sum(row.error for row in rows),
-        "configurations": [one.as_json() for one in cases],
+        "configurations": [asdict(one) for one in cases],
         "worst": [row.compared() | {"again": again(row, folder)} for row in worst(rows)],
     }
     facts = write_facts(folder, result.plan, result.asked, result.seal, more)

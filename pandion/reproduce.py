@@ -58,10 +58,6 @@ def seeds(text: str) -> range:
     return found
 
 
-def _seeds_text(seeds: range) -> str:
-    return f"{seeds.start}:{seeds.stop}"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReproduceOptions:
     """One study."""
@@ -78,7 +74,7 @@ class ReproduceOptions:
         "from A up to but not including B; 0:30 were used for tuning",
         seeds,
         default=range(100, 120),
-        text=_seeds_text,
+        text=lambda seeds: f"{seeds.start}:{seeds.stop}",
     )
     duration_s: float | None = option(
         "--duration S",

@@ -18,8 +18,14 @@ from command_line.process import (
 )
 from sitl.arguments import SitlOptions
 from sitl.faults.keys import LINKS
-from sitl.link.stream_endpoint import ByteStream, parse_listener
-from sitl.link.udp_endpoint import RESEND_S, LinkError, PeerSocket, parse_address
+from sitl.link.endpoints import (
+    RESEND_S,
+    ByteStream,
+    LinkError,
+    PeerSocket,
+    parse_address,
+    parse_listener,
+)
 from sitl.scenario_file import PERFECT, ScenarioError, check_pacing, load_scenario, suite_of
 
 _UDP: Final = "udp:127.0.0.1:4560"

@@ -10,11 +10,10 @@ from sitl.arguments import SitlOptions
 from sitl.flight import FlownSession, Watch
 from sitl.link.companion import Companion
 from sitl.link.encode import StepEncoder
+from sitl.link.endpoints import ByteStream, PeerSocket, parse_address
 from sitl.link.pilot import flight_plan
 from sitl.link.px4_messages import Px4Encoder
 from sitl.link.px4_server import Px4Exchange, serve_px4
-from sitl.link.stream_endpoint import ByteStream
-from sitl.link.udp_endpoint import PeerSocket, parse_address
 from sitl.plant.state import P_WB
 from sitl.sensors.channel import Measurement
 from sitl.simulation import START_US, STEP_US, Simulation

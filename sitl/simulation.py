@@ -173,7 +173,7 @@ class Simulation:
         self._said: tuple[int, SensorReadings] | None = None
         self._measured: tuple[int, tuple[Measurement, ...]] = (-1, ())
         self._held = held()
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
+        self._evaluator = FlightEvaluator(scenario, self.clock, self.places())
         # No steps: only what the accelerometer feels at the start.
         example = self._arguments(self._places[:0], self._states[:0])
         self._step = machine_code(watched_step, *example)
@@ -430,7 +430,7 @@ class Simulation:
     def truth(self) -> Truth:
         """The true state now."""
         exact, thrust = self._exact_reading()
-        places = self._places_now()
+        places = self.places()
         return Truth(
             t_us=self.t_us,
             p_WB=exact.p_WB,
@@ -455,7 +455,7 @@ class Simulation:
             ScenarioError: Something is outside the safe set now.
         """
         self._touch.meet(scenario)
-        self._evaluator = FlightEvaluator(scenario, self.clock, self._places_now())
+        self._evaluator = FlightEvaluator(scenario, self.clock, self.places())
 
     @property
     def tip_force(self) -> V3:
@@ -476,7 +476,7 @@ class Simulation:
 
     def _tip(self) -> V3:
         """Where the end-effector is now [m, NED]."""
-        return row_of_three(self._places_now(), 1 + self._joints)
+        return row_of_three(self.places(), 1 + self._joints)
 
     def asked_force(self) -> float:
         """Normal force that the reference asks for now [N]."""
@@ -490,7 +490,10 @@ class Simulation:
 
     def places(self) -> Array:
         """Rows of ``sitl.plant.places``, and the full body's axes, (rows, 3) [m, NED] now."""
-        return self._places_now()
+        out = np.empty((1, *self._places.shape[1:]))
+        places_into(self._plant, self._state, self._held, out)
+        now: Array = out[0]
+        return now
 
     @property
     def world(self) -> World:
@@ -580,12 +583,6 @@ class Simulation:
                 force = (force[0] + mass * x, force[1] + mass * y, force[2] + mass * z)
             until = min(until, item.held_until(step))
         self._pushed, self._pushed_until = (force, torque), until
-
-    def _places_now(self) -> Array:
-        out = np.empty((1, *self._places.shape[1:]))
-        places_into(self._plant, self._state, self._held, out)
-        now: Array = out[0]
-        return now
 
 
 def _sensors(

@@ -7,11 +7,11 @@ from sitl.arguments import SitlOptions
 from sitl.faults.keys import LINKS
 from sitl.flight import FlownSession, Watch
 from sitl.link.encode import StepEncoder
+from sitl.link.endpoints import PeerSocket
 from sitl.link.exchange import Exchange, Lockstep, RealTime
 from sitl.link.faulty_endpoint import Endpoint, FaultyEndpoint
 from sitl.link.pilot import flight_plan
 from sitl.link.server import serve, shut_down
-from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.simulation import START_US, STEP_US, Simulation
 

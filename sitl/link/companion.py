@@ -17,9 +17,9 @@ from sitl.earth import DEFAULT_ORIGIN, place_of
 from sitl.link import pilot
 from sitl.link.encode import StepEncoder
 from sitl.link.encode_sensors import SensorEncoder
+from sitl.link.endpoints import PeerSocket
 from sitl.link.pilot import FlightPlan, Phase, PilotState
 from sitl.link.pilot_messages import Ack, Heard
-from sitl.link.udp_endpoint import PeerSocket
 from sitl.scenario import V3
 from sitl.sensors.channel import Measurement
 from sitl.sensors.encoders import JointMeasurement

@@ -10,9 +10,9 @@ from typing import Final
 from command_line.process import StopRequest
 from sitl.link import decode
 from sitl.link.decode import VehicleReply
+from sitl.link.endpoints import RESEND_S
 from sitl.link.faulty_endpoint import Endpoint
 from sitl.link.step_grid import StepGrid
-from sitl.link.udp_endpoint import RESEND_S
 from sitl.simulation import Controls
 from vehicles.description import Vehicle
 

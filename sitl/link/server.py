@@ -15,11 +15,11 @@ from sitl.faults.keys import Fault
 from sitl.link import decode, pilot
 from sitl.link.decode import VehicleReply
 from sitl.link.encode import StepEncoder
+from sitl.link.endpoints import PeerSocket
 from sitl.link.exchange import Exchange, SimulatorError
 from sitl.link.failures import Injector
 from sitl.link.pilot import FlightPlan, PilotState
 from sitl.link.pilot_messages import Heard, PilotMessage, SendCommand
-from sitl.link.udp_endpoint import PeerSocket
 from sitl.result import EndKind
 from sitl.sensors.exact import SensorReadings
 from sitl.simulation import STEP_US, Controls, Simulation

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Self
 
@@ -115,7 +115,7 @@ class Campaign(Generic[RowT]):
         """Rows as they come; each is in the journal before it is given on."""
         for rows in self._here(flights) if self._serial else self._elsewhere(flights):
             if self._lines is not None:
-                self._lines.append((key, row.as_line()) for key, row in rows)
+                self._lines.append((key, asdict(row)) for key, row in rows)
             yield from rows
 
     @property

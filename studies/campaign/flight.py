@@ -80,10 +80,6 @@ class CampaignRow:
         """Whether the margin is below 0; a margin that is no number is."""
         return self.margin_m is not None and not self.margin_m >= 0.0
 
-    def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.ports.Row`."""
-        return asdict(self)
-
     def compared(self) -> dict[str, Any]:
         """The fields that are the same wherever the flight is flown."""
         line = asdict(self)

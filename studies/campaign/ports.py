@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 
 class Row(Protocol):
-    """What a flight leaves."""
+    """What a flight leaves: a dataclass, whose fields a journal keeps."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     def error(self) -> bool:
         """Whether the flight itself broke, not the vehicle: it is flown again on resuming."""
-
-    def as_line(self) -> Mapping[str, Any]:
-        """The row as it is kept in a journal."""
 
 
 RowT = TypeVar("RowT", bound=Row)

@@ -6,8 +6,8 @@ import heapq
 import math
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any, Final
+from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
@@ -77,10 +77,6 @@ class CaseSummary:
     errors: int
     margin_m: dict[str, float]  # by share of the flights
     te_m: dict[str, float]
-
-    def as_json(self) -> dict[str, Any]:
-        """For a file."""
-        return asdict(self)
 
 
 def summaries(rows: Sequence[CampaignRow]) -> list[CaseSummary]:

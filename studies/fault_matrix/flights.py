@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 from fsw.autopilot.flight.autopilot import Autopilot
@@ -113,10 +113,6 @@ _ARM: Final[Spoken] = (0.0, Arm())  # at once: until then the vehicle falls
 _ARM_IN_THE_AIR: Final[Spoken] = (0.0, Arm(force=True))
 
 
-def _to(mode: Mode) -> SwitchMode:
-    return SwitchMode(mode)
-
-
 def _go(north: float, east: float) -> MissionStep:
     return MissionStep(MissionAction.GO, (north, east, -1.2), hold_s=0.0)
 
@@ -139,7 +135,7 @@ def _following(packaged: str, body: str = "full", fault_s: float = 4.0) -> Situa
     return Situation(
         Mode.TRAJECTORY,
         lambda suite: load_scenario(packaged, suite),
-        (_ARM, (0.01, _to(Mode.TRAJECTORY))),
+        (_ARM, (0.01, SwitchMode(Mode.TRAJECTORY))),
         fault_s,
         fault_s + 12.0,
         frozenset((Mode.TRAJECTORY,)),
@@ -157,7 +153,7 @@ SITUATIONS: Final[dict[str, Situation]] = {
     "press": _following("probe", fault_s=5.0),
     "offboard": _in_the_air(
         Mode.OFFBOARD,
-        (0.5, _to(Mode.OFFBOARD)),
+        (0.5, SwitchMode(Mode.OFFBOARD)),
         motion=MotionSetpoint(False, (0.0, 0.5, -_HEIGHT)),
     ),
     "mission": _in_the_air(
@@ -178,7 +174,7 @@ SITUATIONS: Final[dict[str, Situation]] = {
     "land": Situation(
         Mode.LAND,
         _AIR,
-        (_ARM_IN_THE_AIR, (1.0, _to(Mode.LAND))),
+        (_ARM_IN_THE_AIR, (1.0, SwitchMode(Mode.LAND))),
         2.5,
         14.5,
         frozenset(_LANDED),
@@ -186,7 +182,7 @@ SITUATIONS: Final[dict[str, Situation]] = {
     "return": _in_the_air(
         Mode.RETURN,
         (0.5, SetHome(Place((0.0, 1.0), 0.32))),
-        (1.0, _to(Mode.RETURN)),
+        (1.0, SwitchMode(Mode.RETURN)),
         then=_LANDED,
     ),
 }
@@ -227,13 +223,9 @@ class FaultFlight:
         """All such texts, in their order."""
         return tuple(said for said in self.texts if said.severity <= Severity.WARNING)
 
-    def as_line(self) -> dict[str, Any]:
-        """The flight for a journal; see :meth:`from_line`."""
-        return asdict(self)
-
     @classmethod
     def from_line(cls, line: Mapping[str, Any]) -> FaultFlight:
-        """The flight that :meth:`as_line` has described, after JSON.
+        """The flight of a line of a journal, after JSON.
 
         Raises:
             TypeError: Another version has described it, or it is damaged.

@@ -6,7 +6,7 @@ import hashlib
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -125,10 +125,6 @@ class Outcome:
     reported: str = ""  # the text that names the sensor at fault; empty if there was none
     error: bool = False  # the flight itself broke, not the vehicle
     took_s: float = field(default=0.0, compare=False)  # processor time
-
-    def as_line(self) -> dict[str, Any]:
-        """See :class:`studies.campaign.ports.Row`."""
-        return asdict(self)
 
 
 def fly_job(job: Job, *, traced: bool = False) -> FlightResult:

@@ -167,7 +167,7 @@ def verdicts(
     assumed = _assumed(result)
     no_proof = assumed if _NO_PROOF in assumed else ""
     cases = list(_of_cases(result))
-    return [judge(one, cases, confidence, no_proof).as_json() for one in required]
+    return [asdict(judge(one, cases, confidence, no_proof)) for one in required]
 
 
 def _required(

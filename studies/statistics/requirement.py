@@ -6,8 +6,8 @@ import math
 import operator
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 from command_line.values import plain_float
 from studies.campaign.flight import CampaignRow
@@ -57,10 +57,6 @@ class Verdict:
     text: str
     met: bool
     found: str
-
-    def as_json(self) -> dict[str, Any]:
-        """For a file."""
-        return asdict(self)
 
 
 def requirement(text: str) -> Requirement:

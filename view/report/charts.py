@@ -323,7 +323,10 @@ def limits(flights: Sequence[Reported]) -> Chart:
         uses = flight.result.get("limits", {})
         if uses:
             names = [name.replace("_", " ") for name in uses]
-            shares = [_percent(use["largest"], use["most"]) for use in uses.values()]
+            shares = [
+                100.0 * use["largest"] / use["most"] if use["most"] else None
+                for use in uses.values()
+            ]
             said = [
                 f"{use['largest']:.3g} of {use['most']:.3g} {use['unit']}, {use['at_s']:.2f} s"
                 for use in uses.values()
@@ -353,10 +356,6 @@ def _of_bars(count: int, title: str) -> dict[str, Any]:
         "yaxis": {"automargin": True},
         "bargap": 0.25,
     }
-
-
-def _percent(largest: float, most: float) -> float | None:
-    return 100.0 * largest / most if most else None
 
 
 def solver(flights: Sequence[Reported]) -> Chart:

@@ -6,7 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,6 @@ class StubRow:
     number: int
     reason: str = ""
     error: bool = False
-
-    def as_line(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def put(
     ]  # fmt: skip
     journal = Journal(directory / JOURNAL)
     journal.append(
-        (own_key or CampaignFlight(plan, row.flight).key(), row.as_line() | changed) for row in rows
+        (own_key or CampaignFlight(plan, row.flight).key(), asdict(row) | changed) for row in rows
     )
     journal.close()
     seal(directory)
@@ -247,16 +247,16 @@ def test_a_line_of_other_types_is_no_row(tmp_path: Path, wrong: dict[str, Any]) 
     assert [row.flight for row in found.rows] == [1, 2, 3]
     assert found.left_out == 1
     with pytest.raises(TypeError):
-        CampaignFlight(plan, 0).from_line(found.rows[0].as_line() | wrong)
+        CampaignFlight(plan, 0).from_line(asdict(found.rows[0]) | wrong)
 
 
 def test_a_row_under_the_key_of_another_flight_is_flown_again(tmp_path: Path) -> None:
     _, directory, plan = begun(tmp_path)
     put(directory, plan, range(1))
     (row,) = read(directory).rows
-    assert CampaignFlight(plan, 0).from_line(row.as_line()) == row
+    assert CampaignFlight(plan, 0).from_line(asdict(row)) == row
     with pytest.raises(TypeError, match="flight = 0 under the key of flight 1"):
-        CampaignFlight(plan, 1).from_line(row.as_line())
+        CampaignFlight(plan, 1).from_line(asdict(row))
 
 
 def test_a_flight_that_did_not_break_has_one_row(tmp_path: Path) -> None:

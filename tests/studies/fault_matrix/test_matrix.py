@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -119,14 +119,14 @@ def test_what_is_not_as_it_must_be_is_named(flight: FaultFlight, differs: tuple[
     ],
 )
 def test_a_line_of_other_types_is_no_flight(wrong: dict[str, Any]) -> None:
-    line = json.loads(json.dumps(FINE.as_line()))
+    line = json.loads(json.dumps(asdict(FINE)))
     assert FaultFlight.from_line(line) == FINE
     with pytest.raises(TypeError):
         FaultFlight.from_line(line | wrong)
 
 
 def test_a_flight_without_its_margin_is_none() -> None:
-    line = FINE.as_line()
+    line = asdict(FINE)
     del line["least_m"]
     with pytest.raises(TypeError, match="are not the fields of a flight"):
         FaultFlight.from_line(line)

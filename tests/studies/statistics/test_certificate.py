@@ -71,7 +71,7 @@ def flown(
     begin(directory, source, plan, flights)
     journal = Journal(directory / JOURNAL)
     rows = [row(plan, k, **changed.get(k, {})) for k in range(flights)]
-    journal.append((key(plan, one), one.as_line()) for one in rows if one.reason != "lost")
+    journal.append((key(plan, one), asdict(one)) for one in rows if one.reason != "lost")
     journal.close()
     seal(directory)
     return directory
@@ -266,7 +266,7 @@ def changed(directory: Path, number: int, **fields: Any) -> None:
     rows = [replace(one, **fields) if one.flight == number else one for one in result.rows]
     (directory / JOURNAL).unlink()
     journal = Journal(directory / JOURNAL)
-    journal.append((key(result.plan, one), one.as_line()) for one in rows)
+    journal.append((key(result.plan, one), asdict(one)) for one in rows)
     journal.close()
     seal(directory)
 

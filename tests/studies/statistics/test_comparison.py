@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -50,7 +50,7 @@ def campaign(
         )
         for k in range(flights)
     ]  # fmt: skip
-    journal.append((CampaignFlight(plan, row.flight).key(), row.as_line()) for row in rows)
+    journal.append((CampaignFlight(plan, row.flight).key(), asdict(row)) for row in rows)
     journal.close()
     return out
 
