@@ -67,9 +67,9 @@ class MachineNoise:
         return not (quiet and (self.stopped is None or self.stopped <= MAX_STOPPED))
 
 
-def load_budgets(path: Path | None = None) -> Budgets:
-    """The budgets file; the one that comes with Pandion if None."""
-    text = (path or Path(__file__).with_name("budgets.toml")).read_text(encoding="utf-8")
+def load_budgets() -> Budgets:
+    """What the file beside this one allows."""
+    text = Path(__file__).with_name("budgets.toml").read_text(encoding="utf-8")
     content: dict[str, dict[str, float]] = tomllib.loads(text)
     return content
 

@@ -12,7 +12,7 @@ from command_line.bounded_file import read_bounded
 from command_line.bounded_toml import TomlError, toml_table
 from command_line.toml_tables import TableReader, nearest, shown
 from command_line.values import plain_float
-from sitl.ranges import ROUNDED
+from sitl.ranges import ROUNDED, UNIT
 from sitl.scenario import (
     V3,
     Scenario,
@@ -25,12 +25,12 @@ from sitl.scenario import (
     vehicle_of,
 )
 from sitl.sensors.keys import MeasuredSensors, SuiteName
+from vehicles.description import Vehicle
 
 _DIGITS = 12
 _MAX_BYTES = 2 * 1024 * 1024  # of a file: a reference of 20,000 points; zones are a hundredth
 _MAX_CSV = 2 * 1024 * 1024  # of a table of points
 COLUMNS = ["time_s", "north_m", "east_m", "down_m", "yaw_deg"]  # of one, the last if there is yaw
-_UNIT = 1e-6  # [1] by which a normal's length is off 1 without any rounding
 PACKAGED = Path(__file__).parent / "scenarios"
 SUITES = Path(__file__).parent / "sensors" / "suites"
 PERFECT = "perfect"
@@ -78,12 +78,12 @@ def with_vehicle(scenario: Scenario, vehicle: str) -> Scenario:
     """
     start = dataclasses.replace(scenario.start, arm_deg=())
     found = dataclasses.replace(scenario, vehicle=vehicle, start=start)
-    _check_vehicle(found)
+    flown = checked_vehicle(found)
     if found.workspace is None:
         return found
     from sitl.plant.trim import end_effector  # its kernels take a moment
 
-    _, _, down = end_effector(vehicle_of(found), start_angles(found))
+    _, _, down = end_effector(flown, start_angles(found))
     workspace = dataclasses.replace(found.workspace, d_iw_m=round(max(down, 0.0), _DIGITS))
     return dataclasses.replace(found, workspace=workspace)
 
@@ -186,7 +186,7 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
         table["vehicle"] = str(folder / vehicle)
     scenario: Scenario = build_table(Scenario, {**table, "name": name}, "")
     if "vehicle" in table:
-        _check_vehicle(scenario)
+        checked_vehicle(scenario)
     return dataclasses.replace(
         scenario,
         trajectory=_with_unit_normal(scenario.trajectory),
@@ -195,11 +195,16 @@ def _parsed(text: str, name: str, suite: str | None, folder: Path | None) -> Sce
     )
 
 
-def _check_vehicle(scenario: Scenario) -> None:
+def checked_vehicle(scenario: Scenario) -> Vehicle:
+    """The vehicle that a scenario names.
+
+    Raises:
+        ScenarioError: There is no such vehicle, or it cannot be.
+    """
     from vehicles.vehicle_file import VehicleError
 
     try:
-        vehicle_of(scenario)
+        return vehicle_of(scenario)
     except VehicleError as error:
         raise ScenarioError(f"vehicle: {error}") from error
 
@@ -262,7 +267,7 @@ def _with_unit_normal(zone: Plane) -> Plane:
         return zone
     length = math.hypot(*normal)
     # Nearer to 1 it is a unit vector as it is written; further off it is some other vector.
-    if abs(length - 1.0) <= _UNIT or abs(length - 1.0) > ROUNDED:
+    if abs(length - 1.0) <= UNIT or abs(length - 1.0) > ROUNDED:
         return zone
     changed: Any = zone  # whichever of them it is
     unit = tuple(part / length for part in normal)

@@ -7,6 +7,7 @@ import math
 
 from sitl.faults.keys import EXACT, Fault, problem
 from sitl.plant.state import SURFACES_MAX
+from sitl.ranges import normal_problem
 from sitl.scenario import (
     ActuatorKeys,
     Circle,
@@ -23,9 +24,9 @@ from sitl.scenario import (
     start_angles,
     vehicle_of,
 )
-from sitl.scenario_file import ScenarioError
+from sitl.scenario_file import ScenarioError, checked_vehicle
 from sitl.sensors.keys import MeasuredSensors
-from vehicles.vehicle_file import VehicleError, posture_problem
+from vehicles.vehicle_file import posture_problem
 
 MAX_POINTS = 20_000  # of a trajectory
 MAX_PLACES = 50  # that one presses on
@@ -93,11 +94,8 @@ def _check_push(curve: Push) -> None:
         given = len(getattr(curve, name))
         if given != count and not (name == "slide_m" and given == 0):
             raise ScenarioError(f"trajectory.{name}: {given} entries for {count} places")
-    length = math.hypot(*curve.normal)
-    if not abs(length - 1.0) <= 1e-6:
-        raise ScenarioError(
-            f"trajectory.normal = {list(curve.normal)}: must have length 1, has {length:.6g}"
-        )
+    if (wrong := normal_problem(curve.normal)) is not None:
+        raise ScenarioError(f"trajectory.{wrong}")
     for k, slide in enumerate(curve.slide_m):
         off = sum(n * d for n, d in zip(curve.normal, slide, strict=True))
         if not abs(off) <= _OFF_SURFACE_M:
@@ -124,11 +122,7 @@ def _check_points(curve: Points) -> None:
 
 
 def _check_vehicle(scenario: Scenario) -> None:
-    try:
-        vehicle = vehicle_of(scenario)
-    except VehicleError as error:
-        raise ScenarioError(f"vehicle: {error}") from error
-    problem = posture_problem(vehicle, start_angles(scenario), math.radians(1.0))
+    problem = posture_problem(checked_vehicle(scenario), start_angles(scenario), math.radians(1.0))
     if problem is not None:
         raise ScenarioError(f"start.arm_deg{problem}")
 
@@ -183,11 +177,8 @@ def _check_payload(keys: Payload | None) -> None:
 
 def _check_walls(scenario: Scenario) -> None:
     for i, wall in enumerate(scenario.walls):
-        length = math.sqrt(sum(c * c for c in wall.normal))
-        if not (abs(length - 1.0) <= 1e-6):
-            raise ScenarioError(
-                f"walls[{i}].normal = {list(wall.normal)}: must have length 1, has {length:.6g}"
-            )
+        if (wrong := normal_problem(wall.normal)) is not None:
+            raise ScenarioError(f"walls[{i}].{wrong}")
 
 
 def _check_zones(scenario: Scenario) -> None:

@@ -458,11 +458,6 @@ class Simulation:
         self._evaluator = FlightEvaluator(scenario, self.clock, self.places())
 
     @property
-    def tip_force(self) -> V3:
-        """Of what the tool touches on its tip now [N, NED]."""
-        return self._touch.force()
-
-    @property
     def touch(self) -> TouchRecord:
         """What the tool may touch, and how it has."""
         return self._touch

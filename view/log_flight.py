@@ -91,7 +91,6 @@ class LogFlight:
         status, plan = self._row("vehicle_status", t), self._plan(t)
         told = self._row("actuator_command", t)
         joints = self._row("arm_joint_state", t)
-        aimed = self._row("vehicle_local_position_setpoint", t, lasts=0.1)
         reference = self._row("end_effector", t, lasts=0.3)
         margins, minimum, added, safety = self._margins(t)
         return Scene(
@@ -103,9 +102,6 @@ class LogFlight:
             torque=None if told is None else _numbers(told["joint_torque"]),
             joint_rates=None if joints is None else _numbers(joints["qd"]),
             target=None if reference is None else _finite(reference["p_ref"]),
-            base_target=None
-            if aimed is None
-            else _finite(np.array((aimed["x"], aimed["y"], aimed["z"]))),
             horizon=plan,
             safe_set=self.safe_set(t),
             margins=margins,
@@ -310,9 +306,7 @@ class LogFlight:
                 found[group] = Timing(
                     name=GROUPS[group],
                     period=1e-6 * float(row["period_us"]),
-                    execution_p50=1e-6 * float(row["execution_p50_us"]),
                     execution_p99=1e-6 * float(row["execution_p99_us"]),
-                    lateness_p99=1e-6 * float(row["lateness_p99_us"]),
                     late=int(row["late_ticks"]),
                     skipped=int(row["skipped_ticks"]),
                 )

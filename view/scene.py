@@ -64,9 +64,7 @@ class Timing(NamedTuple):
 
     name: str
     period: float  # s
-    execution_p50: float  # s
     execution_p99: float  # s
-    lateness_p99: float  # s
     late: int  # ticks, since the start
     skipped: int  # ticks, since the start
 
@@ -112,7 +110,6 @@ class Scene:
     torque: JointVector | None = None  # N m, commanded
     joint_rates: JointVector | None = None  # rad/s
     target: Vec3 | None = None  # m, NED: where the end-effector should be now
-    base_target: Vec3 | None = None  # m, NED: where the running plan has the base now
     horizon: Horizon | None = None
     safe_set: SafeSet | None = None
     margins: tuple[Margin, ...] = ()

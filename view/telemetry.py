@@ -129,7 +129,6 @@ class Telemetry:
     heard: dict[tuple[int, int, int], Heard] = field(default_factory=dict)
     events: deque[Event] = field(default_factory=lambda: deque(maxlen=_EVENTS))
     parameters: dict[str, float] = field(default_factory=dict)
-    parameter_count: int = 0
     answers: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=20))
     """Commands and their MAV_RESULTs, as they were acknowledged."""
     refusals: deque[str] = field(default_factory=lambda: deque(maxlen=20))
@@ -191,8 +190,7 @@ class Telemetry:
             thrust=self._thrust(said.get(ids.SERVO_OUTPUT_RAW)),
             torque=None if arm is None else _arm(arm, 2),
             joint_rates=None if arm is None else _arm(arm, 1),
-            target=_place(said.get(ids.END_EFFECTOR_TARGET), mask_at=12),
-            base_target=_place(said.get(ids.POSITION_TARGET_LOCAL_NED), mask_at=12),
+            target=_target(said.get(ids.END_EFFECTOR_TARGET)),
             horizon=self._horizon(now),
             safe_set=self._safe_set,
             margins=margins,
@@ -420,10 +418,8 @@ class Telemetry:
 
     def read_parameter(self, values: tuple[Any, ...]) -> None:
         """Take a PARAM_VALUE."""
-        field, count, index, name, type_ = values
+        field, _, _, name, type_ = values
         value = value_of(field, type_)
-        if index < count:
-            self.parameter_count = count
         known = _text(name)
         room = known in self.parameters or len(self.parameters) < _MAX_PARAMETERS
         if room and value is not None:
@@ -436,9 +432,7 @@ class Telemetry:
             timing = Timing(
                 name=GROUPS[group],
                 period=1e-6 * values[4],
-                execution_p50=1e-6 * values[5],
                 execution_p99=1e-6 * values[6],
-                lateness_p99=1e-6 * values[9],
                 late=int(values[2]),
                 skipped=int(values[3]),
             )
@@ -505,8 +499,8 @@ def _pulses(servos: tuple[Any, ...]) -> tuple[int, ...]:
     return (*servos[1:9], *servos[10:18])
 
 
-def _place(values: tuple[Any, ...] | None, mask_at: int) -> Vec3 | None:
-    if values is None or values[mask_at] & _IGNORE_POSITION:
+def _target(values: tuple[Any, ...] | None) -> Vec3 | None:
+    if values is None or values[12] & _IGNORE_POSITION:
         return None
     return vec3(values[1:4]) if all(map(math.isfinite, values[1:4])) else None
 
@@ -581,8 +575,7 @@ _LASTS: Final = {
     **dict.fromkeys(
         (
             *(ids.ATTITUDE, ids.LOCAL_POSITION_NED, ids.ARM_JOINT_STATE, ids.SERVO_OUTPUT_RAW),
-            *(ids.END_EFFECTOR_TARGET, ids.POSITION_TARGET_LOCAL_NED, ids.BARRIER_MARGIN),
-            ids.TOOL_CONTACT,
+            *(ids.END_EFFECTOR_TARGET, ids.BARRIER_MARGIN, ids.TOOL_CONTACT),
         ),
         _SHORT_S,
     ),
@@ -590,28 +583,24 @@ _LASTS: Final = {
 }
 
 READERS: Final[dict[int, Callable[[Telemetry, tuple[Any, ...]], None]]] = {
+    **dict.fromkeys(
+        (
+            *(ids.SYS_STATUS, ids.LOCAL_POSITION_NED, ids.MISSION_CURRENT, ids.ESTIMATOR_STATUS),
+            *(ids.EXTENDED_SYS_STATE, ids.END_EFFECTOR_TARGET, ids.BARRIER_MARGIN),
+            *(ids.SETPOINT_STATUS, ids.MPC_STATUS, ids.TOOL_CONTACT, ids.PAYLOAD_STATUS),
+        ),
+        _nothing,
+    ),
     ids.HEARTBEAT: Telemetry.read_beat,
-    ids.SYS_STATUS: _nothing,
     ids.PARAM_VALUE: Telemetry.read_parameter,
     ids.ATTITUDE: Telemetry.read_clock,
-    ids.LOCAL_POSITION_NED: _nothing,
     ids.SERVO_OUTPUT_RAW: Telemetry.read_servos,
-    ids.MISSION_CURRENT: _nothing,
     ids.COMMAND_ACK: Telemetry.read_answer,
-    ids.POSITION_TARGET_LOCAL_NED: _nothing,
-    ids.ESTIMATOR_STATUS: _nothing,
-    ids.EXTENDED_SYS_STATE: _nothing,
     ids.EVENT: Telemetry.read_event,
     ids.STATUSTEXT: Telemetry.read_text,
     ids.ARM_JOINT_STATE: Telemetry.read_arm,
-    ids.END_EFFECTOR_TARGET: _nothing,
-    ids.BARRIER_MARGIN: _nothing,
-    ids.SETPOINT_STATUS: _nothing,
-    ids.MPC_STATUS: _nothing,
     ids.LOOP_TIMING: Telemetry.read_timing,
     ids.OBSTACLE_SHAPE: Telemetry.read_zone,
     ids.MPC_HORIZON: Telemetry.read_plan,
     ids.MPC_HORIZON_ARM: Telemetry.read_plan,
-    ids.TOOL_CONTACT: _nothing,
-    ids.PAYLOAD_STATUS: _nothing,
 }

@@ -142,10 +142,6 @@ class StepEncoder:
         values = (-1, -1, _UNKNOWN_WARMTH, *cells, *about, 0, 0, *(0,) * 4, 0, 0)
         return self._sensors.frame(message_ids.BATTERY_STATUS, *values)
 
-    def command(self, message: SendCommand) -> bytes:
-        """One COMMAND_LONG of the pilot."""
-        return self.spoken((message,))
-
     def spoken(self, messages: tuple[PilotMessage, ...]) -> bytes:
         """What the pilot says."""
         return b"".join(self._pilot.frame(*_wire(message)) for message in messages)

@@ -80,14 +80,11 @@ class Px4Exchange:
                     self.counts.waited_s += time.perf_counter() - begin_s
                     return answer
             if time.perf_counter() >= until_s:
+                hint = "; 500 Hz needs the parameters of pandion px4 params"
                 raise SimulatorError(
                     f"PX4 did not answer step {number} within {STALL_S:g} s"
-                    + ("; 500 Hz needs the parameters of pandion px4 params" * self._is_fast)
+                    + hint * (self._period_s < 0.003)
                 )
-
-    @property
-    def _is_fast(self) -> bool:
-        return self._period_s < 0.003
 
     def _first_answer(self, number: int, until_s: float) -> Px4Answer | None:
         """Any answer that comes before the step is over, in real time."""

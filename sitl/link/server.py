@@ -178,7 +178,7 @@ def _datagram(
 def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
     """Command the vehicle to shut down; True once it has acknowledged."""
     for _ in range(tries):
-        endpoint.send(encoder.command(_SHUTDOWN))
+        endpoint.send(encoder.spoken((_SHUTDOWN,)))
         until_s = time.perf_counter() + 0.25
         while time.perf_counter() < until_s:
             received = endpoint.receive()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from sitl.compiled import kernel
 from sitl.plant.vector import Array
+from sitl.ranges import normal_problem
 from sitl.scenario import NORMAL, V3, WORLD_M, Range, ScenarioZone
 from sitl.shapes.kind import Nearest, ShapeKind
 
@@ -27,10 +27,7 @@ class HalfSpace(ScenarioZone):
 
     def problem(self) -> str | None:
         """A normal that is no unit vector."""
-        length = math.hypot(*self.normal)
-        if abs(length - 1.0) <= 1e-6:
-            return None
-        return f"normal = {list(self.normal)}: must have length 1, has {length:.6g}"
+        return normal_problem(self.normal)
 
 
 @kernel

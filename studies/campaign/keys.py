@@ -94,8 +94,8 @@ def rounded(key: str, value: float, allowed: Range) -> float:
     return min(max(round(value / allowed.step) * allowed.step, allowed.low), allowed.high)
 
 
-def _later(scenario: Scenario, latency_ms: float, _: float) -> Scenario:
-    """Every sensor this much later [ms]; a suite's own latencies come on top."""
+def later(scenario: Scenario, latency_ms: float, _: float = 0.0) -> Scenario:
+    """Every sensor ``latency_ms`` [ms] later; a suite's own latencies come on top."""
     sensors = scenario.sensors
     changed: dict[str, Any] = {}
     for field in fields(sensors):
@@ -120,7 +120,7 @@ def _windy(scenario: Scenario, wind_m_s: float, direction_deg: float) -> Scenari
 
 
 _CHANGES: Final[dict[str, Callable[[Scenario, float, float], Scenario]]] = {
-    LATENCY: _later,
+    LATENCY: later,
     PUSH: _pushed,
     AIR: _windy,
 }

@@ -195,20 +195,20 @@ def _sentence(end: str, flight: FaultFlight) -> str:
     return "silent" if end == "silent" else f"{end}: {flight.ended}"
 
 
-def known_limits(path: Path = KNOWN_LIMITS) -> tuple[Limit, ...]:
+def known_limits() -> tuple[Limit, ...]:
     """The table of known limits.
 
     Raises:
         ValueError: It is not one.
     """
     found = []
-    for table in toml_table(read_bounded(path, _MAX_BYTES).decode("utf-8"))["limits"]:
+    for table in toml_table(read_bounded(KNOWN_LIMITS, _MAX_BYTES).decode("utf-8"))["limits"]:
         every = {"suites": SUITE_NAMES, "modes": tuple(SITUATIONS)} | table
         keys: dict[str, Any] = {k: v if isinstance(v, str) else tuple(v) for k, v in every.items()}
         limit = Limit(**keys)
         if not set(limit.ends) <= set(FINDINGS) or not limit.faults or not limit.sentence:
             raise ValueError(
-                f"{path}: {limit.name} needs faults, a sentence and ends of {FINDINGS}"
+                f"{KNOWN_LIMITS}: {limit.name} needs faults, a sentence and ends of {FINDINGS}"
             )
         found.append(limit)
     return tuple(found)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe
+from fsw.autopilot.model.airframe import AIRFRAME
 
 Array = NDArray[np.float64]
 BOTH_ELBOWS = (1, -1)  # sign of theta_2
@@ -39,12 +39,10 @@ class Inscribed:
 class InverseWorkspace:
     """The set of base positions of one arm, which may use these ``elbows``, signs of theta_2."""
 
-    def __init__(
-        self, airframe: Airframe = AIRFRAME, elbows: tuple[int, ...] = BOTH_ELBOWS
-    ) -> None:
+    def __init__(self, elbows: tuple[int, ...] = BOTH_ELBOWS) -> None:
         # Of the paper's arm: two links in a plane, with limits of the first and of both together.
-        self._links = airframe.bodies.offset[5], airframe.bodies.tip[2]  # m
-        self._limits = airframe.angle_limits.high[0], airframe.angle_limits.high[1]  # rad
+        self._links = AIRFRAME.bodies.offset[5], AIRFRAME.bodies.tip[2]  # m
+        self._limits = AIRFRAME.angle_limits.high[0], AIRFRAME.angle_limits.high[1]  # rad
         self._elbows = elbows
         self.boundary = self._outline()  # (n, 2) m
         self._nearest = cKDTree(self.boundary)

@@ -32,6 +32,7 @@ from sitl.scenario import (
 from sitl.scenario_file import load_scenario, scenario_names
 from sitl.sensors.keys import MeasuredSensors
 from studies.campaign.campaign import Campaign
+from studies.campaign.keys import later
 from studies.flight.job import Job, Outcome
 from studies.flight.sensor_faults import Fault, FaultKind
 from studies.paper import summary
@@ -80,30 +81,7 @@ def _vehicle(scale: VehicleScale) -> Change:
 
 def _late(latency_ms: float) -> Change:
     """Every sensor late; of exact states the flight software does not know when they were."""
-
-    def change(flown: Scenario) -> Scenario:
-        if isinstance(flown.sensors, MeasuredSensors):
-            return replace(flown, sensors=_all_later(flown.sensors, latency_ms))
-        sensors = Sensors(
-            ImuErrors(latency_ms=latency_ms),
-            PoseErrors(latency_ms=latency_ms),
-            EncoderErrors(latency_ms=latency_ms),
-        )
-        return replace(flown, sensors=sensors)
-
-    return change
-
-
-def _all_later(suite: MeasuredSensors, latency_ms: float) -> MeasuredSensors:
-    """The suite ``mocap`` with ``latency_ms`` more in each sensor, and true time stamps."""
-    imu, encoders, pose = suite.imu, suite.encoders, suite.motion_capture
-    assert pose is not None
-    return replace(
-        suite,
-        imu=replace(imu, latency_ms=imu.latency_ms + latency_ms),
-        encoders=replace(encoders, latency_ms=encoders.latency_ms + latency_ms),
-        motion_capture=replace(pose, latency_ms=pose.latency_ms + latency_ms),
-    )
+    return lambda flown: later(flown, latency_ms)
 
 
 def _pose_latency(latency_ms: float) -> Change:

@@ -143,7 +143,7 @@ def test_a_mission_presses_where_it_may_and_says_where_it_may_not() -> None:
     forces = []
     while flight.mode is Mode.MISSION:
         flight.step()
-        forces.append(-flight.sim.tip_force[0])
+        forces.append(-flight.sim.touch.force()[0])
     assert flight.mode is Mode.HOLD
     assert flight.snapshot.mission.state is MissionState.COMPLETE
     (use,) = flight.sim.touch.uses().values()

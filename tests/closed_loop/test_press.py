@@ -43,7 +43,7 @@ def flown(scenario: Scenario, seed: int, seconds: float) -> tuple[Flight, np.nda
     while flight.sim.step * 0.002 < seconds:
         flight.step()
         k = flight.state.record.pressing
-        force = -flight.sim.tip_force[0]
+        force = -flight.sim.touch.force()[0]
         seen.append((force, k.pressed, k.unsure, k.asked))
     return flight, np.array(seen)
 

@@ -79,7 +79,7 @@ def test_the_tip_may_touch_and_what_it_feels_is_in_the_truth() -> None:
         largest = max(largest, normal)
         gap = float(np.linalg.norm(np.subtract(truth.p_WE, KNOB.centre_m))) - RADIUS - 0.025
         assert (normal > 0.0) == (gap < 0.0)
-        assert simulation.tip_force[2] <= 0.0
+        assert simulation.touch.force()[2] <= 0.0
     assert simulation.ended is None
     use = simulation.result().touches["knob"]
     assert largest > 0.5
@@ -319,11 +319,11 @@ def test_a_force_sensor_says_what_acts_on_the_tool_in_the_axes_of_its_link() -> 
         q = configuration(np.array(truth.p_WB), np.array(truth.q_WB), np.array(truth.q_arm))
         pin.forwardKinematics(model, data, q)
         place = pin.updateFramePlacement(model, data, link)
-        np.testing.assert_allclose(place.rotation @ said.force, simulation.tip_force, atol=1e-9)
+        np.testing.assert_allclose(place.rotation @ said.force, simulation.touch.force(), atol=1e-9)
         # The force acts where the ball touches the knob.
         away = np.array(KNOB.centre_m) - place.translation
         away *= 1.0 - RADIUS / np.linalg.norm(away)
-        torque = np.cross(away, simulation.tip_force)
+        torque = np.cross(away, simulation.touch.force())
         np.testing.assert_allclose(place.rotation @ said.torque, torque, atol=1e-9)
         pressed += simulation.touch.normal() > 0.0
         simulation.advance(controls)

@@ -22,7 +22,7 @@ SCENE = Scene(
     failures="battery low",
     battery=Battery(15.2, 0.4),
     solver=Solver("infeasible", 0.12, 0.1, 9, 0.0, 3, 2),
-    timing=(Timing("inner", 0.002, 1e-4, 5e-4, 1e-4, 1, 2),),
+    timing=(Timing("inner", 0.002, 5e-4, 1, 2),),
 )
 
 

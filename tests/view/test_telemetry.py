@@ -111,7 +111,6 @@ def test_the_scene_is_the_snapshot_that_was_sent() -> None:
     assert scene.thrust[3] > scene.thrust[1]
     assert len(scene.thrust) == AIRFRAME.rotors
     assert scene.target == pytest.approx((1.6, 2.6, -2.6))
-    assert scene.base_target == pytest.approx((1.1, 2.1, -3.1))
     assert scene.minimum == pytest.approx(0.2)
     assert [one.margin for one in scene.margins] == pytest.approx([0.3, 0.2, 0.4])
     assert scene.safety == (3, 5, 7, 4)
