@@ -121,23 +121,16 @@ def again(row: CampaignRow, where: Path) -> str:
 def _figures(result: CampaignResult) -> list[str]:
     flown = [row for row in result.rows if not row.error]
     return [
-        _figure(_distributions(flown, result), "Minimum margin [mm] and tracking error TE [mm]"),
+        _figure(_distributions(result), "Minimum margin [mm] and tracking error TE [mm]"),
         *_maps(flown, result),
     ]
 
 
-def _of_cases(rows: Sequence[CampaignRow], result: CampaignResult) -> dict[str, list[CampaignRow]]:
-    found: dict[str, list[CampaignRow]] = {str(case): [] for case in result.plan.cases}
-    names = [str(case) for case in result.plan.cases]
-    for row in rows:
-        found[names[row.flight % len(names)]].append(row)
-    return {name: of for name, of in found.items() if of}
-
-
-def _distributions(rows: Sequence[CampaignRow], result: CampaignResult) -> str:
-    cases = dict(list(_of_cases(rows, result).items())[:_MAX_CASES])
+def _distributions(result: CampaignResult) -> str:
+    flown = ((name, [row for row in of if not row.error]) for name, of in result.by_case.items())
+    cases = [(name, of) for name, of in flown if of][:_MAX_CASES]
     drawn = sheet(max(len(cases), 1), 2, 11.0, max(1.6 * len(cases), 1.6))
-    for (left, right), (name, of) in zip(drawn.axes, cases.items(), strict=False):
+    for (left, right), (name, of) in zip(drawn.axes, cases, strict=False):
         margins = drawable(1e3 * row.margin_m for row in of if row.margin_m is not None)
         errors = drawable(1e3 * row.te_m for row in of if row.te_m is not None)
         left.hist(margins, bins=40, color=BASE)

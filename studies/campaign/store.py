@@ -78,6 +78,16 @@ class CampaignResult:
         """Whether every flight has a row."""
         return len(self.rows) == self.asked
 
+    @property
+    def by_case(self) -> dict[str, tuple[CampaignRow, ...]]:
+        """The rows of each configuration that has some."""
+        count = len(self.plan.cases)
+        found = {
+            str(case): tuple(row for row in self.rows if row.flight % count == k)
+            for k, case in enumerate(self.plan.cases)
+        }
+        return {name: rows for name, rows in found.items() if rows}
+
 
 def read(directory: Path) -> CampaignResult:
     """A campaign from its directory, whole or interrupted.

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from sitl.scenario import Scenario
 from studies.campaign.campaign import Campaign
 from studies.drawing import BOUND, sheet
 from studies.flight.job import Outcome
@@ -20,7 +19,6 @@ from studies.paper.cases import (
     CASES,
     Case,
     configuration,
-    scenario,
     softened,
     tightened,
     with_horizon,
@@ -54,7 +52,9 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Fly every setting, calm and disturbed."""
     settings = replace(settings, duration_s=settings.duration_s or _DURATION_S)
     points = [point for case in CASES for point in _points(case, settings)]
-    flown = {(case, air): _flown(case, settings, air) for case in CASES for air in (False, True)}
+    flown = {
+        (case, air): settings.flown(case, disturbed=air) for case in CASES for air in (False, True)
+    }
     cells = [(flown[point.case, air], point.config) for point in points for air in (False, True)]
     summaries, errors = fly_cells(campaign, settings, cells)
     found = list(zip(points, summaries[::2], summaries[1::2], strict=True))
@@ -82,11 +82,6 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
 
 
 _Found = list[tuple[_Point, Summary, Summary]]
-
-
-def _flown(case: Case, settings: Settings, disturbed: bool) -> Scenario:
-    duration_s, family = settings.duration_s, settings.family
-    return scenario(case, disturbed=disturbed, duration_s=duration_s, family=family)
 
 
 def _points(case: Case, settings: Settings) -> Iterator[_Point]:
@@ -120,7 +115,7 @@ def _points(case: Case, settings: Settings) -> Iterator[_Point]:
 
 def _radius_mm(settings: Settings) -> float:
     """Of the sphere of Case II: to keep more than that from its surface is to be nowhere."""
-    workspace = _flown("II", settings, False).workspace
+    workspace = settings.flown("II", disturbed=False).workspace
     assert workspace is not None
     return 1e3 * workspace.radius_m
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fsw.autopilot.control.cascade import Inner
+from sitl.scenario import Scenario
 from studies.flight.job import PlantName
-from studies.paper.cases import REPORTING_FROM, TUNING_SEEDS, Family
+from studies.paper.cases import REPORTING_FROM, TUNING_SEEDS, Case, Family, scenario
 
 
 class NoCellError(ValueError):
@@ -29,6 +30,10 @@ class Settings:
     # module:Name of the user's, flown as one more controller of Table IV; empty: none.
     own_planner: str = ""
     own_controller: str = ""
+
+    def flown(self, case: Case, *, disturbed: bool) -> Scenario:
+        """A case of the paper in the family of scenarios, for as long as is asked for."""
+        return scenario(case, disturbed=disturbed, duration_s=self.duration_s, family=self.family)
 
     @property
     def tuned_on(self) -> tuple[int, ...]:

@@ -17,7 +17,6 @@ from studies.paper.cases import (
     entrants,
     own_entrant,
     reference_floor_m,
-    scenario,
 )
 from studies.paper.deviations import deviations
 from studies.paper.settings import Report, Settings, Table
@@ -43,12 +42,7 @@ class _Entry:
 def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
     """Fly the table."""
     entries = [
-        _Entry(
-            case,
-            disturbed,
-            entrant,
-            _flown(case, settings, disturbed=disturbed),
-        )
+        _Entry(case, disturbed, entrant, settings.flown(case, disturbed=disturbed))
         for disturbed in (False, True)
         for case in CASES
         for entrant in (
@@ -77,11 +71,6 @@ def run(settings: Settings, campaign: Campaign[Outcome]) -> Report:
 
 def _of(family: Family) -> tuple[str, ...]:
     return () if family == "walls" else (family,)
-
-
-def _flown(case: Case, settings: Settings, *, disturbed: bool) -> Scenario:
-    duration_s, family = settings.duration_s, settings.family
-    return scenario(case, disturbed=disturbed, duration_s=duration_s, family=family)
 
 
 def _row(settings: Settings, entry: _Entry, row: Summary) -> dict[str, Any]:
@@ -113,7 +102,7 @@ def _table(pairs: list[tuple[_Entry, Summary]], comparison: str, disturbed: bool
 
 
 def _floors(settings: Settings) -> Table:
-    floors = [(case, reference_floor_m(_flown(case, settings, disturbed=False))) for case in CASES]
+    floors = [(case, reference_floor_m(settings.flown(case, disturbed=False))) for case in CASES]
     return Table(
         "Minimum TE of any safe controller: RMS distance of the reference from the safe set",
         ("case", "TE m"),

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
 from cmaes import CMA
-from scipy.special import bdtrc, stdtrit
+from scipy.special import bdtrc
 
 from command_line.ranges import Range
 from command_line.toml_tables import nearest
@@ -30,13 +30,14 @@ from studies.campaign.keys import PARAMETERS, CampaignError, Flown
 from studies.campaign.plan import OURS, CampaignPlan, OwnNames, load_tables
 from studies.campaign.randomness import seeded, spread
 from studies.statistics.binomial import bounds, flights_for
+from studies.statistics.comparison import mean_interval
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 Report: TypeAlias = Callable[[int, float], None]  # candidates so far, least cost
 
 EXAMPLE: Final = Path(__file__).parent / "tune_example.toml"
 TABLE: Final = "tune"
-COSTS: Final = ("te_m", "te_max_m", "cs_mean", "ce_mean")
+_WEIGHT: Final = Range(0.0, 1e9)
 _FIRST_STEP: Final = 0.25  # of half a range
 _MIN_PAIRS: Final = 10
 _REFUSED: Final = (2.0,)  # rank of values that the flight software does not take
@@ -44,9 +45,20 @@ _NOTHING: Final = "nothing better than today's values was found: "
 
 
 @dataclass(frozen=True, slots=True)
-class _Keys:
-    """The numbers of the table ``tune``."""
+class _Cost:
+    """Weights of fields of a row."""
 
+    te_m: Annotated[float, _WEIGHT] = 0.0
+    te_max_m: Annotated[float, _WEIGHT] = 0.0
+    cs_mean: Annotated[float, _WEIGHT] = 0.0
+    ce_mean: Annotated[float, _WEIGHT] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Keys:
+    """The table ``tune``, but for the parameters."""
+
+    cost: _Cost = _Cost(te_m=1.0)
     candidates: Annotated[float, Range(2.0, 1e6, step=1.0)] = 60.0
     judge_flights: Annotated[float, Range(float(_MIN_PAIRS), 1e6, step=1.0)] = 60.0
     margin_m: Annotated[float, Range(-1.0, 10.0)] = 0.0
@@ -190,12 +202,15 @@ def _task(plan: CampaignPlan, table: Any) -> Task:
     if not isinstance(table, dict):
         raise CampaignError(f"missing table [{TABLE}]; `pandion tune --example` prints a file")
     own = dict(table)
-    cost, parameters = own.pop("cost", {"te_m": 1.0}), own.pop(PARAMETERS, None)
+    parameters = own.pop(PARAMETERS, None)
     keys: _Keys = build_table(_Keys, own, TABLE)
+    cost = tuple((name, weight) for name, weight in asdict(keys.cost).items() if weight)
+    if not cost:
+        raise CampaignError(f"{TABLE}.cost: must have a weight above 0, such as te_m = 1.0")
     task = Task(
         plan=plan,
         parameters=tuple(_parameters(parameters, plan)),
-        cost=tuple(_cost(cost)),
+        cost=cost,
         candidates=int(keys.candidates),
         judge_flights=int(keys.judge_flights),
         margin_m=keys.margin_m,
@@ -248,22 +263,6 @@ def _parameters(table: Any, plan: CampaignPlan) -> Iterator[Tuned]:
                 f"{parameter.most:g}, rising"
             )
         yield Tuned(parameter, float(ends[0]), float(ends[1]))
-
-
-def _cost(table: Any) -> Iterator[tuple[str, float]]:
-    key = f"{TABLE}.cost"
-    if not isinstance(table, dict) or not table:
-        raise CampaignError(f"{key} = {table!r}: must be a table, such as {{ te_m = 1.0 }}")
-    for name, weight in table.items():
-        if name not in COSTS:
-            raise CampaignError(f'unknown key "{key}.{name}" (known here: {", ".join(COSTS)})')
-        if (
-            isinstance(weight, bool)
-            or not isinstance(weight, int | float)
-            or not 0.0 < weight < 1e9
-        ):
-            raise CampaignError(f"{key}.{name} = {weight!r}: must be a number above 0")
-        yield name, float(weight)
 
 
 def tune(
@@ -455,10 +454,7 @@ def _paired(pairs: Sequence[float], confidence: float) -> tuple[float, tuple[flo
     """Mean and Student's interval of differences; of too few, an interval that shows nothing."""
     if len(pairs) < _MIN_PAIRS:
         return math.nan, (-math.inf, math.inf)
-    mean, deviation = float(np.mean(pairs)), float(np.std(pairs, ddof=1))
-    half = float(stdtrit(len(pairs) - 1, 0.5 + 0.5 * confidence)) * deviation
-    half /= math.sqrt(len(pairs))
-    return mean, (mean - half, mean + half)
+    return mean_interval(np.array(pairs), confidence)
 
 
 def sentences(found: Outcome) -> Iterator[str]:

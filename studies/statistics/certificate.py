@@ -166,7 +166,7 @@ def verdicts(
     """Each requirement, whether it is met, at a ``confidence`` [1], and what was found."""
     assumed = _assumed(result)
     no_proof = assumed if _NO_PROOF in assumed else ""
-    cases = list(_of_cases(result))
+    cases = list(result.by_case.items())
     return [asdict(judge(one, cases, confidence, no_proof)) for one in required]
 
 
@@ -233,16 +233,8 @@ def _counted(rows: Sequence[CampaignRow]) -> dict[str, int]:
     return {name: sum(violates(row, name) for row in rows) for name in VIOLATIONS}
 
 
-def _of_cases(result: CampaignResult) -> Iterator[tuple[str, list[CampaignRow]]]:
-    count = len(result.plan.cases)
-    for k, case in enumerate(result.plan.cases):
-        rows = [row for row in result.rows if row.flight % count == k]
-        if rows:
-            yield str(case), rows
-
-
 def _configurations(result: CampaignResult, confidence: float) -> Iterator[dict[str, Any]]:
-    for name, rows in _of_cases(result):
+    for name, rows in result.by_case.items():
         counted = _counted(rows)
         margins = [row.margin_m for row in rows if row.margin_m is not None]
         yield {
@@ -260,7 +252,7 @@ def _margins(
     """Of each configuration: flights of several have no one tail."""
     cases = [
         (name, rows, [row.margin_m for row in rows if row.margin_m is not None])
-        for name, rows in _of_cases(result)
+        for name, rows in result.by_case.items()
     ]
     cases.sort(key=lambda case: min(case[2], default=math.inf))
     found = []

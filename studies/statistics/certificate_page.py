@@ -214,13 +214,10 @@ def _margin_sentence(one: dict[str, Any]) -> str:
 
 
 def _histograms(stated: dict[str, Any], result: CampaignResult) -> Iterator[str]:
-    count = len(result.plan.cases)
-    names = [str(case) for case in result.plan.cases]
+    rows = result.by_case
     for one in [one for one in stated["margins"] if one["quantiles_m"]][:_MAX_DRAWN]:
         margins_mm = drawable(
-            1e3 * row.margin_m
-            for row in result.rows
-            if names[row.flight % count] == one["name"] and row.margin_m is not None
+            1e3 * row.margin_m for row in rows[one["name"]] if row.margin_m is not None
         )
         if margins_mm:
             yield _histogram(one["name"], margins_mm)

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
+from scipy.special import stdtrit
 
 from command_line.bounded_toml import TomlError, toml_table
 from studies.campaign.flight import CampaignRow
@@ -168,14 +168,18 @@ def _mean(
     """Mean of differences [m] and its interval by Student's law."""
     if not len(steps):
         return None, None
-    mean = float(steps.mean())
     if len(steps) < _FEWEST:
-        return mean, None
-    half = (
-        float(stdtrit(len(steps) - 1, 0.5 + 0.5 * confidence))
-        * float(steps.std(ddof=1))
-        / math.sqrt(len(steps))
-    )
+        return float(steps.mean()), None
+    return mean_interval(steps, confidence)
+
+
+def mean_interval(
+    values: np.ndarray[Any, Any], confidence: float
+) -> tuple[float, tuple[float, float]]:
+    """Mean of ``values`` (n,) [any unit] and Student's interval at a ``confidence`` [1]."""
+    mean, deviation = float(values.mean()), float(values.std(ddof=1))
+    half = float(stdtrit(len(values) - 1, 0.5 + 0.5 * confidence)) * deviation
+    half /= math.sqrt(len(values))
     return mean, (mean - half, mean + half)
 
 
@@ -209,18 +213,14 @@ def newcombe(
     Source: Newcombe: Interval estimation for the difference between independent proportions:
     comparison of eleven methods, Statistics in Medicine 17, 1998, method 10.
     """
-    z = float(ndtri(0.5 + 0.5 * confidence))
-    (p1, low1, high1), (p2, low2, high2) = (_wilson(*pair, z) for pair in (one, other))
+    from scipy.stats import binomtest  # here: it takes a second to load
+
+    p1, p2 = (count / total for count, total in (one, other))
+    (low1, high1), (low2, high2) = (
+        binomtest(*pair).proportion_ci(confidence, "wilson") for pair in (one, other)
+    )
     step = p2 - p1
     return (
         step - math.hypot(p2 - low2, high1 - p1),
         step + math.hypot(high2 - p2, p1 - low1),
     )
-
-
-def _wilson(count: int, total: int, z: float) -> tuple[float, float, float]:
-    share = count / total
-    middle = (share + z * z / (2 * total)) / (1.0 + z * z / total)
-    root = math.sqrt(share * (1.0 - share) / total + z * z / (4 * total**2))
-    half = z * root / (1.0 + z * z / total)
-    return share, max(middle - half, 0.0), min(middle + half, 1.0)
