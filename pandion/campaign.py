@@ -188,11 +188,9 @@ def _written(options: CampaignOptions, folder: Path, display: Display) -> int:
 
 def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
     """One flight in this process, its trace, and what flies it with both processes and a log."""
-    from fsw.storage.parameter_file import save
-    from sitl.scenario_text import write_scenario
     from studies.campaign.flight import CampaignFlight
     from studies.campaign.keys import CampaignError
-    from studies.flight.fly_again import changed_parameters, fly_command
+    from studies.flight.fly_again import keep
 
     number = options.flight or 0
     plan.check(number + 1)
@@ -200,7 +198,6 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
         flight = plan.flight(number)
     except ValueError as error:
         raise CampaignError(f"flight {number} cannot be flown: {error}") from None
-    job = flight.job
     folder = options.out or new_run_directory(Path("runs"), f"{plan.name}-flight{number}")
     folder.mkdir(parents=True, exist_ok=True)
     row, result = CampaignFlight(plan, number).flown(traced=True)
@@ -214,13 +211,11 @@ def _again(options: CampaignOptions, plan: CampaignPlan) -> int:
         traced["texts"] = result.planner.texts
         traced["trace"] = [asdict(point) for point in result.planner.trace]
     stem = folder / f"flight-{number}"
-    trace, scenario, params = (stem.with_suffix(end) for end in (".json", ".toml", ".params"))
+    trace = stem.with_suffix(".json")
     trace.write_text(json_text(traced) + "\n", encoding="utf-8")
-    comment = f"flight {number} of campaign {plan.name}: {flight.case}"
-    write_scenario(job.scenario, scenario, comment)
-    save(params, changed_parameters(job))
     say(f"trace {trace}", console)
-    command = fly_command(command_name(), job, flight.case.controller, scenario, params)
+    comment = f"flight {number} of campaign {plan.name}: {flight.case}"
+    command = keep(flight.job, flight.case.controller, stem, comment, command_name())
     say(f"with its log: {command}", console)
     kept = written("pandion campaign", (options.json, json_text(traced["row"], 1) + "\n"))
     return FLOWN if kept and not row.error else BROKEN

@@ -310,7 +310,7 @@ def _in_two_processes(
         words += [f"--sensors={sensors}"] if sensors is not None else []
         words += [f"--duration={duration_s!r}"] if duration_s is not None else []
         words += [f"--vehicle={vehicle}"] if vehicle is not None else []
-    changed, params = changed_parameters(job), None
+    changed, params = changed_parameters(job.config), None
     if changed:
         params = Path(folder.name) / "own.params"
         save(params, changed)

@@ -19,13 +19,9 @@ DISTURBED, CALM = "found.toml", "found-calm.toml"
 def main(argv: list[str]) -> int:
     """Search; returns the exit code."""
     what = "Search for a scenario that decides between controllers, judged on other seeds."
-    return run_task("search", what, argv, SearchTaskOptions, _example, _search)
-
-
-def _example() -> Path:
-    from studies.search.scenario_search import EXAMPLE
-
-    return EXAMPLE
+    return run_task(
+        "search", what, argv, SearchTaskOptions, "studies.search.scenario_search", _search
+    )
 
 
 def _search(options: SearchTaskOptions, file: Path) -> int:

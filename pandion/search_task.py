@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -40,17 +41,17 @@ def run_task(
     what: str,
     argv: list[str],
     kind: type[Options],
-    example: Callable[[], Path],
+    module: str,
     run: Callable[[Options, Path], int],
 ) -> int:
-    """Read the options of a ``verb``, of a ``kind``, and ``run`` its task or print its ``example``.
+    """Read the options of a ``verb``, of a ``kind``, and ``run`` its task or print an example.
 
-    Returns the exit code. Both import what they need when they are called.
+    Returns the exit code. The example is that of the ``module``, which is loaded only then.
     """
     options = read(kind, f"pandion {verb}", what, argv)
 
     if options.example:
-        print(example().read_text(encoding="utf-8"), end="")
+        print(import_module(module).EXAMPLE.read_text(encoding="utf-8"), end="")
         return _PRINTED
 
     def answer() -> int:

@@ -29,13 +29,7 @@ class TuneOptions(SearchTaskOptions):
 def main(argv: list[str]) -> int:
     """Tune; returns the exit code."""
     what = "Improve parameters against a cost and a chance constraint, judged on other flights."
-    return run_task("tune", what, argv, TuneOptions, _example, _tune)
-
-
-def _example() -> Path:
-    from studies.search.tune import EXAMPLE
-
-    return EXAMPLE
+    return run_task("tune", what, argv, TuneOptions, "studies.search.tune", _tune)
 
 
 def _tune(options: TuneOptions, file: Path) -> int:
@@ -61,12 +55,10 @@ def _tune(options: TuneOptions, file: Path) -> int:
 
 def _written(found: Outcome, path: Path) -> str:
     """Write the parameters that differ from the defaults; the sentence that says where."""
-    from fsw.autopilot.parameters.registry import BY_NAME
     from fsw.storage.parameter_file import save
+    from studies.flight.fly_again import changed_parameters
 
     assert found.best is not None
-    config = found.task.with_values(found.best.values).bases[0].config
-    values = {name: one.read(config) for name, one in BY_NAME.items()}
-    save(path, {name: x for name, x in values.items() if x != BY_NAME[name].default})
+    save(path, changed_parameters(found.task.with_values(found.best.values).bases[0].config))
     scenario = found.task.plan.cases[0].scenario
     return f"parameters {path}; pandion fly {scenario} --params={path}"

@@ -75,12 +75,12 @@ def applied(flown: Flown, values: Iterable[tuple[str, float]]) -> Flown:
             numbers.append((parameter.path, parameter.scale * value))
         elif first == FAULT:
             if scenario.faults:
-                last = _with(scenario.faults[-1], rest.split("."), value)
+                last = with_number(scenario.faults[-1], rest.split("."), value)
                 scenario = replace(scenario, faults=(*scenario.faults[:-1], last))
         elif key in _CHANGES:
             scenario = _CHANGES[key](scenario, value, direction)
         else:
-            scenario = _with(scenario, key.split("."), value)
+            scenario = with_number(scenario, key.split("."), value)
     return Flown(scenario, tuned(config, tuple(numbers)))
 
 
@@ -164,12 +164,12 @@ def _range_at(value: Any, path: list[str], key: str) -> Range:
     return allowed
 
 
-def _with(value: Any, path: list[str], number: float) -> Any:
-    """A tree of frozen dataclasses and tuples with another number at a path."""
+def with_number(value: Any, path: list[str], number: float) -> Any:
+    """A tree of frozen dataclasses and tuples with another ``number`` [the key's] at a path."""
     if not path:
         return number
     name, *rest = path
     if isinstance(value, tuple):
         place = int(name)
-        return (*value[:place], _with(value[place], rest, number), *value[place + 1 :])
-    return replace(value, **{name: _with(getattr(value, name), rest, number)})
+        return (*value[:place], with_number(value[place], rest, number), *value[place + 1 :])
+    return replace(value, **{name: with_number(getattr(value, name), rest, number)})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.storage.parameter_file import save
 from sitl.scenario_file import load_scenario
@@ -12,22 +13,20 @@ from sitl.scenario_text import write_scenario
 from studies.flight.job import Job, Outcome
 
 
-def keep(job: Job, controller: str, stem: Path, comment: str) -> str:
+def keep(job: Job, controller: str, stem: Path, comment: str, program: str = "pandion") -> str:
     """Write ``stem``.toml, and .params where parameters differ; the command that flies it."""
     scenario, params = stem.with_suffix(".toml"), stem.with_suffix(".params")
     write_scenario(job.scenario, scenario, comment)
-    changed = changed_parameters(job)
+    changed = changed_parameters(job.config)
     if changed:
         save(params, changed)
-    return fly_command("pandion", job, controller, scenario, params if changed else None)
+    return fly_command(program, job, controller, scenario, params if changed else None)
 
 
-def changed_parameters(job: Job) -> dict[str, float]:
-    """Parameters of a flight that are not the default."""
+def changed_parameters(config: FlightConfig) -> dict[str, float]:
+    """Parameters of a configuration that are not the default."""
     return {
-        name: value
-        for name, one in BY_NAME.items()
-        if (value := one.read(job.config)) != one.default
+        name: value for name, one in BY_NAME.items() if (value := one.read(config)) != one.default
     }
 
 

@@ -30,9 +30,8 @@ from sitl.scenario import (
     Wind,
 )
 from sitl.scenario_file import load_scenario, scenario_names
-from sitl.sensors.keys import MeasuredSensors
 from studies.campaign.campaign import Campaign
-from studies.campaign.keys import later
+from studies.campaign.keys import later, with_number
 from studies.flight.job import Job, Outcome
 from studies.flight.sensor_faults import Fault, FaultKind
 from studies.paper import summary
@@ -86,15 +85,8 @@ def _late(latency_ms: float) -> Change:
 
 def _pose_latency(latency_ms: float) -> Change:
     """Motion capture as late as this, with true time stamps."""
-
-    def change(flown: Scenario) -> Scenario:
-        suite = flown.sensors
-        assert isinstance(suite, MeasuredSensors)
-        assert suite.motion_capture is not None
-        pose = replace(suite.motion_capture, latency_ms=latency_ms)
-        return replace(flown, sensors=replace(suite, motion_capture=pose))
-
-    return change
+    path = ["sensors", "motion_capture", "latency_ms"]
+    return lambda flown: with_number(flown, path, latency_ms)
 
 
 def _noisy(flown: Scenario) -> Scenario:

@@ -245,7 +245,7 @@ def test_the_command_writes_parameters_only_if_they_are_better(
         ),
         ("[0.1, 1.1]", "[1.1, 0.1]", "rising"),
         ("te_m = 1.0", "te = 1.0", r"unknown key \"tune\.cost\.te\""),
-        ("te_m = 1.0", "te_m = -1.0", "must be 0 to 1e\+09"),
+        ("te_m = 1.0", "te_m = -1.0", r"must be 0 to 1e\+09"),
         ("candidates = 60", "candidats = 60", "unknown key"),
         ("[tune]", "[tuna]", "unknown key|missing table"),
         ("[tune]", 'design = "sobol"\n[tune]', 'design = "sobol": the bounds .* must be "random"'),
