@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.bounded_file import read_bounded
 from command_line.bounded_json import JsonError, json_object
-from command_line.options import group, json_file, option, read
+from command_line.options import read
 from command_line.output import console_beside, json_text, print_error, write_text
 from command_line.parser import COULD_NOT_START
 from command_line.run_directory import new_run_directory
-from command_line.values import known, number, whole
 from command_line.version import version
-from pandion.cluster_options import ClusterOptions
 from pandion.display import Display
-from pandion.own_options import OwnOptions
+from pandion.falsify_options import FalsifyOptions
 from sitl.scenario import vehicle_of
-from sitl.scenario_file import scenario_names
 
 if TYPE_CHECKING:
     from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -32,54 +28,6 @@ _FORMAT: Final = "pandion-disturbance-1"
 _MM: Final = 1e3
 _MAX_BYTES: Final = 64 * 1024 * 1024  # of a file that is read
 _STEPS_A_SECOND: Final = 500
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FalsifyOptions:
-    """One search, or one disturbance of an earlier one."""
-
-    scenario: str = option(
-        "SCENARIO", "name or path of a .toml file", known(*scenario_names()), default="walls"
-    )
-    evaluations: int = option(
-        "--evaluations N",
-        "stretches of 5 s to fly, a tenth of them with the whole stack; with --over whole flights",
-        whole(1, 1_000_000),
-        default=2000,
-    )
-    seed: int = option("--seed N", "root of the search's random numbers", whole(), default=0)
-    amplitude: float = option(
-        "--amplitude A",
-        "of the disturbance on each axis, in m/s^2",
-        number(0.001, 50.0, "m/s^2"),
-        default=0.8,
-    )
-    over: Path | None = option(
-        "--over FILE.toml",
-        "search for the smallest margin over what a campaign file varies, in whole flights and not "
-        "along a recorded plan",
-        Path,
-    )
-    keep: int = option("--keep N", "with --over: how many finds to keep", whole(1, 1000), default=5)
-    generation: int = option(
-        "--generation N",
-        "with --over: flights of a generation, at least; as many can be flown at once, and the "
-        "result depends on it (default by the numbers searched: 7 of three, 19 of two hundred)",
-        whole(1, 100_000),
-        default=1,
-    )
-    params: Path | None = option(
-        "--params FILE", "parameters that differ from the defaults, without --over", Path
-    )
-    cluster: ClusterOptions = group(ClusterOptions)
-    own: OwnOptions = group(OwnOptions)
-    replay: Path | None = option(
-        "--replay FILE", "fly a worst.json of an earlier search with planner and referee", Path
-    )
-    json: str | None = json_file("the result")
-    out: Path | None = option(
-        "--out DIR", "where what was found goes (default a new directory in runs/)", Path
-    )
 
 
 class UnusableError(ValueError):

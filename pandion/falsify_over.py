@@ -11,7 +11,7 @@ from pandion.campaign_run import begin, exit_code
 from pandion.display import Display
 
 if TYPE_CHECKING:
-    from pandion.falsify import FalsifyOptions
+    from pandion.falsify_options import FalsifyOptions
     from studies.search.worst_flights import Find, Searched
 
 HOLDS, BROKEN = 0, 1  # exit codes

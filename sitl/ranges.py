@@ -18,7 +18,7 @@ UNIT: Final = 1e-6  # [1] by which it is off 1 without any rounding
 
 
 def normal_problem(normal: V3) -> str | None:
-    """Key, value and what is allowed, where a ``normal`` is no unit vector [1]."""
+    """Key, value and what is allowed, where a ``normal`` [1, NED] is no unit vector."""
     length = math.hypot(*normal)
     if abs(length - 1.0) <= UNIT:
         return None

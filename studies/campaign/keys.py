@@ -94,7 +94,7 @@ def rounded(key: str, value: float, allowed: Range) -> float:
     return min(max(round(value / allowed.step) * allowed.step, allowed.low), allowed.high)
 
 
-def later(scenario: Scenario, latency_ms: float, _: float = 0.0) -> Scenario:
+def later(scenario: Scenario, latency_ms: float) -> Scenario:
     """Every sensor ``latency_ms`` [ms] later; a suite's own latencies come on top."""
     sensors = scenario.sensors
     changed: dict[str, Any] = {}
@@ -120,7 +120,7 @@ def _windy(scenario: Scenario, wind_m_s: float, direction_deg: float) -> Scenari
 
 
 _CHANGES: Final[dict[str, Callable[[Scenario, float, float], Scenario]]] = {
-    LATENCY: later,
+    LATENCY: lambda scenario, latency_ms, _: later(scenario, latency_ms),
     PUSH: _pushed,
     AIR: _windy,
 }

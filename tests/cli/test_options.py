@@ -31,7 +31,7 @@ from pandion import __main__ as pandion_main
 from pandion.certify import CertifyOptions
 from pandion.dialect import DialectOptions
 from pandion.export import ExportOptions
-from pandion.falsify import FalsifyOptions
+from pandion.falsify_options import FalsifyOptions
 from pandion.fly_verb import FlyOptions
 from pandion.replay import ReplayOptions
 from pandion.report import ReportOptions
