@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import OneOf, option, read
-from command_line.output import print_error, say, without
+from command_line.output import print_error, say
 from command_line.parser import COULD_NOT_START
 from pandion.display import Display
 
@@ -64,9 +64,6 @@ def main(argv: list[str]) -> int:
             raise UlogError(f"{path} holds no record")
     except (UlogError, ValueError, OSError) as error:
         print_error("pandion export", error)
-        return COULD_NOT_START
-    except ModuleNotFoundError as error:
-        print_error("pandion export", f"--mcap: {without(error, 'mcap')}")
         return COULD_NOT_START
     say(f"{count} records of {path} in {options.csv or options.mcap}{_left_out(log)}")
     return DONE

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from command_line.options import option, read
-from command_line.output import print_error, say, without
+from command_line.output import print_error, say
 from command_line.parser import COULD_NOT_START
 from pandion.result import FlightReports, as_json, table_rows
 
@@ -39,9 +39,6 @@ def main(argv: list[str]) -> int:
         written = write_report(options.logs, options.html)
     except (UlogError, ValueError, OSError) as error:
         print_error("pandion report", error)
-        return COULD_NOT_START
-    except ModuleNotFoundError as error:
-        print_error("pandion report", without(error, "report"))
         return COULD_NOT_START
     say(f"{written}, {1e-6 * written.stat().st_size:.1f} MB")
     return WRITTEN

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from command_line.options import option, read
-from command_line.output import print_error, without
+from command_line.output import print_error
 from command_line.parser import COULD_NOT_START
 from messages.addresses import LinkError, parse_link_address
 from vehicles.vehicle_file import VehicleError, load_vehicle
@@ -38,24 +38,16 @@ def main(argv: list[str]) -> int:
     options = read(TopOptions, "pandion top", what, argv)
     try:
         vehicle, flown = parse_link_address(options.vehicle), load_vehicle(options.airframe)
+        if not sys.stdout.isatty():
+            print_error("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
+            return COULD_NOT_START
+        from fsw.autopilot.model.airframe import airframe_of
         from view.top.app import TopApp
         from view.top.peer import TelemetryPeer
+
+        app = TopApp(TelemetryPeer(vehicle), airframe_of(flown))
     except (LinkError, VehicleError) as error:
         print_error("pandion top", error)
         return COULD_NOT_START
-    except ModuleNotFoundError as error:
-        print_error("pandion top", without(error, "top"))
-        return COULD_NOT_START
-    if not sys.stdout.isatty():
-        print_error("pandion top", "needs a terminal; over SSH: ssh -t HOST pandion top")
-        return COULD_NOT_START
-    try:
-        peer = TelemetryPeer(vehicle)
-    except LinkError as error:
-        print_error("pandion top", error)
-        return COULD_NOT_START
-    from fsw.autopilot.model.airframe import airframe_of
-
-    app = TopApp(peer, airframe_of(flown))
     app.run()
     return app.return_code or LEFT  # 1 after an exception, which it has printed and does not raise

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from command_line.options import option, read, switch
-from command_line.output import print_error, say, without
+from command_line.output import print_error, say
 from command_line.parser import COULD_NOT_START
 from command_line.values import whole
 from pandion.view_beside import PORT
@@ -54,11 +54,7 @@ def main(argv: list[str]) -> int:
     """Show until interrupted; returns the exit code."""
     what = "Show a flight in the browser: a log, or without one a running vehicle."
     options = read(ViewOptions, "pandion view", what, argv)
-    try:
-        return _show_live(options) if options.log is None else _show_log(options, options.log)
-    except ModuleNotFoundError as error:
-        print_error("pandion view", without(error, "view"))
-        return COULD_NOT_START
+    return _show_live(options) if options.log is None else _show_log(options, options.log)
 
 
 def _show_log(options: ViewOptions, log: Path) -> int:
