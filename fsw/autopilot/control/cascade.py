@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
 from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
-from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
 from fsw.autopilot.control.expectation import tell_filter
 from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.joint_reference import refer
@@ -24,7 +23,7 @@ from fsw.autopilot.control.joints import (
     torques_of_failed,
 )
 from fsw.autopilot.control.payload import let_go, weigh_payload
-from fsw.autopilot.control.pid import height_pid
+from fsw.autopilot.control.pid import attitude_pid, attitude_reference, height_pid
 from fsw.autopilot.control.press import look_for_surface, weigh_tool
 from fsw.autopilot.control.safety_filter import (
     FilterLaw,

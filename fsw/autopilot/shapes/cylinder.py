@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.shapes.frame import CENTRE_BALL
-from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface, place_moved
+from fsw.autopilot.shapes.kind import CENTRE_BALL, Numbers, ShapeKind, Surface, place_moved
 from fsw.autopilot.signals import Shape, Vec3, Zone
 from fsw.compiled import kernel
 

@@ -13,6 +13,7 @@ from fsw.autopilot.signals import MAX_DISTANCE, Shape, Vec3, Zone
 
 NUMBERS = 16  # most numbers that describe a shape
 ENDLESS = 1e4  # m; what has no end ends here
+CENTRE_BALL = 0.002  # m; closer to a centre than this a direction is noise and any does
 
 
 class Surface(NamedTuple):
