@@ -44,7 +44,7 @@ class InverseWorkspace:
     ) -> None:
         # Of the paper's arm: two links in a plane, with limits of the first and of both together.
         self._links = airframe.bodies.offset[5], airframe.bodies.tip[2]  # m
-        self._limits = airframe.angle_limits.high[0], airframe.angle_limits.high[1]  # rad
+        self._limits = tuple(limit.high for limit in airframe.angle_limits)  # rad
         self._elbows = elbows
         self.boundary = self._outline()  # (n, 2) m
         self._nearest = cKDTree(self.boundary)
