@@ -58,12 +58,8 @@ def _tube(px4: Px4Tuning, hanging: float, hold_s: float, dt: float) -> Tube:
     return Tube(
         base=_sum(base),
         end_effector=_sum(end_effector),
-        base_wind=0.0,
-        wind=0.0,
-        wind_beyond=0.0,
         known=_sum(base),
         height=_sum(climbs[:, 0]),
-        end_effector_wind=0.0,
         base_expected=RARE * random_steps(base, per_hold),
         end_effector_expected=RARE * random_steps(end_effector, per_hold),
         acceleration=_sum(states[:, 2]),
@@ -73,7 +69,6 @@ def _tube(px4: Px4Tuning, hanging: float, hold_s: float, dt: float) -> Tube:
         present_jerk=_sum(states[:, 3]),
         snap=_sum(states[:, 4]),
         vertical_acceleration=_sum(climbs[:, 2]),
-        vertical_disturbance=0.0,
     )
 
 

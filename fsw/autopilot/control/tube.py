@@ -78,18 +78,18 @@ class TubeAround(NamedTuple):
 NO_TUBE: Final = TubeAround(math.inf, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tube:
-    """Reach of a disturbance of 1 m/s^2 on one horizontal axis."""
+    """Reach of a disturbance of 1 m/s^2 on one horizontal axis; of PX4's loops without wind."""
 
     base: float  # m, worst case, body origin
     end_effector: float  # m, worst case, a hanging end-effector across the arm's plane
-    base_wind: float  # m, what the memory of wind can add to it, at its limit
-    wind: float  # m per m/s^2 of that memory
-    wind_beyond: float  # m of ``base_wind`` by which clearances grow while the memory is in force
+    base_wind: float = 0.0  # m, what the memory of wind can add to it, at its limit
+    wind: float = 0.0  # m per m/s^2 of that memory
+    wind_beyond: float = 0.0  # m of it, by which clearances grow while the memory is in force
     known: float  # m per m/s^2 of a force on the tool, as it comes and goes
     height: float  # m, worst case, vertically
-    end_effector_wind: float  # m, of what is covered
+    end_effector_wind: float = 0.0  # m, of what is covered
     base_expected: float  # m, 3.7 sigma under random steps
     end_effector_expected: float  # m
     # The most that each quantity can be, worst case:
@@ -100,30 +100,25 @@ class Tube:
     present_jerk: float  # m/s^3
     snap: float  # m/s^4, wanted
     vertical_acceleration: float  # m/s^2, of the thrust
-    vertical_disturbance: float  # m/s^2, observed
+    vertical_disturbance: float = 0.0  # m/s^2, observed
 
 
 @lru_cache(maxsize=8)  # 4 ms; most changes of a tuning do not touch it
 def tube(
-    airframe: Airframe,
-    tuning: TrackingTuning,
-    gains: TrackingGains,
-    hanging: float,
-    hold_s: float,
-    dt: float,
+    airframe: Airframe, tuning: TrackingTuning, hanging: float, hold_s: float, dt: float
 ) -> Tube:
     """The tube of the tracking loop with a tick of ``dt`` [s].
 
     The end-effector is ``hanging`` [m] below the base; a random disturbance keeps its value for
     ``hold_s``.
     """
-    below = hanging / GRAVITY
-    states = impulse_responses(airframe, tuning, gains, dt, wind=False)
+    below, gains = hanging / GRAVITY, tracking_gains(tuning, airframe.rotor_lag, dt)
+    states = impulse_responses(airframe, tuning, dt, wind=False)
     base, acceleration = states[:, 0], states[:, 2]
     k3, k4 = gains.k[2], gains.k[3]
     wanted = states @ _wanted_acceleration(gains)
     end_effector = base - below * acceleration
-    in_wind = impulse_responses(airframe, tuning, gains, dt, wind=True)
+    in_wind = impulse_responses(airframe, tuning, dt, wind=True)
     base_wind = in_wind[:, 0]
     end_effector_wind = base_wind - below * in_wind[:, 2]
     climbs = _vertical_responses(airframe, tuning, gains, dt)
@@ -152,16 +147,13 @@ def tube(
 
 
 @lru_cache(maxsize=4)
-def base_after(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
-) -> Array:
+def base_after(airframe: Airframe, tuning: TrackingTuning, dt: float) -> Array:
     """How far [m] any disturbance within 1 m/s^2 of one axis can have pushed the base.
 
     An entry (ticks,) for each tick of ``dt`` [s] after it began.
     """
-    reach: Array = np.cumsum(
-        np.abs(impulse_responses(airframe, tuning, gains, dt, wind=False)[:, 0])
-    )
+    off = impulse_responses(airframe, tuning, dt, wind=False)[:, 0]
+    reach: Array = np.cumsum(np.abs(off))
     return reach
 
 
@@ -184,30 +176,21 @@ class EstimateTube:
 
 
 @lru_cache(maxsize=4)
-def estimate_tube(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
-) -> EstimateTube:
+def estimate_tube(airframe: Airframe, tuning: TrackingTuning, dt: float) -> EstimateTube:
     """How far the base is moved by an estimate that is wrong, with a tick of ``dt`` [s]."""
-    a = _loop(airframe, tuning, gains)
-    k, lag = gains.k, airframe.rotor_lag
+    gains = tracking_gains(tuning, airframe.rotor_lag, dt)
+    a, k, lag = _loop(airframe, tuning, gains), gains.k, airframe.rotor_lag
     gain_v, gain_d = 2.0 * tuning.observer_bandwidth, tuning.observer_bandwidth**2
-    # Into the snap and the observer's two states; the observer alone uses the velocity.
-    enters = {
-        "position": (-k[0] / lag, 0.0, 0.0),
-        "velocity": (0.0, gain_v, gain_d),
-        "acceleration": (-k[2] / lag, 1.0, 0.0),
-        "jerk": (-k[3] / lag, 0.0, 0.0),
-    }
-    moved = {}
-    for name, entries in enters.items():
-        b = np.zeros(len(a))
-        b[4:] = entries
-        moved[name] = after_a_push(a, b, dt)[:, 0]
+
+    def moved(*enters: float) -> Array:
+        """The base, by an error that enters the snap and the observer's two states."""
+        return after_a_push(a, np.array([0.0, 0.0, 0.0, 0.0, *enters]), dt)[:, 0]
+
     return EstimateTube(
-        position=_sum(moved["position"]),
-        velocity=_sum(moved["velocity"]),
-        acceleration=_sum(moved["acceleration"]),
-        jerk=float(np.linalg.norm(moved["jerk"])),
+        position=_sum(moved(-k[0] / lag, 0.0, 0.0)),
+        velocity=_sum(moved(0.0, gain_v, gain_d)),  # the observer alone uses it
+        acceleration=_sum(moved(-k[2] / lag, 1.0, 0.0)),
+        jerk=float(np.linalg.norm(moved(-k[3] / lag, 0.0, 0.0))),
     )
 
 
@@ -247,8 +230,7 @@ def closest_tracking(
     """
     while tuning.input_weight > _MIN_WEIGHT:
         closer = replace(tuning, input_weight=max(0.5 * tuning.input_weight, _MIN_WEIGHT))
-        gains = tracking_gains(closer, airframe.rotor_lag, dt)
-        loop = tube(airframe, closer, gains, hanging, hold_s, dt)
+        loop = tube(airframe, closer, hanging, hold_s, dt)
         if max(limits_used(airframe, closer, loop, disturbance).values()) > _MAX_USED:
             break
         tuning = closer
@@ -332,12 +314,13 @@ def _wanted_snap(gains: TrackingGains) -> Array:
 
 
 def impulse_responses(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float, *, wind: bool
+    airframe: Airframe, tuning: TrackingTuning, dt: float, *, wind: bool
 ) -> Array:
     """States after a unit push of one tick of ``dt`` [s]: p, v, a, j, s and the observer's v, d.
 
     A row (7,) [SI] a tick. The push is a disturbance, or a memory of wind where there is none.
     """
+    gains = tracking_gains(tuning, airframe.rotor_lag, dt)
     a = _loop(airframe, tuning, gains)
     b = np.zeros(len(a))
     if wind:
