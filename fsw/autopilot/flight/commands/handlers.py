@@ -17,7 +17,8 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
-from fsw.autopilot.model.body import hull_reach
+from fsw.autopilot.model.body import body_of, hull_reach
+from fsw.autopilot.parameters.flight_config import lowest_height
 from fsw.autopilot.shapes.zones import surface, surfaces
 from fsw.autopilot.signals import (
     Arm,
@@ -142,7 +143,7 @@ def _arm(action: Arm, context: CommandContext, modes: Modes) -> Decision:
 def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
     if not _is_armed(context):
         return Decision(ACCEPTED)
-    if context.landed or context.above_px4:
+    if context.landed or _is_above_px4(context):
         return Decision(ACCEPTED, mode=Mode.DISARMED)
     if not action.force:
         return Decision(LATER, "not disarmed: the vehicle is in the air; land first or force")
@@ -182,8 +183,8 @@ def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decisio
     if height is None or Mode.TAKEOFF not in (decision.mode, decision.intended_mode):
         return decision
     here = -context.position[2]
-    least, most = context.climb_range
-    most = min(most, context.highest - here)
+    least = context.config.limits.airborne_height
+    most = min(context.config.limits.takeoff_climb_most, context.config.steering.highest - here)
     climb = height - here
     if not least - _CLIMB_TOLERANCE <= climb <= most + _CLIMB_TOLERANCE:
         range_text = f"{here + least:.1f} to {here + most:.1f} m"
@@ -211,9 +212,9 @@ def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
     refusal = motion_refusal(motion)
     if refusal is not None or not (speed is None or 0.0 < speed < math.inf):
         return Decision(DENIED, f"no goto: {refusal or 'speed out of range'}")
-    slower = ""
-    if speed is not None and speed > context.max_speed:
-        slower = f"goto at {context.max_speed:g} m/s: faster is not flown (STR_V_MAX)"
+    slower, max_speed = "", context.config.steering.speed
+    if speed is not None and speed > max_speed:
+        slower = f"goto at {max_speed:g} m/s: faster is not flown (STR_V_MAX)"
     return replace(decision, goal=PositionGoal(motion, speed=speed), reason=slower)
 
 
@@ -225,8 +226,9 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
     blocked = _out_of_bounds(centre, context) or _circle_too_close(centre, radius, context)
     if blocked is not None:
         return Decision(DENIED, f"no orbit: {blocked}")
-    most = max_orbit_speed(radius, context.yaw_rate, context.acceleration)
-    most = min(most, context.max_speed)
+    limits = context.config.steering
+    most = max_orbit_speed(radius, limits.yaw_rate, limits.acceleration)
+    most = min(most, limits.speed)
     asked = min(context.speed, most) if action.speed is None else action.speed
     decision = _switch(Mode.ORBIT, context, modes)
     if decision.result != ACCEPTED:
@@ -255,9 +257,9 @@ def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
 
 def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) -> Decision:
     """Change the speed towards position goals; in a mission from the next segment."""
-    speed = action.speed
-    if speed is not None and not MIN_SPEED <= speed <= context.max_speed:
-        reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {context.max_speed:g} m/s"
+    speed, most = action.speed, context.config.steering.speed
+    if speed is not None and not MIN_SPEED <= speed <= most:
+        reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {most:g} m/s"
         return Decision(DENIED, f"speed unchanged: {reason}")
     return Decision(ACCEPTED, speed=action)
 
@@ -269,7 +271,7 @@ def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> D
         refusal = f"the arm is not free while {context.mode.value}; hold first"
     if refusal is not None:
         return Decision(LATER, f"joints not moved: {refusal}")
-    arm, q_arm = arm_coordinates(context.airframe), list(context.joints)
+    arm, q_arm = arm_coordinates(context.config.airframe), list(context.joints)
     for k, share in enumerate(action.shares):
         if share is None:
             continue
@@ -278,7 +280,7 @@ def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> D
             return Decision(DENIED, f"joints not moved: {refusal}")
         limit = arm.high[k] if share > 0.0 else -arm.low[k]
         q_arm[k] = share * min(limit, math.pi)
-    refusal = joints_refusal(tuple(q_arm), context.airframe)
+    refusal = joints_refusal(tuple(q_arm), context.config.airframe)
     if refusal is not None:
         return Decision(DENIED, f"joints not moved: {refusal}")
     return Decision(ACCEPTED, joints=tuple(q_arm))
@@ -290,9 +292,9 @@ def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decisio
     place = context.position if action.place is None else _place(action.place, context)
     north, east, height = *place[:2], -place[2]
     against = context.against_sender or place_problem(place)
-    if not against and not height <= context.highest:
-        most = f"the maximum is {context.highest:g} m"
-        against = f"{height:.1f} m above the origin is too high; {most}"
+    highest = context.config.steering.highest
+    if not against and not height <= highest:
+        against = f"{height:.1f} m above the origin is too high; the maximum is {highest:g} m"
     against = against or way_home.outside(context.fence, (north, east))
     if against:
         return Decision(DENIED, f"home not set by {{sender}}: {against}")
@@ -327,13 +329,13 @@ def _set_mission_step(action: SetMissionStep, context: CommandContext, modes: Mo
 
 def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes) -> Decision:
     """The simulator answers; a vehicle without one never does."""
-    if not context.failures_allowed:
+    if not context.config.limits.failure_injection:
         return Decision(DENIED, "no failure injected: SYS_FAILURE_EN is 0; set it to 1 to allow it")
     return Decision(CommandResult.IN_PROGRESS)
 
 
 def _grip(action: Grip, context: CommandContext, modes: Modes) -> Decision:
-    if context.above_px4:
+    if _is_above_px4(context):
         return Decision(DENIED, GRIPPER_OF_PX4)
     return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
 
@@ -346,7 +348,7 @@ def _terminate(context: CommandContext, modes: Modes) -> Decision:
     """Stop the rotors until the flight software is restarted."""
     if not _is_armed(context):
         return Decision(DENIED, "not terminated: the vehicle is not armed")
-    if context.above_px4:
+    if _is_above_px4(context):
         return Decision(DENIED, "not terminated: the rotors are PX4's; terminate it there")
     reason = "flight terminated by {sender}: the rotors stop"
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
@@ -428,6 +430,11 @@ def _is_armed(context: CommandContext) -> bool:
     return context.mode not in (Mode.DISARMED, Mode.FAULT)
 
 
+def _is_above_px4(context: CommandContext) -> bool:
+    """PX4 flies: what is disarmed here is given back to it."""
+    return context.config.inner == "px4"
+
+
 def _hovering_refusal(context: CommandContext) -> str | None:
     """Why the vehicle cannot accept a position goal now."""
     if not _is_armed(context):
@@ -454,7 +461,7 @@ def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
     far = place_problem(place)
     if far is not None:
         return far
-    least, most = context.airframe.leg_length + context.climb_range[0], context.highest
+    least, most = lowest_height(context.config), context.config.steering.highest
     if not -place[2] >= least:
         return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
     if not -place[2] <= most:
@@ -464,21 +471,23 @@ def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
 
 def _too_close(place: Vec3, context: CommandContext) -> str | None:
     """Why the body cannot be at a place."""
+    body = body_of(context.config.planner.body, context.config.airframe)
     for number, at in enumerate(surfaces(context.safe_set, place, context.now_us), start=1):
-        if not at.distance > hull_reach(context.body, at.normal):
+        if not at.distance > hull_reach(body, at.normal):
             return f"the place is too close to zone {number} of the safe set, or beyond it"
     return None
 
 
 def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
     """Why the body cannot fly a circle."""
+    body = body_of(context.config.planner.body, context.config.airframe)
     for number in range(len(context.safe_set.zones)):
 
         def room(angle: float, number: int = number) -> float:
             x, y, z = centre
             place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
             at = surface(context.safe_set, number, place, context.now_us)
-            return 1.0 if at is None else at.distance - hull_reach(context.body, at.normal)
+            return 1.0 if at is None else at.distance - hull_reach(body, at.normal)
 
         # The nearest of some places on the circle, then of as many between its neighbours.
         apart, best = math.pi, 0.0  # rad
