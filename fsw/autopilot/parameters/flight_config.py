@@ -52,9 +52,8 @@ class FlightLimits:
     fence_clearance: float = 0.1  # m, kept from the walls of an uploaded fence
     station_timeout_us: int = 10_000_000  # without a ground station its loss is acted upon
     station_loss_action: int = 2  # how: 0 not at all, 1 hold, 2 return, 3 land, 5 terminate
-    station_loss_exceptions: int = (
-        0  # where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory
-    )
+    # Where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory.
+    station_loss_exceptions: int = 0
     radio_input: int = 1  # 1 or 4: no radio; kept for programs that set it as PX4 wants it
     radio_loss_exceptions: int = 0  # the same: modes as above in which no radio is missed
     failsafe_delay_us: int = 5_000_000  # in hold, before the vehicle returns or lands

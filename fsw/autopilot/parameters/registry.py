@@ -116,25 +116,13 @@ def _pid(name: str, path: str, unit: str, most: _Pid, what: str, least: _Pid = _
 
 def _barrier(name: str, path: str, what: str) -> list[Row]:
     return [
-        (
-            f"{name}_ALPHA",
-            f"{path}.alpha",
-            "m/s^2",
-            0.1,
-            10.0,
-            f"{what}: assumed braking deceleration",
-        ),
+        (f"{name}_ALPHA", f"{path}.alpha", "m/s^2", 0.1, 10.0,
+         f"{what}: assumed braking deceleration"),
         (f"{name}_K_S", f"{path}.slope", "1/s", 0.5, 10.0, f"{what}: slope k_S at the boundary"),
         (f"{name}_GAMMA", f"{path}.gamma", "1/s", 0.1, 10.0, f"{what}: CBF decay rate γ"),
-        (
-            f"{name}_LAMBDA",
-            f"{path}.lambda_",
-            "m/s",
-            0.01,
-            5.0,
-            f"{what}: disturbance robustness λ",
-        ),
-    ]
+        (f"{name}_LAMBDA", f"{path}.lambda_", "m/s", 0.01, 5.0,
+         f"{what}: disturbance robustness λ"),
+    ]  # fmt: skip
 
 
 def _of_sensor(name: str, row: Row) -> Row:
@@ -489,61 +477,35 @@ _ROWS: Final[dict[str, list[Row]]] = {
 
 def _exceptions(bits: int) -> str:
     """Modes of COM_DLL_EXCEPT, as a choice."""
-    modes = [
-        mode
-        for k, mode in enumerate(("Mission", "Hold", "Offboard", "Trajectory"))
-        if bits >> k & 1
-    ]
-    return " and ".join(modes) or "None"
+    modes = enumerate(("Mission", "Hold", "Offboard", "Trajectory"))
+    return " and ".join(mode for k, mode in modes if bits >> k & 1) or "None"
 
 
 _CHOICES: Final[dict[str, Choices]] = {
     "PLN_BODY": ((0, "Base, joint 2 and end-effector as points"), (1, "Full body")),
-    "LOG_PROFILE": (
-        (0, "Sensors and actuators every tick, the rest at 50 Hz"),
-        (1, "Everything every tick"),
-    ),
+    "LOG_PROFILE": ((0, "Sensors and actuators every tick, the rest at 50 Hz"),
+                    (1, "Everything every tick")),
     "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold"), (6, _ENDS)),
     "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, _ENDS)),
     "COM_RC_IN_MODE": ((1, "Joystick only"), (4, "Disabled")),
     "COM_DLL_EXCEPT": tuple((bits, _exceptions(bits)) for bits in range(16)),
     "COM_FLTT_LOW_ACT": ((0, "None"), (1, "Warning"), (3, "Return")),
-    "COM_ACT_FAIL_ACT": (
-        (0, "Warning"),
-        (1, "Hold"),
-        (2, "Land"),
-        (3, "Return"),
-        (4, _ENDS),
-    ),
+    "COM_ACT_FAIL_ACT": ((0, "Warning"), (1, "Hold"), (2, "Land"), (3, "Return"), (4, _ENDS)),
     "FD_ACT_EN": ((0, "Disabled"), (1, "Enabled")),
     "CA_FAILURE_MODE": ((0, "Ignored"), (1, "Allocation reweighted by its effectiveness")),
     "CBRK_FLIGHTTERM": ((0, "Termination enabled"), (121212, "Termination disabled")),
     "COM_ARM_SDCARD": ((0, "Allowed"), (1, "Allowed, with a warning"), (2, "Denied")),
-    "GF_ACTION": (
-        (0, "None"),
-        (1, "Warning"),
-        (2, "Hold"),
-        (3, "Return"),
-        (4, _ENDS),
-        (5, "Land"),
-        (6, "Retreat along the normal, then hold"),
-    ),
+    "GF_ACTION": ((0, "None"), (1, "Warning"), (2, "Hold"), (3, "Return"), (4, _ENDS), (5, "Land"),
+                  (6, "Retreat along the normal, then hold")),
     "SAFE_FILTER": ((0, "Disabled"), (1, "Enabled")),
-    "SAFE_BREACH_ACT": (
-        (1, "Warning"),
-        (2, "Hold"),
-        (5, "Land"),
-        (6, "Retreat along the normal, then hold"),
-    ),
+    "SAFE_BREACH_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land"),
+                        (6, "Retreat along the normal, then hold")),
     "SYS_FAILURE_EN": ((0, "Refused"), (1, "Passed on to the simulator")),
     "COM_POS_LOW_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
     "COM_SENS_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
-    "COM_LOW_BAT_ACT": (
-        (0, "Warning"),
-        (2, "Land when critical"),
-        (3, "Return when critical, land at emergency"),
-    ),
-}
+    "COM_LOW_BAT_ACT": ((0, "Warning"), (2, "Land when critical"),
+                        (3, "Return when critical, land at emergency")),
+}  # fmt: skip
 
 # PX4 has these as INT32 although they are no counts: whole seconds and degrees.
 _WHOLE: Final = frozenset(("COM_DL_LOSS_T", "FD_FAIL_P", "FD_FAIL_R", "RTL_TIME_MARGIN"))

@@ -101,8 +101,9 @@ Modes = Mapping[Mode, FlightMode]
 
 def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
     """Accept a command with its effects, or refuse it with a reason."""
-    handler = COMMAND_HANDLERS[type(command.action)]
-    decision: Decision = handler(command.action, context, modes)
+    action = command.action
+    handler = COMMAND_HANDLERS[action if isinstance(action, Order) else type(action)]
+    decision: Decision = handler(action, context, modes)
     if "{sender}" not in decision.reason:
         return decision
     sender = "{}/{}".format(*command.request.sender)
@@ -149,10 +150,6 @@ def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
         return Decision(LATER, "not disarmed: the vehicle is in the air; land first or force")
     reason = "disarmed in the air, by force of {sender}: the rotors stop"
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.DISARMED)
-
-
-def _switch_mode(action: SwitchMode, context: CommandContext, modes: Modes) -> Decision:
-    return _switch(action.mode, context, modes)
 
 
 def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
@@ -340,11 +337,7 @@ def _grip(action: Grip, context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
 
 
-def _order(action: Order, context: CommandContext, modes: Modes) -> Decision:
-    return _ORDERS[action](context, modes)
-
-
-def _terminate(context: CommandContext, modes: Modes) -> Decision:
+def _terminate(action: Order, context: CommandContext, modes: Modes) -> Decision:
     """Stop the rotors until the flight software is restarted."""
     if not _is_armed(context):
         return Decision(DENIED, "not terminated: the vehicle is not armed")
@@ -354,19 +347,14 @@ def _terminate(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
 
 
-def _pause_mission(context: CommandContext, modes: Modes) -> Decision:
+def _pause_mission(action: Order, context: CommandContext, modes: Modes) -> Decision:
     """Hold where the vehicle is."""
     if context.mode not in (Mode.MISSION, Mode.HOLD):
         return Decision(LATER, f"not paused: no mission is flown while {context.mode.value}")
     return _switch(Mode.HOLD, context, modes)
 
 
-def _continue_mission(context: CommandContext, modes: Modes) -> Decision:
-    """Go on with the current step."""
-    return _switch(Mode.MISSION, context, modes)
-
-
-def _check_arming(context: CommandContext, modes: Modes) -> Decision:
+def _check_arming(action: Order, context: CommandContext, modes: Modes) -> Decision:
     if _is_armed(context):
         return Decision(LATER, "no checks: the vehicle is armed")
     refusal = arming.refusal(context)
@@ -375,7 +363,7 @@ def _check_arming(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, refusal or "ready to arm")
 
 
-def _restart(context: CommandContext, modes: Modes) -> Decision:
+def _restart(action: Order, context: CommandContext, modes: Modes) -> Decision:
     """Begin anew: what had failed is well again, says the operator."""
     if _is_armed(context):
         return Decision(DENIED, "not restarted: the vehicle is armed; disarm first")
@@ -387,24 +375,11 @@ def _restart(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, RESTARTED, restart=True)
 
 
-def _nothing(context: CommandContext, modes: Modes) -> Decision:
-    return Decision(ACCEPTED)
-
-
-_ORDERS: Final[dict[Order, Callable[[CommandContext, Modes], Decision]]] = {
-    Order.TERMINATE: _terminate,
-    Order.PAUSE_MISSION: _pause_mission,
-    Order.CONTINUE_MISSION: _continue_mission,
-    Order.CHECK_ARMING: _check_arming,
-    Order.RESTART: _restart,
-    Order.NOTHING: _nothing,
-}
-
 _Handler = Callable[[Any, CommandContext, Modes], Decision]
-COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
+COMMAND_HANDLERS: Final[dict[type[CommandAction] | Order, _Handler]] = {
     Arm: _arm,
     Disarm: _disarm,
-    SwitchMode: _switch_mode,
+    SwitchMode: lambda action, context, modes: _switch(action.mode, context, modes),
     TakeOff: _take_off,
     GoTo: _go_to,
     FlyOrbit: _orbit,
@@ -416,7 +391,12 @@ COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
     SetMissionStep: _set_mission_step,
     InjectFailure: _inject_failure,
     Grip: _grip,
-    Order: _order,
+    Order.TERMINATE: _terminate,
+    Order.PAUSE_MISSION: _pause_mission,
+    Order.CONTINUE_MISSION: lambda _, context, modes: _switch(Mode.MISSION, context, modes),
+    Order.CHECK_ARMING: _check_arming,
+    Order.RESTART: _restart,
+    Order.NOTHING: lambda _, context, modes: Decision(ACCEPTED),
     Rejected: _reject,
 }
 # The vehicle cannot be armed then, and so is not.

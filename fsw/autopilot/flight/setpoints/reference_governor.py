@@ -218,7 +218,6 @@ class ReferenceGovernor:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._max_lead_distance = config.steering.max_lead_distance
         self._barrier = config.planner.walls
         self._body = body_of(config.planner.body, config.airframe)
         # The arm hangs: the end-effector is that much lower than the base.
@@ -253,10 +252,6 @@ class ReferenceGovernor:
         return limit_approach(
             p, v, ((body, self._body), (tip, None)), safe_set, t_us, self._barrier
         )
-
-    def limit_lead(self, p: Vec3, vehicle: Vec3) -> Vec3:
-        """``p`` [m, NED] within reach of the vehicle's own point ``vehicle`` [m, NED]."""
-        return limit_lead(p, vehicle, self._max_lead_distance)
 
     def limit_horizon(
         self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
