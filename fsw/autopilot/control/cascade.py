@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
@@ -62,7 +61,7 @@ from fsw.autopilot.model.rotors import (
     motion_state,
     rotor_decay,
 )
-from fsw.autopilot.shapes.zones import NO_ZONES
+from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Mat3, Setpoint, StateEstimate, Vec3
 from fsw.autopilot.tick_record import (
     BREACH,
@@ -206,11 +205,11 @@ class Cascade:
         self,
         r: Tick,
         ticks: int = 1,
-        zones: NDArray[np.float64] = NO_ZONES,
+        zones: Zones = NO_ZONES,
         health: ActuatorHealth = HEALTHY,
         tube: TubeAround = NO_TUBE,
     ) -> None:
-        """Close the loops of a record; see ``close_loops``, ``zones`` (zones, k) [SI]."""
+        """Close the loops of a record; see ``close_loops``."""
         if health is not HEALTHY or r.flags & IMPAIRED:
             note_health(r.health, health)
             r.flags = 0 if health is HEALTHY else IMPAIRED
@@ -218,18 +217,12 @@ class Cascade:
 
 
 @compilable
-def close_loops(
-    r: Tick,
-    law: CascadeLaw,
-    ticks: int,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
-) -> None:
+def close_loops(r: Tick, law: CascadeLaw, ticks: int, zones: Zones, probes: FilterProbes) -> None:
     """One tick, or several at once where some were missed: from estimate and plan to a command.
 
     Each law writes what those after it read; ``sent`` is the last command until the end, where the
-    new one takes its place, not yet gated. The safety filter keeps the ``probes`` off the ``zones``
-    (zones, k) [SI] of ``moving_zones``.
+    new one takes its place, not yet gated. The safety filter keeps the ``probes`` off the
+    ``zones``, those of ``moving_zones``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     estimate = r.estimate
@@ -271,16 +264,11 @@ def settle_rotors(r: Tick, law: CascadeLaw, ticks: int) -> None:
 
 @compilable
 def keep_off_zones(
-    r: Tick,
-    law: CascadeLaw,
-    motion: MotionState,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
+    r: Tick, law: CascadeLaw, motion: MotionState, zones: Zones, probes: FilterProbes
 ) -> None:
     """What is flown: plan and input such that the loops ask for a filtered acceleration.
 
-    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``. Reads
-    estimate, plan, u, observed; writes flown, flown_u, margin, flags.
+    Reads estimate, plan, u, observed; writes flown, flown_u, margin, flags.
     """
     r.flown, r.flown_u = r.plan, r.u
     r.flags, r.margin = r.flags & IMPAIRED, math.inf
@@ -305,17 +293,11 @@ def keep_off_zones(
 
 @compilable
 def filter_asked(
-    r: Tick,
-    law: CascadeLaw,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
-    a: Vec3,
-    asked: Vec3,
+    r: Tick, law: CascadeLaw, zones: Zones, probes: FilterProbes, a: Vec3, asked: Vec3
 ) -> tuple[Vec3, bool]:
     """The filtered acceleration, and whether it is another than ``asked`` [m/s^2, NED].
 
-    The base accelerates by ``a`` [m/s^2, NED] now; ``zones`` (zones, k) [SI] and ``probes``
-    as of ``close_loops``. Reads estimate, observed; writes margin, flags.
+    The base accelerates by ``a`` [m/s^2, NED] now. Reads estimate, observed; writes margin, flags.
     """
     safe, changed, margin = filtered(
         law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, asked
@@ -430,7 +412,7 @@ def _close_loops(
     law: NDArray[Any],
     records: NDArray[Any],
     ticks: int,
-    zones: NDArray[np.float64],
+    zones: Zones,
     probes: FilterProbes,
     tube: TubeAround,
 ) -> None:

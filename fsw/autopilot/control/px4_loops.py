@@ -24,7 +24,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.cascade import (
@@ -47,7 +46,7 @@ from fsw.autopilot.model.airframe import GRAVITY, Airframe, AttitudeLag
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.multibody import move_bodies
 from fsw.autopilot.model.rotors import MotionState, motion_state
-from fsw.autopilot.shapes.zones import NO_ZONES
+from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Setpoint, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
 from fsw.compiled import compilable, kernel, machine_code, packed
@@ -114,11 +113,11 @@ class Px4Loops(Cascade):
         self,
         r: Tick,
         ticks: int = 1,
-        zones: NDArray[np.float64] = NO_ZONES,
+        zones: Zones = NO_ZONES,
         health: ActuatorHealth = HEALTHY,
         tube: TubeAround = NO_TUBE,
     ) -> None:
-        """See ``Cascade.step``, ``zones`` (zones, k) [SI]; rotors are PX4's whatever ``health``."""
+        """See ``Cascade.step``; rotors are PX4's whatever ``health``."""
         r.flags = 0
         self._ask(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
 
@@ -143,17 +142,9 @@ _NO_GAINS = TrackingGains((0.0,) * 5, 0.0, (0.0,) * 3, 0.0)
 
 @compilable
 def ask_px4(
-    r: Tick,
-    law: CascadeLaw,
-    px4: Px4Tuning,
-    ticks: int,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
+    r: Tick, law: CascadeLaw, px4: Px4Tuning, ticks: int, zones: Zones, probes: FilterProbes
 ) -> None:
-    """One tick: from estimate and plan to what PX4 is asked for, in ``flown`` and ``flown_u``.
-
-    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``.
-    """
+    """One tick: from estimate and plan to what PX4 is asked for, in ``flown`` and ``flown_u``."""
     airframe, dt = law.airframe, law.dt
     settle_rotors(r, law, ticks)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
@@ -183,13 +174,10 @@ def keep_off_zones(
     law: CascadeLaw,
     px4: Px4Tuning,
     motion: MotionState,
-    zones: NDArray[np.float64],
+    zones: Zones,
     probes: FilterProbes,
 ) -> None:
-    """Add what the safety filter pushes beyond what PX4 will ask its attitude loop for.
-
-    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``.
-    """
+    """Add what the safety filter pushes beyond what PX4 will ask its attitude loop for."""
     a = add_scaled(motion.a, r.observed.d, 1.0)
     asked = asked_by_px4(r, px4, a)
     safe, changed = filter_asked(r, law, zones, probes, a, asked)
@@ -228,7 +216,7 @@ def _ask_px4(
     models: NDArray[Any],
     records: NDArray[Any],
     ticks: int,
-    zones: NDArray[np.float64],
+    zones: Zones,
     probes: FilterProbes,
     tube: TubeAround,
 ) -> None:

@@ -56,6 +56,7 @@ from fsw.autopilot.shapes.zones import (
     FORCE_MAX,
     KEEP_IN,
     PLANES,
+    Zones,
     acceleration_of,
     moved_by,
     surface_at,
@@ -139,7 +140,7 @@ def filtered(
     law: FilterLaw,
     bodies: Bodies,
     probes: FilterProbes,
-    zones: NDArray[np.float64],
+    zones: Zones,
     estimate: StateEstimate | Estimate,
     v: Vec3 | Floats,
     a: Vec3,
@@ -147,9 +148,9 @@ def filtered(
 ) -> tuple[Vec3, bool, float]:
     """The acceleration nearest to the ``wanted`` [m/s^2, NED] one that keeps the condition.
 
-    ``zones`` (zones, k) [SI] are those of ``moving_zones``, ``v`` [m/s, NED] and ``a``
-    [m/s^2, NED] the body's own now, disturbance included. Also says whether the wanted one was
-    changed, and the least margin [m] of all parts, infinite where no zone is near.
+    ``zones`` are those of ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED] the body's own
+    now, disturbance included. Also says whether the wanted one was changed, and the least margin
+    [m] of all parts, infinite where no zone is near.
     """
     put_base(probes.frame, estimate.p_WB, estimate.v_WB, estimate.R_WB, estimate.w_WB_B)
     put_links(probes.frame, bodies, estimate.q_arm, estimate.qd_arm)
@@ -175,7 +176,7 @@ def filtered(
 def _kept_off(
     law: FilterLaw,
     all_probes: FilterProbes,
-    zones: NDArray[np.float64],
+    zones: Zones,
     zone: int,
     which: int,
     shift: Vec3,
