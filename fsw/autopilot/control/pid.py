@@ -6,12 +6,15 @@ import math
 from dataclasses import dataclass
 
 from fsw.autopilot.geometry.rotation import euler_zyx, wrap_angle
-from fsw.autopilot.geometry.vectors import clamp_magnitude
+from fsw.autopilot.geometry.vectors import Vector, clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
-from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec3
-from fsw.autopilot.tick_record import Accelerations, Estimate, PlanState
+from fsw.autopilot.signals import Vec3
+from fsw.autopilot.tick_record import (
+    AnyEstimate,
+    AnyInput,
+    AnyPlan,
+)
 from fsw.compiled import compilable
-from fsw.record import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,7 @@ def pid_step(
 
 
 @compilable
-def attitude_reference(a: Vec3 | Floats, yaw: float) -> Vec3:
+def attitude_reference(a: Vector, yaw: float) -> Vec3:
     """Roll, pitch and ``yaw`` [rad] whose thrust gives ``a`` [m/s^2, NED] (exact, ZYX)."""
     c, s = math.cos(yaw), math.sin(yaw)
     forward, right = c * a[0] + s * a[1], -s * a[0] + c * a[1]
@@ -62,11 +65,7 @@ def attitude_reference(a: Vec3 | Floats, yaw: float) -> Vec3:
 
 @compilable
 def attitude_pid(
-    gains: PidGains,
-    integral: Vec3 | Floats,
-    estimate: StateEstimate | Estimate,
-    reference: Vec3,
-    dt: float,
+    gains: PidGains, integral: Vector, estimate: AnyEstimate, reference: Vec3, dt: float
 ) -> tuple[Vec3, Vec3]:
     """Angular acceleration [rad/s^2, FRD] towards an attitude, and the integrals to pass back.
 
@@ -86,9 +85,9 @@ def height_pid(
     airframe: Airframe,
     gains: PidGains,
     integral: float,
-    estimate: StateEstimate | Estimate,
-    plan: PredictionState | PlanState,
-    u: PlanInput | Accelerations,
+    estimate: AnyEstimate,
+    plan: AnyPlan,
+    u: AnyInput,
     dt: float,
 ) -> tuple[float, float]:
     """Total thrust [N] that keeps the planned height, and the integral to pass back.

@@ -44,7 +44,7 @@ from fsw.autopilot.barriers.safe_approach import (
     safe_approach_slope,
     safe_approach_speed,
 )
-from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
+from fsw.autopilot.geometry.vectors import Vector, add_scaled, clamp, dot, subtract
 from fsw.autopilot.model.body import CAPSULE, FORM, ON, RADIUS, TOOL, TURN, Body
 from fsw.autopilot.model.kinematics import FRAME, put_base, put_links
 from fsw.autopilot.model.multibody import Bodies
@@ -62,10 +62,9 @@ from fsw.autopilot.shapes.zones import (
     surface_at,
     velocity_of,
 )
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Estimate
+from fsw.autopilot.signals import Vec2, Vec3
+from fsw.autopilot.tick_record import AnyEstimate
 from fsw.compiled import compilable
-from fsw.record import Floats
 
 ROOM = 1.0  # m, that a vehicle may be outside of a zone and still draws back from it
 _PASSES = 4  # over all zones
@@ -141,8 +140,8 @@ def filtered(
     bodies: Bodies,
     probes: FilterProbes,
     zones: Zones,
-    estimate: StateEstimate | Estimate,
-    v: Vec3 | Floats,
+    estimate: AnyEstimate,
+    v: Vector,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
@@ -181,7 +180,7 @@ def _kept_off(
     which: int,
     shift: Vec3,
     t_us: int,
-    v: Vec3 | Floats,
+    v: Vector,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
@@ -221,7 +220,7 @@ def _within(law: FilterLaw, a: Vec3) -> Vec3:
 
 
 @compilable
-def _fastest(law: FilterLaw, n: Vec3, v: Vec3 | Floats, along: float) -> float:
+def _fastest(law: FilterLaw, n: Vec3, v: Vector, along: float) -> float:
     """The acceleration [m/s^2] along ``n`` that brings ``v`` [m/s, NED] to the most, ``along`` now.
 
     What it moves at across ``n`` leaves less of that.

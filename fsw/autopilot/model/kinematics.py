@@ -15,8 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.geometry.rotation import nine, rotate
+from fsw.autopilot.geometry.rotation import Axes, nine, rotate
 from fsw.autopilot.geometry.vectors import (
+    Vector,
     add,
     add_scaled,
     cross,
@@ -90,9 +91,7 @@ def put_rate(frame: Frame, at: int, b1: Vec3, b3: Vec3, d1: Vec3, d3: Vec3) -> N
 
 
 @compilable
-def put_base(
-    frame: Frame, p: Vec3 | Floats, v: Vec3 | Floats, R: Mat3 | Floats, w: Vec3 | Floats
-) -> None:
+def put_base(frame: Frame, p: Vector, v: Vector, R: Axes, w: Vector) -> None:
     """The base at ``p`` [m, NED] with the attitude ``R`` [1].
 
     It moves with ``v`` [m/s, NED] and turns with ``w`` [rad/s, FRD].
