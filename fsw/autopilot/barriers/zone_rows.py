@@ -342,9 +342,10 @@ def fill_starts(
 ) -> None:
     """The least value of each zone and part at one instant: h [m/s], or the distance [m].
 
-    ``settings`` (20 + j,) [SI] are as above, ``shift`` (zones, 3) [m, NED] and ``speed`` (zones, 3)
-    [m/s, NED] those of the zones. Into ``starts`` (zones x parts,) [SI], zone by zone; a zone that
-    follows the target has one entry, one that may be touched none of the tool's.
+    ``settings`` (20 + j,) [SI] are as above, ``shift`` (zones, 3) [m, NED] and
+    ``speed`` (zones, 3) [m/s, NED] those of the zones. Into ``starts`` (zones x parts,) [SI], zone
+    by zone; a zone that follows the target has one entry, one that may be touched none of the
+    tool's.
     """
     starts[:] = math.inf
     first = 0

@@ -47,11 +47,7 @@ class NominalModel:
         """Bring the plan's state of a record some ticks on. Reads plan, u; writes plan."""
         self._move(self.packed, r.array, ticks)
 
-    def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
-        """The state one tick later."""
-        return self.advance(x, u, 1)
-
-    def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
+    def advance(self, x: PredictionState, u: PlanInput, ticks: int = 1) -> PredictionState:
         """The state some ticks later under one input."""
         r = Tick()
         r.joint_count = len(x.q_arm)
