@@ -76,7 +76,7 @@ def minimise(
     return Solution(status, x, int(answer.nit))
 
 
-def least_slacks(program: QpData, inputs: Array) -> Array:
+def min_slacks(program: QpData, inputs: Array) -> Array:
     """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (inputs n,) [SI]."""
     rows, slacks = program.rows, np.zeros(len(program.penalty))
     held = np.flatnonzero(rows.slack >= 0)
@@ -105,7 +105,7 @@ class NonlinearProgram:
     def rest(self) -> Array:
         """u = 0, and the slacks that make it admissible."""
         rest = np.zeros(len(self._inputs))
-        return np.concatenate((rest, least_slacks(self.at(rest), rest)))
+        return np.concatenate((rest, min_slacks(self.at(rest), rest)))
 
     def bounds(self) -> list[tuple[float | None, float | None]]:
         """Of every unknown; the tilt bounds the horizontal acceleration through the margins."""

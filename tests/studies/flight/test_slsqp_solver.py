@@ -30,7 +30,7 @@ from studies.flight.slsqp_solver import (
     TOLERANCE,
     NonlinearProgram,
     by_slsqp,
-    least_slacks,
+    min_slacks,
     minimise,
 )
 from tests.fsw.autopilot.mpc.requests import STILL, below, hovering, planned, planner, request
@@ -85,7 +85,7 @@ def price(ocp: Ocp, start: Array, targets: TargetPoints, inputs: Array) -> float
     """Cost of inputs with the smallest slacks that admit them: what both optimisers minimise."""
     ocp.linearise(start, inputs, targets)
     program = ocp.qp
-    return float(ocp.cost + program.penalty @ least_slacks(program, inputs))
+    return float(ocp.cost + program.penalty @ min_slacks(program, inputs))
 
 
 def converged(ocp: Ocp, start: Array, targets: TargetPoints) -> Array:

@@ -21,7 +21,7 @@ from fsw.autopilot.mpc.qp_data import QpData
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from fsw.autopilot.signals import SafeSet, SolverStatus
-from studies.flight.slsqp_solver import least_slacks
+from studies.flight.slsqp_solver import min_slacks
 from tests.fsw.autopilot.mpc.whole_program import whole
 from tests.fsw.paper_arm import INPUTS
 from tests.fsw.random_states import prediction_vector
@@ -83,7 +83,7 @@ def exactly(program: QpData) -> Array:
 def soft_cost(program: QpData, x: Array) -> float:
     """The cost of the inputs in ``x``, softened as little as can be."""
     inputs = x[: program.inputs]
-    return cost(program, np.concatenate((inputs, least_slacks(program, inputs))))
+    return cost(program, np.concatenate((inputs, min_slacks(program, inputs))))
 
 
 @pytest.mark.drawn(2)
@@ -123,7 +123,7 @@ def test_the_optimum_is_that_of_the_whole_program(
         off_by = inputs - best[: program.inputs]
         assert 0.5 * off_by @ hessian @ off_by <= gap
         np.testing.assert_allclose(
-            found.x[program.inputs :], least_slacks(program, inputs), atol=1e-4
+            found.x[program.inputs :], min_slacks(program, inputs), atol=1e-4
         )
         softened = np.append(found.x[program.inputs :], 0.0)
         left = program.rows.b - program.rows.g @ found.x[: program.inputs]
@@ -152,7 +152,7 @@ def test_an_arm_outside_its_limits_is_softened_at_every_node_as_little_as_can_be
     slacks = found.x[ocp.qp.inputs :]
     assert slacks[0] > 0.1
     np.testing.assert_allclose(slacks, expected.x[ocp.qp.inputs :], atol=1e-3)
-    np.testing.assert_allclose(slacks, least_slacks(ocp.qp, found.x[: ocp.qp.inputs]), atol=1e-4)
+    np.testing.assert_allclose(slacks, min_slacks(ocp.qp, found.x[: ocp.qp.inputs]), atol=1e-4)
 
 
 @pytest.mark.parametrize("safe_set", [WALLS, SPHERE], ids=["walls", "sphere"])
