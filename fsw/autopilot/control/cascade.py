@@ -9,12 +9,13 @@ from typing import Any, Literal
 from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.control.actuator_watch import felt_inside
 from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
-from fsw.autopilot.control.expectation import tell_filter
 from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.joint_reference import refer
 from fsw.autopilot.control.joints import (
+    accelerate_joints,
     joint_torques,
     observe_contact,
     observe_disturbance,
@@ -64,10 +65,12 @@ from fsw.autopilot.model.rotors import (
 from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Mat3, Setpoint, StateEstimate, Vec3
 from fsw.autopilot.tick_record import (
+    BEGINS_ANEW,
     BREACH,
     FILTER_ACTED,
     GATE_NEEDED,
     IMPAIRED,
+    JUDGES,
     OFF_PLAN,
     Expected,
     Tick,
@@ -397,6 +400,37 @@ def compare_with_plan(r: Tick, tube: TubeAround) -> None:
     for i in range(3):
         if not -most <= r.estimate.p_WB[i] - r.plan.p[i] <= most:
             r.flags |= OFF_PLAN
+
+
+@compilable
+def tell_filter(
+    r: Tick, airframe: Airframe, rotor_decay: float, found: Expected, explains: bool, judged: bool
+) -> None:
+    """Write what is expected of the next tick, after which ``rotor_decay`` [1] of a lag is left.
+
+    Of a vehicle that stands thrust does not say how it moves: then it ``explains`` nothing.
+    Encoders are ``judged`` unless a joint has failed. Reads estimate, sent, rotors, health, watch,
+    pressing, observed, payload; writes bodies, mixer.
+    """
+    for i in range(int(airframe.rotors)):
+        settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
+        r.mixer.mean[i] = lag_rotor(r.rotors[i], settling_at, rotor_decay)
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
+    motion = motion_state(airframe, r, r.mixer.mean, r.sent.joint_torque)
+    # The accelerometer knows of gusts, and of the ground.
+    field = 0.0, 0.0, r.estimate.specific_force
+    accelerate_joints(r, airframe.bodies, field, motion.turning)
+    felt_inside(r, airframe, found.felt)
+    for i in range(int(airframe.bodies.joints)):
+        found.u[i], found.undone[i] = r.bodies.work[i], r.watch.undone[i]
+        found.unseen[i] = r.watch.unseen[i]
+    for i in range(3):
+        found.pushed[i] = r.observed.known[i]
+        found.model[i] = motion.turning[i] if explains else 0.0
+    # Not by the mass that is flown: it goes by the accelerometer, which this is a witness against.
+    lift = motion.thrust / (airframe.mass + r.payload.mass)
+    found.model[3] = lift if explains else 0.0
+    found.judges = JUDGES if judged else BEGINS_ANEW
 
 
 @compilable
