@@ -303,7 +303,6 @@ class Commander:
     def _apply(
         self, state: FlightState, decision: Decision, estimate: StateEstimate
     ) -> FlightState:
-        """Apply the effects of a decision."""
         vehicle, limits = state.vehicle, self._config.limits
         if decision.home is not None:
             vehicle = replace(vehicle, home=decision.home)

@@ -71,7 +71,6 @@ def rest_state(joints: int) -> PredictionState:
 
 @kernel
 def _move(models: NDArray[Any], records: NDArray[Any], ticks: int) -> None:
-    """Bring the plan's state some ``ticks`` on."""
     model, r = models[0], records[0]
     for _ in range(ticks):
         move_plan(model, r.plan, r.u, r.joint_count)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.shapes.kind import CENTRE_BALL, Numbers, ShapeKind, Surface
+from fsw.autopilot.shapes.kind import CENTRE_BALL, Numbers, ShapeKind, Surface, places
 from fsw.autopilot.signals import Shape, Vec3, Zone
 from fsw.compiled import kernel
 
@@ -104,7 +104,7 @@ def _ball_around(numbers: Numbers) -> tuple[Vec3, float]:
 KIND = ShapeKind(
     name="ball",
     number=1,
-    meaning=("centre north [m]", "centre east [m]", "centre down [m]", "radius [m]"),
+    meaning=(*places("centre"), "radius [m]"),
     planes_inside=PLANES_INSIDE,
     plane=ball_plane,
     problem=radius_problem,

@@ -33,6 +33,11 @@ class Surface(NamedTuple):
 Numbers = tuple[float, ...]
 
 
+def places(*what: str) -> tuple[str, ...]:
+    """The meaning of the three numbers of each place, NED."""
+    return tuple(f"{one} {axis} [m]" for one in what for axis in ("north", "east", "down"))
+
+
 def place_moved(numbers: Numbers, shift: Vec3) -> Numbers:
     """``numbers`` [SI] that begin with a shape's place [m, NED], moved by ``shift`` [m, NED]."""
     x, y, z, *rest = numbers

@@ -450,7 +450,6 @@ def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
 
 
 def _too_close(place: Vec3, context: CommandContext) -> str | None:
-    """Why the body cannot be at a place."""
     body = body_of(context.config.planner.body, context.config.airframe)
     for number, at in enumerate(surfaces(context.safe_set, place, context.now_us), start=1):
         if not at.distance > hull_reach(body, at.normal):
@@ -459,7 +458,6 @@ def _too_close(place: Vec3, context: CommandContext) -> str | None:
 
 
 def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
-    """Why the body cannot fly a circle."""
     body = body_of(context.config.planner.body, context.config.airframe)
     for number in range(len(context.safe_set.zones)):
 

@@ -349,13 +349,10 @@ class ReferenceGovernor:
     def reason(self, left: int, limits: Limits) -> str:
         """Which of the ``limits`` have been left, in words; empty: none."""
         lowest, highest, fastest = limits
-        said = []
-        if left & _LOW:
-            said.append(f"a target is below {-lowest:.2f} m")
-        if left & _HIGH:
-            said.append(f"a target is above {-highest:.0f} m")
-        if left & _FAST:
-            said.append(f"targets ask for more than {fastest:g} m/s")
-        if left & _FAR:
-            said.append(f"targets are more than {_AWAY:g} m ahead of the end-effector")
-        return ", ".join(said)
+        said = {
+            _LOW: f"a target is below {-lowest:.2f} m",
+            _HIGH: f"a target is above {-highest:.0f} m",
+            _FAST: f"targets ask for more than {fastest:g} m/s",
+            _FAR: f"targets are more than {_AWAY:g} m ahead of the end-effector",
+        }
+        return ", ".join(text for flag, text in said.items() if left & flag)
