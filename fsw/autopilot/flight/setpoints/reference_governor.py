@@ -66,6 +66,15 @@ def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
     )
 
 
+@compilable
+def lead_at(v: Vec3, fastest: float) -> float:
+    """How far [m] a reference may lead a vehicle at ``v`` [m/s, NED], of ``fastest`` [m/s].
+
+    One that is led by as much at any speed would be led to any speed.
+    """
+    return max(_MAX_LEAD_DISTANCE * max(1.0 - norm(v) / fastest, 0.0), _NEAR)
+
+
 def limit_approach(
     p: Vec3,
     v: Vec3,
@@ -141,10 +150,7 @@ def _limited(
             left |= _LOW
         if p[2] < highest - _TOLD:
             left |= _HIGH
-        # A vehicle that is led by as much at any speed would be led to any speed.
-        slower = max(1.0 - norm(v_WE) / fastest, 0.0)
-        reach = fastest * ahead + max(_MAX_LEAD_DISTANCE * slower, _NEAR)
-        near = limit_lead(near, p_WE, reach)
+        near = limit_lead(near, p_WE, fastest * ahead + lead_at(v_WE, fastest))
         if norm(v) > fastest + _TOLD:
             left |= _FAST
         if norm(subtract(p, p_WE)) > fastest * ahead + _AWAY:
