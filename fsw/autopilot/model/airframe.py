@@ -129,9 +129,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         joint_torque_max=padded(tuple([joint.torque_max for joint in vehicle.joints]), JOINTS),
         joint_rate_max=padded(tuple([joint.rate_max for joint in vehicle.joints]), JOINTS),
         joint_friction=padded(tuple([joint.coulomb for joint in vehicle.joints]), JOINTS),
-        joint_drag=padded(
-            tuple([joint.viscous * joint.rate_max for joint in vehicle.joints]), JOINTS
-        ),
+        joint_drag=padded(tuple([one.viscous * one.rate_max for one in vehicle.joints]), JOINTS),
         angle_limits=_angle_limits(vehicle),
         home_posture=padded(vehicle.home_posture, JOINTS),
         points=points_of(vehicle),
