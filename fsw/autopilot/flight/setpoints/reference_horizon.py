@@ -11,7 +11,7 @@ from fsw.autopilot.flight.setpoints.reference_governor import ReferenceGovernor,
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.geometry.vectors import subtract
 from fsw.autopilot.model.kinematics import end_effector
-from fsw.autopilot.mpc.reference import sample, still_at
+from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     EndEffectorTarget,
@@ -39,9 +39,7 @@ class ReferenceHorizon:
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel."""
         here, rest = estimate.p_WB, (0.0, 0.0, 0.0)
-        stream = still_at(estimate.p_WB), still_at(estimate.p_WB, 100_000)
-        between = sample(stream, 50_000)
-        self._governor.limit_external((between,), here, rest, SafeSet())
+        self._governor.limit_external((still_at(here),), here, rest, SafeSet())
 
     def __call__(
         self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
