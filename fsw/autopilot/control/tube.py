@@ -45,13 +45,12 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from fsw.autopilot.control.allocation import AXES, PITCH, ROLL
 from fsw.autopilot.control.gains import TrackingGains, TrackingTuning, tracking_gains
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import posture
-from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.model.prediction import Array, zero_order_hold
 from fsw.autopilot.model.rotors import WEIGHING_TIME
 from fsw.autopilot.signals import Vec2
 from fsw.compiled import compilable
@@ -125,24 +124,24 @@ def tube(
     per_hold = round(hold_s / dt)
     covered = min(tuning.wind_limit, WIND_COVERED)
     return Tube(
-        base=_sum(base),
-        end_effector=_sum(end_effector),
-        base_wind=tuning.wind_limit * _sum(base_wind),
-        wind=_sum(base_wind),
-        wind_beyond=(tuning.wind_limit - covered) * _sum(base_wind),
-        known=0.5 * _sum(base + base_wind),
-        height=_sum(climbs[:, 0]),
-        end_effector_wind=covered * _sum(end_effector_wind),
+        base=worst(base),
+        end_effector=worst(end_effector),
+        base_wind=tuning.wind_limit * worst(base_wind),
+        wind=worst(base_wind),
+        wind_beyond=(tuning.wind_limit - covered) * worst(base_wind),
+        known=0.5 * worst(base + base_wind),
+        height=worst(climbs[:, 0]),
+        end_effector_wind=covered * worst(end_effector_wind),
         base_expected=RARE * random_steps(base, per_hold),
         end_effector_expected=RARE * random_steps(end_effector, per_hold),
-        acceleration=_sum(acceleration),
-        wanted_acceleration=_sum(wanted),
-        acceleration_error=_sum(wanted - acceleration),
-        jerk=k3 / k4 * _sum(wanted - acceleration),
-        present_jerk=_sum(states[:, 3]),
-        snap=_sum(states @ _wanted_snap(gains)),
-        vertical_acceleration=_sum(climbs[:, 2] - climbs[:, 5]),
-        vertical_disturbance=_sum(climbs[:, 4]),
+        acceleration=worst(acceleration),
+        wanted_acceleration=worst(wanted),
+        acceleration_error=worst(wanted - acceleration),
+        jerk=k3 / k4 * worst(wanted - acceleration),
+        present_jerk=worst(states[:, 3]),
+        snap=worst(states @ _wanted_snap(gains)),
+        vertical_acceleration=worst(climbs[:, 2] - climbs[:, 5]),
+        vertical_disturbance=worst(climbs[:, 4]),
     )
 
 
@@ -187,9 +186,9 @@ def estimate_tube(airframe: Airframe, tuning: TrackingTuning, dt: float) -> Esti
         return after_a_push(a, np.array([0.0, 0.0, 0.0, 0.0, *enters]), dt)[:, 0]
 
     return EstimateTube(
-        position=_sum(moved(-k[0] / lag, 0.0, 0.0)),
-        velocity=_sum(moved(0.0, gain_v, gain_d)),  # the observer alone uses it
-        acceleration=_sum(moved(-k[2] / lag, 1.0, 0.0)),
+        position=worst(moved(-k[0] / lag, 0.0, 0.0)),
+        velocity=worst(moved(0.0, gain_v, gain_d)),  # the observer alone uses it
+        acceleration=worst(moved(-k[2] / lag, 1.0, 0.0)),
         jerk=float(np.linalg.norm(moved(-k[3] / lag, 0.0, 0.0))),
     )
 
@@ -298,7 +297,8 @@ def _snap_in_hover(airframe: Airframe) -> float:
     return GRAVITY * least
 
 
-def _sum(response: Array) -> float:
+def worst(response: Array) -> float:
+    """The most that any push within +-1 makes of a ``response`` (ticks,) [any] to one of a tick."""
     return float(np.abs(response).sum())
 
 
@@ -371,15 +371,10 @@ def after_a_push(a: Array, b: Array, dt: float, settled_s: float = _SETTLED_S) -
 
     ``a`` is (n, n) and ``b`` (n,) [SI]; nothing is left after ``settled_s`` [s].
     """
-    n = len(a)
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n], block[:n, n] = a * dt, b * dt
-    exponential = expm(block)
-    x = exponential[:n, n]
-    states = []
-    for _ in range(round(settled_s / dt)):
-        states.append(x)
-        x = exponential[:n, :n] @ x
+    held, pushed = zero_order_hold(a, b[:, None], dt)
+    states = [pushed[:, 0]]
+    while len(states) < round(settled_s / dt):
+        states.append(held @ states[-1])
     return np.array(states)
 
 
