@@ -173,15 +173,14 @@ class Cascade:
         loop = TrackingLaw(airframe.attitude_lag, tuning.tracking, gains)
         lag, follows = gains.k[3] / gains.k[2], inner == "tracking"
         self.law = cascade_law(airframe, tuning, loop, clear, lag, dt, follows_plan=follows)
-        self.probes = filter_probes(clear.body)
-        self.packed = packed(self.law)
-        rest = NO_ZONES, self.probes, NO_TUBE
-        self._close_loops = machine_code(_close_loops, self.packed, Tick().array, 1, *rest)
-        self._load()
+        self._load(clear, _close_loops)
 
-    def _load(self) -> None:
-        """Load what says how the vehicle moves, for a law that is packed."""
-        example = self.packed, Tick().array
+    def _load(self, clear: KeepClear, tick: Any, *models: NDArray[Any]) -> None:
+        """Load the kernels of the law: that of a ``tick``, which takes ``models`` besides."""
+        self.probes, self.packed, r = filter_probes(clear.body), packed(self.law), Tick().array
+        rest = NO_ZONES, self.probes, NO_TUBE
+        self._tick = machine_code(tick, self.packed, *models, r, 1, *rest)
+        example = self.packed, r
         self._found = Expected()
         self._expected = machine_code(_expected, *example, self._found.array, True, True)
         self._motion = machine_code(_motion, *example)
@@ -216,7 +215,7 @@ class Cascade:
         if health is not HEALTHY or r.flags & IMPAIRED:
             note_health(r.health, health)
             r.flags = 0 if health is HEALTHY else IMPAIRED
-        self._close_loops(self.packed, r.array, ticks, zones, self.probes, tube)
+        self._tick(self.packed, r.array, ticks, zones, self.probes, tube)
 
 
 @compilable

@@ -37,7 +37,7 @@ from fsw.autopilot.control.cascade import (
     settle_rotors,
 )
 from fsw.autopilot.control.gains import LoopGains, TrackingGains
-from fsw.autopilot.control.safety_filter import FilterProbes, filter_probes
+from fsw.autopilot.control.safety_filter import FilterProbes
 from fsw.autopilot.control.tracking import TrackingLaw, observe
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
@@ -49,7 +49,7 @@ from fsw.autopilot.model.rotors import MotionState, motion_state
 from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Setpoint, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
-from fsw.compiled import compilable, kernel, machine_code, packed
+from fsw.compiled import compilable, kernel, packed
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +102,8 @@ class Px4Loops(Cascade):
         lag = loop.lag.kd / loop.lag.kp + airframe.rotor_lag
         gains = replace(tuning, tracking=tracking)
         self.law = cascade_law(airframe, gains, loop, clear, lag, dt, follows_plan=True)
-        self.px4 = px4
-        self.probes = filter_probes(clear.body)
-        self.packed, self._packed_px4 = packed(self.law), packed(px4)
-        self._load()
-        example = self.packed, self._packed_px4, Tick().array, 1, NO_ZONES, self.probes, NO_TUBE
-        self._ask = machine_code(_ask_px4, *example)
+        self.px4, self._packed_px4 = px4, packed(px4)
+        self._load(clear, _ask_px4, self._packed_px4)
 
     def step(
         self,
@@ -119,7 +115,7 @@ class Px4Loops(Cascade):
     ) -> None:
         """See ``Cascade.step``; rotors are PX4's whatever ``health``."""
         r.flags = 0
-        self._ask(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
+        self._tick(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
 
     def setpoint(self, r: Tick) -> Setpoint:
         """What PX4 is asked for by a record after its step."""
