@@ -12,7 +12,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.body import BODIES, BodyName, body_of
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.signals import (
@@ -182,7 +181,7 @@ class LogFlight:
         return _curve("rotor thrust [N]", table.t, rotor_names(self.airframe), rows, limits)
 
     def _joint_curve(self, table: Table) -> Curve:
-        limits = angle_rows(self.airframe.angle_limits, table["q"].shape[1])
+        limits = self.airframe.angle_limits
         lines = [math.degrees(limit) for one in limits for limit in (one.low, one.high)]
         rows = [np.degrees(table["q"] @ one.row) for one in limits]
         shown = tuple(line for line in lines if math.isfinite(line))

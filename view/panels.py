@@ -9,7 +9,6 @@ from typing import Final
 
 from command_line.printable import printable
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.rotors import rotor_names
 from fsw.autopilot.periods import PLANNING_US
 from view import colours
@@ -195,7 +194,7 @@ def _inputs(now: Scene, airframe: Airframe) -> str:
         rows.append(_limited(f"joint {k} torque", torque, airframe.joint_torque_max[k - 1], "N m"))
     if now.estimate is not None:
         deg = math.degrees
-        for one in angle_rows(airframe.angle_limits, len(now.estimate.q_arm)):
+        for one in airframe.angle_limits:
             angle = sum(a * q for a, q in zip(one.row, now.estimate.q_arm, strict=True))
             limit = one.high if angle >= 0.0 else -one.low
             rows.append(_limited(one.name, deg(angle), deg(limit), "°"))

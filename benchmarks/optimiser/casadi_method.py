@@ -32,7 +32,7 @@ from fsw.autopilot.model.prediction import (
     to_vector,
 )
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.shapes.frame import outward_axis
+from fsw.autopilot.shapes.ball import outward_axis
 from fsw.autopilot.signals import PlanRequest, SafeSet
 
 SOLVERS = ("ipopt", "fatrop")

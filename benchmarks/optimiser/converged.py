@@ -10,6 +10,7 @@ from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
 from fsw.autopilot.signals import PlanRequest, SafeSet
+from studies.flight.slsqp_solver import min_slacks
 
 _MAX_ITERATIONS = 60
 _STAYS = 1e-7  # m/s^2 and rad/s^2
@@ -27,7 +28,7 @@ class ConvergedOcp:
         ocp = self._ocp
         ocp.linearise(to_vector(request.start), inputs, target_points(request))
         program = ocp.qp
-        return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
+        return float(ocp.cost + program.penalty @ min_slacks(program, inputs))
 
     def solve(self, request: PlanRequest, guess: Array) -> tuple[Array, float]:
         """Inputs and cost after programs from ``guess`` (6 n,) [m/s^2, rad/s^2] until they stay.

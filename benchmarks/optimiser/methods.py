@@ -19,7 +19,7 @@ from fsw.autopilot.model.prediction import Array, condense, to_vector
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner import Planner
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.qp_data import Solution
 from fsw.autopilot.signals import Plan, SafeSet
 from studies.flight.slsqp_solver import NonlinearProgram, minimise
 

@@ -153,11 +153,8 @@ def _node(
     for k in range(1, slack.numel()):
         program.cost += barrier * slack[k]
     th1, th12 = x[Q_ARM], x[Q_ARM] + x[Q_ARM + 2]
-    for angle, limit in (
-        (th1, airframe.angle_limits.high[0]),
-        (th12, airframe.angle_limits.high[1]),
-    ):
-        program.at_least_zero([limit + slack[0] - angle, limit + slack[0] + angle])
+    for angle, limit in zip((th1, th12), airframe.angle_limits, strict=True):
+        program.at_least_zero([limit.high + slack[0] - angle, limit.high + slack[0] + angle])
     if slack.numel() > 1:
         program.at_least_zero(_barrier(config, safe_set, points, slack, node))
 

@@ -76,6 +76,12 @@ class Accelerations(Record):
     force: float  # N
 
 
+# What laws take that Python calls as well, with values of its own.
+AnyEstimate = StateEstimate | Estimate
+AnyPlan = PredictionState | PlanState
+AnyInput = PlanInput | Accelerations
+
+
 class Sent(Record):
     """``ActuatorCommand``, for kernels."""
 

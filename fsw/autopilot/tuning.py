@@ -14,7 +14,7 @@ Tuning = tuple[tuple[str, float], ...]
 """Dotted path and value of every number that differs; what is absent is as configured."""
 
 Row = tuple[str, str, str, float, float, str] | tuple[str, str, str, float, float, str, float]
-"""A parameter: its name, the path of its number, unit, range, meaning; the number is so many."""
+"""A parameter: its name, the path of its number, unit, range, meaning; how many the number is."""
 
 Number = int | float | bool
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any, Final
 
-from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.control.pid import attitude_reference
 from fsw.autopilot.estimation.vibration import VibrationMeter
 from fsw.autopilot.flight.estimate.estimator_report import (
     ABSOLUTE,

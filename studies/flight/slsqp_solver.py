@@ -18,8 +18,7 @@ from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.qp_data import CONE, QpData
-from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.qp_data import CONE, QpData, Solution
 from fsw.autopilot.mpc.solvers import Question, Search, Stopwatch
 from fsw.autopilot.signals import SolverStatus
 
@@ -77,6 +76,14 @@ def minimise(
     return Solution(status, x, int(answer.nit))
 
 
+def min_slacks(program: QpData, inputs: Array) -> Array:
+    """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (inputs n,) [SI]."""
+    rows, slacks = program.rows, np.zeros(len(program.penalty))
+    held = np.flatnonzero(rows.slack >= 0)
+    np.maximum.at(slacks, rows.slack[held], rows.g[held] @ inputs - rows.b[held])
+    return slacks
+
+
 class NonlinearProgram:
     """The problem at the inputs asked for last, linearised anew only where they changed.
 
@@ -98,7 +105,7 @@ class NonlinearProgram:
     def rest(self) -> Array:
         """u = 0, and the slacks that make it admissible."""
         rest = np.zeros(len(self._inputs))
-        return np.concatenate((rest, self.at(rest).least_slacks(rest)))
+        return np.concatenate((rest, min_slacks(self.at(rest), rest)))
 
     def bounds(self) -> list[tuple[float | None, float | None]]:
         """Of every unknown; the tilt bounds the horizontal acceleration through the margins."""

@@ -42,7 +42,7 @@ class InverseWorkspace:
     def __init__(self, elbows: tuple[int, ...] = BOTH_ELBOWS) -> None:
         # Of the paper's arm: two links in a plane, with limits of the first and of both together.
         self._links = AIRFRAME.bodies.offset[5], AIRFRAME.bodies.tip[2]  # m
-        self._limits = AIRFRAME.angle_limits.high[0], AIRFRAME.angle_limits.high[1]  # rad
+        self._limits = tuple(limit.high for limit in AIRFRAME.angle_limits)  # rad
         self._elbows = elbows
         self.boundary = self._outline()  # (n, 2) m
         self._nearest = cKDTree(self.boundary)

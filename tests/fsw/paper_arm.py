@@ -8,7 +8,6 @@ from typing import Final
 
 from fsw.autopilot.model.airframe import AIRFRAME, Airframe
 from fsw.autopilot.model.prediction import inputs_of, states_of
-from fsw.record import ANGLE_LIMITS, padded
 
 JOINTS: Final = 2
 LENGTHS: Final = (0.15, 0.15)  # m, of the links
@@ -19,9 +18,6 @@ INPUTS: Final = inputs_of(JOINTS)
 
 def with_angle_limits(first: float, both: float) -> Airframe:
     """The airframe of paper with other limits of joint 1 and of both joints' sum [rad]."""
-    limits = replace(
-        AIRFRAME.angle_limits,
-        low=padded((-first, -both), ANGLE_LIMITS),
-        high=padded((first, both), ANGLE_LIMITS),
-    )
-    return replace(AIRFRAME, angle_limits=limits)
+    pairs = zip(AIRFRAME.angle_limits, (first, both), strict=True)
+    limits = [replace(limit, low=-most, high=most) for limit, most in pairs]
+    return replace(AIRFRAME, angle_limits=tuple(limits))

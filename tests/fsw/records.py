@@ -111,9 +111,8 @@ def observe(before: Observed, v: Vec3, a: Vec3, tuning: TrackingTuning, dt: floa
 
 def boundless(airframe: Airframe, most: float = 3.0) -> Airframe:
     """A vehicle with wide limits of its joints' angles [rad]."""
-    limits = airframe.angle_limits
-    wide = replace(limits, low=(-most,) * len(limits.low), high=(most,) * len(limits.high))
-    return replace(airframe, angle_limits=wide)
+    wide = [replace(limit, low=-most, high=most) for limit in airframe.angle_limits]
+    return replace(airframe, angle_limits=tuple(wide))
 
 
 Motion = tuple[JointVector, JointVector]

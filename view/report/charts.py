@@ -10,7 +10,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.model.arm_coordinates import angle_rows
 from fsw.autopilot.model.rotors import rotor_names
 from sitl.body import spoken
 from view.flight_data import Table
@@ -282,7 +281,7 @@ def motion(flight: Reported) -> Chart | None:
     else:
         return None
     airframe = airframe_of(flight.data.information)
-    limits = angle_rows(airframe.angle_limits, angles.shape[1])
+    limits = airframe.angle_limits
     ends = [_DEG * end for one in limits for end in (one.low, one.high) if math.isfinite(end)]
     fastest = max(airframe.joint_rate_max[: angles.shape[1]])
     tilt_max = _DEG * airframe.tilt_max

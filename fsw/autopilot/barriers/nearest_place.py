@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 from fsw.autopilot.geometry.vectors import add_scaled, dot
-from fsw.autopilot.model.body import BEGIN, CAPSULE, DISC, END, FORM, ON, RIM, TURN
-from fsw.autopilot.model.kinematics import in_axes, position
+from fsw.autopilot.model.body import BEGIN, CAPSULE, DISC, END, FORM, ON, RIM, TURN, Probes
+from fsw.autopilot.model.kinematics import Frame, in_axes, position
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.shapes.kind import Surface
-from fsw.autopilot.shapes.zones import FLAT, KEEP_IN, surface_at
+from fsw.autopilot.shapes.zones import FLAT, KEEP_IN, Zones, surface_at
 from fsw.autopilot.signals import Vec3
 from fsw.compiled import kernel
 
@@ -27,14 +27,12 @@ _AXIAL = 0.7  # cosine between a disc's axis and a normal from which all of its 
 
 @kernel
 def nearest_place(
-    zones: Array, zone: int, which: int, shift: Vec3, probes: Array, probe: int, frame: Array
+    zones: Zones, zone: int, which: int, shift: Vec3, probes: Probes, probe: int, frame: Frame
 ) -> tuple[Vec3, Surface, bool]:
     """The place of a probe that counts against a plane of a zone, and that plane.
 
-    ``zones`` (zones, 23 or more) [SI], ``probes`` (probes, 12) [SI] and ``frame`` (FRAME,) [SI] are
-    as in ``barriers.zone_rows.fill_starts``, the zone moved by ``shift`` [m, NED];
-    ``which`` [1] of the planes. The place is given where it is on its part [m]. False: this probe
-    says nothing that another does not say.
+    The zone is moved by ``shift`` [m, NED]; ``which`` of the planes. The place is given where it is
+    on its part [m]. False: this probe says nothing that another does not say.
     """
     form = probes[probe, FORM]
     if form == CAPSULE:
@@ -48,7 +46,7 @@ def nearest_place(
 
 @kernel
 def _nearest_on_capsule(
-    zones: Array, zone: int, which: int, shift: Vec3, probe: Array, frame: Array
+    zones: Zones, zone: int, which: int, shift: Vec3, probe: Array, frame: Frame
 ) -> tuple[Vec3, Surface, bool]:
     begin = (probe[BEGIN], probe[BEGIN + 1], probe[BEGIN + 2])
     end = (probe[END], probe[END + 1], probe[END + 2])
@@ -69,7 +67,7 @@ def _nearest_on_capsule(
 
 @kernel
 def _nearest_between(
-    zones: Array, zone: int, shift: Vec3, first: Vec3, last: Vec3
+    zones: Zones, zone: int, shift: Vec3, first: Vec3, last: Vec3
 ) -> tuple[float, Surface]:
     """Where between two places of the world a zone to keep out of is nearest, as a share.
 
@@ -102,7 +100,7 @@ def _nearest_between(
 
 @kernel
 def _nearest_on_disc(
-    zones: Array, zone: int, which: int, shift: Vec3, probe: Array, frame: Array
+    zones: Zones, zone: int, which: int, shift: Vec3, probe: Array, frame: Frame
 ) -> tuple[Vec3, Surface, bool]:
     begin, rim = (probe[BEGIN], probe[BEGIN + 1], probe[BEGIN + 2]), probe[RIM]
     on, at_rim = int(probe[ON]), zones[zone, FLAT] > 0.0 or zones[zone, KEEP_IN] > 0.0
@@ -146,6 +144,6 @@ def _nearest_on_disc(
 
 
 @kernel
-def _seen(zones: Array, zone: int, which: int, shift: Vec3, x: Vec3) -> Surface:
+def _seen(zones: Zones, zone: int, which: int, shift: Vec3, x: Vec3) -> Surface:
     """The plane of a zone near a place in the world."""
     return surface_at(zones, zone, which, x[0] - shift[0], x[1] - shift[1], x[2] - shift[2])

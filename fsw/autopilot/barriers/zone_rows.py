@@ -31,8 +31,19 @@ from fsw.autopilot.barriers.constraint_block import Rows, TargetPoints, block
 from fsw.autopilot.barriers.nearest_place import nearest_place
 from fsw.autopilot.barriers.safe_approach import BarrierNumbers, BarrierTuning, safe_approach_slope
 from fsw.autopilot.geometry.vectors import dot, three
-from fsw.autopilot.model.body import FORM, ON, OTHER, PART, RADIUS, SPHERE, TOOL, Body, reaches
-from fsw.autopilot.model.kinematics import position, velocity
+from fsw.autopilot.model.body import (
+    FORM,
+    ON,
+    OTHER,
+    PART,
+    RADIUS,
+    SPHERE,
+    TOOL,
+    Body,
+    Probes,
+    reaches,
+)
+from fsw.autopilot.model.kinematics import Frame, position, velocity
 from fsw.autopilot.model.linearisation import (
     Horizon,
     Linearisation,
@@ -54,6 +65,7 @@ from fsw.autopilot.shapes.zones import (
     FOLLOWS,
     FORCE_MAX,
     PLANES,
+    Zones,
     all_moving_zones,
     shifts,
     zone_arrays,
@@ -183,16 +195,16 @@ def _tuning(settings: Array, follows: bool, touches: bool) -> BarrierNumbers:
 
 
 @kernel
-def _room_to_touch(zones: Array, k: int, touches: bool, tuning: BarrierNumbers) -> float:
+def _room_to_touch(zones: Zones, k: int, touches: bool, tuning: BarrierNumbers) -> float:
     """How much nearer [m] than others the tool may come."""
     return zones[k, CLEARANCE] + TOUCH_SPEED / tuning.slope if touches else 0.0
 
 
 @kernel
 def _fill(
-    zones: Array,
+    zones: Zones,
     moves: tuple[Array, Array],
-    probes: Array,
+    probes: Probes,
     horizon: Horizon,
     settings: Array,
     rows: Rows,
@@ -248,7 +260,7 @@ def _fill(
 
 @kernel
 def _barrier(
-    frame: Array,
+    frame: Frame,
     start: Array,
     on: int,
     local: Vec3,
@@ -319,22 +331,21 @@ def _reach(horizon: Horizon, node: int, settings: Array) -> tuple[float, float]:
 
 @kernel
 def fill_starts(
-    zones: Array,
+    zones: Zones,
     shift: Array,
     speed: Array,
-    probes: Array,
-    frame: Array,
+    probes: Probes,
+    frame: Frame,
     settings: Array,
     distances: bool,
     starts: Array,
 ) -> None:
     """The least value of each zone and part at one instant: h [m/s], or the distance [m].
 
-    ``zones`` (zones, 23) [SI], ``probes`` (probes, 14) [SI] and ``settings`` (20 + j,) [SI] are as
-    in ``shapes.zones``, ``model.body`` and above, ``frame`` (FRAME,) [SI] the vehicle;
-    ``shift`` (zones, 3) [m, NED] and ``speed`` (zones, 3) [m/s, NED] those of the zones. Into
-    ``starts`` (zones x parts,) [SI], zone by zone; a zone that follows the target has one entry,
-    one that may be touched none of the tool's.
+    ``settings`` (20 + j,) [SI] are as above, ``shift`` (zones, 3) [m, NED] and
+    ``speed`` (zones, 3) [m/s, NED] those of the zones. Into ``starts`` (zones x parts,) [SI], zone
+    by zone; a zone that follows the target has one entry, one that may be touched none of the
+    tool's.
     """
     starts[:] = math.inf
     first = 0

@@ -49,8 +49,8 @@ from fsw.autopilot.model.multibody import (
     place_of_tip,
     solve,
 )
-from fsw.autopilot.signals import Mat3, PredictionState, StateEstimate, Vec3
-from fsw.autopilot.tick_record import ArmTask, Estimate, PlanState
+from fsw.autopilot.signals import Mat3, Vec3
+from fsw.autopilot.tick_record import AnyEstimate, AnyPlan, ArmTask
 from fsw.compiled import compilable
 from fsw.record import JOINTS, Floats
 
@@ -80,11 +80,7 @@ class CompensationLimits:
 
 @compilable
 def lately_off_plan(
-    limits: CompensationLimits,
-    before: float,
-    estimate: StateEstimate | Estimate,
-    plan: PredictionState | PlanState,
-    dt: float,
+    limits: CompensationLimits, before: float, estimate: AnyEstimate, plan: AnyPlan, dt: float
 ) -> float:
     """Largest recent distance [m] of the base from its plan, given that of a tick ``before`` [m].
 
@@ -102,8 +98,8 @@ def compensate(
     limits: CompensationLimits,
     joint_limits: JointReferenceLimits,
     off_plan: float,
-    estimate: StateEstimate | Estimate,
-    plan: PredictionState | PlanState,
+    estimate: AnyEstimate,
+    plan: AnyPlan,
 ) -> None:
     """Joint angles and rates that keep the end-effector on its planned path. Writes a.q, a.qd.
 
@@ -152,7 +148,7 @@ def compensate(
 
 
 @compilable
-def planned_axes(plan: PredictionState | PlanState) -> tuple[Mat3, Vec3]:
+def planned_axes(plan: AnyPlan) -> tuple[Mat3, Vec3]:
     """The base's attitude R_WB in the plan's state, and its rate [rad/s, B].
 
     What ``body_axes`` says, of real numbers and without arrays.
@@ -173,10 +169,7 @@ def planned_axes(plan: PredictionState | PlanState) -> tuple[Mat3, Vec3]:
 
 @compilable
 def _seen_from_base(
-    estimate: StateEstimate | Estimate,
-    plan: PredictionState | PlanState,
-    planned: Vec3,
-    moving: Vec3,
+    estimate: AnyEstimate, plan: AnyPlan, planned: Vec3, moving: Vec3
 ) -> tuple[Vec3, Vec3]:
     """By how much the end-effector's place and motion in B differ from those ``planned`` in B.
 

@@ -6,17 +6,16 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.barriers.safe_approach import BarrierTuning
+from fsw.autopilot.control.actuator_watch import felt_inside
 from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.arm_compensation import compensate, lately_off_plan
-from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
-from fsw.autopilot.control.expectation import tell_filter
 from fsw.autopilot.control.gains import LoopGains, tracking_gains
 from fsw.autopilot.control.joint_reference import refer
 from fsw.autopilot.control.joints import (
+    accelerate_joints,
     joint_torques,
     observe_contact,
     observe_disturbance,
@@ -24,7 +23,7 @@ from fsw.autopilot.control.joints import (
     torques_of_failed,
 )
 from fsw.autopilot.control.payload import let_go, weigh_payload
-from fsw.autopilot.control.pid import height_pid
+from fsw.autopilot.control.pid import attitude_pid, attitude_reference, height_pid
 from fsw.autopilot.control.press import look_for_surface, weigh_tool
 from fsw.autopilot.control.safety_filter import (
     FilterLaw,
@@ -63,13 +62,15 @@ from fsw.autopilot.model.rotors import (
     motion_state,
     rotor_decay,
 )
-from fsw.autopilot.shapes.zones import NO_ZONES
+from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Mat3, Setpoint, StateEstimate, Vec3
 from fsw.autopilot.tick_record import (
+    BEGINS_ANEW,
     BREACH,
     FILTER_ACTED,
     GATE_NEEDED,
     IMPAIRED,
+    JUDGES,
     OFF_PLAN,
     Expected,
     Tick,
@@ -172,15 +173,14 @@ class Cascade:
         loop = TrackingLaw(airframe.attitude_lag, tuning.tracking, gains)
         lag, follows = gains.k[3] / gains.k[2], inner == "tracking"
         self.law = cascade_law(airframe, tuning, loop, clear, lag, dt, follows_plan=follows)
-        self.probes = filter_probes(clear.body)
-        self.packed = packed(self.law)
-        rest = NO_ZONES, self.probes, NO_TUBE
-        self._close_loops = machine_code(_close_loops, self.packed, Tick().array, 1, *rest)
-        self._load()
+        self._load(clear, _close_loops)
 
-    def _load(self) -> None:
-        """Load what says how the vehicle moves, for a law that is packed."""
-        example = self.packed, Tick().array
+    def _load(self, clear: KeepClear, tick: Any, *models: NDArray[Any]) -> None:
+        """Load the kernels of the law: that of a ``tick``, which takes ``models`` besides."""
+        self.probes, self.packed, r = filter_probes(clear.body), packed(self.law), Tick().array
+        rest = NO_ZONES, self.probes, NO_TUBE
+        self._tick = machine_code(tick, self.packed, *models, r, 1, *rest)
+        example = self.packed, r
         self._found = Expected()
         self._expected = machine_code(_expected, *example, self._found.array, True, True)
         self._motion = machine_code(_motion, *example)
@@ -207,30 +207,24 @@ class Cascade:
         self,
         r: Tick,
         ticks: int = 1,
-        zones: NDArray[np.float64] = NO_ZONES,
+        zones: Zones = NO_ZONES,
         health: ActuatorHealth = HEALTHY,
         tube: TubeAround = NO_TUBE,
     ) -> None:
-        """Close the loops of a record; see ``close_loops``, ``zones`` (zones, k) [SI]."""
+        """Close the loops of a record; see ``close_loops``."""
         if health is not HEALTHY or r.flags & IMPAIRED:
             note_health(r.health, health)
             r.flags = 0 if health is HEALTHY else IMPAIRED
-        self._close_loops(self.packed, r.array, ticks, zones, self.probes, tube)
+        self._tick(self.packed, r.array, ticks, zones, self.probes, tube)
 
 
 @compilable
-def close_loops(
-    r: Tick,
-    law: CascadeLaw,
-    ticks: int,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
-) -> None:
+def close_loops(r: Tick, law: CascadeLaw, ticks: int, zones: Zones, probes: FilterProbes) -> None:
     """One tick, or several at once where some were missed: from estimate and plan to a command.
 
     Each law writes what those after it read; ``sent`` is the last command until the end, where the
-    new one takes its place, not yet gated. The safety filter keeps the ``probes`` off the ``zones``
-    (zones, k) [SI] of ``moving_zones``.
+    new one takes its place, not yet gated. The safety filter keeps the ``probes`` off the
+    ``zones``, those of ``moving_zones``.
     """
     airframe, tuning, dt = law.airframe, law.tuning, law.dt
     estimate = r.estimate
@@ -272,16 +266,11 @@ def settle_rotors(r: Tick, law: CascadeLaw, ticks: int) -> None:
 
 @compilable
 def keep_off_zones(
-    r: Tick,
-    law: CascadeLaw,
-    motion: MotionState,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
+    r: Tick, law: CascadeLaw, motion: MotionState, zones: Zones, probes: FilterProbes
 ) -> None:
     """What is flown: plan and input such that the loops ask for a filtered acceleration.
 
-    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``. Reads
-    estimate, plan, u, observed; writes flown, flown_u, margin, flags.
+    Reads estimate, plan, u, observed; writes flown, flown_u, margin, flags.
     """
     r.flown, r.flown_u = r.plan, r.u
     r.flags, r.margin = r.flags & IMPAIRED, math.inf
@@ -306,17 +295,11 @@ def keep_off_zones(
 
 @compilable
 def filter_asked(
-    r: Tick,
-    law: CascadeLaw,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
-    a: Vec3,
-    asked: Vec3,
+    r: Tick, law: CascadeLaw, zones: Zones, probes: FilterProbes, a: Vec3, asked: Vec3
 ) -> tuple[Vec3, bool]:
     """The filtered acceleration, and whether it is another than ``asked`` [m/s^2, NED].
 
-    The base accelerates by ``a`` [m/s^2, NED] now; ``zones`` (zones, k) [SI] and ``probes``
-    as of ``close_loops``. Reads estimate, observed; writes margin, flags.
+    The base accelerates by ``a`` [m/s^2, NED] now. Reads estimate, observed; writes margin, flags.
     """
     safe, changed, margin = filtered(
         law.filter, law.airframe.bodies, probes, zones, r.estimate, r.observed.v, a, asked
@@ -419,6 +402,37 @@ def compare_with_plan(r: Tick, tube: TubeAround) -> None:
 
 
 @compilable
+def tell_filter(
+    r: Tick, airframe: Airframe, rotor_decay: float, found: Expected, explains: bool, judged: bool
+) -> None:
+    """Write what is expected of the next tick, after which ``rotor_decay`` [1] of a lag is left.
+
+    Of a vehicle that stands thrust does not say how it moves: then it ``explains`` nothing.
+    Encoders are ``judged`` unless a joint has failed. Reads estimate, sent, rotors, health, watch,
+    pressing, observed, payload; writes bodies, mixer.
+    """
+    for i in range(int(airframe.rotors)):
+        settling_at = r.health.effectiveness[i] * r.sent.rotor_thrust[i]
+        r.mixer.mean[i] = lag_rotor(r.rotors[i], settling_at, rotor_decay)
+    move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
+    motion = motion_state(airframe, r, r.mixer.mean, r.sent.joint_torque)
+    # The accelerometer knows of gusts, and of the ground.
+    field = 0.0, 0.0, r.estimate.specific_force
+    accelerate_joints(r, airframe.bodies, field, motion.turning)
+    felt_inside(r, airframe, found.felt)
+    for i in range(int(airframe.bodies.joints)):
+        found.u[i], found.undone[i] = r.bodies.work[i], r.watch.undone[i]
+        found.unseen[i] = r.watch.unseen[i]
+    for i in range(3):
+        found.pushed[i] = r.observed.known[i]
+        found.model[i] = motion.turning[i] if explains else 0.0
+    # Not by the mass that is flown: it goes by the accelerometer, which this is a witness against.
+    lift = motion.thrust / (airframe.mass + r.payload.mass)
+    found.model[3] = lift if explains else 0.0
+    found.judges = JUDGES if judged else BEGINS_ANEW
+
+
+@compilable
 def _joints_are_sound(r: Tick, airframe: Airframe) -> bool:
     sound = True
     for i in range(int(airframe.bodies.joints)):
@@ -431,7 +445,7 @@ def _close_loops(
     law: NDArray[Any],
     records: NDArray[Any],
     ticks: int,
-    zones: NDArray[np.float64],
+    zones: Zones,
     probes: FilterProbes,
     tube: TubeAround,
 ) -> None:

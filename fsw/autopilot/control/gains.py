@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
+from scipy.linalg import solve_discrete_are
 
 from fsw.autopilot.control.arm_compensation import CompensationLimits
 from fsw.autopilot.control.joint_reference import JointReferenceLimits
 from fsw.autopilot.control.pid import PidGains
 from fsw.autopilot.control.press import PressTuning
 from fsw.autopilot.model.airframe import GRAVITY
-from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.model.prediction import Array, zero_order_hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,11 +115,7 @@ def tracking_gains(tuning: TrackingTuning, rotor_lag: float, dt: float) -> Track
 
 def _lqr(a: Array, b: Array, q: Array, input_weight: float, dt: float) -> list[float]:
     """Discrete LQR gain of a single-input chain."""
-    n = len(a)
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n], block[:n, n:] = a * dt, b * dt
-    exponential = expm(block)
-    ad, bd = exponential[:n, :n], exponential[:n, n:]
+    ad, bd = zero_order_hold(a, b, dt)
     p = solve_discrete_are(ad, bd, q, np.array([[input_weight]]))
     gain = np.linalg.solve(input_weight + bd.T @ p @ bd, bd.T @ p @ ad)
     return [float(value) for value in gain[0]]

@@ -20,7 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
+from fsw.autopilot.control.gains import TrackingTuning
 from fsw.autopilot.control.tube import RARE, WIND_COVERED, impulse_responses, random_steps
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.body import Body
@@ -47,7 +47,6 @@ class LoopOfParts:
 
     airframe: Airframe
     tuning: TrackingTuning
-    gains: TrackingGains
     disturbance: float  # m/s^2
     hold_s: float  # of a random one
     dt: float  # s, a tick
@@ -107,5 +106,5 @@ def _worst(loop: LoopOfParts, push: Array, wind: Array) -> float:
 
 def _responses(loop: LoopOfParts, *, wind: bool) -> Array:
     """Position and acceleration after a unit push of one tick, a row per tick."""
-    states = impulse_responses(loop.airframe, loop.tuning, loop.gains, loop.dt, wind=wind)
+    states = impulse_responses(loop.airframe, loop.tuning, loop.dt, wind=wind)
     return states[:, [0, 2]]

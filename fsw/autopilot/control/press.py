@@ -63,7 +63,7 @@ from fsw.autopilot.shapes.zones import (
     FORCE_MAX,
     ROUGH,
     STIFF,
-    Array,
+    Zones,
     moved_by,
     surface_at,
     velocity_of,
@@ -111,13 +111,12 @@ class PressTuning:
 
 @compilable
 def look_for_surface(
-    r: Tick, bodies: Bodies, tuning: PressTuning, radius: float, zones: Array, dt: float
+    r: Tick, bodies: Bodies, tuning: PressTuning, radius: float, zones: Zones, dt: float
 ) -> None:
     """The surface that the tool's ball of ``radius`` [m] may touch, the nearest of ``zones``.
 
-    ``zones`` (zones, k) [SI] are those of ``moving_zones``; how long the tool has missed it, and
-    how it slips, is looked at ``dt`` [s] after the last time. Reads u, estimate, bodies; writes
-    pressing.
+    How long the tool has missed it, and how it slips, is looked at ``dt`` [s] after the last time.
+    Reads u, estimate, bodies; writes pressing.
     """
     k, estimate, found = r.pressing, r.estimate, False
     nearest = tuning.near

@@ -24,7 +24,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.cascade import (
@@ -38,7 +37,7 @@ from fsw.autopilot.control.cascade import (
     settle_rotors,
 )
 from fsw.autopilot.control.gains import LoopGains, TrackingGains
-from fsw.autopilot.control.safety_filter import FilterProbes, filter_probes
+from fsw.autopilot.control.safety_filter import FilterProbes
 from fsw.autopilot.control.tracking import TrackingLaw, observe
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
@@ -47,10 +46,10 @@ from fsw.autopilot.model.airframe import GRAVITY, Airframe, AttitudeLag
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.multibody import move_bodies
 from fsw.autopilot.model.rotors import MotionState, motion_state
-from fsw.autopilot.shapes.zones import NO_ZONES
+from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Setpoint, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
-from fsw.compiled import compilable, kernel, machine_code, packed
+from fsw.compiled import compilable, kernel, packed
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,24 +102,20 @@ class Px4Loops(Cascade):
         lag = loop.lag.kd / loop.lag.kp + airframe.rotor_lag
         gains = replace(tuning, tracking=tracking)
         self.law = cascade_law(airframe, gains, loop, clear, lag, dt, follows_plan=True)
-        self.px4 = px4
-        self.probes = filter_probes(clear.body)
-        self.packed, self._packed_px4 = packed(self.law), packed(px4)
-        self._load()
-        example = self.packed, self._packed_px4, Tick().array, 1, NO_ZONES, self.probes, NO_TUBE
-        self._ask = machine_code(_ask_px4, *example)
+        self.px4, self._packed_px4 = px4, packed(px4)
+        self._load(clear, _ask_px4, self._packed_px4)
 
     def step(
         self,
         r: Tick,
         ticks: int = 1,
-        zones: NDArray[np.float64] = NO_ZONES,
+        zones: Zones = NO_ZONES,
         health: ActuatorHealth = HEALTHY,
         tube: TubeAround = NO_TUBE,
     ) -> None:
-        """See ``Cascade.step``, ``zones`` (zones, k) [SI]; rotors are PX4's whatever ``health``."""
+        """See ``Cascade.step``; rotors are PX4's whatever ``health``."""
         r.flags = 0
-        self._ask(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
+        self._tick(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
 
     def setpoint(self, r: Tick) -> Setpoint:
         """What PX4 is asked for by a record after its step."""
@@ -143,17 +138,9 @@ _NO_GAINS = TrackingGains((0.0,) * 5, 0.0, (0.0,) * 3, 0.0)
 
 @compilable
 def ask_px4(
-    r: Tick,
-    law: CascadeLaw,
-    px4: Px4Tuning,
-    ticks: int,
-    zones: NDArray[np.float64],
-    probes: FilterProbes,
+    r: Tick, law: CascadeLaw, px4: Px4Tuning, ticks: int, zones: Zones, probes: FilterProbes
 ) -> None:
-    """One tick: from estimate and plan to what PX4 is asked for, in ``flown`` and ``flown_u``.
-
-    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``.
-    """
+    """One tick: from estimate and plan to what PX4 is asked for, in ``flown`` and ``flown_u``."""
     airframe, dt = law.airframe, law.dt
     settle_rotors(r, law, ticks)
     move_bodies(r.bodies, airframe.bodies, airframe.joint_armature, r.estimate)
@@ -183,13 +170,10 @@ def keep_off_zones(
     law: CascadeLaw,
     px4: Px4Tuning,
     motion: MotionState,
-    zones: NDArray[np.float64],
+    zones: Zones,
     probes: FilterProbes,
 ) -> None:
-    """Add what the safety filter pushes beyond what PX4 will ask its attitude loop for.
-
-    ``zones`` (zones, k) [SI] and ``probes`` as of ``close_loops``.
-    """
+    """Add what the safety filter pushes beyond what PX4 will ask its attitude loop for."""
     a = add_scaled(motion.a, r.observed.d, 1.0)
     asked = asked_by_px4(r, px4, a)
     safe, changed = filter_asked(r, law, zones, probes, a, asked)
@@ -228,7 +212,7 @@ def _ask_px4(
     models: NDArray[Any],
     records: NDArray[Any],
     ticks: int,
-    zones: NDArray[np.float64],
+    zones: Zones,
     probes: FilterProbes,
     tube: TubeAround,
 ) -> None:

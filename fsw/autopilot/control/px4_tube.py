@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from fsw.autopilot.control.px4_loops import Px4Tuning
-from fsw.autopilot.control.tube import RARE, Tube, after_a_push, random_steps
+from fsw.autopilot.control.tube import RARE, Tube, after_a_push, random_steps, worst
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.prediction import Array
 
@@ -56,24 +56,19 @@ def _tube(px4: Px4Tuning, hanging: float, hold_s: float, dt: float) -> Tube:
     climbs = after_a_push(*_vertical_loop(px4), dt, _SETTLED_S)
     per_hold = round(hold_s / dt)
     return Tube(
-        base=_sum(base),
-        end_effector=_sum(end_effector),
-        base_wind=0.0,
-        wind=0.0,
-        wind_beyond=0.0,
-        known=_sum(base),
-        height=_sum(climbs[:, 0]),
-        end_effector_wind=0.0,
+        base=worst(base),
+        end_effector=worst(end_effector),
+        known=worst(base),
+        height=worst(climbs[:, 0]),
         base_expected=RARE * random_steps(base, per_hold),
         end_effector_expected=RARE * random_steps(end_effector, per_hold),
-        acceleration=_sum(states[:, 2]),
-        wanted_acceleration=_sum(wanted),
-        acceleration_error=_sum(wanted - states[:, 2]),
-        jerk=_sum(states[:, 3]),
-        present_jerk=_sum(states[:, 3]),
-        snap=_sum(states[:, 4]),
-        vertical_acceleration=_sum(climbs[:, 2]),
-        vertical_disturbance=0.0,
+        acceleration=worst(states[:, 2]),
+        wanted_acceleration=worst(wanted),
+        acceleration_error=worst(wanted - states[:, 2]),
+        jerk=worst(states[:, 3]),
+        present_jerk=worst(states[:, 3]),
+        snap=worst(states[:, 4]),
+        vertical_acceleration=worst(climbs[:, 2]),
     )
 
 
@@ -114,7 +109,3 @@ def _vertical_loop(px4: Px4Tuning) -> tuple[Array, Array]:
     a[2, 2] -= 1.0 / px4.delay
     a[3, :2] = px4.climb_integral * px4.height_gain, px4.climb_integral
     return a, b
-
-
-def _sum(response: Array) -> float:
-    return float(np.abs(response).sum())

@@ -44,7 +44,7 @@ from fsw.autopilot.barriers.safe_approach import (
     safe_approach_slope,
     safe_approach_speed,
 )
-from fsw.autopilot.geometry.vectors import add_scaled, clamp, dot, subtract
+from fsw.autopilot.geometry.vectors import Vector, add_scaled, clamp, dot, subtract
 from fsw.autopilot.model.body import CAPSULE, FORM, ON, RADIUS, TOOL, TURN, Body
 from fsw.autopilot.model.kinematics import FRAME, put_base, put_links
 from fsw.autopilot.model.multibody import Bodies
@@ -56,15 +56,15 @@ from fsw.autopilot.shapes.zones import (
     FORCE_MAX,
     KEEP_IN,
     PLANES,
+    Zones,
     acceleration_of,
     moved_by,
     surface_at,
     velocity_of,
 )
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Estimate
+from fsw.autopilot.signals import Vec2, Vec3
+from fsw.autopilot.tick_record import AnyEstimate
 from fsw.compiled import compilable
-from fsw.record import Floats
 
 ROOM = 1.0  # m, that a vehicle may be outside of a zone and still draws back from it
 _PASSES = 4  # over all zones
@@ -139,17 +139,17 @@ def filtered(
     law: FilterLaw,
     bodies: Bodies,
     probes: FilterProbes,
-    zones: NDArray[np.float64],
-    estimate: StateEstimate | Estimate,
-    v: Vec3 | Floats,
+    zones: Zones,
+    estimate: AnyEstimate,
+    v: Vector,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
     """The acceleration nearest to the ``wanted`` [m/s^2, NED] one that keeps the condition.
 
-    ``zones`` (zones, k) [SI] are those of ``moving_zones``, ``v`` [m/s, NED] and ``a``
-    [m/s^2, NED] the body's own now, disturbance included. Also says whether the wanted one was
-    changed, and the least margin [m] of all parts, infinite where no zone is near.
+    ``zones`` are those of ``moving_zones``, ``v`` [m/s, NED] and ``a`` [m/s^2, NED] the body's own
+    now, disturbance included. Also says whether the wanted one was changed, and the least margin
+    [m] of all parts, infinite where no zone is near.
     """
     put_base(probes.frame, estimate.p_WB, estimate.v_WB, estimate.R_WB, estimate.w_WB_B)
     put_links(probes.frame, bodies, estimate.q_arm, estimate.qd_arm)
@@ -175,12 +175,12 @@ def filtered(
 def _kept_off(
     law: FilterLaw,
     all_probes: FilterProbes,
-    zones: NDArray[np.float64],
+    zones: Zones,
     zone: int,
     which: int,
     shift: Vec3,
     t_us: int,
-    v: Vec3 | Floats,
+    v: Vector,
     a: Vec3,
     wanted: Vec3,
 ) -> tuple[Vec3, bool, float]:
@@ -220,7 +220,7 @@ def _within(law: FilterLaw, a: Vec3) -> Vec3:
 
 
 @compilable
-def _fastest(law: FilterLaw, n: Vec3, v: Vec3 | Floats, along: float) -> float:
+def _fastest(law: FilterLaw, n: Vec3, v: Vector, along: float) -> float:
     """The acceleration [m/s^2] along ``n`` that brings ``v`` [m/s, NED] to the most, ``along`` now.
 
     What it moves at across ``n`` leaves less of that.

@@ -19,17 +19,15 @@ import math
 
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.signals import StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Estimate
+from fsw.autopilot.signals import Vec2, Vec3
+from fsw.autopilot.tick_record import AnyEstimate
 from fsw.compiled import compilable
 
 _POLE = 12.0  # 1/s; quicker than the plan's own attitude (7), which it must not slow down
 
 
 @compilable
-def limited_turn(
-    airframe: Airframe, estimate: StateEstimate | Estimate, turning: Vec3, wd: Vec3
-) -> Vec3:
+def limited_turn(airframe: Airframe, estimate: AnyEstimate, turning: Vec3, wd: Vec3) -> Vec3:
     """Angular acceleration ``wd`` [rad/s^2, FRD], as far as tilt and body rates allow.
 
     ``turning`` [rad/s^2, FRD] is the angular acceleration that there is.

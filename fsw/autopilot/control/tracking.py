@@ -26,13 +26,18 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from fsw.autopilot.control.gains import TrackingGains, TrackingTuning
-from fsw.autopilot.geometry.vectors import clamp_magnitude
+from fsw.autopilot.geometry.rotation import Axes
+from fsw.autopilot.geometry.vectors import Vector, clamp_magnitude
 from fsw.autopilot.model.airframe import GRAVITY, AttitudeLag
 from fsw.autopilot.model.rotors import MotionState
-from fsw.autopilot.signals import Mat3, PlanInput, PredictionState, StateEstimate, Vec2, Vec3
-from fsw.autopilot.tick_record import Accelerations, Estimate, Observed, PlanState
+from fsw.autopilot.signals import Vec2, Vec3
+from fsw.autopilot.tick_record import (
+    AnyEstimate,
+    AnyInput,
+    AnyPlan,
+    Observed,
+)
 from fsw.compiled import compilable
-from fsw.record import Floats
 
 _LEAST_SPECIFIC_THRUST = 2.0  # m/s^2; below it tilt hardly accelerates the vehicle
 _RECENT_S = 2.0  # in which a disturbance fades that is not seen again
@@ -133,13 +138,7 @@ def snap_command(
 
 @compilable
 def vertical_acceleration(
-    law: TrackingLaw,
-    p: Vec3 | Floats,
-    v: Vec3 | Floats,
-    a: Vec3,
-    d: float,
-    plan: PredictionState | PlanState,
-    u: PlanInput | Accelerations,
+    law: TrackingLaw, p: Vector, v: Vector, a: Vec3, d: float, plan: AnyPlan, u: AnyInput
 ) -> float:
     """Acceleration down [m/s^2] that the law asks for.
 
@@ -154,7 +153,7 @@ def vertical_acceleration(
 
 
 @compilable
-def beyond_plan(observed: Observed, u: PlanInput | Accelerations) -> Vec3:
+def beyond_plan(observed: Observed, u: AnyInput) -> Vec3:
     """What a surface accelerates the base by [m/s^2, NED], beyond what the plan ``u`` counts on."""
     k, push = observed.known, u.push
     return k[0] - push[0], k[1] - push[1], k[2] - push[2]
@@ -163,11 +162,11 @@ def beyond_plan(observed: Observed, u: PlanInput | Accelerations) -> Vec3:
 @compilable
 def wanted_accelerations(
     law: TrackingLaw,
-    estimate: StateEstimate | Estimate,
+    estimate: AnyEstimate,
     motion: MotionState,
     observed: Observed,
-    plan: PredictionState | PlanState,
-    u: PlanInput | Accelerations,
+    plan: AnyPlan,
+    u: AnyInput,
 ) -> Vec3:
     """What ``follow_plan`` asks for on all axes [m/s^2, NED]."""
     p, v, d, bias = estimate.p_WB, observed.v, observed.d, observed.disturbance_bias
@@ -183,7 +182,7 @@ def wanted_accelerations(
 
 @compilable
 def _along(
-    axis: int, p: float, v: float, motion: MotionState, plan: PredictionState | PlanState
+    axis: int, p: float, v: float, motion: MotionState, plan: AnyPlan
 ) -> tuple[AxisState, AxisState]:
     """The vehicle at ``p`` [m] with ``v`` [m/s] and the plan, along one horizontal axis."""
     return (
@@ -193,7 +192,7 @@ def _along(
 
 
 @compilable
-def velocity_of_mass(estimate: StateEstimate | Estimate, swing: Mat3 | Floats) -> Vec3:
+def velocity_of_mass(estimate: AnyEstimate, swing: Axes) -> Vec3:
     """Velocity [m/s, NED] of the centre of mass, as far as turning makes it another.
 
     ``swing`` (9,) [m] is what it gets in B of a rate of the base, while drives are free: of an arm
@@ -209,12 +208,12 @@ def velocity_of_mass(estimate: StateEstimate | Estimate, swing: Mat3 | Floats) -
 def follow_plan(
     law: TrackingLaw,
     mass: float,
-    swing: Mat3 | Floats,
-    estimate: StateEstimate | Estimate,
+    swing: Axes,
+    estimate: AnyEstimate,
     motion: MotionState,
     observed: Observed,
-    plan: PredictionState | PlanState,
-    u: PlanInput | Accelerations,
+    plan: AnyPlan,
+    u: AnyInput,
 ) -> tuple[Vec2, float]:
     """Angular acceleration about body x and y [rad/s^2] and total thrust [N].
 
@@ -243,7 +242,7 @@ def follow_plan(
 
 
 @compilable
-def _swung(swing: Mat3 | Floats, c: float, s: float, lean: Vec2) -> Vec2:
+def _swung(swing: Axes, c: float, s: float, lean: Vec2) -> Vec2:
     """How far [m, NED] the centre of mass swings as the body's z axis leans by ``lean`` [1, NED].
 
     ``c`` [1] and ``s`` [1] are cosine and sine of the yaw.
@@ -259,11 +258,11 @@ def _swung(swing: Mat3 | Floats, c: float, s: float, lean: Vec2) -> Vec2:
 def _horizontal_snap(
     law: TrackingLaw,
     axis: int,
-    estimate: StateEstimate | Estimate,
+    estimate: AnyEstimate,
     motion: MotionState,
     observed: Observed,
-    plan: PredictionState | PlanState,
-    u: PlanInput | Accelerations,
+    plan: AnyPlan,
+    u: AnyInput,
     off: float,
     going: float,
 ) -> float:

@@ -45,13 +45,12 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from fsw.autopilot.control.allocation import AXES, PITCH, ROLL
 from fsw.autopilot.control.gains import TrackingGains, TrackingTuning, tracking_gains
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import posture
-from fsw.autopilot.model.prediction import Array
+from fsw.autopilot.model.prediction import Array, zero_order_hold
 from fsw.autopilot.model.rotors import WEIGHING_TIME
 from fsw.autopilot.signals import Vec2
 from fsw.compiled import compilable
@@ -78,18 +77,18 @@ class TubeAround(NamedTuple):
 NO_TUBE: Final = TubeAround(math.inf, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tube:
-    """Reach of a disturbance of 1 m/s^2 on one horizontal axis."""
+    """Reach of a disturbance of 1 m/s^2 on one horizontal axis; of PX4's loops without wind."""
 
     base: float  # m, worst case, body origin
     end_effector: float  # m, worst case, a hanging end-effector across the arm's plane
-    base_wind: float  # m, what the memory of wind can add to it, at its limit
-    wind: float  # m per m/s^2 of that memory
-    wind_beyond: float  # m of ``base_wind`` by which clearances grow while the memory is in force
+    base_wind: float = 0.0  # m, what the memory of wind can add to it, at its limit
+    wind: float = 0.0  # m per m/s^2 of that memory
+    wind_beyond: float = 0.0  # m of it, by which clearances grow while the memory is in force
     known: float  # m per m/s^2 of a force on the tool, as it comes and goes
     height: float  # m, worst case, vertically
-    end_effector_wind: float  # m, of what is covered
+    end_effector_wind: float = 0.0  # m, of what is covered
     base_expected: float  # m, 3.7 sigma under random steps
     end_effector_expected: float  # m
     # The most that each quantity can be, worst case:
@@ -100,68 +99,60 @@ class Tube:
     present_jerk: float  # m/s^3
     snap: float  # m/s^4, wanted
     vertical_acceleration: float  # m/s^2, of the thrust
-    vertical_disturbance: float  # m/s^2, observed
+    vertical_disturbance: float = 0.0  # m/s^2, observed
 
 
 @lru_cache(maxsize=8)  # 4 ms; most changes of a tuning do not touch it
 def tube(
-    airframe: Airframe,
-    tuning: TrackingTuning,
-    gains: TrackingGains,
-    hanging: float,
-    hold_s: float,
-    dt: float,
+    airframe: Airframe, tuning: TrackingTuning, hanging: float, hold_s: float, dt: float
 ) -> Tube:
     """The tube of the tracking loop with a tick of ``dt`` [s].
 
     The end-effector is ``hanging`` [m] below the base; a random disturbance keeps its value for
     ``hold_s``.
     """
-    below = hanging / GRAVITY
-    states = impulse_responses(airframe, tuning, gains, dt, wind=False)
+    below, gains = hanging / GRAVITY, tracking_gains(tuning, airframe.rotor_lag, dt)
+    states = impulse_responses(airframe, tuning, dt, wind=False)
     base, acceleration = states[:, 0], states[:, 2]
     k3, k4 = gains.k[2], gains.k[3]
     wanted = states @ _wanted_acceleration(gains)
     end_effector = base - below * acceleration
-    in_wind = impulse_responses(airframe, tuning, gains, dt, wind=True)
+    in_wind = impulse_responses(airframe, tuning, dt, wind=True)
     base_wind = in_wind[:, 0]
     end_effector_wind = base_wind - below * in_wind[:, 2]
     climbs = _vertical_responses(airframe, tuning, gains, dt)
     per_hold = round(hold_s / dt)
     covered = min(tuning.wind_limit, WIND_COVERED)
     return Tube(
-        base=_sum(base),
-        end_effector=_sum(end_effector),
-        base_wind=tuning.wind_limit * _sum(base_wind),
-        wind=_sum(base_wind),
-        wind_beyond=(tuning.wind_limit - covered) * _sum(base_wind),
-        known=0.5 * _sum(base + base_wind),
-        height=_sum(climbs[:, 0]),
-        end_effector_wind=covered * _sum(end_effector_wind),
+        base=worst(base),
+        end_effector=worst(end_effector),
+        base_wind=tuning.wind_limit * worst(base_wind),
+        wind=worst(base_wind),
+        wind_beyond=(tuning.wind_limit - covered) * worst(base_wind),
+        known=0.5 * worst(base + base_wind),
+        height=worst(climbs[:, 0]),
+        end_effector_wind=covered * worst(end_effector_wind),
         base_expected=RARE * random_steps(base, per_hold),
         end_effector_expected=RARE * random_steps(end_effector, per_hold),
-        acceleration=_sum(acceleration),
-        wanted_acceleration=_sum(wanted),
-        acceleration_error=_sum(wanted - acceleration),
-        jerk=k3 / k4 * _sum(wanted - acceleration),
-        present_jerk=_sum(states[:, 3]),
-        snap=_sum(states @ _wanted_snap(gains)),
-        vertical_acceleration=_sum(climbs[:, 2] - climbs[:, 5]),
-        vertical_disturbance=_sum(climbs[:, 4]),
+        acceleration=worst(acceleration),
+        wanted_acceleration=worst(wanted),
+        acceleration_error=worst(wanted - acceleration),
+        jerk=k3 / k4 * worst(wanted - acceleration),
+        present_jerk=worst(states[:, 3]),
+        snap=worst(states @ _wanted_snap(gains)),
+        vertical_acceleration=worst(climbs[:, 2] - climbs[:, 5]),
+        vertical_disturbance=worst(climbs[:, 4]),
     )
 
 
 @lru_cache(maxsize=4)
-def base_after(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
-) -> Array:
+def base_after(airframe: Airframe, tuning: TrackingTuning, dt: float) -> Array:
     """How far [m] any disturbance within 1 m/s^2 of one axis can have pushed the base.
 
     An entry (ticks,) for each tick of ``dt`` [s] after it began.
     """
-    reach: Array = np.cumsum(
-        np.abs(impulse_responses(airframe, tuning, gains, dt, wind=False)[:, 0])
-    )
+    off = impulse_responses(airframe, tuning, dt, wind=False)[:, 0]
+    reach: Array = np.cumsum(np.abs(off))
     return reach
 
 
@@ -184,30 +175,21 @@ class EstimateTube:
 
 
 @lru_cache(maxsize=4)
-def estimate_tube(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float
-) -> EstimateTube:
+def estimate_tube(airframe: Airframe, tuning: TrackingTuning, dt: float) -> EstimateTube:
     """How far the base is moved by an estimate that is wrong, with a tick of ``dt`` [s]."""
-    a = _loop(airframe, tuning, gains)
-    k, lag = gains.k, airframe.rotor_lag
+    gains = tracking_gains(tuning, airframe.rotor_lag, dt)
+    a, k, lag = _loop(airframe, tuning, gains), gains.k, airframe.rotor_lag
     gain_v, gain_d = 2.0 * tuning.observer_bandwidth, tuning.observer_bandwidth**2
-    # Into the snap and the observer's two states; the observer alone uses the velocity.
-    enters = {
-        "position": (-k[0] / lag, 0.0, 0.0),
-        "velocity": (0.0, gain_v, gain_d),
-        "acceleration": (-k[2] / lag, 1.0, 0.0),
-        "jerk": (-k[3] / lag, 0.0, 0.0),
-    }
-    moved = {}
-    for name, entries in enters.items():
-        b = np.zeros(len(a))
-        b[4:] = entries
-        moved[name] = after_a_push(a, b, dt)[:, 0]
+
+    def moved(*enters: float) -> Array:
+        """The base, by an error that enters the snap and the observer's two states."""
+        return after_a_push(a, np.array([0.0, 0.0, 0.0, 0.0, *enters]), dt)[:, 0]
+
     return EstimateTube(
-        position=_sum(moved["position"]),
-        velocity=_sum(moved["velocity"]),
-        acceleration=_sum(moved["acceleration"]),
-        jerk=float(np.linalg.norm(moved["jerk"])),
+        position=worst(moved(-k[0] / lag, 0.0, 0.0)),
+        velocity=worst(moved(0.0, gain_v, gain_d)),  # the observer alone uses it
+        acceleration=worst(moved(-k[2] / lag, 1.0, 0.0)),
+        jerk=float(np.linalg.norm(moved(-k[3] / lag, 0.0, 0.0))),
     )
 
 
@@ -247,8 +229,7 @@ def closest_tracking(
     """
     while tuning.input_weight > _MIN_WEIGHT:
         closer = replace(tuning, input_weight=max(0.5 * tuning.input_weight, _MIN_WEIGHT))
-        gains = tracking_gains(closer, airframe.rotor_lag, dt)
-        loop = tube(airframe, closer, gains, hanging, hold_s, dt)
+        loop = tube(airframe, closer, hanging, hold_s, dt)
         if max(limits_used(airframe, closer, loop, disturbance).values()) > _MAX_USED:
             break
         tuning = closer
@@ -316,7 +297,8 @@ def _snap_in_hover(airframe: Airframe) -> float:
     return GRAVITY * least
 
 
-def _sum(response: Array) -> float:
+def worst(response: Array) -> float:
+    """The most that any push within +-1 makes of a ``response`` (ticks,) [any] to one of a tick."""
     return float(np.abs(response).sum())
 
 
@@ -332,12 +314,13 @@ def _wanted_snap(gains: TrackingGains) -> Array:
 
 
 def impulse_responses(
-    airframe: Airframe, tuning: TrackingTuning, gains: TrackingGains, dt: float, *, wind: bool
+    airframe: Airframe, tuning: TrackingTuning, dt: float, *, wind: bool
 ) -> Array:
     """States after a unit push of one tick of ``dt`` [s]: p, v, a, j, s and the observer's v, d.
 
     A row (7,) [SI] a tick. The push is a disturbance, or a memory of wind where there is none.
     """
+    gains = tracking_gains(tuning, airframe.rotor_lag, dt)
     a = _loop(airframe, tuning, gains)
     b = np.zeros(len(a))
     if wind:
@@ -388,15 +371,10 @@ def after_a_push(a: Array, b: Array, dt: float, settled_s: float = _SETTLED_S) -
 
     ``a`` is (n, n) and ``b`` (n,) [SI]; nothing is left after ``settled_s`` [s].
     """
-    n = len(a)
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n], block[:n, n] = a * dt, b * dt
-    exponential = expm(block)
-    x = exponential[:n, n]
-    states = []
-    for _ in range(round(settled_s / dt)):
-        states.append(x)
-        x = exponential[:n, :n] @ x
+    held, pushed = zero_order_hold(a, b[:, None], dt)
+    states = [pushed[:, 0]]
+    while len(states) < round(settled_s / dt):
+        states.append(held @ states[-1])
     return np.array(states)
 
 

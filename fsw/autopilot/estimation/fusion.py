@@ -28,7 +28,7 @@ from fsw.autopilot.estimation.error_state import (
     reset_covariance,
     vec4,
 )
-from fsw.autopilot.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
 from fsw.autopilot.geometry.vectors import (
     add,
     add_scaled,
@@ -313,19 +313,39 @@ def forget(x: Any, first: int, variance: Vec3) -> None:
 
 @machine_code
 @kernel
-def doubt(filters: Filter, place: float, turn: float, held: bool) -> None:
+def doubt(filters: Filter, along: Vec3, about: Vec3, place: float, turn: float, held: bool) -> None:
     """Know little more of a state that poses contradict by a ``place`` [m] and a ``turn`` [rad].
 
     Either the pose's frame has moved, or the inertial unit leads the filter astray: its biases may
-    be anything, and velocity and attitude are what they have made of them. But where poses do not
-    say how the vehicle is turned, ``held``, their places would be explained by any attitude.
+    be anything, and velocity and attitude are what they have made of them. They have made what is
+    contradicted, a place that is off ``along`` [m, NED], by a force or a tilt, and an attitude that
+    is off ``about`` an axis [rad, body]: nothing is doubted across. What is off by little, by a
+    ``place``, may be so by chance, in any direction. But where poses do not say how the vehicle is
+    turned, ``held``, their places would be explained by any attitude.
     """
-    M = filters[0].covariance
+    x = filters[0]
+    M, R = x.covariance, matrix_from_quaternion(vec4(x.q))
+    north, east, down = _unit(along)
+    level, up = (north, east, 0.0), (0.0, 0.0, down)
+    tilt, spin = rotate_back(R, (-east, north, 0.0)), _unit(about)
+    force, lift = rotate_back(R, level), rotate_back(R, up)
     for i in range(3):
-        M[P + i, P + i] += place * place
-        M[V + i, V + i] += _DOUBTED_SPEED * _DOUBTED_SPEED
-        if not held:
-            continue
-        M[TH + i, TH + i] += turn * turn
-        M[BA + i, BA + i] += _DOUBTED_FORCE * _DOUBTED_FORCE
-        M[BG + i, BG + i] += _DOUBTED_RATE * _DOUBTED_RATE
+        for j in range(3):
+            moved = level[i] * level[j] + up[i] * up[j]
+            pushed = force[i] * force[j] + lift[i] * lift[j]
+            turned = tilt[i] * tilt[j] + spin[i] * spin[j]
+            if place > 0.0:
+                moved = pushed = turned = 1.0 if i == j else 0.0
+            M[P + i, P + j] += place * place * moved
+            M[V + i, V + j] += _DOUBTED_SPEED * _DOUBTED_SPEED * moved
+            if not held:
+                continue
+            M[TH + i, TH + j] += turn * turn * turned
+            M[BA + i, BA + j] += _DOUBTED_FORCE * _DOUBTED_FORCE * pushed
+            M[BG + i, BG + j] += _DOUBTED_RATE * _DOUBTED_RATE * turned
+
+
+@compilable
+def _unit(v: Vec3) -> Vec3:
+    """The direction of a vector ``v`` [any], or none where it is none."""
+    return add_scaled(_NONE, v, 1.0 / max(norm(v), 1e-9))

@@ -62,7 +62,7 @@ from fsw.autopilot.estimation.sensors.pose import Pose, is_attitude_stuck
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
-from fsw.autopilot.geometry.vectors import add_scaled, norm
+from fsw.autopilot.geometry.vectors import add_scaled, norm, three
 from fsw.autopilot.measurements import (
     AidingSample,
     GnssSample,
@@ -124,7 +124,7 @@ class SensorFusion:
         assert estimate is not None
         for sensor in self._sensors.values():
             sensor.take(memory, sensor.at_rest, t, (2.0, 2.0))
-        fusion.doubt(memory.numbers, 0.0, 0.0, True)
+        fusion.doubt(memory.numbers, _REST, _REST, 0.0, 0.0, True)
         residuals.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
@@ -462,7 +462,7 @@ class SensorFusion:
             parts = [1.0 < r < math.inf for r in ratio]
             if little and not (announced or run.stepped) and run.is_no_noise(parts):
                 before = memory.numbers[0].copy()
-                fusion.doubt(memory.numbers, _SMALL_STEP, _SMALL_TURN, max(ratio) < math.inf)
+                self._doubt(memory, ratio, innovation, _SMALL_STEP, _SMALL_TURN)
                 ratio = sensor.fuse(memory, sample, one.half)
                 memory = memory.led(_jump(before, memory.numbers[0])[0])
         fused = health.fused or (now,) * len(ratio)
@@ -483,13 +483,32 @@ class SensorFusion:
             memory = sensor.take(memory, sample, one.time, ratio)
             if not (announced or run.stepped) and isinstance(sample, PoseSample):
                 # Either the frame has moved, or the inertial unit lies.
-                fusion.doubt(memory.numbers, 0.0, 0.0, max(ratio) < math.inf)
+                self._doubt(memory, ratio, innovation, 0.0, 0.0)
             taken = zip(fused, ratio, strict=True)
             fused = tuple([now if r < math.inf else before for before, r in taken])
-            memory = memory.noting(health._replace(fused=fused))
+            # The estimate is there now: this one was used, and the next run begins anew.
+            ratio = tuple([min(r, 1.0) if r < math.inf else r for r in ratio])
+            health = health.with_fused(fused, ratio, (0.0,) * len(health.innovation))
+            runs = tuple([one for one in memory.runs if one.kind is not run.kind])
+            memory = replace(memory.noting(health), runs=runs)
         elif previous is not None and not refused:
             memory = memory.jumped(*_jump(previous, memory.numbers[0]), expected=True)
         return memory
+
+    def _doubt(
+        self,
+        memory: FusionMemory,
+        ratio: tuple[float, ...],
+        innovation: tuple[float, ...],
+        place: float,
+        turn: float,
+    ) -> None:
+        """Doubt what an inertial unit may have made of a pose's refused parts."""
+        along, about = [
+            three(innovation, at) if 1.0 < r < math.inf else _REST
+            for at, r in zip((0, 3), ratio, strict=True)
+        ]
+        fusion.doubt(memory.numbers, along, about, place, turn, max(ratio) < math.inf)
 
     def _run(
         self,

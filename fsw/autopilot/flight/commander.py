@@ -126,7 +126,7 @@ class Commander:
     ) -> CommandContext:
         """The state that a decision on a command may depend on, and what its ``sender`` may not."""
         limits, vehicle, stream = self._config.limits, state.vehicle, state.mission.stream
-        setpoint_limits, goal = self._config.steering, state.setpoint.goal
+        goal = state.setpoint.goal
         asked = goal.joints if goal is not None else None
         return CommandContext(
             mode=vehicle.mode,
@@ -148,19 +148,11 @@ class Commander:
             against_sender=way_home.against(
                 state.mission, sender, limits.safe_set_owner, armed=vehicle.armed
             ),
-            body=self._body,
             now_us=estimate.t_us,
-            climb_range=(limits.airborne_height, limits.takeoff_climb_most),
-            airframe=self._config.airframe,
+            config=self._config,
             health=arming_health(self._config, state, estimate, self._contradiction),
             blocked=_blocked(vehicle),
-            speed=vehicle.speed or setpoint_limits.cruise_speed,
-            max_speed=setpoint_limits.speed,
-            yaw_rate=setpoint_limits.yaw_rate,
-            acceleration=setpoint_limits.acceleration,
-            highest=setpoint_limits.highest,
-            failures_allowed=limits.failure_injection == 1,
-            above_px4=self._config.inner == "px4",
+            speed=vehicle.speed or self._config.steering.cruise_speed,
             rests=rests(state, estimate, limits.aiding_loss_us),
         )
 
@@ -311,7 +303,6 @@ class Commander:
     def _apply(
         self, state: FlightState, decision: Decision, estimate: StateEstimate
     ) -> FlightState:
-        """Apply the effects of a decision."""
         vehicle, limits = state.vehicle, self._config.limits
         if decision.home is not None:
             vehicle = replace(vehicle, home=decision.home)

@@ -78,7 +78,7 @@ class Descent:
             if place is not None:
                 across = self._back(height, estimate, aiding, place)
         for _ in range(ticks):
-            nominal = self._model.step(nominal, self._input(nominal, speed, most, across))
+            nominal = self._model.advance(nominal, self._input(nominal, speed, most, across))
         if blind:
             (x, y, _), (_, _, z) = estimate.p_WB, nominal.p
             nominal = nominal._replace(p=(x, y, z))

@@ -12,7 +12,7 @@ from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
-from fsw.autopilot.model.nominal import NominalModel
+from fsw.autopilot.model.nominal import NominalModel, rest_state
 from fsw.autopilot.model.rotors import MotionState
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -30,17 +30,8 @@ from fsw.frozen import replace
 
 def nominal_at_rest(estimate: StateEstimate) -> PredictionState:
     """A plan state at rest at the vehicle's position."""
-    return PredictionState(
-        p=estimate.p_WB,
-        v=(0.0, 0.0, 0.0),
-        a=(0.0, 0.0, 0.0),
-        j=(0.0, 0.0),
-        s=(0.0, 0.0),
-        yaw=estimate.yaw,
-        yaw_rate=0.0,
-        q_arm=estimate.q_arm,
-        qd_arm=(0.0,) * len(estimate.q_arm),
-    )
+    rest = rest_state(len(estimate.q_arm))
+    return rest._replace(p=estimate.p_WB, yaw=estimate.yaw, q_arm=estimate.q_arm)
 
 
 def measured_state(estimate: StateEstimate, motion: MotionState) -> PredictionState:

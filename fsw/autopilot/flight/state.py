@@ -303,9 +303,8 @@ class FlightState:
     estimator: EstimatorReport | None = None  # what telemetry says of it, once a planning period
     aiding: Aiding = AIDED
     dropout: Dropout = COMPLETE  # where states are exact
-    kept: InflatedSafeSet = (
-        InflatedSafeSet()
-    )  # the safe set, with clearances for an estimate that is not sure
+    # The safe set, with clearances for an estimate that is not sure.
+    kept: InflatedSafeSet = InflatedSafeSet()
     accuracy: AccuracyMemory = AccuracyMemory()  # of the estimate, until it is told
     host: HostHealth = field(default_factory=HostHealth)
     damage: Damage = Damage()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
-from fsw.autopilot.geometry.vectors import clamp_magnitude
+from fsw.autopilot.geometry.vectors import Vector, clamp_magnitude
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable
 from fsw.record import Floats
+
+Axes = Mat3 | Floats  # compiled code may hand over nine entries of an array
 
 
 @compilable
@@ -33,13 +35,13 @@ def matrix_from_quaternion(q: Vec4) -> Mat3:
 
 
 @compilable
-def yaw_of(R: Mat3 | Floats) -> float:
+def yaw_of(R: Axes) -> float:
     """ZYX yaw of a rotation [rad]."""
     return math.atan2(R[3], R[0])
 
 
 @compilable
-def euler_zyx(R: Mat3 | Floats) -> Vec3:
+def euler_zyx(R: Axes) -> Vec3:
     """Roll, pitch and yaw of a rotation [rad]."""
     return math.atan2(R[7], R[8]), -math.asin(clamp_magnitude(R[6], 1.0)), yaw_of(R)
 
@@ -90,7 +92,7 @@ def nine(a: tuple[float, ...] | Floats, at: int) -> Mat3:
 
 
 @compilable
-def rotate(R: Mat3 | Floats, v: Vec3) -> Vec3:
+def rotate(R: Axes, v: Vec3) -> Vec3:
     """World components of ``v`` [any unit, FRD]."""
     x, y, z = v
     return (
@@ -101,7 +103,7 @@ def rotate(R: Mat3 | Floats, v: Vec3) -> Vec3:
 
 
 @compilable
-def rotate_back(R: Mat3 | Floats, v: Vec3 | Floats) -> Vec3:
+def rotate_back(R: Axes, v: Vector) -> Vec3:
     """Body components of ``v`` [any unit, NED]."""
     x, y, z = v[0], v[1], v[2]
     return (

@@ -11,7 +11,7 @@ import numpy as np
 from fsw.autopilot.model.multibody import Bodies, Several, bodies_of
 from fsw.autopilot.model.parts import Part, parts_of, points_of
 from fsw.autopilot.signals import ActuatorCommand, JointVector, Vec2
-from fsw.record import ANGLE_LIMITS, JOINTS, ROTORS, padded, padded_rows
+from fsw.record import JOINTS, ROTORS, padded, padded_rows
 from vehicles.description import Battery, Rotor, Vehicle
 from vehicles.vehicle_file import load_vehicle
 
@@ -32,13 +32,20 @@ class AttitudeLag:
 
 
 @dataclass(frozen=True, slots=True)
-class AngleLimits:
-    """Limits of the joints' angles, ``low <= row · q <= high``: of one joint, or of a sum."""
+class AngleLimit:
+    """A limit of joints' angles, ``low <= row · q <= high``: of one joint, or of a sum."""
 
-    rows: int
-    row: Several  # (JOINTS,) [1] each
-    low: Several  # (ANGLE_LIMITS,) rad
-    high: Several  # (ANGLE_LIMITS,) rad
+    row: JointVector  # (j,) [1]
+    low: float  # rad
+    high: float  # rad
+
+    @property
+    def name(self) -> str:
+        """What it limits: "joint 1", or "joints 1 and 2 together"."""
+        joints = [str(k) for k, share in enumerate(self.row, start=1) if share]
+        if len(joints) == 1:
+            return f"joint {joints[0]}"
+        return f"joints {', '.join(joints[:-1])} and {joints[-1]} together"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +65,7 @@ class Airframe:
     joint_rate_max: Several  # (JOINTS,) rad/s
     joint_friction: Several  # (JOINTS,) N m, of a drive that turns slowly
     joint_drag: Several  # (JOINTS,) N m, more of one that turns at its largest rate
-    angle_limits: AngleLimits
+    angle_limits: tuple[AngleLimit, ...]
     home_posture: Several  # (JOINTS,) rad, to fly in
     points: tuple[Part, ...]  # the critical points
     parts: tuple[Part, ...]  # what takes up space
@@ -122,9 +129,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
         joint_torque_max=padded(tuple([joint.torque_max for joint in vehicle.joints]), JOINTS),
         joint_rate_max=padded(tuple([joint.rate_max for joint in vehicle.joints]), JOINTS),
         joint_friction=padded(tuple([joint.coulomb for joint in vehicle.joints]), JOINTS),
-        joint_drag=padded(
-            tuple([joint.viscous * joint.rate_max for joint in vehicle.joints]), JOINTS
-        ),
+        joint_drag=padded(tuple([one.viscous * one.rate_max for one in vehicle.joints]), JOINTS),
         angle_limits=_angle_limits(vehicle),
         home_posture=padded(vehicle.home_posture, JOINTS),
         points=points_of(vehicle),
@@ -136,23 +141,16 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     )
 
 
-def _angle_limits(vehicle: Vehicle) -> AngleLimits:
-    """The joints' own limits, then the coupled ones; a joint without any has no row."""
-    limits = [
-        (tuple(float(k == i) for k in range(JOINTS)), joint.position_min, joint.position_max)
+def _angle_limits(vehicle: Vehicle) -> tuple[AngleLimit, ...]:
+    """The joints' own limits, then the coupled ones; a joint without any has none."""
+    n = len(vehicle.joints)
+    own = [
+        AngleLimit(tuple([float(k == i) for k in range(n)]), joint.position_min, joint.position_max)
         for i, joint in enumerate(vehicle.joints)
         if math.isfinite(joint.position_min) or math.isfinite(joint.position_max)
     ]
-    limits += [
-        (padded(limit.row, JOINTS), limit.minimum, limit.maximum)
-        for limit in vehicle.coupled_limits
-    ]
-    return AngleLimits(
-        rows=len(limits),
-        row=padded_rows([row for row, _, _ in limits], ANGLE_LIMITS * JOINTS),
-        low=padded(tuple([low for _, low, _ in limits]), ANGLE_LIMITS),
-        high=padded(tuple([high for _, _, high in limits]), ANGLE_LIMITS),
-    )
+    coupled = [AngleLimit(one.row, one.minimum, one.maximum) for one in vehicle.coupled_limits]
+    return (*own, *coupled)
 
 
 def wrench_of(rotor: Rotor) -> Several:

@@ -11,14 +11,14 @@ arms have nothing but bounds on c. Limits that are left over, the ``others``, ar
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from fsw.autopilot.geometry.vectors import clamp
-from fsw.autopilot.model.airframe import Airframe, AngleLimits
+from fsw.autopilot.model.airframe import Airframe, AngleLimit
 from fsw.autopilot.model.multibody import Several
 from fsw.autopilot.signals import JointVector, Vec2
 from fsw.compiled import compilable
@@ -44,30 +44,29 @@ class ArmCoordinates:
 def arm_coordinates(airframe: Airframe) -> ArmCoordinates:
     """The coordinates of a vehicle's arm."""
     n, limits = airframe.bodies.joints, airframe.angle_limits
-    rows = [limits.row[JOINTS * i : JOINTS * (i + 1)] for i in range(limits.rows)]
-    chosen: dict[int, int] = {}
-    for i, row in enumerate(rows):
+    own = [tuple([float(i == k) for i in range(n)]) for k in range(n)]
+    chosen = [AngleLimit(row, -math.inf, math.inf) for row in own]
+    for limit in limits:
         # Of those that end at the same joint the last: a joint's own limits come first.
-        chosen[max(k for k in range(n) if row[k] != 0.0)] = i
-    own = [tuple(float(i == k) for i in range(JOINTS)) for k in range(n)]
-    left = [i for i in range(limits.rows) if i not in chosen.values()]
-    low = [limits.low[chosen[k]] if k in chosen else -math.inf for k in range(n)]
-    high = [limits.high[chosen[k]] if k in chosen else math.inf for k in range(n)]
-    L = [rows[chosen[k]] if k in chosen else own[k] for k in range(n)]
-    inverse = np.linalg.inv(np.array([row[:n] for row in L]))
+        chosen[max(k for k in range(n) if limit.row[k] != 0.0)] = limit
+    left = [limit for limit in limits if not any(limit is one for one in chosen)]
+    inverse = np.linalg.inv(np.array([one.row for one in chosen]))
     return ArmCoordinates(
         joints=n,
-        row=padded_rows(L, JOINTS * JOINTS),
-        column=padded_rows(
-            [padded(tuple(one), JOINTS) for one in inverse.T.tolist()], JOINTS * JOINTS
-        ),
-        low=padded(tuple(low), JOINTS),
-        high=padded(tuple(high), JOINTS),
+        row=_matrix([one.row for one in chosen], JOINTS),
+        column=_matrix(inverse.T.tolist(), JOINTS),
+        low=padded(tuple([one.low for one in chosen]), JOINTS),
+        high=padded(tuple([one.high for one in chosen]), JOINTS),
         others=len(left),
-        other_row=padded_rows([rows[i] for i in left], ANGLE_LIMITS * JOINTS),
-        other_low=padded(tuple([limits.low[i] for i in left]), ANGLE_LIMITS),
-        other_high=padded(tuple([limits.high[i] for i in left]), ANGLE_LIMITS),
+        other_row=_matrix([one.row for one in left], ANGLE_LIMITS),
+        other_low=padded(tuple([one.low for one in left]), ANGLE_LIMITS),
+        other_high=padded(tuple([one.high for one in left]), ANGLE_LIMITS),
     )
+
+
+def _matrix(rows: Iterable[Iterable[float]], room: int) -> Several:
+    """Rows (j,) of numbers as (JOINTS,) each, with ``room`` for so many."""
+    return padded_rows([padded(tuple(row), JOINTS) for row in rows], room * JOINTS)
 
 
 @compilable
@@ -115,34 +114,12 @@ def within_limits(arm: ArmCoordinates, q: JointVector, margin: float) -> JointVe
     return tuple(found.tolist())
 
 
-class AngleRow(NamedTuple):
-    """A limit of a joint's angle, or of a sum of them."""
-
-    name: str  # "joint 1", or "joints 1 and 2 together"
-    row: JointVector  # (j,) [1]
-    low: float  # rad
-    high: float  # rad
-
-
-def angle_rows(limits: AngleLimits, joints: int) -> list[AngleRow]:
-    """The limits of an arm of so many ``joints``."""
-    found = []
-    for i in range(limits.rows):
-        row = limits.row[JOINTS * i : JOINTS * i + joints]
-        names = [str(k) for k, share in enumerate(row, start=1) if share]
-        name = f"joint {''.join(names)}"
-        if len(names) > 1:
-            name = f"joints {', '.join(names[:-1])} and {names[-1]} together"
-        found.append(AngleRow(name, row, limits.low[i], limits.high[i]))
-    return found
-
-
-def first_beyond(limits: AngleLimits, q: JointVector, room: float) -> str | None:
+def first_beyond(limits: tuple[AngleLimit, ...], q: JointVector, room: float) -> str | None:
     """The first joint, or sum of joints, that is more than ``room`` [rad] beyond its limits.
 
     As a sentence, of joints at ``q`` (j,) [rad].
     """
-    for one in angle_rows(limits, len(q)):
+    for one in limits:
         angle = sum(a * b for a, b in zip(one.row, q, strict=True) if a)
         if not one.low - room <= angle <= one.high + room:
             are = "are beyond their" if " and " in one.name else "is beyond its"

@@ -41,6 +41,10 @@ PART, FORM, ON, BEGIN, END, RADIUS, RIM, TURN, TOOL, OTHER = 0, 1, 2, 3, 6, 9, 1
 before it are not."""
 
 
+Probes = NDArray[np.float64]
+"""A row a probe (probes, 14) [SI], with those columns."""
+
+
 @dataclass(frozen=True, slots=True)
 class Body:
     """Parts, of which the first is at the body's origin."""
@@ -49,8 +53,8 @@ class Body:
     parts: tuple[Part, ...]
 
     @property
-    def probes(self) -> NDArray[np.float64]:
-        """A row of numbers a probe (probes, 14) [SI], in the order of the parts."""
+    def probes(self) -> Probes:
+        """In the order of the parts."""
         rows, others = [], 0
         for k, part in enumerate(self.parts):
             form = DISC if part.rim > 0.0 else SPHERE if part.end is None else CAPSULE

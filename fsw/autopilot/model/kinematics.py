@@ -15,8 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.geometry.rotation import nine, rotate
+from fsw.autopilot.geometry.rotation import Axes, nine, rotate
 from fsw.autopilot.geometry.vectors import (
+    Vector,
     add,
     add_scaled,
     cross,
@@ -40,6 +41,8 @@ AT_D_R, AT_D_TURNING = 24, 60  # derivatives of the last two in each of four tur
 AT_LINKS, AT_AXIS, AT_AXIS_RATE = 96, 24, 27
 LINK: Final = 30
 FRAME: Final = AT_LINKS + LINK * JOINTS
+Frame = Array
+"""Where and how the vehicle is (FRAME,) [SI]."""
 
 _REST: Final[Vec3] = (0.0, 0.0, 0.0)
 
@@ -51,17 +54,14 @@ def place_of(on: int) -> int:
 
 
 @compilable
-def fill_frame(state: Array, b: Bodies, frame: Array) -> None:
-    """Where the vehicle is in a prediction ``state`` (states,) [SI].
-
-    Into a ``frame`` (FRAME,) [SI], whose derivatives stay as they are.
-    """
+def fill_frame(state: Array, b: Bodies, frame: Frame) -> None:
+    """Where the vehicle is in a prediction ``state`` (states,) [SI]; no derivatives."""
     _fill_base(state, frame)
     put_links(frame, b, state[Q_ARM::2], state[QD_ARM::2])
 
 
 @compilable
-def _fill_base(state: Array, frame: Array) -> None:
+def _fill_base(state: Array, frame: Frame) -> None:
     b1, b3, d1, d3 = body_axes(turning_of(state))
     for k in range(3):
         frame[AT_P + k], frame[AT_V + k] = state[P + k], state[V + k]
@@ -70,11 +70,8 @@ def _fill_base(state: Array, frame: Array) -> None:
 
 
 @compilable
-def put_matrix(frame: Array, at: int, b1: Vec3, b3: Vec3) -> None:
-    """The axes b1, b2 and b3 as columns, of ``b1`` [1, NED] and ``b3`` [1, NED].
-
-    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on.
-    """
+def put_matrix(frame: Frame, at: int, b1: Vec3, b3: Vec3) -> None:
+    """The axes b1, b2 and b3 as columns, of ``b1`` [1, NED] and ``b3`` [1, NED]."""
     b2 = cross(b3, b1)
     for row in range(3):
         frame[at + 3 * row], frame[at + 3 * row + 1] = b1[row], b2[row]
@@ -82,11 +79,10 @@ def put_matrix(frame: Array, at: int, b1: Vec3, b3: Vec3) -> None:
 
 
 @compilable
-def put_rate(frame: Array, at: int, b1: Vec3, b3: Vec3, d1: Vec3, d3: Vec3) -> None:
+def put_rate(frame: Frame, at: int, b1: Vec3, b3: Vec3, d1: Vec3, d3: Vec3) -> None:
     """The change of ``put_matrix`` by the product rule, for any change of its axes.
 
-    Into a ``frame`` (FRAME,) [SI] from ``at`` [1] on: ``b1`` [1, NED] changes by ``d1`` [any, NED]
-    and ``b3`` [1, NED] by ``d3`` [any, NED].
+    ``b1`` [1, NED] changes by ``d1`` [any, NED] and ``b3`` [1, NED] by ``d3`` [any, NED].
     """
     a, b = cross(d3, b1), cross(b3, d1)
     for row in range(3):
@@ -95,10 +91,8 @@ def put_rate(frame: Array, at: int, b1: Vec3, b3: Vec3, d1: Vec3, d3: Vec3) -> N
 
 
 @compilable
-def put_base(
-    frame: Array, p: Vec3 | Floats, v: Vec3 | Floats, R: Mat3 | Floats, w: Vec3 | Floats
-) -> None:
-    """The base of a ``frame`` (FRAME,) [SI] at ``p`` [m, NED] with the attitude ``R`` [1].
+def put_base(frame: Frame, p: Vector, v: Vector, R: Axes, w: Vector) -> None:
+    """The base at ``p`` [m, NED] with the attitude ``R`` [1].
 
     It moves with ``v`` [m/s, NED] and turns with ``w`` [rad/s, FRD].
     """
@@ -112,11 +106,8 @@ def put_base(
 
 
 @compilable
-def put_links(frame: Array, b: Bodies, q: JointVector | Floats, qd: JointVector | Floats) -> None:
-    """The links in a ``frame`` (FRAME,) [SI] whose base is there.
-
-    Joints are at ``q`` (j,) [rad] and turn with ``qd`` (j,) [rad/s].
-    """
+def put_links(frame: Frame, b: Bodies, q: JointVector | Floats, qd: JointVector | Floats) -> None:
+    """The links of a base that is there, joints at ``q`` (j,) [rad] with ``qd`` (j,) [rad/s]."""
     R, turning = nine(frame, AT_R), nine(frame, AT_TURNING)
     p, v = three(frame, AT_P), three(frame, AT_V)
     # The rate of the base in the world: its cross product is turning times R transposed.
@@ -145,22 +136,22 @@ def put_links(frame: Array, b: Bodies, q: JointVector | Floats, qd: JointVector 
 
 
 @kernel
-def position(frame: Array, on: int, local: Vec3) -> Vec3:
-    """Position of a place [m, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
+def position(frame: Frame, on: int, local: Vec3) -> Vec3:
+    """Position of a place [m, NED], ``local`` [m, part] where it is ``on``."""
     at = place_of(on)
     return add(three(frame, at), rotate(nine(frame, at + AT_R), local))
 
 
 @kernel
-def velocity(frame: Array, on: int, local: Vec3) -> Vec3:
-    """Velocity of a place [m/s, NED]; ``frame`` (FRAME,) [SI], ``on`` [1], ``local`` [m, part]."""
+def velocity(frame: Frame, on: int, local: Vec3) -> Vec3:
+    """Velocity of a place [m/s, NED], ``local`` [m, part] where it is ``on``."""
     at = place_of(on)
     return add(three(frame, at + AT_V), rotate(nine(frame, at + AT_TURNING), local))
 
 
 @kernel
-def in_axes(frame: Array, n: Vec3) -> Vec3:
-    """A direction ``n`` [1, NED] in the body's axes, of a ``frame`` (FRAME,) [SI]."""
+def in_axes(frame: Frame, n: Vec3) -> Vec3:
+    """A direction ``n`` [1, NED] in the body's axes."""
     return (
         n[0] * frame[6] + n[1] * frame[9] + n[2] * frame[12],
         n[0] * frame[7] + n[1] * frame[10] + n[2] * frame[13],
@@ -169,11 +160,10 @@ def in_axes(frame: Array, n: Vec3) -> Vec3:
 
 
 @kernel
-def in_body(frame: Array, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
+def in_body(frame: Frame, on: int, local: Vec3) -> tuple[Vec3, Vec3]:
     """Where a place of the vehicle is in the body [m, FRD], and its velocity there [m/s].
 
-    ``frame`` (FRAME,) [SI] is the vehicle, ``on`` [1] what the place is rigid on, ``local``
-    [m, part] where there (``fsw.autopilot.model.parts.Part``).
+    ``on`` is what it is rigid on, ``local`` [m, part] where there (``model.parts.Part``).
     """
     p, v = position(frame, on, local), velocity(frame, on, local)
     place = in_axes(frame, subtract(p, three(frame, AT_P)))
@@ -210,7 +200,7 @@ def frame_of(bodies: Bodies, estimate: StateEstimate) -> Array:
 @machine_code
 @kernel
 def _put_vehicle(
-    frame: Array, bodies: NDArray[Any], p: Vec3, v: Vec3, R: Mat3, w: Vec3, q: Array, qd: Array
+    frame: Frame, bodies: NDArray[Any], p: Vec3, v: Vec3, R: Mat3, w: Vec3, q: Array, qd: Array
 ) -> None:
     put_base(frame, p, v, R, w)
     put_links(frame, bodies[0], q, qd)
@@ -223,7 +213,7 @@ def end_effector(bodies: Bodies, estimate: StateEstimate) -> tuple[Vec3, Vec3]:
 
 @machine_code
 @kernel
-def _tip(frame: Array, bodies: NDArray[Any]) -> tuple[Vec3, Vec3]:
+def _tip(frame: Frame, bodies: NDArray[Any]) -> tuple[Vec3, Vec3]:
     b = bodies[0]
     tip, last = (b.tip[0], b.tip[1], b.tip[2]), int(b.joints)
     return position(frame, last, tip), velocity(frame, last, tip)

@@ -24,6 +24,7 @@ from fsw.autopilot.model.kinematics import (
     AT_R,
     AT_V,
     FRAME,
+    Frame,
     body_axes,
     fill_frame,
     in_axes,
@@ -171,7 +172,7 @@ def _refilled(horizon: Horizon, tracked: Tracked, bodies: NDArray[Any]) -> None:
 
 
 @kernel
-def _differentiate(state: Array, frame: Array) -> None:
+def _differentiate(state: Array, frame: Frame) -> None:
     """Derivatives of rotation and its rate in the turning states, by complex steps."""
     ax, ay, az, yaw, jx, jy, w = turning_of(state)
     b1, b3, d1, d3 = body_axes((ax, ay, az, yaw, jx, jy, w))
@@ -204,8 +205,8 @@ def _stepped(e: Any) -> Vec3:
 
 
 @kernel
-def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
-    """``n`` [1, NED] times every matrix of a ``frame`` (FRAME,) [SI], into ``turned`` (10, 3) [SI].
+def fill_turned(frame: Frame, n: Vec3, turned: Array) -> None:
+    """``n`` [1, NED] times every matrix of a frame, into ``turned`` (10, 3) [SI].
 
     R_WB and its rate, their derivatives in the turning states, in the order of the frame.
     """
@@ -220,12 +221,12 @@ def fill_turned(frame: Array, n: Vec3, turned: Array) -> None:
 
 
 @kernel
-def fill_slopes(frame: Array, on: int, local: Vec3, n: Vec3, turned: Array, slopes: Array) -> None:
+def fill_slopes(frame: Frame, on: int, local: Vec3, n: Vec3, turned: Array, slopes: Array) -> None:
     """Derivatives of ``n . p`` and ``n . v`` of a place in the state.
 
-    Into ``slopes`` (2, states) [SI]. ``frame`` (FRAME,) [SI], ``on`` [1] and ``local`` [m, part]
-    are as in ``in_body``. The direction ``n`` [1, NED] is any, ``turned`` (10, 3) [SI] that of
-    ``fill_turned`` for it. Snap moves nothing at once, so its entries stay as they are: 0.
+    Into ``slopes`` (2, states) [SI]; ``on`` and ``local`` [m, part] as in ``in_body``. The
+    direction ``n`` [1, NED] is any, ``turned`` (10, 3) [SI] that of ``fill_turned`` for it. Snap
+    moves nothing at once, so its entries stay as they are: 0.
     """
     place, along = in_body(frame, on, local)
     for k in range(3):

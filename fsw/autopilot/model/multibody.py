@@ -43,8 +43,8 @@ from fsw.autopilot.geometry.vectors import (
     subtract,
     three,
 )
-from fsw.autopilot.signals import Mat3, StateEstimate, Vec3
-from fsw.autopilot.tick_record import ArmTask, Estimate, Multibody
+from fsw.autopilot.signals import Mat3, Vec3
+from fsw.autopilot.tick_record import AnyEstimate, ArmTask, Multibody
 from fsw.compiled import compilable
 from fsw.record import JOINTS, Floats, padded_rows
 from vehicles.description import V6, Vehicle
@@ -182,9 +182,7 @@ def place_links(m: Multibody | ArmTask, b: Bodies, q: Several | Floats) -> None:
 
 
 @compilable
-def move_bodies(
-    m: Multibody, b: Bodies, armature: float, estimate: StateEstimate | Estimate
-) -> None:
+def move_bodies(m: Multibody, b: Bodies, armature: float, estimate: AnyEstimate) -> None:
     """All of ``m`` at the joints' angles and rates and the base's rate that are estimated.
 
     Every joint has an ``armature`` [kg m^2] beside its own.
@@ -199,7 +197,7 @@ def move_bodies(
 
 
 @compilable
-def _are_others(m: Multibody, b: Bodies, estimate: StateEstimate | Estimate) -> bool:
+def _are_others(m: Multibody, b: Bodies, estimate: AnyEstimate) -> bool:
     """Whether a pose and motion are others than those of ``m``. Writes of."""
     changed = not m.inertia[0] > 0.0  # nothing was found yet
     for i in range(3):

@@ -47,11 +47,7 @@ class NominalModel:
         """Bring the plan's state of a record some ticks on. Reads plan, u; writes plan."""
         self._move(self.packed, r.array, ticks)
 
-    def step(self, x: PredictionState, u: PlanInput) -> PredictionState:
-        """The state one tick later."""
-        return self.advance(x, u, 1)
-
-    def advance(self, x: PredictionState, u: PlanInput, ticks: int) -> PredictionState:
+    def advance(self, x: PredictionState, u: PlanInput, ticks: int = 1) -> PredictionState:
         """The state some ticks later under one input."""
         r = Tick()
         r.joint_count = len(x.q_arm)
@@ -75,7 +71,6 @@ def rest_state(joints: int) -> PredictionState:
 
 @kernel
 def _move(models: NDArray[Any], records: NDArray[Any], ticks: int) -> None:
-    """Bring the plan's state some ``ticks`` on."""
     model, r = models[0], records[0]
     for _ in range(ticks):
         move_plan(model, r.plan, r.u, r.joint_count)

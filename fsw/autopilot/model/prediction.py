@@ -107,19 +107,22 @@ def _add_lag(airframe: Airframe, a: Array, b: Array) -> None:
 
 def discretise(airframe: Airframe, period: float) -> tuple[Array, Array]:
     """Exact zero-order-hold A (states, states), B (states, inputs) over one ``period`` [s]."""
-    exponential, states = _exponential(airframe, period), states_of(airframe.bodies.joints)
-    return exponential[:states, :states].copy(), exponential[:states, states:].copy()
+    a, b = _discrete(airframe, period)
+    return a.copy(), b.copy()
 
 
 @lru_cache(maxsize=64)
-def _exponential(airframe: Airframe, period: float) -> Array:
-    a, b = continuous_model(airframe)
-    states, inputs = b.shape
-    block = np.zeros((states + inputs, states + inputs))
-    block[:states, :states] = a * period
-    block[:states, states:] = b * period
-    exponential: Array = expm(block)
-    return exponential
+def _discrete(airframe: Airframe, period: float) -> tuple[Array, Array]:
+    return zero_order_hold(*continuous_model(airframe), period)
+
+
+def zero_order_hold(a: Array, b: Array, period: float) -> tuple[Array, Array]:
+    """What ``a`` (n, n) [1/s] and ``b`` (n, m) [SI/s] do in a ``period`` [s], with inputs held."""
+    n, m = b.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = a * period, b * period
+    exponential = expm(block)
+    return exponential[:n, :n], exponential[:n, n:]
 
 
 def condense(airframe: Airframe, period: float, horizon: int) -> CondensedModel:

@@ -33,14 +33,8 @@ from fsw.compiled import compilable
 from fsw.record import Floats
 
 _SIDES: Final = (
-    "front",
-    "front right",
-    "right",
-    "rear right",
-    "rear",
-    "rear left",
-    "left",
-    "front left",
+    *("front", "front right", "right", "rear right"),
+    *("rear", "rear left", "left", "front left"),
 )
 WEIGHING_TIME = 1.0  # s
 _WEIGHING_THRUST = 5.0  # m/s^2

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import clarabel
 import numpy as np
+from numpy.typing import NDArray
 
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.mpc.qp_data import QpData, QuadraticProgram
-from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.qp_data import Solution
 from fsw.autopilot.signals import SolverStatus
 
 _STATUS = {
@@ -49,6 +51,41 @@ def _settings() -> clarabel.DefaultSettings:
     return settings
 
 
+class Columns(NamedTuple):
+    """A sparse matrix, column by column: what Clarabel reads of SciPy's class.
+
+    That class checks all it is given, which made a step with a new pattern take twice as long.
+    """
+
+    data: Array  # (entries,)
+    indices: NDArray[np.intp]  # (entries,) rows
+    indptr: NDArray[np.intp]  # (columns + 1,) where each column begins
+    shape: tuple[int, ...]
+    has_canonical_format: bool = True  # rows in order, none twice
+
+
+def columns_of(matrix: Array) -> Columns:
+    """The entries of a ``matrix`` (rows, columns) [any] that are not zero."""
+    column, row = np.nonzero(matrix.T)
+    begins = column.searchsorted(np.arange(matrix.shape[1] + 1))
+    return Columns(matrix[row, column], row, begins, matrix.shape)
+
+
+@dataclass(frozen=True)
+class QuadraticProgram:
+    """Clarabel's form: minimise ``1/2 x' P x + q' x`` where ``b - A x`` lies in the cones.
+
+    The data of P, q and b may change; patterns and A may not.
+    """
+
+    p: Columns  # upper triangle
+    q: Array
+    a: Columns
+    b: Array
+    nonnegative_rows: int  # the first
+    cones: int  # second-order, of three rows each, after the non-negative ones
+
+
 class ClarabelSolver:
     """Solves one program again and again with new P, q and b; A stays as it is."""
 
@@ -73,14 +110,3 @@ class ClarabelSolver:
         if not np.isfinite(x).all():
             status = SolverStatus.NUMERICAL_ERROR
         return Solution(status, x, int(answer.iterations))
-
-
-class WholeSolver:
-    """``QpSolver`` that hands all unknowns and rows over: what ``DualSolver`` is compared with."""
-
-    def __init__(self, program: QpData) -> None:
-        self._program = program
-
-    def solve(self, guess: Array) -> Solution:
-        """See ``QpSolver``; an interior-point method cannot use ``guess`` (6 n,) [SI inputs]."""
-        return ClarabelSolver(self._program.whole()).solve()

@@ -20,7 +20,6 @@ Source: docs/equations.md E17 and docs/decisions/0009; Boyd and Vandenberghe, Co
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +27,8 @@ from scipy.linalg.blas import dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.mpc.clarabel_solver import ClarabelSolver
-from fsw.autopilot.mpc.qp_data import CONE, HARD, QpData, QuadraticProgram
-from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.clarabel_solver import ClarabelSolver, QuadraticProgram, columns_of
+from fsw.autopilot.mpc.qp_data import CONE, HARD, QpData, Solution
 from fsw.autopilot.signals import SolverStatus
 
 # Residual at the guess (m/s, rad, m/s^2) below which a row starts in the working set: the first
@@ -139,9 +137,9 @@ class _Multipliers:
         upper = np.triu(np.ones((size, size)))
         self._upper = np.flatnonzero(upper.T)  # of the transpose, which is the same, row by row
         self._program = QuadraticProgram(
-            p=_columns(upper),
+            p=columns_of(upper),
             q=np.zeros(size),
-            a=_columns(np.concatenate((signs[:simple], sums, signs[simple:]))),
+            a=columns_of(np.concatenate((signs[:simple], sums, signs[simple:]))),
             b=np.zeros(size + slacks),
             nonnegative_rows=simple + slacks,
             cones=(size - simple) // CONE,
@@ -159,23 +157,3 @@ class _Multipliers:
         np.multiply(residual, _MULTIPLIER / _COST, out=self._program.q)
         np.divide(penalty, _MULTIPLIER, out=self._penalty)
         return self._solver.solve()
-
-
-class _Columns(NamedTuple):
-    """A sparse matrix, column by column: what Clarabel reads of SciPy's class.
-
-    That class checks all it is given, which made a step with a new pattern take twice as long.
-    """
-
-    data: Array  # (entries,)
-    indices: NDArray[np.intp]  # (entries,) rows
-    indptr: NDArray[np.intp]  # (columns + 1,) where each column begins
-    shape: tuple[int, ...]
-    has_canonical_format: bool = True  # rows in order, none twice
-
-
-def _columns(matrix: Array) -> _Columns:
-    """The entries of a ``matrix`` (rows, columns) that are not zero."""
-    column, row = np.nonzero(matrix.T)
-    begins = column.searchsorted(np.arange(matrix.shape[1] + 1))
-    return _Columns(matrix[row, column], row, begins, matrix.shape)

@@ -11,7 +11,6 @@ from fsw.autopilot.barriers.constraint_block import block
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Q_ARM, QD_ARM, Array, CondensedModel
 from fsw.autopilot.mpc.qp_data import InputLimits
-from fsw.record import JOINTS
 
 _RATE_SHARE: Final = 0.6  # of what a joint can do; the rest is for the loops
 
@@ -39,13 +38,12 @@ class JointLimits:
 def _rows(model: CondensedModel, limits: InputLimits) -> list[tuple[Array, float]]:
     """Of a state what is to be at most how much: (states,) [1], and rad or rad/s."""
     airframe, rows = model.airframe, []
-    joints, angles = airframe.bodies.joints, airframe.angle_limits
-    for k in range(angles.rows):
+    for angle in airframe.angle_limits:
         row = np.zeros(model.states)
-        row[Q_ARM::2] = angles.row[JOINTS * k : JOINTS * k + joints]
-        rows += [(row, angles.high[k] - limits.joint_margin)]
-        rows += [(-row, -angles.low[k] - limits.joint_margin)]
-    for joint in range(joints):
+        row[Q_ARM::2] = angle.row
+        rows += [(row, angle.high - limits.joint_margin)]
+        rows += [(-row, -angle.low - limits.joint_margin)]
+    for joint in range(airframe.bodies.joints):
         row = np.zeros(model.states)
         row[QD_ARM + 2 * joint] = 1.0
         rate = min(limits.joint_rate, _RATE_SHARE * airframe.joint_rate_max[joint])

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fsw.autopilot.barriers.constraint_block import ConstraintBlock, TargetPoints
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Array, CondensedModel
-from fsw.autopilot.mpc.clarabel_solver import WholeSolver
 from fsw.autopilot.mpc.costs import Quadratic
 from fsw.autopilot.mpc.dual_solver import DualSolver
 from fsw.autopilot.mpc.joint_limits import JointLimits
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.qp_data import QpData
-from fsw.autopilot.mpc.solution import QpSolver, Solution
+from fsw.autopilot.mpc.qp_data import QpData, QpSolver, Solution
 from fsw.autopilot.mpc.variants import parts_of
 from fsw.autopilot.signals import SafeSet
-
-QP_SOLVERS: dict[str, Callable[[QpData], QpSolver]] = {"dual": DualSolver, "whole": WholeSolver}
 
 
 class Ocp:
@@ -37,7 +31,7 @@ class Ocp:
         blocks += [(barrier.rows, parts.slack) for barrier in parts.barriers]
         self.qp = QpData(config.horizon, model.inputs, config.limits, tuple(blocks))
         self._first_barrier_slack = self.qp.inputs + self._limits.rows.slacks
-        self._solver = QP_SOLVERS[config.qp_solver](self.qp)
+        self._solver: QpSolver = DualSolver(self.qp)
 
     def update(self, safe_set: SafeSet) -> None:
         """Take other numbers of a safe set of the same layout, whose zones moved."""

@@ -156,7 +156,6 @@ class Planner:
         return None
 
     def _retune(self, tuning: Tuning) -> None:
-        """Plan with other weights, limits and barriers from now on."""
         self._config = tuned(self._untuned, tuning)
         self._tuning = tuning
         self._ocp = None

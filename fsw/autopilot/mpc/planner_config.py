@@ -30,7 +30,6 @@ class PlannerConfig:
     horizon: int = HORIZON_US // PLANNING_US  # n
     period_us: int = PLANNING_US  # T
     solver: str = "clarabel"  # a name in solvers.py; slsqp is the paper's
-    qp_solver: str = "dual"  # a name in ocp.py, of what solves each program of clarabel
     sqp_iterations: int = 2  # slsqp goes on until it converges
     body: BodyName = "full"  # what keeps clear; "points" are the paper's
     weights: CostWeights = field(default_factory=CostWeights)

@@ -1,4 +1,4 @@
-"""The planner's quadratic program as data: dense numbers, refilled in place.
+"""The planner's quadratic program as data, dense and refilled in place, and what a solver answers.
 
 Minimise ``1/2 U' H U + c' U + penalty' s`` over the inputs U of all nodes and the slacks s >= 0 of
 the soft rows, subject to
@@ -18,15 +18,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from fsw.autopilot.barriers.constraint_block import ConstraintBlock
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.model.prediction import QDD_ARM, Array
-from fsw.autopilot.signals import Vec4
+from fsw.autopilot.signals import SolverStatus, Vec4
 
 HARD = -1  # in the place of a slack's index: no slack softens the row
 CONE = 3  # rows of a tilt cone: what there is, then the two that it must cover
@@ -63,22 +63,6 @@ class Rows:
     b: Array  # (rows,)
     slack: NDArray[np.intp]  # (rows,) index of the slack that softens the row, or ``HARD``
     first_cone: int  # rows from here on are tilt cones
-
-
-@dataclass(frozen=True)
-class QuadraticProgram:
-    """Clarabel's form: minimise ``1/2 x' P x + q' x`` where ``b - A x`` lies in the cones.
-
-    The data of P, q and b may change; patterns and A may not. P and A may be anything that has the
-    members of SciPy's class which Clarabel reads.
-    """
-
-    p: sparse.csc_matrix  # upper triangle
-    q: Array
-    a: sparse.csc_matrix
-    b: Array
-    nonnegative_rows: int  # the first
-    cones: int  # second-order, of three rows each, after the non-negative ones
 
 
 class QpData:
@@ -132,35 +116,6 @@ class QpData:
             self.rows.b[row:end] = block.value - block.gradient @ guess - block.lower_bound
             row = end
 
-    def least_slacks(self, inputs: Array) -> Array:
-        """Smallest slacks (slacks,) with which the soft rows admit ``inputs`` (inputs n,) [SI]."""
-        rows, slacks = self.rows, np.zeros(len(self.penalty))
-        held = np.flatnonzero(rows.slack >= 0)
-        np.maximum.at(slacks, rows.slack[held], rows.g[held] @ inputs - rows.b[held])
-        return slacks
-
-    def whole(self) -> QuadraticProgram:
-        """All of it in Clarabel's form, unknowns (U, s), with a row for every slack >= 0."""
-        rows, slacks = self.rows, len(self.penalty)
-        softened = np.flatnonzero(rows.slack >= 0)
-        holds = sparse.csc_matrix(
-            (-np.ones(len(softened)), (softened, rows.slack[softened])),
-            shape=(len(rows.b), slacks),
-        )
-        upper = sparse.csc_matrix(np.triu(self.hessian))
-        nothing = sparse.csc_matrix((slacks, slacks))
-        inside = sparse.hstack((sparse.csc_matrix(rows.g), holds)).tocsr()
-        positive = sparse.hstack((sparse.csc_matrix((slacks, self.inputs)), -sparse.eye(slacks)))
-        cut = rows.first_cone
-        return QuadraticProgram(
-            p=sparse.block_diag((upper, nothing)).tocsc(),
-            q=np.concatenate((self.linear, self.penalty)),
-            a=sparse.vstack((inside[:cut], positive, inside[cut:])).tocsc(),
-            b=np.concatenate((rows.b[:cut], np.zeros(slacks), rows.b[cut:])),
-            nonnegative_rows=cut + slacks,
-            cones=(len(rows.b) - cut) // CONE,
-        )
-
 
 def _bounds(horizon: int, inputs: int, limits: InputLimits) -> tuple[Array, Array]:
     """Upper, then lower bounds of (vertical, yaw, each joint) a node."""
@@ -178,3 +133,25 @@ def _tilt_cones(horizon: int, inputs: int, tilt: float) -> tuple[Array, Array]:
     cone[0, 2], cone[1, 0], cone[2, 1] = slope, -1.0, -1.0
     rows = np.kron(np.eye(horizon), cone).astype(np.float64)
     return rows, np.tile([slope * GRAVITY, 0.0, 0.0], horizon)
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Outcome of one solve; ``x`` is usable only where the status is (almost) solved."""
+
+    status: SolverStatus
+    x: Array  # (unknowns,)
+    iterations: int
+
+    @property
+    def usable(self) -> bool:
+        """Whether ``x`` may be flown: a truncated iterate is finite but wrong."""
+        return self.status in (SolverStatus.SOLVED, SolverStatus.ALMOST_SOLVED)
+
+
+class QpSolver(Protocol):
+    """Solves one ``QpData``, which it is built with, again and again as filled anew."""
+
+    def solve(self, guess: Array) -> Solution:
+        """Inputs and slacks at the optimum; a ``guess`` (inputs n,) [SI] may save time."""
+        ...

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
-from functools import cache
 from operator import attrgetter
 
 from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.signals import EndEffectorTarget, Vec3
-from fsw.compiled import compilable, kernel, machine_code
 
 _REST: Vec3 = (0.0, 0.0, 0.0)
 _time = attrgetter("t_us")
@@ -65,45 +62,20 @@ def sample(stream: tuple[EndEffectorTarget, ...], t_us: int) -> EndEffectorTarge
 
 def _hermite(first: EndEffectorTarget, last: EndEffectorTarget, t_us: int) -> EndEffectorTarget:
     """Cubic through both points' positions and velocities."""
-    p, v, a, yaw = _between_points()(
-        *(first.p_WE, first.v_WE, first.yaw, first.t_us),
-        *(last.p_WE, last.v_WE, last.yaw, last.t_us, t_us),
+    span = (last.t_us - first.t_us) * 1e-6
+    share = (t_us - first.t_us) * 1e-6 / span
+    (x, vx, ax), (y, vy, ay), (z, vz, az) = (
+        _cubic(span, share, first.p_WE[k], first.v_WE[k], last.p_WE[k], last.v_WE[k])
+        for k in range(3)
     )
+    yaw = wrap_angle(first.yaw + share * wrap_angle(last.yaw - first.yaw))
     force = first.force
     if force != last.force:
         force += (t_us - first.t_us) / (last.t_us - first.t_us) * (last.force - force)
-    return EndEffectorTarget(t_us, p, v, a, yaw, force)
+    return EndEffectorTarget(t_us, (x, y, z), (vx, vy, vz), (ax, ay, az), yaw, force)
 
 
-@kernel
-def _cubic(
-    p0: Vec3,
-    v0: Vec3,
-    yaw0: float,
-    t0_us: int,
-    p1: Vec3,
-    v1: Vec3,
-    yaw1: float,
-    t1_us: int,
-    t_us: int,
-) -> tuple[Vec3, Vec3, Vec3, float]:
-    """Position, velocity, acceleration and yaw of ``_hermite``."""
-    span = (t1_us - t0_us) * 1e-6
-    x = (t_us - t0_us) * 1e-6 / span
-    first = _cubic_of_axis(span, x, p0[0], v0[0], p1[0], v1[0])
-    second = _cubic_of_axis(span, x, p0[1], v0[1], p1[1], v1[1])
-    third = _cubic_of_axis(span, x, p0[2], v0[2], p1[2], v1[2])
-    yaw = wrap_angle(yaw0 + x * wrap_angle(yaw1 - yaw0))
-    return (
-        (first[0], second[0], third[0]),
-        (first[1], second[1], third[1]),
-        (first[2], second[2], third[2]),
-        yaw,
-    )
-
-
-@compilable
-def _cubic_of_axis(span: float, x: float, p0: float, v0: float, p1: float, v1: float) -> Vec3:
+def _cubic(span: float, x: float, p0: float, v0: float, p1: float, v1: float) -> Vec3:
     """Position, velocity and acceleration on one axis, at ``x`` of the ``span``."""
     m0, m1 = span * v0, span * v1
     c2 = 3.0 * (p1 - p0) - 2.0 * m0 - m1
@@ -113,12 +85,6 @@ def _cubic_of_axis(span: float, x: float, p0: float, v0: float, p1: float, v1: f
         (m0 + x * (2.0 * c2 + x * 3.0 * c3)) / span,
         (2.0 * c2 + 6.0 * x * c3) / (span * span),
     )
-
-
-@cache
-def _between_points() -> Callable[..., tuple[Vec3, Vec3, Vec3, float]]:
-    """``_cubic``, compiled when it is first wanted."""
-    return machine_code(_cubic, _REST, _REST, 0.0, 0, _REST, _REST, 0.0, 0, 0)
 
 
 def vertical_ramp(

@@ -15,7 +15,7 @@ from fsw.autopilot.barriers.constraint_block import TargetPoints
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.qp_data import Solution
 
 Stopwatch = Callable[[], float]
 """Monotonic time [us], for the reported stage times only."""

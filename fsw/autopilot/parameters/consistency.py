@@ -178,11 +178,8 @@ def loop_tube(config: FlightConfig) -> Tube:
     dt = config.tick_period_us * 1e-6
     if config.inner == "px4":
         return px4_tube(config.px4, surroundings.hanging, surroundings.disturbance_hold, dt)
-    tracking = config.tuning.tracking
-    gains = tracking_gains(tracking, config.airframe.rotor_lag, dt)
-    return tube(
-        config.airframe, tracking, gains, surroundings.hanging, surroundings.disturbance_hold, dt
-    )
+    loop = config.airframe, config.tuning.tracking
+    return tube(*loop, surroundings.hanging, surroundings.disturbance_hold, dt)
 
 
 def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
@@ -191,9 +188,8 @@ def estimate_reach(config: FlightConfig, accuracy: Accuracy) -> EstimateReach:
     Errors of position, velocity and tilt are bounded however they change; what the gyro's noise
     does is known by its spectrum.
     """
-    dt, airframe, tracking = config.tick_period_us * 1e-6, config.airframe, config.tuning.tracking
-    gains = tracking_gains(tracking, airframe.rotor_lag, dt)
-    moved: EstimateTube = estimate_tube(airframe, tracking, gains, dt)
+    dt = config.tick_period_us * 1e-6
+    moved: EstimateTube = estimate_tube(config.airframe, config.tuning.tracking, dt)
     sigmas = config.limits.clearance_sigmas or _SIGMAS
     noise = GRAVITY * config.estimator.gyro_noise / math.sqrt(dt)
     loop = (
@@ -376,9 +372,7 @@ def return_room(config: FlightConfig, loop: Tube, least: float) -> float:
     h rises as eq 25 has it, and the distance follows h.
     """
     dt, planner, tuning = config.tick_period_us * 1e-6, config.planner, config.planner.walls
-    tracking, airframe = config.tuning.tracking, config.airframe
-    gains = tracking_gains(tracking, airframe.rotor_lag, dt)
-    after = base_after(airframe, tracking, gains, dt)
+    after = base_after(config.airframe, config.tuning.tracking, dt)
     wind = loop.base_wind - loop.wind_beyond
     begins = _SEEN_S + planner.period + config.plan_delay_ticks * dt
     times = dt * np.arange(1, len(after) + 1)
@@ -463,16 +457,14 @@ def _end_effector_tube(config: FlightConfig, loop: Tube) -> Finding:
 def part_tube(config: FlightConfig) -> tuple[PartReach, ...]:
     """Reach of the parts of the base with the configured tracking loop."""
     surroundings, dt = config.surroundings, config.tick_period_us * 1e-6
-    tracking, airframe = config.tuning.tracking, config.airframe
     loop = LoopOfParts(
-        airframe=airframe,
-        tuning=tracking,
-        gains=tracking_gains(tracking, airframe.rotor_lag, dt),
+        airframe=config.airframe,
+        tuning=config.tuning.tracking,
         disturbance=surroundings.disturbance,
         hold_s=surroundings.disturbance_hold,
         dt=dt,
     )
-    return part_reaches(loop, body_of(config.planner.body, airframe))
+    return part_reaches(loop, body_of(config.planner.body, config.airframe))
 
 
 def _part_tube(config: FlightConfig, zones: list[Zone]) -> Finding:

@@ -9,15 +9,13 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.tuning import Tuning, tuned
 
-# Pairs of parameters: the first is to be below the second, or at most equal to it.
-_BELOW: tuple[tuple[str, str], ...] = (
-    ("BAT_CRIT_THR", "BAT_LOW_THR"),
-    ("BAT_EMERGEN_THR", "BAT_CRIT_THR"),
-)
-_AT_MOST: tuple[tuple[str, str], ...] = (
-    ("COM_POS_LOW_EPH", "COM_POS_FS_EPH"),
-    ("LND_HEIGHT", "LND_AIRBORNE"),
-    ("MIS_TAKEOFF_ALT", "TKO_CLIMB_MAX"),
+# What one parameter is to be of another.
+_ORDERED: tuple[tuple[str, str, str], ...] = (
+    ("BAT_CRIT_THR", "below", "BAT_LOW_THR"),
+    ("BAT_EMERGEN_THR", "below", "BAT_CRIT_THR"),
+    ("COM_POS_LOW_EPH", "at most", "COM_POS_FS_EPH"),
+    ("LND_HEIGHT", "at most", "LND_AIRBORNE"),
+    ("MIS_TAKEOFF_ALT", "at most", "TKO_CLIMB_MAX"),
 )
 
 # Limits of roll and pitch [deg] beyond which the flight is ended; 0: none.
@@ -42,12 +40,9 @@ def agreed(config: FlightConfig, tuning: Tuning) -> FlightConfig:
 def contradictions(config: FlightConfig) -> tuple[str, ...]:
     """A sentence for each contradiction between parameters, or with what the vehicle does."""
     found = []
-    for pairs, strictly in ((_BELOW, True), (_AT_MOST, False)):
-        for lower, upper in pairs:
-            less, more = BY_NAME[lower].read(config), BY_NAME[upper].read(config)
-            if less < more or (less == more and not strictly):
-                continue
-            relation = "below" if strictly else "at most"
+    for lower, relation, upper in _ORDERED:
+        less, more = BY_NAME[lower].read(config), BY_NAME[upper].read(config)
+        if not (less < more or (less == more and relation == "at most")):
             found.append(f"{lower} {less:g} is to be {relation} {upper}, {more:g}")
     return (*found, *_within_usual_tilt(config))
 

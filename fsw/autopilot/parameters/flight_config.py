@@ -52,9 +52,8 @@ class FlightLimits:
     fence_clearance: float = 0.1  # m, kept from the walls of an uploaded fence
     station_timeout_us: int = 10_000_000  # without a ground station its loss is acted upon
     station_loss_action: int = 2  # how: 0 not at all, 1 hold, 2 return, 3 land, 5 terminate
-    station_loss_exceptions: int = (
-        0  # where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory
-    )
+    # Where it is not: 1 in a mission, 2 in hold, 4 offboard, 8 on a trajectory.
+    station_loss_exceptions: int = 0
     radio_input: int = 1  # 1 or 4: no radio; kept for programs that set it as PX4 wants it
     radio_loss_exceptions: int = 0  # the same: modes as above in which no radio is missed
     failsafe_delay_us: int = 5_000_000  # in hold, before the vehicle returns or lands
@@ -210,40 +209,30 @@ def flight_config(
     planner = PlannerConfig(controller=controller, solver=solver, body=cast(BodyName, body))
     wanted = ROBUSTNESS_PRESETS[robustness]
     if wanted is not None:
-        planner = replace(
-            planner,
-            walls=replace(planner.walls, lambda_=wanted),
-            workspace=replace(planner.workspace, lambda_=wanted),
-        )
+        planner = tuned(planner, (("walls.lambda_", wanted), ("workspace.lambda_", wanted)))
     config = FlightConfig(controller=controller, inner=inner, planner=planner, soft=soft)
     return config if vehicle is None else of_vehicle(config, vehicle)
+
+
+_ABOVE_PX4: Tuning = (
+    # PX4's loops are slower than ours, so a plan keeps more from walls: with this lambda the tube
+    # of the default ones fits, and with this alpha the tilt can brake.
+    *(("planner.walls.alpha", 1.93), ("planner.walls.lambda_", 0.4)),
+    *(("planner.workspace.alpha", 1.8), ("planner.workspace.lambda_", 0.4)),
+    ("planner.lambda_min", 0.0),
+    ("limits.watches_actuators", 0),  # which are PX4's to watch
+    ("limits.clearance_sigmas", 0.0),
+    ("tuning.compensate", False),  # PX4 knows nothing of what the arm's reaction does
+    ("safety_filter.enabled", 0),  # it relies on quicker loops
+)
 
 
 def above_px4(config: FlightConfig, tuning: Tuning = ()) -> FlightConfig:
     """The configuration of the planner above PX4, which flies the vehicle.
 
     A ``tuning`` of the start says what is known of PX4's loops; plans are predicted with their lag.
-    They are slower than ours, so a plan keeps more from walls: with this lambda the tube of the
-    default loops fits, and with this alpha the tilt can brake. Actuators are PX4's to watch.
-    The safety filter is off, which relies on quicker loops, and the arm does not compensate,
-    because PX4 knows nothing of what its reaction does.
     """
-    planner = replace(
-        config.planner,
-        walls=replace(config.planner.walls, alpha=1.93, lambda_=0.4),
-        workspace=replace(config.planner.workspace, alpha=1.8, lambda_=0.4),
-        lambda_min=0.0,
-    )
-    limits = replace(config.limits, watches_actuators=0, clearance_sigmas=0.0)
-    config = replace(
-        config,
-        inner="px4",
-        planner=planner,
-        limits=limits,
-        tuning=replace(config.tuning, compensate=False),
-        safety_filter=replace(config.safety_filter, enabled=0),
-    )
-    config = tuned(config, tuning)
+    config = tuned(replace(config, inner="px4"), (*_ABOVE_PX4, *tuning))
     return replace(config, airframe=airframe_above_px4(config.airframe, config.px4))
 
 

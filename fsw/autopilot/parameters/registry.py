@@ -22,16 +22,18 @@ from fsw.autopilot.parameters.param_type import nearest_decimal
 from fsw.autopilot.tuning import Row, Tuning, number_at
 
 ACCEL_RANGE: Final = "EST_ACC_RANGE"
-_DEGREE: Final = math.pi / 180.0
-_MICRO: Final = 1e-6
-_MILLI: Final = 1e-3
+# What the configuration's number is of a parameter's, by the begin of its unit.
+_SCALES: Final = {"deg": math.pi / 180.0, "ms": 1e-3, "1e-6": 1e-6}
+_IN_MICROSECONDS: Final = 1e6  # numbers whose names say so, of parameters in seconds
 # PX4 multiplies these by the step of its filter, 10 ms: densities of white noise times its root.
 _PX4_STEP: Final = 0.1  # sqrt(s)
-_IN_MICROSECONDS: Final = 1e6
 
 
 Choices = tuple[tuple[int, str], ...]
 """The values that something can have, with what each means."""
+
+_Choice = tuple[str, str, str, dict[int, str]]
+"""A parameter that chooses: its name, the path of its number, meaning, and what each number is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +95,18 @@ _DISARMED: Final = frozenset(
 )
 _ASSUMED: Final = "surroundings."
 _ENDS: Final = "Terminate"
+_RETREAT: Final = "Retreat along the normal, then hold"
 
 
 def _is_for_disarmed(name: str, path: str) -> bool:
     """Whether no value of the parameter may come while armed."""
     return name in _DISARMED or path.startswith(_ASSUMED)
+
+
+def _exceptions(bits: int) -> str:
+    """Modes of COM_DLL_EXCEPT, as a choice."""
+    modes = enumerate(("Mission", "Hold", "Offboard", "Trajectory"))
+    return " and ".join(mode for k, mode in modes if bits >> k & 1) or "None"
 
 
 _Pid = tuple[float, float, float, float]  # P, I, D and the limit
@@ -116,25 +125,13 @@ def _pid(name: str, path: str, unit: str, most: _Pid, what: str, least: _Pid = _
 
 def _barrier(name: str, path: str, what: str) -> list[Row]:
     return [
-        (
-            f"{name}_ALPHA",
-            f"{path}.alpha",
-            "m/s^2",
-            0.1,
-            10.0,
-            f"{what}: assumed braking deceleration",
-        ),
+        (f"{name}_ALPHA", f"{path}.alpha", "m/s^2", 0.1, 10.0,
+         f"{what}: assumed braking deceleration"),
         (f"{name}_K_S", f"{path}.slope", "1/s", 0.5, 10.0, f"{what}: slope k_S at the boundary"),
         (f"{name}_GAMMA", f"{path}.gamma", "1/s", 0.1, 10.0, f"{what}: CBF decay rate γ"),
-        (
-            f"{name}_LAMBDA",
-            f"{path}.lambda_",
-            "m/s",
-            0.01,
-            5.0,
-            f"{what}: disturbance robustness λ",
-        ),
-    ]
+        (f"{name}_LAMBDA", f"{path}.lambda_", "m/s", 0.01, 5.0,
+         f"{what}: disturbance robustness λ"),
+    ]  # fmt: skip
 
 
 def _of_sensor(name: str, row: Row) -> Row:
@@ -146,15 +143,14 @@ _TRACKING = "tuning.tracking"
 _WEIGHTS = "planner.weights"
 _SOFT = "planner.soft"
 _EST = "estimator"
-_ROWS: Final[dict[str, list[Row]]] = {
+_ROWS: Final[dict[str, list[Row | _Choice]]] = {
     "Tracking loop": [
         ("TRK_EFFORT", f"{_TRACKING}.input_weight", "1e-6 s^8", 0.05, 100.0,
-         "Horizontal LQR weight on snap; smaller tracks tighter until the rotors saturate",
-         _MICRO),
+         "Horizontal LQR weight on snap; smaller tracks tighter until the rotors saturate"),
         ("TRK_POINT", f"{_TRACKING}.point_below_base", "m", 0.0, 0.3,
          "Distance of the controlled point below the base"),
         ("TRK_Z_EFFORT", f"{_TRACKING}.vertical_input_weight", "1e-6 s^4", 0.05, 10000.0,
-         "Vertical LQR weight on acceleration", _MICRO),
+         "Vertical LQR weight on acceleration"),
         ("TRK_DIST_TAU", f"{_TRACKING}.disturbance_correlation", "s", 0.01, 1.0,
          "Disturbance model: correlation time"),
         ("TRK_Z_DIST_TAU", f"{_TRACKING}.vertical_disturbance_correlation", "s", 0.01, 10.0,
@@ -163,16 +159,14 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Observed vertical disturbance that thrust reacts to, maximum"),
         ("TRK_OBS_BW", f"{_TRACKING}.observer_bandwidth", "rad/s", 10.0, 200.0,
          "Disturbance observer bandwidth"),
-        ("TRK_WIND_TAU", f"{_TRACKING}.wind_time", "s", 0.5, 60.0,
-         "Wind estimate: time constant"),
+        ("TRK_WIND_TAU", f"{_TRACKING}.wind_time", "s", 0.5, 60.0, "Wind estimate: time constant"),
         ("TRK_WIND_MAX", f"{_TRACKING}.wind_limit", "m/s^2", 0.0, 1.0,
          "Wind estimate: limit per axis"),
         ("TRK_ERR_MAX", f"{_TRACKING}.position_error_limit", "m", 0.01, 0.5,
          "Position error limit"),
         ("TRK_ACC_MAX", f"{_TRACKING}.acceleration_limit", "m/s^2", 0.5, 5.0,
          "Acceleration command limit"),
-        ("TRK_JRK_MAX", f"{_TRACKING}.jerk_limit", "m/s^3", 2.0, 100.0,
-         "Jerk command limit"),
+        ("TRK_JRK_MAX", f"{_TRACKING}.jerk_limit", "m/s^3", 2.0, 100.0, "Jerk command limit"),
         ("TRK_STOP_SNAP", f"{_TRACKING}.stopping_snap", "m/s^4", 10.0, 1000.0,
          "Snap that a commanded jerk must be stoppable with"),
     ],
@@ -192,7 +186,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Damping of PX4's attitude loop; plans count on it from the next start on"),
         ("PX4_DELAY", "px4.delay", "ms", 2.0, 200.0,
          "From a state that is measured to a torque that answers it; plans count on it from the "
-         "next start on", _MILLI),
+         "next start on"),
         ("PX4_OBS_BW", "px4.observer", "rad/s", 1.0, 60.0,
          "Disturbance observer bandwidth above PX4"),
         ("PX4_CANCEL", "px4.cancelled", "", 0.0, 1.0,
@@ -251,8 +245,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Yaw error look-ahead time (damps yaw)"),
         ("PLN_W_INPUT", f"{_WEIGHTS}.inputs", "", 0.0001, 100.0,
          "Input weight (keeps the optimum unique)"),
-        ("PLN_TILT_MAX", "planner.limits.tilt", "deg", 2.0, 30.0,
-         "Maximum tilt", _DEGREE),
+        ("PLN_TILT_MAX", "planner.limits.tilt", "deg", 2.0, 30.0, "Maximum tilt"),
         ("PLN_AZ_MAX", "planner.limits.vertical", "m/s^2", 0.2, 6.0,
          "Maximum vertical acceleration"),
         ("PLN_YAW_MAX", "planner.limits.yaw_acc", "rad/s^2", 0.01, 1.0,
@@ -264,8 +257,8 @@ _ROWS: Final[dict[str, list[Row]]] = {
         ("PLN_JNT_MARGIN", "planner.limits.joint_margin", "rad", 0.0, 0.5,
          "Margin of a plan to the joint limits"),
         ("PLN_JNT_SLACK", "planner.joint_slack", "", 0.0, 1e5, "Joint limit slack penalty"),
-        ("PLN_BODY", "planner.body", "", 0.0, 1.0,
-         "What keeps clear of obstacles"),
+        ("PLN_BODY", "planner.body", "What keeps clear of obstacles",
+         {0: "Base, joint 2 and end-effector as points", 1: "Full body"}),
         ("PLN_UPS_DIST", "upset_distance", "m", 0.02, 1.0,
          "Position error above which planning restarts from the measured state"),
         ("PLN_UPS_YAW", "upset_yaw", "rad", 0.05, 3.0,
@@ -289,8 +282,7 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Distance of the end-effector below the base (start-up analysis)"),
     ],
     "Other controllers": [
-        ("HC_TIGHTEN", "planner.tightening", "m", 0.0, 0.5,
-         "HC controller: additional clearance"),
+        ("HC_TIGHTEN", "planner.tightening", "m", 0.0, 0.5, "HC controller: additional clearance"),
         ("SC_W_WALL", f"{_SOFT}.wall", "", 0.001, 1000.0,
          "SC controller: wall weight w_4 of eq 29 (larger is weaker)"),
         ("SC_W_WALL_N", f"{_SOFT}.wall_terminal", "", 0.001, 1000.0,
@@ -324,30 +316,26 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Standard deviation of the tilt at a start without a pose"),
     ],
     "Takeoff and landing": [
-        ("MIS_TAKEOFF_ALT", "limits.takeoff_climb", "m", 0.3, 10.0,
-         "Default takeoff height"),
-        ("TKO_CLIMB_MAX", "limits.takeoff_climb_most", "m", 1.0, 150.0,
-         "Maximum takeoff height"),
+        ("MIS_TAKEOFF_ALT", "limits.takeoff_climb", "m", 0.3, 10.0, "Default takeoff height"),
+        ("TKO_CLIMB_MAX", "limits.takeoff_climb_most", "m", 1.0, 150.0, "Maximum takeoff height"),
         ("TKO_WAIT_T", "limits.takeoff_wait_us", "s", 1.0, 300.0,
-         "Takeoff command timeout before arming", _IN_MICROSECONDS),
+         "Takeoff command timeout before arming"),
         ("TKO_SPEED", "limits.climb_speed", "m/s", 0.05, 1.5, "Takeoff speed"),
         ("LND_SPEED", "limits.land_speed", "m/s", 0.05, 0.6, "Landing speed"),
         ("LND_HEIGHT", "limits.landed_height", "m", 0.02, 0.25,
          "Landing detector: maximum height above ground"),
         ("LND_AIRBORNE", "limits.airborne_height", "m", 0.25, 1.0,
          "Landing detector: height above ground that counts as flying"),
-        ("LND_V_STILL", "limits.landed_speed", "m/s", 0.01, 0.3,
-         "Landing detector: maximum speed"),
+        ("LND_V_STILL", "limits.landed_speed", "m/s", 0.01, 0.3, "Landing detector: maximum speed"),
         ("LND_T_STILL", "limits.landed_time_us", "s", 0.1, 5.0,
-         "Landing detector: time below both limits", _IN_MICROSECONDS),
+         "Landing detector: time below both limits"),
         ("LND_IDLE_THR", "limits.idle_thrust", "N", 0.0, 4.0,
          "Rotor idle thrust on the ground when armed"),
     ],
     "Steering": [
         ("STR_CRUISE", "steering.cruise_speed", "m/s", 0.1, 3.0, "Cruise speed"),
         ("STR_V_MAX", "steering.speed", "m/s", 0.1, 3.0, "Maximum speed setpoint"),
-        ("STR_ALT_MAX", "steering.highest", "m", 2.0, 1000.0,
-         "Maximum height above the origin"),
+        ("STR_ALT_MAX", "steering.highest", "m", 2.0, 1000.0, "Maximum height above the origin"),
         ("STR_ACC_MAX", "steering.acceleration", "m/s^2", 0.2, 2.5,
          "Maximum acceleration of the position setpoint"),
         ("STR_YAW_RATE", "steering.yaw_rate", "rad/s", 0.05, 1.0, "Maximum yaw rate"),
@@ -357,104 +345,110 @@ _ROWS: Final[dict[str, list[Row]]] = {
          "Joint speed for joint setpoints"),
         ("STR_LEASH", "steering.max_lead_distance", "m", 0.1, 0.6,
          "Maximum lead distance of the setpoint over the vehicle"),
-        ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0,
-         "Return altitude above home"),
+        ("RTL_RETURN_ALT", "limits.return_height", "m", 0.5, 50.0, "Return altitude above home"),
         ("RTL_DESCEND_ALT", "limits.return_descent", "m", 0.5, 50.0,
          "Return: altitude above home of the wait before landing"),
         ("RTL_LAND_DELAY", "limits.return_wait", "s", -1.0, 300.0,
          "Return: wait before landing; negative: hold there"),
     ],
     "Failsafes": [
-        ("COM_OF_LOSS_T", "limits.setpoint_timeout_us", "s", 0.1, 5.0,
-         "Offboard setpoint timeout", _IN_MICROSECONDS),
-        ("COM_OBL_RC_ACT", "limits.setpoint_loss_action", "", 3.0, 6.0,
-         "Offboard loss action"),
+        ("COM_OF_LOSS_T", "limits.setpoint_timeout_us", "s", 0.1, 5.0, "Offboard setpoint timeout"),
+        ("COM_OBL_RC_ACT", "limits.setpoint_loss_action", "Offboard loss action",
+         {3: "Return", 4: "Land", 5: "Hold", 6: _ENDS}),
         ("COM_DL_LOSS_T", "limits.station_timeout_us", "s", 3.0, 300.0,
-         "Ground station heartbeat timeout", _IN_MICROSECONDS),
-        ("NAV_DLL_ACT", "limits.station_loss_action", "", 0.0, 5.0,
-         "Ground station loss action, in every flight mode but those of COM_DLL_EXCEPT"),
-        ("COM_DLL_EXCEPT", "limits.station_loss_exceptions", "", 0.0, 15.0,
-         "Modes in which the loss of the ground station is ignored"),
+         "Ground station heartbeat timeout"),
+        ("NAV_DLL_ACT", "limits.station_loss_action",
+         "Ground station loss action, in every flight mode but those of COM_DLL_EXCEPT",
+         {0: "Disabled", 1: "Hold", 2: "Return", 3: "Land", 5: _ENDS}),
+        ("COM_DLL_EXCEPT", "limits.station_loss_exceptions",
+         "Modes in which the loss of the ground station is ignored",
+         {bits: _exceptions(bits) for bits in range(16)}),
         # Any of their values is true of a vehicle without a radio, and scripts for PX4 set them.
-        ("COM_RC_IN_MODE", "limits.radio_input", "", 1.0, 4.0,
-         "Manual control input: there is no radio control, and no check of it"),
+        ("COM_RC_IN_MODE", "limits.radio_input",
+         "Manual control input: there is no radio control, and no check of it",
+         {1: "Joystick only", 4: "Disabled"}),
         ("COM_RCL_EXCEPT", "limits.radio_loss_exceptions", "", 0.0, 31.0,
          "Modes in which the loss of radio control is ignored: all, for there is none"),
         ("COM_FAIL_ACT_T", "limits.failsafe_delay_us", "s", 0.0, 25.0,
-         "Time in Hold before a lost ground station or a battery lets the vehicle return or land",
-         _IN_MICROSECONDS),
+         "Time in Hold before a lost ground station or a battery lets the vehicle return or land"),
         ("BAT_LOW_THR", "limits.battery_low", "norm", 0.12, 0.5, "Battery low threshold"),
         ("BAT_CRIT_THR", "limits.battery_critical", "norm", 0.05, 0.5,
          "Battery critical threshold"),
         ("BAT_EMERGEN_THR", "limits.battery_emergency", "norm", 0.03, 0.5,
          "Battery emergency threshold"),
-        ("COM_LOW_BAT_ACT", "limits.low_battery_action", "", 0.0, 3.0,
-         "Low battery action"),
-        ("COM_FLTT_LOW_ACT", "limits.flight_time_action", "", 0.0, 3.0,
-         "Action when the flight time that is left is no longer than the way home takes"),
+        ("COM_LOW_BAT_ACT", "limits.low_battery_action", "Low battery action",
+         {0: "Warning", 2: "Land when critical", 3: "Return when critical, land at emergency"}),
+        ("COM_FLTT_LOW_ACT", "limits.flight_time_action",
+         "Action when the flight time that is left is no longer than the way home takes",
+         {0: "None", 1: "Warning", 3: "Return"}),
         ("RTL_TIME_FACTOR", "limits.return_time_factor", "", 1.0, 2.0,
          "Safety factor of the time that the way home takes"),
         ("RTL_TIME_MARGIN", "limits.return_time_margin", "s", 0.0, 3600.0,
          "Safety margin of the time that the way home takes"),
         ("FD_FAIL_R", "limits.roll_failure", "deg", 0.0, 180.0,
-         "Roll that is an attitude failure, well above its own tilt; 0: no check", _DEGREE),
+         "Roll that is an attitude failure, well above its own tilt; 0: no check"),
         ("FD_FAIL_P", "limits.pitch_failure", "deg", 0.0, 180.0,
-         "Pitch that is an attitude failure, well above its own tilt; 0: no check", _DEGREE),
+         "Pitch that is an attitude failure, well above its own tilt; 0: no check"),
         ("FD_FAIL_R_TTRI", "limits.roll_failure_us", "s", 0.02, 5.0,
-         "Time beyond FD_FAIL_R that is a failure", _IN_MICROSECONDS),
+         "Time beyond FD_FAIL_R that is a failure"),
         ("FD_FAIL_P_TTRI", "limits.pitch_failure_us", "s", 0.02, 5.0,
-         "Time beyond FD_FAIL_P that is a failure", _IN_MICROSECONDS),
-        ("CBRK_FLIGHTTERM", "limits.termination_breaker", "", 0.0, 121212.0,
-         "Circuit breaker of the flight termination by an attitude failure"),
+         "Time beyond FD_FAIL_P that is a failure"),
+        ("CBRK_FLIGHTTERM", "limits.termination_breaker",
+         "Circuit breaker of the flight termination by an attitude failure",
+         {0: "Termination enabled", 121212: "Termination disabled"}),
         ("COM_PLN_LOSS_T", "limits.planner_loss_us", "s", 1.0, 60.0,
-         "Time without a new plan after which the vehicle descends", _IN_MICROSECONDS),
-        ("FD_ACT_EN", "limits.watches_actuators", "", 0.0, 1.0,
-         "Detection of rotors and joints that fail"),
-        ("CA_FAILURE_MODE", "limits.failed_rotor_mode", "", 0.0, 1.0,
-         "What allocation does about a failed rotor"),
-        ("COM_ACT_FAIL_ACT", "limits.actuator_failure_action", "", 0.0, 4.0,
-         "Action when a rotor or a joint has failed"),
+         "Time without a new plan after which the vehicle descends"),
+        ("FD_ACT_EN", "limits.watches_actuators", "Detection of rotors and joints that fail",
+         {0: "Disabled", 1: "Enabled"}),
+        ("CA_FAILURE_MODE", "limits.failed_rotor_mode", "What allocation does about a failed rotor",
+         {0: "Ignored", 1: "Allocation reweighted by its effectiveness"}),
+        ("COM_ACT_FAIL_ACT", "limits.actuator_failure_action",
+         "Action when a rotor or a joint has failed",
+         {0: "Warning", 1: "Hold", 2: "Land", 3: "Return", 4: _ENDS}),
         ("COM_FLOOD_RATE", "limits.flood_rate", "1/s", 100.0, 100000.0,
          "Datagrams from the ground above which a link is reported as flooded"),
         ("COM_AID_LOSS_T", "limits.aiding_loss_us", "s", 0.01, 10.0,
-         "Time without a usable position after which its loss is reported", _IN_MICROSECONDS),
+         "Time without a usable position after which its loss is reported"),
         ("COM_POS_LOW_EPH", "limits.position_low", "m", 0.02, 10.0,
          "Dead reckoning: how far off the position may be that is acted upon"),
-        ("COM_POS_LOW_ACT", "limits.position_low_action", "", 1.0, 5.0,
-         "Dead reckoning: action above COM_POS_LOW_EPH"),
+        ("COM_POS_LOW_ACT", "limits.position_low_action",
+         "Dead reckoning: action above COM_POS_LOW_EPH",
+         {1: "Warning", 2: "Hold", 5: "Land"}),
         ("COM_POS_FS_EPH", "limits.position_lost", "m", 0.05, 100.0,
          "Dead reckoning: standard deviation of the position above which the vehicle descends"),
         ("COM_ATT_LOSS", "limits.attitude_loss", "deg", 5.0, 60.0,
-         "Standard deviation of roll and pitch above which the rotors stop", _DEGREE),
+         "Standard deviation of roll and pitch above which the rotors stop"),
         ("COM_SENS_LOSS_T", "limits.sensor_loss_us", "s", 0.004, 10.0,
-         "Time without a usable inertial unit or encoder after which it is lost",
-         _IN_MICROSECONDS),
-        ("COM_SENS_ACT", "limits.sensor_loss_action", "", 1.0, 5.0,
-         "Action when inertial unit or joint encoders are lost"),
-        ("SYS_FAILURE_EN", "limits.failure_injection", "", 0.0, 1.0,
-         "Command INJECT_FAILURE in simulation"),
+         "Time without a usable inertial unit or encoder after which it is lost"),
+        ("COM_SENS_ACT", "limits.sensor_loss_action",
+         "Action when inertial unit or joint encoders are lost",
+         {1: "Warning", 2: "Hold", 5: "Land"}),
+        ("SYS_FAILURE_EN", "limits.failure_injection", "Command INJECT_FAILURE in simulation",
+         {0: "Refused", 1: "Passed on to the simulator"}),
     ],
     "Arming": [
         ("COM_ARM_BAT_MIN", "limits.arm_battery", "norm", -1.0, 0.9,
          "Battery below which arming is denied; negative: below BAT_CRIT_THR"),
-        ("COM_ARM_TILT", "limits.arm_tilt", "deg", 1.0, 90.0,
-         "Tilt above which arming is denied", _DEGREE),
-        ("COM_ARM_SDCARD", "limits.arm_without_log", "", 0.0, 2.0,
-         "Arming while the flight log cannot be written"),
+        ("COM_ARM_TILT", "limits.arm_tilt", "deg", 1.0, 90.0, "Tilt above which arming is denied"),
+        ("COM_ARM_SDCARD", "limits.arm_without_log",
+         "Arming while the flight log cannot be written",
+         {0: "Allowed", 1: "Allowed, with a warning", 2: "Denied"}),
     ],
     "Safe set": [
         ("SAFE_OWNER", "limits.safe_set_owner", "", 0.0, 255.0,
          "MAVLink system that owns the safe set and may grow it in flight; 0: the first one"),
-        ("SAFE_BREACH_ACT", "limits.breach_action", "", 1.0, 6.0,
-         "Action when the vehicle is outside its safe set"),
-        ("GF_ACTION", "limits.fence_action", "", 0.0, 6.0,
-         "Action when the vehicle is outside an uploaded fence"),
+        ("SAFE_BREACH_ACT", "limits.breach_action",
+         "Action when the vehicle is outside its safe set",
+         {1: "Warning", 2: "Hold", 5: "Land", 6: _RETREAT}),
+        ("GF_ACTION", "limits.fence_action", "Action when the vehicle is outside an uploaded fence",
+         {0: "None", 1: "Warning", 2: "Hold", 3: "Return", 4: _ENDS, 5: "Land", 6: _RETREAT}),
         ("SAFE_LAMBDA_MIN", "planner.lambda_min", "m/s", 0.0, 5.0,
          "Least λ beside walls, after little disturbance for long; 0: λ is always whole"),
         ("SAFE_SIGMAS", "limits.clearance_sigmas", "", 0.0, 6.0,
          "Standard deviations of the estimate that clearances grow by"),
-        ("SAFE_FILTER", "safety_filter.enabled", "", 0.0, 1.0,
-         "Filter of the acceleration that the loops are about to realise"),
+        ("SAFE_FILTER", "safety_filter.enabled",
+         "Filter of the acceleration that the loops are about to realise",
+         {0: "Disabled", 1: "Enabled"}),
         ("SAFE_FLT_GAMMA", "safety_filter.gamma", "1/s", 0.1, 20.0,
          "Safety filter: CBF decay rate"),
         ("SAFE_FLT_DIST", "safety_filter.allowance", "m/s^2", -5.0, 5.0,
@@ -464,19 +458,16 @@ _ROWS: Final[dict[str, list[Row]]] = {
         ("SAFE_FLT_AZ_MAX", "safety_filter.vertical", "m/s^2", 0.5, 6.0,
          "Safety filter: maximum vertical acceleration"),
         ("SAFE_OWNER_T", "limits.owner_timeout_us", "s", 2.0, 300.0,
-         "Silence after which another source may own the safe set, on the ground",
-         _IN_MICROSECONDS),
+         "Silence after which another source may own the safe set, on the ground"),
         ("SAFE_MOVE_T", "limits.zone_timeout_us", "s", 0.5, 60.0,
-         "Silence after which a moving zone is held where it is predicted then",
-         _IN_MICROSECONDS),
+         "Silence after which a moving zone is held where it is predicted then"),
     ],
     "Log": [
-        ("LOG_PROFILE", "log_profile", "", 0.0, 1.0,
-         "Contents of flight.ulg; takes effect at the next start"),
+        ("LOG_PROFILE", "log_profile", "Contents of flight.ulg; takes effect at the next start",
+         {0: "Sensors and actuators every tick, the rest at 50 Hz", 1: "Everything every tick"}),
     ],
     "Missions": [
-        ("MSN_SPEED", "limits.mission_speed", "m/s", 0.01, 1.0,
-         "Default mission speed"),
+        ("MSN_SPEED", "limits.mission_speed", "m/s", 0.01, 1.0, "Default mission speed"),
         ("MSN_TURN_RATE", "limits.mission_turn_rate", "rad/s", 0.01, 1.0,
          "Mission: maximum yaw rate"),
         ("MSN_TURN_ACC", "limits.mission_turn_acceleration", "rad/s^2", 0.005, 0.1,
@@ -487,73 +478,19 @@ _ROWS: Final[dict[str, list[Row]]] = {
 }  # fmt: skip
 
 
-def _exceptions(bits: int) -> str:
-    """Modes of COM_DLL_EXCEPT, as a choice."""
-    modes = [
-        mode
-        for k, mode in enumerate(("Mission", "Hold", "Offboard", "Trajectory"))
-        if bits >> k & 1
-    ]
-    return " and ".join(modes) or "None"
-
-
-_CHOICES: Final[dict[str, Choices]] = {
-    "PLN_BODY": ((0, "Base, joint 2 and end-effector as points"), (1, "Full body")),
-    "LOG_PROFILE": (
-        (0, "Sensors and actuators every tick, the rest at 50 Hz"),
-        (1, "Everything every tick"),
-    ),
-    "COM_OBL_RC_ACT": ((3, "Return"), (4, "Land"), (5, "Hold"), (6, _ENDS)),
-    "NAV_DLL_ACT": ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, _ENDS)),
-    "COM_RC_IN_MODE": ((1, "Joystick only"), (4, "Disabled")),
-    "COM_DLL_EXCEPT": tuple((bits, _exceptions(bits)) for bits in range(16)),
-    "COM_FLTT_LOW_ACT": ((0, "None"), (1, "Warning"), (3, "Return")),
-    "COM_ACT_FAIL_ACT": (
-        (0, "Warning"),
-        (1, "Hold"),
-        (2, "Land"),
-        (3, "Return"),
-        (4, _ENDS),
-    ),
-    "FD_ACT_EN": ((0, "Disabled"), (1, "Enabled")),
-    "CA_FAILURE_MODE": ((0, "Ignored"), (1, "Allocation reweighted by its effectiveness")),
-    "CBRK_FLIGHTTERM": ((0, "Termination enabled"), (121212, "Termination disabled")),
-    "COM_ARM_SDCARD": ((0, "Allowed"), (1, "Allowed, with a warning"), (2, "Denied")),
-    "GF_ACTION": (
-        (0, "None"),
-        (1, "Warning"),
-        (2, "Hold"),
-        (3, "Return"),
-        (4, _ENDS),
-        (5, "Land"),
-        (6, "Retreat along the normal, then hold"),
-    ),
-    "SAFE_FILTER": ((0, "Disabled"), (1, "Enabled")),
-    "SAFE_BREACH_ACT": (
-        (1, "Warning"),
-        (2, "Hold"),
-        (5, "Land"),
-        (6, "Retreat along the normal, then hold"),
-    ),
-    "SYS_FAILURE_EN": ((0, "Refused"), (1, "Passed on to the simulator")),
-    "COM_POS_LOW_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
-    "COM_SENS_ACT": ((1, "Warning"), (2, "Hold"), (5, "Land")),
-    "COM_LOW_BAT_ACT": (
-        (0, "Warning"),
-        (2, "Land when critical"),
-        (3, "Return when critical, land at emergency"),
-    ),
-}
-
 # PX4 has these as INT32 although they are no counts: whole seconds and degrees.
 _WHOLE: Final = frozenset(("COM_DL_LOSS_T", "FD_FAIL_P", "FD_FAIL_R", "RTL_TIME_MARGIN"))
 _UNTUNED: Final = FlightConfig()
 
 
-def _parameter(group: str, row: Row) -> Parameter:
+def _parameter(group: str, row: Row | _Choice) -> Parameter:
+    choices: dict[int, str] = {}
+    if len(row) == 4:
+        name, path, meaning, choices = row
+        row = (name, path, "", min(choices), max(choices), meaning)
     name, path, unit, least, most, meaning = row[:6]
-    scale = row[6] if len(row) == 7 else 1.0
-    choices = _CHOICES.get(name, ())
+    usual = _IN_MICROSECONDS if path.endswith("_us") else _SCALES.get(unit.partition(" ")[0], 1.0)
+    scale = row[6] if len(row) == 7 else usual
     counts = scale == 1.0 and isinstance(attrgetter(path)(_UNTUNED), int | str)
     return Parameter(
         name=name,
@@ -565,7 +502,7 @@ def _parameter(group: str, row: Row) -> Parameter:
         group=group,
         scale=scale,
         integer=counts or name in _WHOLE,
-        choices=choices,
+        choices=tuple(choices.items()),
     )
 
 

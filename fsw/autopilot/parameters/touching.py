@@ -33,7 +33,7 @@ from fsw.autopilot.model.arm_coordinates import arm_coordinates, within_limits
 from fsw.autopilot.model.multibody import place_of_tip, posture
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import Touch, Vec3, Zone
+from fsw.autopilot.signals import Vec3, Zone
 from fsw.record import JOINTS
 
 _SLOWEST = 0.005  # m/s, below which no surface is found in a reasonable time
@@ -124,12 +124,35 @@ def against_touching(config: FlightConfig, zone: Zone, loop: Tube) -> str:
     found = grip(airframe, tuning, _normal_in_body(zone), disturbance)
     if not math.isfinite(found.mass):
         return "the arm does not move along its normal in the home posture"
-    return (
-        _against_force(found, touch, tuning)
-        or _against_stiffness(found, touch, tuning)
-        or _against_thrust(config, loop)
-        or _against_loss(config, zone, loop, found)
+    least = found.unsure + tuning.damping + _LEAST
+    hardest = (tuning.share * (touch.force_max - found.unsure) / _SLOWEST) ** 2 / found.mass
+    leaning = airframe.mass * _left(config, loop)
+    lost = of_contact(loop, _LEAST, found.unsure, airframe.mass)
+    reach, arm = _pushed(config, zone, loop) + lost, min(found.inwards, found.outwards)
+    kept = stand_off(config.planner.walls)
+    reasons = (
+        (
+            touch.force_max >= least,
+            f"its force bound of {touch.force_max:.1f} N is too small: friction and pushes leave "
+            f"{found.unsure:.1f} N unknown; {math.ceil(10.0 * least) / 10.0:.1f} N is enough",
+        ),
+        (
+            touch.stiffness_high <= hardest,
+            f"a stiffness of {touch.stiffness_high:.0f} N/m is too much for a tool of "
+            f"{found.mass:.2f} kg and {touch.force_max:.1f} N; at most {hardest:.0f} N/m",
+        ),
+        (
+            leaning >= _LEAST,
+            f"beside the worst disturbance the tilt leaves {max(leaning, 0.0):.1f} N to press with",
+        ),
+        (
+            _covered(config, zone, loop, found) >= _LEAST,
+            f"the base can be pushed {1e3 * reach:.0f} mm off its plan where {_LEAST:g} N are "
+            f"lost; the arm takes up {1e3 * arm:.0f} mm along its normal in the home posture, and "
+            f"the plan keeps {1e3 * kept:.0f} mm",
+        ),
     )
+    return next((why for holds, why in reasons if not holds), "")
 
 
 class Pressed(NamedTuple):
@@ -224,46 +247,6 @@ def _left(config: FlightConfig, loop: Tube) -> float:
     """Acceleration [m/s^2] that the tilt leaves beside the worst disturbance on one axis."""
     level = GRAVITY * math.tan(config.airframe.tilt_max)
     return level - loop.acceleration * config.surroundings.disturbance
-
-
-def _against_force(found: Grip, touch: Touch, tuning: PressTuning) -> str:
-    least = found.unsure + tuning.damping + _LEAST
-    if touch.force_max >= least:
-        return ""
-    return (
-        f"its force bound of {touch.force_max:.1f} N is too small: friction and pushes leave "
-        f"{found.unsure:.1f} N unknown; {math.ceil(10.0 * least) / 10.0:.1f} N is enough"
-    )
-
-
-def _against_stiffness(found: Grip, touch: Touch, tuning: PressTuning) -> str:
-    impact = tuning.share * (touch.force_max - found.unsure)
-    most = (impact / _SLOWEST) ** 2 / found.mass
-    if touch.stiffness_high <= most:
-        return ""
-    return (
-        f"a stiffness of {touch.stiffness_high:.0f} N/m is too much for a tool of "
-        f"{found.mass:.2f} kg and {touch.force_max:.1f} N; at most {most:.0f} N/m"
-    )
-
-
-def _against_thrust(config: FlightConfig, loop: Tube) -> str:
-    force = config.airframe.mass * _left(config, loop)
-    if force >= _LEAST:
-        return ""
-    return f"beside the worst disturbance the tilt leaves {max(force, 0.0):.1f} N to press with"
-
-
-def _against_loss(config: FlightConfig, zone: Zone, loop: Tube, found: Grip) -> str:
-    if _covered(config, zone, loop, found) >= _LEAST:
-        return ""
-    mass = config.airframe.mass
-    reach = _pushed(config, zone, loop) + of_contact(loop, _LEAST, found.unsure, mass)
-    return (
-        f"the base can be pushed {1e3 * reach:.0f} mm off its plan where {_LEAST:g} N are lost; "
-        f"the arm takes up {1e3 * min(found.inwards, found.outwards):.0f} mm along its normal in "
-        f"the home posture, and the plan keeps {1e3 * stand_off(config.planner.walls):.0f} mm"
-    )
 
 
 def _normal_in_body(zone: Zone) -> Vec3:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface
+from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface, places
 from fsw.autopilot.signals import Shape, Vec3, Vec4, Zone
 from fsw.compiled import kernel
 
@@ -88,16 +88,9 @@ KIND = ShapeKind(
     name="box",
     number=5,
     meaning=(
-        "centre north [m]",
-        "centre east [m]",
-        "centre down [m]",
-        "half size along its x [m]",
-        "half size along its y [m]",
-        "half size along its z [m]",
-        "attitude w",
-        "attitude x",
-        "attitude y",
-        "attitude z",
+        *places("centre"),
+        *(f"half size along its {axis} [m]" for axis in "xyz"),
+        *(f"attitude {entry}" for entry in "wxyz"),
     ),
     planes_inside=6,
     plane=_plane,

@@ -7,8 +7,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.shapes.frame import CENTRE_BALL
-from fsw.autopilot.shapes.kind import Numbers, ShapeKind, Surface, place_moved
+from fsw.autopilot.shapes.kind import (
+    CENTRE_BALL,
+    Numbers,
+    ShapeKind,
+    Surface,
+    place_moved,
+    places,
+)
 from fsw.autopilot.signals import Shape, Vec3, Zone
 from fsw.compiled import kernel
 
@@ -116,15 +122,7 @@ def _ball_around(numbers: Numbers) -> tuple[Vec3, float]:
 KIND = ShapeKind(
     name="cylinder",
     number=4,
-    meaning=(
-        "begin north [m]",
-        "begin east [m]",
-        "begin down [m]",
-        "end north [m]",
-        "end east [m]",
-        "end down [m]",
-        "radius [m]",
-    ),
+    meaning=(*places("begin", "end"), "radius [m]"),
     planes_inside=PLANES_INSIDE,
     plane=_plane,
     problem=_problem,

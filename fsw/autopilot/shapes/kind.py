@@ -13,6 +13,7 @@ from fsw.autopilot.signals import MAX_DISTANCE, Shape, Vec3, Zone
 
 NUMBERS = 16  # most numbers that describe a shape
 ENDLESS = 1e4  # m; what has no end ends here
+CENTRE_BALL = 0.002  # m; closer to a centre than this a direction is noise and any does
 
 
 class Surface(NamedTuple):
@@ -32,20 +33,15 @@ class Surface(NamedTuple):
 Numbers = tuple[float, ...]
 
 
+def places(*what: str) -> tuple[str, ...]:
+    """The meaning of the three numbers of each place, NED."""
+    return tuple(f"{one} {axis} [m]" for one in what for axis in ("north", "east", "down"))
+
+
 def place_moved(numbers: Numbers, shift: Vec3) -> Numbers:
     """``numbers`` [SI] that begin with a shape's place [m, NED], moved by ``shift`` [m, NED]."""
     x, y, z, *rest = numbers
     return (x + shift[0], y + shift[1], z + shift[2], *rest)
-
-
-def covers_nothing(_new: Zone, _old: Zone) -> bool:
-    """Of a shape about which nothing is shown."""
-    return False
-
-
-def unbounded(_numbers: Numbers) -> tuple[Vec3, float] | None:
-    """Of a shape that no ball holds, or none is known for."""
-    return None
 
 
 PlaneOf = Callable[[NDArray[np.float64], bool, int, float, float, float], Surface]
@@ -69,9 +65,9 @@ class ShapeKind:
     moved: Callable[[Numbers, Vec3], Numbers] = place_moved  # the numbers of the shape elsewhere
     # Whether every place that the first of two zones leaves free the second does too. Both are of
     # this kind, kept out of or both in, clearances included; False where it is not shown.
-    covers: Callable[[Zone, Zone], bool] = covers_nothing
-    # Centre [m, NED] and radius [m] of a ball that holds the shape of these numbers.
-    ball_around: Callable[[Numbers], tuple[Vec3, float] | None] = unbounded
+    covers: Callable[[Zone, Zone], bool] = lambda _new, _old: False
+    # Centre [m, NED] and radius [m] of a ball that holds the shape of these numbers, if any does.
+    ball_around: Callable[[Numbers], tuple[Vec3, float] | None] = lambda _numbers: None
     flat: bool = False  # its plane is the same wherever the point is
     follows_target: bool = False  # rides on the end-effector's target, and keeps the base alone
     endless: frozenset[int] = frozenset()  # which of its numbers may be ENDLESS

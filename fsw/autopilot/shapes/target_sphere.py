@@ -6,7 +6,7 @@ Source: docs/equations.md E15, E23.
 from __future__ import annotations
 
 from fsw.autopilot.shapes.ball import PLANES_INSIDE, ball_plane, covers_inside
-from fsw.autopilot.shapes.kind import ShapeKind
+from fsw.autopilot.shapes.kind import ShapeKind, places
 from fsw.autopilot.signals import TARGET_SPHERE, Shape, Vec3, Zone
 
 
@@ -26,12 +26,7 @@ def _problem(numbers: tuple[float, ...]) -> str | None:
 KIND = ShapeKind(
     name=TARGET_SPHERE,
     number=2,
-    meaning=(
-        "centre from target, north [m]",
-        "centre from target, east [m]",
-        "centre from target, down [m]",
-        "radius [m]",
-    ),
+    meaning=(*places("centre from target,"), "radius [m]"),
     planes_inside=PLANES_INSIDE,
     plane=ball_plane,
     problem=_problem,

@@ -15,6 +15,8 @@ from fsw.autopilot.signals import EndEffectorTarget, SafeSet, Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
 Array = NDArray[np.float64]
+Zones = Array
+"""A row a zone (zones, columns) [SI]: as of ``zone_arrays``, or of ``moving_zones``, which move."""
 
 _PLANES = tuple(kind.plane for kind in KINDS)
 _INDEX = {kind.name: k for k, kind in enumerate(KINDS)}
@@ -52,11 +54,11 @@ def zone_arrays(safe_set: SafeSet) -> Array:
 
 
 @kernel
-def surface_at(zones: Array, zone: int, which: int, x: float, y: float, z: float) -> Surface:
+def surface_at(zones: Zones, zone: int, which: int, x: float, y: float, z: float) -> Surface:
     """Distance [m] from a ``zone`` [1] with its clearance to a point, and the normal [1].
 
-    ``zones`` (zones, FIRST + 16) [SI] are all of them; ``x``, ``y``, ``z`` [m, NED] are seen from
-    where the zone is: its movement is taken off. ``which`` [1] of its planes is asked for.
+    ``x``, ``y``, ``z`` [m, NED] are seen from where the zone is: its movement is taken off.
+    ``which`` of its planes is asked for.
     """
     kind, keep_in, numbers = zones[zone, KIND], zones[zone, KEEP_IN] > 0.0, zones[zone, FIRST:]
     at = Surface(0.0, 0.0, 0.0, 0.0)
@@ -90,22 +92,22 @@ def moving_zones(
 
 
 @compilable
-def acceleration_of(zones: Array, zone: int) -> Vec3:
-    """Acceleration [m/s^2, NED] of one of the ``zones`` (zones, k) [SI] of ``moving_zones``."""
+def acceleration_of(zones: Zones, zone: int) -> Vec3:
+    """Acceleration [m/s^2, NED] of one of ``moving_zones``."""
     k = _ACCELERATION
     return zones[zone, k], zones[zone, k + 1], zones[zone, k + 2]
 
 
 @compilable
-def velocity_of(zones: Array, zone: int, t_us: int) -> Vec3:
-    """Velocity [m/s, NED] of one of the ``zones`` (zones, columns) [SI] of ``moving_zones``."""
+def velocity_of(zones: Zones, zone: int, t_us: int) -> Vec3:
+    """Velocity [m/s, NED] of one of ``moving_zones``."""
     v = zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
     return add_scaled(v, acceleration_of(zones, zone), 1e-6 * (t_us - zones[zone, _MOVE + 6]))
 
 
 @compilable
-def moved_by(zones: Array, zone: int, t_us: int) -> Vec3:
-    """How far one of the ``zones`` (zones, columns) [SI] of ``moving_zones`` is at a time [m]."""
+def moved_by(zones: Zones, zone: int, t_us: int) -> Vec3:
+    """How far one of ``moving_zones`` has moved at a time [m, NED]."""
     elapsed = 1e-6 * (t_us - zones[zone, _MOVE + 6])
     v = zones[zone, _MOVE], zones[zone, _MOVE + 1], zones[zone, _MOVE + 2]
     mean = add_scaled(v, acceleration_of(zones, zone), 0.5 * elapsed)
@@ -114,11 +116,8 @@ def moved_by(zones: Array, zone: int, t_us: int) -> Vec3:
 
 
 @compilable
-def nearest_plane(zones: Array, zone: int, p: Vec3, t_us: int) -> Surface:
-    """The plane of a zone that is nearest to ``p`` [m, NED] at a time, its clearance taken off.
-
-    ``zones`` (zones, columns) [SI] are those of ``moving_zones``.
-    """
+def nearest_plane(zones: Zones, zone: int, p: Vec3, t_us: int) -> Surface:
+    """The plane of a zone that is nearest to ``p`` [m, NED] at a time, its clearance taken off."""
     shift = moved_by(zones, zone, t_us)
     x, y, z = p[0] - shift[0], p[1] - shift[1], p[2] - shift[2]
     nearest = surface_at(zones, zone, 0, x, y, z)
@@ -135,12 +134,12 @@ def all_moving_zones(safe_set: SafeSet) -> Array:
 
 
 def shifts(
-    zones: Array, times_us: NDArray[np.int64], p_target: Array, v_target: Array
+    zones: Zones, times_us: NDArray[np.int64], p_target: Array, v_target: Array
 ) -> tuple[Array, Array]:
     """How far each zone has moved at each time, and its velocity, (times, zones, 3) [m], [m/s].
 
-    ``zones`` (zones, columns) [SI] are ``all_moving_zones``; ``p_target`` (times, 3) [m, NED] and
-    ``v_target`` (times, 3) [m/s, NED] are those of the target.
+    Of ``all_moving_zones``; the target has ``p_target`` (times, 3) [m, NED] and ``v_target``
+    (times, 3) [m/s, NED].
     """
     moved = np.empty((len(times_us), len(zones), 3))
     velocities = np.empty_like(moved)
@@ -150,7 +149,7 @@ def shifts(
 
 @kernel
 def _shifts(
-    zones: Array,
+    zones: Zones,
     times_us: NDArray[np.int64],
     p_target: Array,
     v_target: Array,

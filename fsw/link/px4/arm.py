@@ -133,15 +133,13 @@ class ArmLink:
 
 def servo_ranges(airframe: Airframe) -> tuple[tuple[float, float], ...]:
     """Least and most angle [rad] of each joint with the others at zero; half around without one."""
-    limits, count = airframe.angle_limits, airframe.bodies.joints
-    width = len(limits.row) // len(limits.low)
     ranges = []
-    for k in range(count):
+    for k in range(airframe.bodies.joints):
         least, most = -math.pi, math.pi
-        for i in range(limits.rows):
-            share = limits.row[i * width + k]
+        for limit in airframe.angle_limits:
+            share = limit.row[k]
             if share != 0.0:
-                ends = sorted((limits.low[i] / share, limits.high[i] / share))
+                ends = sorted((limit.low / share, limit.high / share))
                 least, most = max(least, ends[0]), min(most, ends[1])
         ranges.append((least, most))
     return tuple(ranges)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.control.pid import attitude_reference
 from fsw.autopilot.geometry.geodesy import to_global
 from fsw.autopilot.geometry.rotation import euler_zyx, quaternion_from_euler, quaternion_from_matrix
 from fsw.autopilot.model.airframe import Airframe

@@ -15,7 +15,7 @@ from pyulog import ULog
 from pyulog.px4 import PX4ULog
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.attitude import attitude_reference
+from fsw.autopilot.control.pid import attitude_reference
 from fsw.autopilot.flight.failsafe.conditions import Condition
 from fsw.autopilot.geometry.geodesy import to_local
 from fsw.autopilot.measurements import ImuSample

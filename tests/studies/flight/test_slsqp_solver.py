@@ -19,7 +19,7 @@ from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array, condense
 from fsw.autopilot.mpc.ocp import Ocp
 from fsw.autopilot.mpc.planner_config import PlannerConfig
-from fsw.autopilot.mpc.solution import Solution
+from fsw.autopilot.mpc.qp_data import Solution
 from fsw.autopilot.mpc.solvers import Question, Search
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.target_sphere import target_sphere
@@ -30,9 +30,11 @@ from studies.flight.slsqp_solver import (
     TOLERANCE,
     NonlinearProgram,
     by_slsqp,
+    min_slacks,
     minimise,
 )
 from tests.fsw.autopilot.mpc.requests import STILL, below, hovering, planned, planner, request
+from tests.fsw.autopilot.mpc.whole_program import whole
 from tests.fsw.paper_arm import INPUTS, STATES
 
 CONFIG = PlannerConfig(body="points")
@@ -83,7 +85,7 @@ def price(ocp: Ocp, start: Array, targets: TargetPoints, inputs: Array) -> float
     """Cost of inputs with the smallest slacks that admit them: what both optimisers minimise."""
     ocp.linearise(start, inputs, targets)
     program = ocp.qp
-    return float(ocp.cost + program.penalty @ program.least_slacks(inputs))
+    return float(ocp.cost + program.penalty @ min_slacks(program, inputs))
 
 
 def converged(ocp: Ocp, start: Array, targets: TargetPoints) -> Array:
@@ -184,10 +186,10 @@ def test_margins_and_bounds_together_admit_what_the_program_admits() -> None:
             for value, (low, high) in zip(x, point.bounds(), strict=True)
         )
         point.cost(x)
-        whole = ocp.qp.whole()
-        left = whole.b - whole.a @ x
-        t, ax, ay = left[whole.nonnegative_rows :].reshape(-1, 3).T
-        expected = left[: whole.nonnegative_rows].min() >= 0.0 and (t >= np.hypot(ax, ay)).all()
+        program = whole(ocp.qp)
+        left = program.b - program.a @ x
+        t, ax, ay = left[program.nonnegative_rows :].reshape(-1, 3).T
+        expected = left[: program.nonnegative_rows].min() >= 0.0 and (t >= np.hypot(ax, ay)).all()
         assert admitted == expected
         results.add(admitted)
     assert results == {True, False}

@@ -4,8 +4,8 @@ What is refused in flight is compared by its innovation, which knows how the veh
 run of refused samples goes on where value and direction nearly stay, of which noise makes no long
 one, and until a pose is used. How long a run must be until it is believed grows with how far it
 would move the estimate, from where it is or from where it was before it jumped: what was believed
-wrongly is soon undone. One that began with a step of the place is used as that, or not at all: it
-is no motion of the vehicle.
+wrongly is soon undone. Once it is believed it ends: the next jump needs a run of its own. One that
+began with a step of the place is used as that, or not at all: it is no motion of the vehicle.
 """
 
 from __future__ import annotations

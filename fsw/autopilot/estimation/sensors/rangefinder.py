@@ -67,6 +67,9 @@ class Rangefinder(AidingSensor[RangeSample, RangefinderTuning]):
         # satellites know better the filter would explain it by a tilt.
         variance = max(sample.variance, self.tuning.floor**2)
         variance += (self.tuning.share * sample.distance) ** 2
+        # By as much as jumps have moved the height that nobody else confirms it may be off: against
+        # a place that has just been taken it would make a velocity of that.
+        variance += memory.unproven[2] ** 2
         return (fuse_range(x, law, gate, sample.time, sample.distance, variance),)
 
 

@@ -54,7 +54,7 @@ def _estimate(context: CommandContext) -> str:
 
 
 def _attitude(context: CommandContext) -> str:
-    tilt, most = (math.degrees(x) for x in (context.health.tilt, context.health.max_tilt))
+    tilt, most = map(math.degrees, (context.health.tilt, context.config.limits.arm_tilt))
     if tilt <= most:
         return ""
     return f"the vehicle is tilted by {tilt:.0f} deg; {most:.0f} deg are allowed"
@@ -85,7 +85,7 @@ def _joints(context: CommandContext) -> str:
     joints, rates = context.health.joints, context.health.joint_rates
     if not all(abs(rate) <= _SWINGING for rate in rates):
         return "the arm swings; wait until it hangs still"
-    return first_beyond(context.airframe.angle_limits, joints, _BEYOND) or ""
+    return first_beyond(context.config.airframe.angle_limits, joints, _BEYOND) or ""
 
 
 def _storage(context: CommandContext) -> str:

@@ -20,7 +20,6 @@ class ArmingHealth:
     """Empty sentences are what is well."""
 
     tilt: float = 0.0  # rad
-    max_tilt: float = math.radians(15.0)  # rad
     estimator: str = ""  # why the estimate is not to be relied upon
     sensor: str = ""  # which one fails, and how
     remaining: float = 1.0  # share of the battery's capacity
@@ -48,7 +47,6 @@ def arming_health(
     upright = estimate.R_WB[8]
     return ArmingHealth(
         tilt=math.acos(min(max(upright, -1.0), 1.0)) if upright == upright else math.pi,
-        max_tilt=limits.arm_tilt,
         estimator=estimator,
         sensor=_failing_sensor(state, estimate.t_us - limits.sensor_loss_us),
         remaining=state.battery.remaining,

@@ -17,7 +17,8 @@ from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.setpoints.offboard_setpoint import joints_refusal
 from fsw.autopilot.flight.setpoints.orbit_path import max_orbit_speed
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
-from fsw.autopilot.model.body import hull_reach
+from fsw.autopilot.model.body import body_of, hull_reach
+from fsw.autopilot.parameters.flight_config import lowest_height
 from fsw.autopilot.shapes.zones import surface, surfaces
 from fsw.autopilot.signals import (
     Arm,
@@ -100,8 +101,9 @@ Modes = Mapping[Mode, FlightMode]
 
 def decide(command: Command, context: CommandContext, modes: Modes) -> Decision:
     """Accept a command with its effects, or refuse it with a reason."""
-    handler = COMMAND_HANDLERS[type(command.action)]
-    decision: Decision = handler(command.action, context, modes)
+    action = command.action
+    handler = COMMAND_HANDLERS[action if isinstance(action, Order) else type(action)]
+    decision: Decision = handler(action, context, modes)
     if "{sender}" not in decision.reason:
         return decision
     sender = "{}/{}".format(*command.request.sender)
@@ -142,16 +144,12 @@ def _arm(action: Arm, context: CommandContext, modes: Modes) -> Decision:
 def _disarm(action: Disarm, context: CommandContext, modes: Modes) -> Decision:
     if not _is_armed(context):
         return Decision(ACCEPTED)
-    if context.landed or context.above_px4:
+    if context.landed or _is_above_px4(context):
         return Decision(ACCEPTED, mode=Mode.DISARMED)
     if not action.force:
         return Decision(LATER, "not disarmed: the vehicle is in the air; land first or force")
     reason = "disarmed in the air, by force of {sender}: the rotors stop"
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.DISARMED)
-
-
-def _switch_mode(action: SwitchMode, context: CommandContext, modes: Modes) -> Decision:
-    return _switch(action.mode, context, modes)
 
 
 def _switch(wanted: Mode, context: CommandContext, modes: Modes) -> Decision:
@@ -182,8 +180,8 @@ def _take_off(action: TakeOff, context: CommandContext, modes: Modes) -> Decisio
     if height is None or Mode.TAKEOFF not in (decision.mode, decision.intended_mode):
         return decision
     here = -context.position[2]
-    least, most = context.climb_range
-    most = min(most, context.highest - here)
+    least = context.config.limits.airborne_height
+    most = min(context.config.limits.takeoff_climb_most, context.config.steering.highest - here)
     climb = height - here
     if not least - _CLIMB_TOLERANCE <= climb <= most + _CLIMB_TOLERANCE:
         range_text = f"{here + least:.1f} to {here + most:.1f} m"
@@ -211,9 +209,9 @@ def _go_to(action: GoTo, context: CommandContext, modes: Modes) -> Decision:
     refusal = motion_refusal(motion)
     if refusal is not None or not (speed is None or 0.0 < speed < math.inf):
         return Decision(DENIED, f"no goto: {refusal or 'speed out of range'}")
-    slower = ""
-    if speed is not None and speed > context.max_speed:
-        slower = f"goto at {context.max_speed:g} m/s: faster is not flown (STR_V_MAX)"
+    slower, max_speed = "", context.config.steering.speed
+    if speed is not None and speed > max_speed:
+        slower = f"goto at {max_speed:g} m/s: faster is not flown (STR_V_MAX)"
     return replace(decision, goal=PositionGoal(motion, speed=speed), reason=slower)
 
 
@@ -225,8 +223,9 @@ def _orbit(action: FlyOrbit, context: CommandContext, modes: Modes) -> Decision:
     blocked = _out_of_bounds(centre, context) or _circle_too_close(centre, radius, context)
     if blocked is not None:
         return Decision(DENIED, f"no orbit: {blocked}")
-    most = max_orbit_speed(radius, context.yaw_rate, context.acceleration)
-    most = min(most, context.max_speed)
+    limits = context.config.steering
+    most = max_orbit_speed(radius, limits.yaw_rate, limits.acceleration)
+    most = min(most, limits.speed)
     asked = min(context.speed, most) if action.speed is None else action.speed
     decision = _switch(Mode.ORBIT, context, modes)
     if decision.result != ACCEPTED:
@@ -255,9 +254,9 @@ def _look_at(action: LookAt, context: CommandContext, modes: Modes) -> Decision:
 
 def _change_speed(action: ChangeSpeed, context: CommandContext, modes: Modes) -> Decision:
     """Change the speed towards position goals; in a mission from the next segment."""
-    speed = action.speed
-    if speed is not None and not MIN_SPEED <= speed <= context.max_speed:
-        reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {context.max_speed:g} m/s"
+    speed, most = action.speed, context.config.steering.speed
+    if speed is not None and not MIN_SPEED <= speed <= most:
+        reason = f"{speed:g} m/s is outside {MIN_SPEED:g} to {most:g} m/s"
         return Decision(DENIED, f"speed unchanged: {reason}")
     return Decision(ACCEPTED, speed=action)
 
@@ -269,7 +268,7 @@ def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> D
         refusal = f"the arm is not free while {context.mode.value}; hold first"
     if refusal is not None:
         return Decision(LATER, f"joints not moved: {refusal}")
-    arm, q_arm = arm_coordinates(context.airframe), list(context.joints)
+    arm, q_arm = arm_coordinates(context.config.airframe), list(context.joints)
     for k, share in enumerate(action.shares):
         if share is None:
             continue
@@ -278,7 +277,7 @@ def _move_joints(action: MoveJoints, context: CommandContext, modes: Modes) -> D
             return Decision(DENIED, f"joints not moved: {refusal}")
         limit = arm.high[k] if share > 0.0 else -arm.low[k]
         q_arm[k] = share * min(limit, math.pi)
-    refusal = joints_refusal(tuple(q_arm), context.airframe)
+    refusal = joints_refusal(tuple(q_arm), context.config.airframe)
     if refusal is not None:
         return Decision(DENIED, f"joints not moved: {refusal}")
     return Decision(ACCEPTED, joints=tuple(q_arm))
@@ -290,9 +289,9 @@ def _set_home(action: SetHome, context: CommandContext, modes: Modes) -> Decisio
     place = context.position if action.place is None else _place(action.place, context)
     north, east, height = *place[:2], -place[2]
     against = context.against_sender or place_problem(place)
-    if not against and not height <= context.highest:
-        most = f"the maximum is {context.highest:g} m"
-        against = f"{height:.1f} m above the origin is too high; {most}"
+    highest = context.config.steering.highest
+    if not against and not height <= highest:
+        against = f"{height:.1f} m above the origin is too high; the maximum is {highest:g} m"
     against = against or way_home.outside(context.fence, (north, east))
     if against:
         return Decision(DENIED, f"home not set by {{sender}}: {against}")
@@ -327,44 +326,35 @@ def _set_mission_step(action: SetMissionStep, context: CommandContext, modes: Mo
 
 def _inject_failure(action: InjectFailure, context: CommandContext, modes: Modes) -> Decision:
     """The simulator answers; a vehicle without one never does."""
-    if not context.failures_allowed:
+    if not context.config.limits.failure_injection:
         return Decision(DENIED, "no failure injected: SYS_FAILURE_EN is 0; set it to 1 to allow it")
     return Decision(CommandResult.IN_PROGRESS)
 
 
 def _grip(action: Grip, context: CommandContext, modes: Modes) -> Decision:
-    if context.above_px4:
+    if _is_above_px4(context):
         return Decision(DENIED, GRIPPER_OF_PX4)
     return Decision(ACCEPTED, gripper=1.0 if action.closes else -1.0)
 
 
-def _order(action: Order, context: CommandContext, modes: Modes) -> Decision:
-    return _ORDERS[action](context, modes)
-
-
-def _terminate(context: CommandContext, modes: Modes) -> Decision:
+def _terminate(action: Order, context: CommandContext, modes: Modes) -> Decision:
     """Stop the rotors until the flight software is restarted."""
     if not _is_armed(context):
         return Decision(DENIED, "not terminated: the vehicle is not armed")
-    if context.above_px4:
+    if _is_above_px4(context):
         return Decision(DENIED, "not terminated: the rotors are PX4's; terminate it there")
     reason = "flight terminated by {sender}: the rotors stop"
     return Decision(ACCEPTED, reason, alarming=True, mode=Mode.FAULT)
 
 
-def _pause_mission(context: CommandContext, modes: Modes) -> Decision:
+def _pause_mission(action: Order, context: CommandContext, modes: Modes) -> Decision:
     """Hold where the vehicle is."""
     if context.mode not in (Mode.MISSION, Mode.HOLD):
         return Decision(LATER, f"not paused: no mission is flown while {context.mode.value}")
     return _switch(Mode.HOLD, context, modes)
 
 
-def _continue_mission(context: CommandContext, modes: Modes) -> Decision:
-    """Go on with the current step."""
-    return _switch(Mode.MISSION, context, modes)
-
-
-def _check_arming(context: CommandContext, modes: Modes) -> Decision:
+def _check_arming(action: Order, context: CommandContext, modes: Modes) -> Decision:
     if _is_armed(context):
         return Decision(LATER, "no checks: the vehicle is armed")
     refusal = arming.refusal(context)
@@ -373,7 +363,7 @@ def _check_arming(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, refusal or "ready to arm")
 
 
-def _restart(context: CommandContext, modes: Modes) -> Decision:
+def _restart(action: Order, context: CommandContext, modes: Modes) -> Decision:
     """Begin anew: what had failed is well again, says the operator."""
     if _is_armed(context):
         return Decision(DENIED, "not restarted: the vehicle is armed; disarm first")
@@ -385,24 +375,11 @@ def _restart(context: CommandContext, modes: Modes) -> Decision:
     return Decision(ACCEPTED, RESTARTED, restart=True)
 
 
-def _nothing(context: CommandContext, modes: Modes) -> Decision:
-    return Decision(ACCEPTED)
-
-
-_ORDERS: Final[dict[Order, Callable[[CommandContext, Modes], Decision]]] = {
-    Order.TERMINATE: _terminate,
-    Order.PAUSE_MISSION: _pause_mission,
-    Order.CONTINUE_MISSION: _continue_mission,
-    Order.CHECK_ARMING: _check_arming,
-    Order.RESTART: _restart,
-    Order.NOTHING: _nothing,
-}
-
 _Handler = Callable[[Any, CommandContext, Modes], Decision]
-COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
+COMMAND_HANDLERS: Final[dict[type[CommandAction] | Order, _Handler]] = {
     Arm: _arm,
     Disarm: _disarm,
-    SwitchMode: _switch_mode,
+    SwitchMode: lambda action, context, modes: _switch(action.mode, context, modes),
     TakeOff: _take_off,
     GoTo: _go_to,
     FlyOrbit: _orbit,
@@ -414,7 +391,12 @@ COMMAND_HANDLERS: Final[dict[type[CommandAction], _Handler]] = {
     SetMissionStep: _set_mission_step,
     InjectFailure: _inject_failure,
     Grip: _grip,
-    Order: _order,
+    Order.TERMINATE: _terminate,
+    Order.PAUSE_MISSION: _pause_mission,
+    Order.CONTINUE_MISSION: lambda _, context, modes: _switch(Mode.MISSION, context, modes),
+    Order.CHECK_ARMING: _check_arming,
+    Order.RESTART: _restart,
+    Order.NOTHING: lambda _, context, modes: Decision(ACCEPTED),
     Rejected: _reject,
 }
 # The vehicle cannot be armed then, and so is not.
@@ -426,6 +408,11 @@ _ORDERS_WITHOUT_ESTIMATE: Final = frozenset(
 
 def _is_armed(context: CommandContext) -> bool:
     return context.mode not in (Mode.DISARMED, Mode.FAULT)
+
+
+def _is_above_px4(context: CommandContext) -> bool:
+    """PX4 flies: what is disarmed here is given back to it."""
+    return context.config.inner == "px4"
 
 
 def _hovering_refusal(context: CommandContext) -> str | None:
@@ -454,7 +441,7 @@ def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
     far = place_problem(place)
     if far is not None:
         return far
-    least, most = context.airframe.leg_length + context.climb_range[0], context.highest
+    least, most = lowest_height(context.config), context.config.steering.highest
     if not -place[2] >= least:
         return f"{-place[2]:.1f} m above the origin is too low; the minimum is {least:.1f} m"
     if not -place[2] <= most:
@@ -463,22 +450,22 @@ def _out_of_bounds(place: Vec3, context: CommandContext) -> str | None:
 
 
 def _too_close(place: Vec3, context: CommandContext) -> str | None:
-    """Why the body cannot be at a place."""
+    body = body_of(context.config.planner.body, context.config.airframe)
     for number, at in enumerate(surfaces(context.safe_set, place, context.now_us), start=1):
-        if not at.distance > hull_reach(context.body, at.normal):
+        if not at.distance > hull_reach(body, at.normal):
             return f"the place is too close to zone {number} of the safe set, or beyond it"
     return None
 
 
 def _circle_too_close(centre: Vec3, radius: float, context: CommandContext) -> str | None:
-    """Why the body cannot fly a circle."""
+    body = body_of(context.config.planner.body, context.config.airframe)
     for number in range(len(context.safe_set.zones)):
 
         def room(angle: float, number: int = number) -> float:
             x, y, z = centre
             place = (x + radius * math.cos(angle), y + radius * math.sin(angle), z)
             at = surface(context.safe_set, number, place, context.now_us)
-            return 1.0 if at is None else at.distance - hull_reach(context.body, at.normal)
+            return 1.0 if at is None else at.distance - hull_reach(body, at.normal)
 
         # The nearest of some places on the circle, then of as many between its neighbours.
         apart, best = math.pi, 0.0  # rad

@@ -1,32 +1,40 @@
-"""What the parameters choose to be done about a condition, in PX4's numbers."""
+"""What the parameters choose to be done about a condition."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from fsw.autopilot.flight.failsafe.conditions import Action
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext, position_is_off
+from fsw.autopilot.parameters.registry import BY_NAME
 from fsw.autopilot.signals import BatteryWarning, Mode
 
 BREAKER: Final = 121212  # of CBRK_FLIGHTTERM, PX4's number
 
 
-def by_number(number: int) -> Action:
-    """PX4's actions of GF_ACTION, COM_POS_LOW_ACT and their like; 6 is Pandion's own."""
-    return {
-        0: Action.NONE,
-        2: Action.HOLD,
-        3: Action.RETURN,
-        4: Action.TERMINATE,
-        5: Action.LAND,
-        6: Action.RETREAT,
-    }.get(number, Action.WARN)
+# By what the parameters say of their values.
+_CHOSEN: Final = {
+    "None": Action.NONE,
+    "Disabled": Action.WARN,
+    "Warning": Action.WARN,
+    "Hold": Action.HOLD,
+    "Retreat along the normal, then hold": Action.RETREAT,
+    "Return": Action.RETURN,
+    "Land": Action.LAND,
+    "Terminate": Action.TERMINATE,
+}
 
 
-def on_setpoints_lost(context: FailsafeContext) -> Action:
-    """COM_OBL_RC_ACT; the mode cannot continue."""
-    known = {3: Action.RETURN, 4: Action.LAND, 5: Action.HOLD, 6: Action.TERMINATE}
-    return known.get(context.limits.setpoint_loss_action, Action.HOLD)
+def by(name: str) -> Callable[[FailsafeContext], Action]:
+    """The action that a parameter chooses; hold, by a number that is none of its own."""
+    parameter = BY_NAME[name]
+    choices = {number: _CHOSEN[what] for number, what in parameter.choices}
+    return lambda context: choices.get(int(parameter.read(context.config)), Action.HOLD)
+
+
+_ON_DATALINK_LOST: Final = by("NAV_DLL_ACT")
+on_actuator_failure: Final = by("COM_ACT_FAIL_ACT")
 
 
 # Bits of COM_DLL_EXCEPT, PX4's; that of external modes is the one of its COM_RCL_EXCEPT.
@@ -41,13 +49,12 @@ _EXCEPTIONS: Final = {
 
 def on_datalink_lost(context: FailsafeContext) -> Action:
     """NAV_DLL_ACT, but for the modes of COM_DLL_EXCEPT."""
-    vehicle, limits = context.state.vehicle, context.limits
+    vehicle = context.state.vehicle
     flown = vehicle.failsafe_from or vehicle.mode  # the hold of a failsafe is no hold of a pilot's
-    excepted = _EXCEPTIONS.get(flown, 0) & limits.station_loss_exceptions
+    excepted = _EXCEPTIONS.get(flown, 0) & context.limits.station_loss_exceptions
     if not vehicle.flies or excepted:
         return Action.NONE
-    known = {1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND, 5: Action.TERMINATE}
-    return known.get(limits.station_loss_action, Action.WARN)
+    return _ON_DATALINK_LOST(context)
 
 
 def on_battery(context: FailsafeContext) -> Action:
@@ -60,12 +67,15 @@ def on_battery(context: FailsafeContext) -> Action:
     }.get((context.limits.low_battery_action, context.state.battery.charge), Action.WARN)
 
 
-def on_breach(context: FailsafeContext, number: int) -> Action:
-    """The action where the controller has barriers that promise not to get there."""
-    config = context.config
-    if config.controller != "blf" or config.soft:
-        return Action.WARN
-    return by_number(number)
+def on_breach(name: str) -> Callable[[FailsafeContext], Action]:
+    """The action that a parameter chooses, of a controller whose barriers promise no breach."""
+    chosen = by(name)
+
+    def action(context: FailsafeContext) -> Action:
+        promised = context.config.controller == "blf" and not context.config.soft
+        return chosen(context) if promised else Action.WARN
+
+    return action
 
 
 def on_lack_of_room(context: FailsafeContext) -> Action:
@@ -74,10 +84,12 @@ def on_lack_of_room(context: FailsafeContext) -> Action:
     return Action.DESCEND if off else Action.WARN
 
 
+_ON_BREACH: Final = on_breach("SAFE_BREACH_ACT")
+
+
 def on_far_outside(context: FailsafeContext) -> Action:
     """Land, where a breach is to be acted on at all."""
-    acted_on = on_breach(context, context.limits.breach_action).mode is not None
-    return Action.LAND if acted_on else Action.WARN
+    return Action.LAND if _ON_BREACH(context).mode is not None else Action.WARN
 
 
 def on_tilt_lost(context: FailsafeContext) -> Action:
@@ -100,9 +112,3 @@ def on_rotor_failed(context: FailsafeContext) -> Action:
     if action is Action.WARN or not context.state.damage.severe:
         return action
     return action if action.strength > Action.LAND.strength else Action.LAND
-
-
-def on_actuator_failure(context: FailsafeContext) -> Action:
-    """COM_ACT_FAIL_ACT, PX4's numbers."""
-    known = {1: Action.HOLD, 2: Action.LAND, 3: Action.RETURN, 4: Action.TERMINATE}
-    return known.get(context.limits.actuator_failure_action, Action.WARN)

@@ -1,4 +1,4 @@
-"""When a condition of the failsafe table is active."""
+"""When a condition of the failsafe table is active, where a row does not say it in a line."""
 
 from __future__ import annotations
 
@@ -66,22 +66,21 @@ def plan_age_us(context: FailsafeContext) -> int:
 
 
 def plans(context: FailsafeContext) -> bool:
-    """Whether a plan is being flown, or should be."""
+    """Whether in flight a plan is flown, or should be."""
     vehicle = context.state.vehicle
-    return vehicle.flies and vehicle.unloaded is None and vehicle.mode is not Mode.DESCEND
+    return vehicle.unloaded is None and vehicle.mode is not Mode.DESCEND
 
 
 def plan_is_stale(context: FailsafeContext) -> bool:
-    """In flight, the running plan (or taking over) began more than three periods ago."""
+    """The running plan (or taking over) began more than three periods ago."""
     stale_us = PLAN_STALE_PERIODS * context.config.planner.period_us
     return plan_age_us(context) > stale_us and plans(context)
 
 
 def planner_is_lost(context: FailsafeContext) -> bool:
-    """In flight, no plan has begun for COM_PLN_LOSS_T."""
-    vehicle = context.state.vehicle
-    plans = vehicle.flies and vehicle.unloaded is None
-    return plans and plan_age_us(context) > context.limits.planner_loss_us
+    """No plan has begun for COM_PLN_LOSS_T."""
+    unloaded = context.state.vehicle.unloaded is not None
+    return not unloaded and plan_age_us(context) > context.limits.planner_loss_us
 
 
 def setpoints_are_lost(context: FailsafeContext) -> bool:
@@ -104,10 +103,10 @@ def datalink_is_lost(context: FailsafeContext) -> bool:
 
 
 def lacks_room(context: FailsafeContext) -> bool:
-    """In flight, for half a second, walls leave less than clearances should grow by."""
+    """For half a second walls have left less than clearances should grow by."""
     kept = context.state.kept
     lasts = context.estimate.t_us - kept.sufficient_us >= _LACKING_US
-    return kept.shortfall > SHORTFALL and lasts and context.state.vehicle.flies
+    return kept.shortfall > SHORTFALL and lasts
 
 
 def force_on_tool(context: FailsafeContext) -> float:
@@ -117,44 +116,26 @@ def force_on_tool(context: FailsafeContext) -> float:
 
 
 def presses_too_hard(context: FailsafeContext) -> bool:
-    """In flight, the tool may be pressed upon by more than its surface allows."""
+    """The tool may be pressed upon by more than its surface allows."""
     k = context.state.record.pressing
-    return bool(k.near and force_on_tool(context) + k.unsure > k.most) and _flies(context)
-
-
-def has_lost_contact(context: FailsafeContext) -> bool:
-    """In flight, the tool has missed its surface for a while."""
-    return context.state.record.pressing.lost_for > CONTACT_LOST_S and _flies(context)
+    return bool(k.near and force_on_tool(context) + k.unsure > k.most)
 
 
 def surface_has_moved(context: FailsafeContext) -> bool:
-    """In flight, the tool meets its surface far from where it was announced."""
+    """The tool meets its surface far from where it was announced."""
     pressing = context.state.record.pressing
-    return bool(pressing.near and abs(pressing.moved) > SURFACE_OFF) and _flies(context)
+    return bool(pressing.near and abs(pressing.moved) > SURFACE_OFF)
 
 
 def tool_slips(context: FailsafeContext) -> bool:
-    """In flight, the tool moves along its surface faster than any reference leads it."""
+    """The tool moves along its surface faster than any reference leads it."""
     pressing = context.state.record.pressing
-    if not pressing.contact:
-        return False
-    return math.hypot(*pressing.slip.tolist()) > SLIP and _flies(context)
-
-
-def payload_is_heavy(context: FailsafeContext) -> bool:
-    """In flight, the gripper holds more than is safe, by more than it is weighed within."""
-    held = context.state.record.payload.mass
-    return bool(held > WEIGHED * context.heaviest) and _flies(context)
-
-
-def _flies(context: FailsafeContext) -> bool:
-    return context.state.vehicle.flies
+    return bool(pressing.contact) and math.hypot(*pressing.slip.tolist()) > SLIP
 
 
 def is_unaided(context: FailsafeContext) -> bool:
-    """In flight, no position could be used for COM_AID_LOSS_T."""
-    aiding = context.state.aiding
-    return aiding.unaided_us >= context.limits.aiding_loss_us and context.state.vehicle.flies
+    """No position could be used for COM_AID_LOSS_T."""
+    return context.state.aiding.unaided_us >= context.limits.aiding_loss_us
 
 
 def is_blind(context: FailsafeContext) -> bool:
@@ -163,9 +144,9 @@ def is_blind(context: FailsafeContext) -> bool:
 
 
 def attitude_is_lost(context: FailsafeContext) -> bool:
-    """In flight, roll or pitch is uncertain by more than COM_ATT_LOSS, or nothing is known."""
+    """Roll or pitch is uncertain by more than COM_ATT_LOSS, or nothing is known."""
     known = context.state.aiding.attitude_sigma <= context.limits.attitude_loss
-    return (not known or is_blind(context)) and context.state.vehicle.flies
+    return not known or is_blind(context)
 
 
 def position_is_off(context: FailsafeContext, most: float) -> bool:
@@ -176,7 +157,7 @@ def position_is_off(context: FailsafeContext, most: float) -> bool:
 def position_is_disputed(context: FailsafeContext) -> bool:
     """The estimate is off by COM_POS_LOW_EPH, or positions say so: refused, or by their jumps."""
     aiding, most = context.state.aiding, context.limits.position_low
-    if math.hypot(*aiding.unproven) > most and context.state.vehicle.flies:
+    if math.hypot(*aiding.unproven) > most:
         return True
     return is_unaided(context) and not max(aiding.position_sigma, aiding.elsewhere) <= most
 
@@ -187,25 +168,13 @@ def lost_sensors(context: FailsafeContext) -> tuple[LostSensor, ...]:
     return tuple([one for one in context.state.aiding.lost if one.since_us <= since_us])
 
 
-def sensor_is_lost(context: FailsafeContext) -> bool:
-    """In flight, at least one of ``lost_sensors``."""
-    return bool(lost_sensors(context)) and context.state.vehicle.flies
-
-
-def sensors_contradict(context: FailsafeContext, seconds: float) -> bool:
-    """In flight, sensors contradict each other for so many ``seconds`` [s], whoever is wrong."""
-    disputed_us = context.state.aiding.disputed_us
-    return disputed_us > 1e6 * seconds and context.state.vehicle.flies
-
-
 def inertial_is_lost(context: FailsafeContext) -> bool:
-    """In flight, the inertial unit was of no use for a while, and no pose holds the attitude.
+    """The inertial unit was of no use for a while, and no pose holds the attitude.
 
     Satellites and rotors hold it for longer where only one half of the unit is lost.
     """
     aiding, now_us = context.state.aiding, context.estimate.t_us
-    held = aiding.holds_attitude(context.limits.aiding_loss_us)
-    if held or not context.state.vehicle.flies:
+    if aiding.holds_attitude(context.limits.aiding_loss_us):
         return False
     return any(
         one.sensor is Sensor.IMU
@@ -245,9 +214,3 @@ def way_home_s(context: FailsafeContext) -> float:
     seconds = (math.hypot(x - hx, y - hy) + z - top) / cruise + wait
     seconds += max(hz - top, 0.0) / limits.land_speed
     return limits.return_time_factor * seconds + limits.return_time_margin
-
-
-def flight_time_is_short(context: FailsafeContext) -> bool:
-    """In flight, the battery lasts no longer than the way home takes."""
-    left = context.state.battery.time_left
-    return context.state.vehicle.flies and left < way_home_s(context)

@@ -99,10 +99,7 @@ def allowed(action: Action, mode: Mode, flies: bool) -> Action:
 
 
 _OF_MODES: Final = {
-    Mode.HOLD: Action.HOLD,
-    Mode.RETURN: Action.RETURN,
-    Mode.LAND: Action.LAND,
-    Mode.DESCEND: Action.DESCEND,
+    one.mode: one for one in (Action.HOLD, Action.RETURN, Action.LAND, Action.DESCEND)
 }
 
 

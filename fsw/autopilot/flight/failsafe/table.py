@@ -30,8 +30,6 @@ AT_ONCE_US: Final = TICK_US
 SLOW_US: Final = PLANNING_US  # after which the other rows are looked at again
 _OF_HOST_US: Final = 1_000_000 + SLOW_US  # the loop looks at its machine once a second
 
-Evidence = Callable[[FailsafeContext], bool]
-
 
 class UserTakeoverAllowed(Enum):
     """Whether the pilot can fly another mode while a condition acts, in PX4's words."""
@@ -45,11 +43,12 @@ class Failsafe:
     """One row of the table."""
 
     condition: Condition
-    active: Evidence
+    active: Callable[[FailsafeContext], bool]
     asks: Action | Callable[[FailsafeContext], Action] = Action.WARN  # what is done
     severity: Severity = Severity.WARNING  # of a report without a change of mode
     detail: Callable[[FailsafeContext], str] = lambda _: ""  # behind the condition's name
     of_vehicle: bool = False  # a fault of the vehicle, shown by telemetry for as long as it lasts
+    in_flight: bool = False  # none on the ground
     slow: bool = False  # looked at once a planning period, not every tick
     delayed: bool = False  # holds for COM_FAIL_ACT_T before it returns or lands
     within_us: int = AT_ONCE_US  # until it is reported, beyond the time of a parameter
@@ -66,13 +65,19 @@ _SLOWLY: Final = SLOW_US + AT_ONCE_US
 _TWICE: Final = 2 * SLOW_US + AT_ONCE_US  # found in a planning tick, looked at up to a period later
 # What rows have in common. Faults of the vehicle are told a planning period late at most.
 _fault = partial(Failsafe, of_vehicle=True, within_us=_SLOWLY)
+_in_flight = partial(_fault, in_flight=True)
 _of_contact = partial(
-    Failsafe, asks=Action.RETREAT, severity=Severity.CRITICAL, slow=True, within_us=_SLOWLY
+    Failsafe,
+    asks=Action.RETREAT,
+    severity=Severity.CRITICAL,
+    in_flight=True,
+    slow=True,
+    within_us=_SLOWLY,
 )
 _of_sensors = partial(
-    Failsafe,
+    _in_flight,
     severity=Severity.CRITICAL,
-    of_vehicle=True,
+    detail=wording.suspects,
     slow=True,
     within_us=_TWICE,
     component=Subject.SENSORS,
@@ -80,15 +85,16 @@ _of_sensors = partial(
 _of_battery = partial(
     Failsafe,
     asks=actions.on_battery,
-    detail=wording.charge_left,
+    detail=lambda c: f": {100.0 * c.state.battery.remaining:.0f} % left",
     slow=True,
     within_us=_TWICE,
     component=Subject.BATTERY,
 )
+_of_tick = partial(Failsafe, of_vehicle=True, within_us=2 * AT_ONCE_US)
 _of_host = partial(Failsafe, slow=True, within_us=_OF_HOST_US)
 
 FAILSAFES: Final = (
-    _fault(
+    _in_flight(
         Condition.ATTITUDE_LOST,
         evidence.attitude_is_lost,
         Action.TERMINATE,
@@ -110,7 +116,7 @@ FAILSAFES: Final = (
         ),
         component=Subject.ATTITUDE,
     ),
-    _fault(
+    _in_flight(
         Condition.POSITION_LOST,
         lambda c: evidence.position_is_off(c, c.limits.position_lost),
         Action.DESCEND,
@@ -120,7 +126,7 @@ FAILSAFES: Final = (
         component=Subject.ESTIMATOR,
         takeover=UserTakeoverAllowed.NEVER,
     ),
-    _fault(
+    _in_flight(
         Condition.PLANNER_LOST,
         evidence.planner_is_lost,
         Action.DESCEND,
@@ -133,7 +139,7 @@ FAILSAFES: Final = (
     _fault(
         Condition.BREACH,
         lambda c: c.state.safety.breach_us >= 0,
-        lambda c: actions.on_breach(c, c.limits.breach_action),
+        actions.on_breach("SAFE_BREACH_ACT"),
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.breach_by),
         parameters=("SAFE_BREACH_ACT",),
@@ -141,17 +147,16 @@ FAILSAFES: Final = (
     _fault(
         Condition.FENCE_BREACH,
         lambda c: c.state.safety.fence_us >= 0,
-        lambda c: actions.on_breach(c, c.limits.fence_action),
+        actions.on_breach("GF_ACTION"),
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.fence_by),
         parameters=("GF_ACTION",),
     ),
-    Failsafe(
+    _in_flight(
         Condition.FAR_OUTSIDE,
-        lambda c: is_deep(c.state.constraints) and c.state.vehicle.flies,
+        lambda c: is_deep(c.state.constraints),
         actions.on_far_outside,
         Severity.CRITICAL,
-        of_vehicle=True,
         slow=True,
         delayed=True,
         within_us=_TWICE,
@@ -165,21 +170,19 @@ FAILSAFES: Final = (
         detail=wording.carried,
         slow=True,
     ),
-    Failsafe(
+    _in_flight(
         Condition.ROTOR_LOST,
-        lambda c: c.state.damage.report.lost and c.state.vehicle.flies,
+        lambda c: c.state.damage.report.lost,
         actions.on_rotor_lost,
         Severity.EMERGENCY,
         detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
-        of_vehicle=True,
+        within_us=AT_ONCE_US,
         parameters=("FD_ACT_EN", "CBRK_FLIGHTTERM"),
         component=Subject.ACTUATORS,
     ),
-    _fault(
+    _in_flight(
         Condition.ROTOR_FAILED,
-        lambda c: (
-            bool(c.state.damage.rotor) and not c.state.damage.spared and c.state.vehicle.flies
-        ),
+        lambda c: bool(c.state.damage.rotor) and not c.state.damage.spared,
         actions.on_rotor_failed,
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.damage.rotor}{wording.lasting(c, c.state.damage.rotor_us)}",
@@ -187,9 +190,9 @@ FAILSAFES: Final = (
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT", "CA_FAILURE_MODE"),
         component=Subject.ACTUATORS,
     ),
-    _fault(
+    _in_flight(
         Condition.JOINT_FAILED,
-        lambda c: bool(c.state.damage.joint) and c.state.vehicle.flies,
+        lambda c: bool(c.state.damage.joint),
         actions.on_actuator_failure,
         Severity.CRITICAL,
         detail=lambda c: f": {c.state.damage.joint}{wording.lasting(c, c.state.damage.joint_us)}",
@@ -197,19 +200,19 @@ FAILSAFES: Final = (
         parameters=("FD_ACT_EN", "COM_ACT_FAIL_ACT"),
         component=Subject.ACTUATORS,
     ),
-    _fault(
+    _in_flight(
         Condition.POSITION_LOW,
         evidence.position_is_disputed,
-        lambda c: actions.by_number(c.limits.position_low_action),
+        actions.by("COM_POS_LOW_ACT"),
         Severity.CRITICAL,
         wording.uncertain,
         parameters=("COM_AID_LOSS_T", "COM_POS_LOW_EPH", "COM_POS_LOW_ACT"),
         component=Subject.ESTIMATOR,
     ),
-    _fault(
+    _in_flight(
         Condition.SENSOR_LOST,
-        evidence.sensor_is_lost,
-        lambda c: actions.by_number(c.limits.sensor_loss_action),
+        lambda c: bool(evidence.lost_sensors(c)),
+        actions.by("COM_SENS_ACT"),
         Severity.CRITICAL,
         wording.lost_sensor,
         parameters=("COM_SENS_LOSS_T", "COM_SENS_ACT"),
@@ -224,15 +227,13 @@ FAILSAFES: Final = (
     ),
     _of_sensors(
         Condition.SENSORS_UNDECIDED,
-        lambda c: evidence.sensors_contradict(c, UNDECIDED),
+        lambda c: c.state.aiding.disputed_us > 1e6 * UNDECIDED,
         Action.LAND,
-        detail=wording.suspects,
     ),
     _of_sensors(
         Condition.SENSORS_CONTRADICT,
-        lambda c: evidence.sensors_contradict(c, 0.1),
+        lambda c: c.state.aiding.disputed_us > 100_000,
         Action.RETREAT,
-        detail=wording.suspects,
     ),
     Failsafe(
         Condition.ROOM_LACKING,
@@ -240,6 +241,7 @@ FAILSAFES: Final = (
         actions.on_lack_of_room,
         Severity.CRITICAL,
         detail=lambda c: f": {1e3 * c.state.kept.shortfall:.0f} mm less than SAFE_SIGMAS asks for",
+        in_flight=True,
         slow=True,
         within_us=_TWICE,
         parameters=("SAFE_SIGMAS", "COM_AID_LOSS_T", "COM_POS_LOW_EPH"),
@@ -252,42 +254,46 @@ FAILSAFES: Final = (
         slow=False,
         within_us=2 * AT_ONCE_US,
     ),
-    _of_contact(Condition.CONTACT_LOST, evidence.has_lost_contact, detail=wording.without_contact),
-    _of_contact(Condition.SURFACE_MOVED, evidence.surface_has_moved, detail=wording.surface_moved),
+    _of_contact(
+        Condition.CONTACT_LOST,
+        lambda c: c.state.record.pressing.lost_for > evidence.CONTACT_LOST_S,
+        detail=lambda c: f" for {c.state.record.pressing.lost_for:.1f} s",
+    ),
+    _of_contact(
+        Condition.SURFACE_MOVED,
+        evidence.surface_has_moved,
+        detail=lambda c: wording.by_mm(abs(c.state.record.pressing.moved)),
+    ),
     _of_contact(Condition.TOOL_SLIPS, evidence.tool_slips),
     _of_contact(
         Condition.PAYLOAD_HEAVY,
-        evidence.payload_is_heavy,
+        lambda c: c.state.record.payload.mass > evidence.WEIGHED * c.heaviest,
         asks=Action.LAND,
-        detail=wording.payload,
+        detail=lambda c: f": {1e3 * c.state.record.payload.mass:.0f} g of {1e3 * c.heaviest:.0f} g",
         delayed=True,
         parameters=("COM_FAIL_ACT_T",),
     ),
-    Failsafe(
+    _of_tick(
         Condition.TUBE_LEFT,
         lambda c: c.state.safety.off_plan_us >= 0,
         Action.REPLAN,
         Severity.CRITICAL,
         detail=lambda c: wording.by_mm(c.state.safety.off_plan_by),
-        of_vehicle=True,
-        within_us=2 * AT_ONCE_US,
     ),
-    Failsafe(
+    _of_tick(
         Condition.FILTER_ACTIVE,
         lambda c: c.state.safety.filter_us >= 0,
         Action.PUSH,
         Severity.CRITICAL,
-        of_vehicle=True,
-        within_us=2 * AT_ONCE_US,
     ),
-    Failsafe(
+    _in_flight(
         Condition.PLAN_STALE,
         evidence.plan_is_stale,
         Action.BRAKE,
         detail=wording.no_plan,
-        of_vehicle=True,
+        within_us=AT_ONCE_US,
     ),
-    _fault(
+    _in_flight(
         Condition.AIDING_LOST,
         evidence.is_unaided,
         Action.DEAD_RECKON,
@@ -301,24 +307,17 @@ FAILSAFES: Final = (
         of_vehicle=True,
         component=Subject.ESTIMATOR,
     ),
-    Failsafe(
+    _of_tick(
         Condition.OUTPUT_NOT_FINITE,
         lambda c: c.state.output_replaced,
-        of_vehicle=True,
-        within_us=2 * AT_ONCE_US,
         component=Subject.ACTUATORS,
     ),
-    Failsafe(
-        Condition.PLAN_REFUSED,
-        lambda c: c.state.plan.refused,
-        detail=wording.refused_plan,
-        of_vehicle=True,
-        within_us=2 * AT_ONCE_US,
-    ),
+    _of_tick(Condition.PLAN_REFUSED, lambda c: c.state.plan.refused, detail=wording.refused_plan),
     Failsafe(
         Condition.PLAN_LATE,
         # In every tick: a plan may come before the next look, and would have been late in silence.
         lambda c: c.state.plan.awaited_missed and evidence.plans(c),
+        in_flight=True,
         within_us=2 * AT_ONCE_US,
     ),
     Failsafe(
@@ -367,7 +366,7 @@ FAILSAFES: Final = (
     Failsafe(
         Condition.SETPOINTS_LOST,
         evidence.setpoints_are_lost,
-        actions.on_setpoints_lost,
+        actions.by("COM_OBL_RC_ACT"),
         detail=wording.refused_setpoints,
         parameters=("COM_OF_LOSS_T", "COM_OBL_RC_ACT"),
     ),
@@ -393,9 +392,10 @@ FAILSAFES: Final = (
     ),
     Failsafe(
         Condition.FLIGHT_TIME_LOW,
-        evidence.flight_time_is_short,
-        lambda c: actions.by_number(c.limits.flight_time_action),
+        lambda c: c.state.battery.time_left < evidence.way_home_s(c),
+        actions.by("COM_FLTT_LOW_ACT"),
         detail=wording.time_left,
+        in_flight=True,
         slow=True,
         delayed=True,
         within_us=_TWICE,
@@ -448,13 +448,17 @@ def unhealthy(conditions: tuple[Condition, ...]) -> tuple[str, ...]:
 
 def active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """Rows whose condition is active, in the order of the table; almost always none."""
-    return tuple([row for row in FAILSAFES if row.active(context)])
+    flies = context.state.vehicle.flies
+    return tuple([row for row in FAILSAFES if (flies or not row.in_flight) and row.active(context)])
 
 
 def quickly_active(context: FailsafeContext) -> tuple[Failsafe, ...]:
     """The same between two planning periods: the slow rows are as they were found last."""
-    before = context.state.vehicle.conditions
-    rows = FAILSAFES if before else _QUICK
-    return tuple(
-        [row for row in rows if (row.condition in before if row.slow else row.active(context))]
-    )
+    vehicle = context.state.vehicle
+    before, flies = vehicle.conditions, vehicle.flies
+    found = []
+    for row in FAILSAFES if before else _QUICK:
+        looked_at = row.slow or flies or not row.in_flight
+        if looked_at and (row.condition in before if row.slow else row.active(context)):
+            found.append(row)
+    return tuple(found)

@@ -1,4 +1,4 @@
-"""What is said of an active condition, behind its name."""
+"""What is said of an active condition, behind its name, where a row does not say it in a line."""
 
 from __future__ import annotations
 
@@ -42,11 +42,6 @@ def suspects(context: FailsafeContext) -> str:
     """Which sensors may be wrong, and for how long they have contradicted each other."""
     aiding = context.state.aiding
     return f": {aiding.suspects}, for {1e-6 * aiding.disputed_us:.2f} s"
-
-
-def charge_left(context: FailsafeContext) -> str:
-    """Of the battery."""
-    return f": {100.0 * context.state.battery.remaining:.0f} % left"
 
 
 def time_left(context: FailsafeContext) -> str:
@@ -114,22 +109,6 @@ def force(context: FailsafeContext) -> str:
     pressing = context.state.record.pressing
     found, unsure, most = force_on_tool(context), pressing.unsure, pressing.most
     return f": {found:.1f} N, or {unsure:.1f} N more, of {most:.1f} N"
-
-
-def without_contact(context: FailsafeContext) -> str:
-    """For how long the tool has missed its surface."""
-    return f" for {context.state.record.pressing.lost_for:.1f} s"
-
-
-def surface_moved(context: FailsafeContext) -> str:
-    """How far a surface is from where it was announced."""
-    return by_mm(abs(context.state.record.pressing.moved))
-
-
-def payload(context: FailsafeContext) -> str:
-    """What the gripper holds, and what it may."""
-    held = context.state.record.payload.mass
-    return f": {1e3 * held:.0f} g of {1e3 * context.heaviest:.0f} g"
 
 
 def carried(context: FailsafeContext) -> str:

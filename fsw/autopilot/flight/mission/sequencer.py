@@ -69,18 +69,12 @@ class MissionFlight:
     steps: tuple[MissionStep, ...] = ()
     stage: Stage = Stage.IDLE
     segment: Segment | None = None
-    place: Vec3 | None = (
-        None  # m, where the step is to be reached; the segment may stop before a wall
-    )
+    # m, where the step is to be reached; the segment may stop before a wall
+    place: Vec3 | None = None
     since_us: int = 0  # when the stage began
     speed: float | None = None  # m/s, as the mission says
     jumps: tuple[int, ...] = ()  # the steps whose jump was taken, once for each time
     progress: MissionProgress = field(default_factory=MissionProgress)
-
-
-def nothing_there(place: Vec3, _force: float) -> Meeting:
-    """Where there is nothing to press on, at ``place`` [m, NED], with ``_force`` [N]."""
-    return Meeting(place, (0.0, 0.0, 0.0), "there is no surface that may be touched")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +85,10 @@ class MissionContext:
     p_WE: Vec3  # m, estimate
     height: float  # m, base above the origin
     home_z: float  # m, NED, of home
+    # Where the tool meets the surface at a place [m, NED], to press with a force [N].
+    meet: Callable[[Vec3, float], Meeting]
     safe_set: SafeSet = field(default_factory=SafeSet)
     look_at: Vec3 | None = None  # m, where the nose is to point
-    # Where the tool meets the surface at a place [m, NED], to press with a force [N].
-    meet: Callable[[Vec3, float], Meeting] = nothing_there
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ A flight mode is one file in this folder: a subclass of ``FlightMode`` and a nam
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -14,8 +13,6 @@ from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.land_detector import feel_ground
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, SetpointGenerator
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.model.airframe import Airframe
-from fsw.autopilot.model.body import Body
 from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
@@ -27,7 +24,6 @@ from fsw.autopilot.signals import (
     SafeSet,
     StateEstimate,
     StatusText,
-    Vec2,
     Vec3,
 )
 from fsw.frozen import replace
@@ -66,20 +62,12 @@ class CommandContext:
     joints: JointVector  # rad, asked for last or as they are
     home: Home | None
     safe_set: SafeSet
-    body: Body
     now_us: int
-    climb_range: Vec2  # m, of a takeoff
-    airframe: Airframe
+    config: FlightConfig
     health: ArmingHealth
     blocked: str  # why nothing but Descend can be flown now; empty: other modes can be
     speed: float  # m/s, on the way to places
-    max_speed: float  # m/s, that can be asked for
-    yaw_rate: float  # rad/s, at most
-    acceleration: float  # m/s^2, of a generated setpoint
-    failures_allowed: bool = False  # to be injected
-    above_px4: bool = False  # PX4 flies: what is disarmed here is given back to it
     rests: bool = True  # it lies or stands still
-    highest: float = math.inf  # m above the origin, of the base
     fence: SafeSet = field(default_factory=SafeSet)  # the part of the safe set that was uploaded
     against_sender: str = ""  # why it may not change where a return ends; empty: it may
 

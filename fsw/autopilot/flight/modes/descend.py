@@ -9,9 +9,8 @@ from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.setpoints.generator import PositionGoal
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
 from fsw.autopilot.model.body import body_of
-from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import EndEffectorTarget, Mode, MotionSetpoint, StateEstimate
+from fsw.autopilot.signals import Mode, MotionSetpoint, StateEstimate
 from fsw.frozen import replace
 
 
@@ -43,8 +42,3 @@ class Descend(FlightMode):
         place = retreat_place(safe_set, estimate, self._body, self._bodies, self._room)
         goal = PositionGoal(MotionSetpoint(False, place))
         return replace(state, setpoint=SetpointMemory(goal=goal))
-
-    def reference(self, state: FlightState, t_us: int) -> EndEffectorTarget:
-        """Where it began: the planner, if there is one, is asked for the day it is needed again."""
-        vehicle = state.vehicle
-        return still_at(vehicle.mode_origin, t_us, vehicle.mode_yaw)

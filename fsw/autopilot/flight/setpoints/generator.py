@@ -18,7 +18,11 @@ from dataclasses import dataclass
 from fsw.autopilot.barriers.safe_approach import safe_approach_speed
 from fsw.autopilot.flight.setpoints.offboard_setpoint import finite_or_zero, turn_level
 from fsw.autopilot.flight.setpoints.orbit_path import looking_at, on_orbit
-from fsw.autopilot.flight.setpoints.reference_governor import SETTLE_RATE, ReferenceGovernor
+from fsw.autopilot.flight.setpoints.reference_governor import (
+    SETTLE_RATE,
+    ReferenceGovernor,
+    limit_lead,
+)
 from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, limit_norm, norm, subtract
 from fsw.autopilot.model.kinematics import end_effector, end_effector_when_level
@@ -122,7 +126,7 @@ class SetpointGenerator:
             vehicle = end_effector(config.airframe.bodies, estimate)[0]
         else:
             vehicle = estimate.p_WB
-        p = self._governor.limit_lead(moved.p, vehicle)
+        p = limit_lead(moved.p, vehicle, config.steering.max_lead_distance)
         return self._limited(replace(moved, p=p), estimate, safe_set, estimate.t_us)
 
     def horizon(

@@ -66,6 +66,15 @@ def limit_lead(p: Vec3, vehicle: Vec3, max_lead_distance: float) -> Vec3:
     )
 
 
+@compilable
+def lead_at(v: Vec3, fastest: float) -> float:
+    """How far [m] a reference may lead a vehicle at ``v`` [m/s, NED], of ``fastest`` [m/s].
+
+    One that is led by as much at any speed would be led to any speed.
+    """
+    return max(_MAX_LEAD_DISTANCE * max(1.0 - norm(v) / fastest, 0.0), _NEAR)
+
+
 def limit_approach(
     p: Vec3,
     v: Vec3,
@@ -141,10 +150,7 @@ def _limited(
             left |= _LOW
         if p[2] < highest - _TOLD:
             left |= _HIGH
-        # A vehicle that is led by as much at any speed would be led to any speed.
-        slower = max(1.0 - norm(v_WE) / fastest, 0.0)
-        reach = fastest * ahead + max(_MAX_LEAD_DISTANCE * slower, _NEAR)
-        near = limit_lead(near, p_WE, reach)
+        near = limit_lead(near, p_WE, fastest * ahead + lead_at(v_WE, fastest))
         if norm(v) > fastest + _TOLD:
             left |= _FAST
         if norm(subtract(p, p_WE)) > fastest * ahead + _AWAY:
@@ -218,7 +224,6 @@ class ReferenceGovernor:
 
     def __init__(self, config: FlightConfig) -> None:
         self._config = config
-        self._max_lead_distance = config.steering.max_lead_distance
         self._barrier = config.planner.walls
         self._body = body_of(config.planner.body, config.airframe)
         # The arm hangs: the end-effector is that much lower than the base.
@@ -253,10 +258,6 @@ class ReferenceGovernor:
         return limit_approach(
             p, v, ((body, self._body), (tip, None)), safe_set, t_us, self._barrier
         )
-
-    def limit_lead(self, p: Vec3, vehicle: Vec3) -> Vec3:
-        """``p`` [m, NED] within reach of the vehicle's own point ``vehicle`` [m, NED]."""
-        return limit_lead(p, vehicle, self._max_lead_distance)
 
     def limit_horizon(
         self, targets: tuple[EndEffectorTarget, ...], p_WE: Vec3, v_WE: Vec3, safe_set: SafeSet
@@ -354,13 +355,10 @@ class ReferenceGovernor:
     def reason(self, left: int, limits: Limits) -> str:
         """Which of the ``limits`` have been left, in words; empty: none."""
         lowest, highest, fastest = limits
-        said = []
-        if left & _LOW:
-            said.append(f"a target is below {-lowest:.2f} m")
-        if left & _HIGH:
-            said.append(f"a target is above {-highest:.0f} m")
-        if left & _FAST:
-            said.append(f"targets ask for more than {fastest:g} m/s")
-        if left & _FAR:
-            said.append(f"targets are more than {_AWAY:g} m ahead of the end-effector")
-        return ", ".join(said)
+        said = {
+            _LOW: f"a target is below {-lowest:.2f} m",
+            _HIGH: f"a target is above {-highest:.0f} m",
+            _FAST: f"targets ask for more than {fastest:g} m/s",
+            _FAR: f"targets are more than {_AWAY:g} m ahead of the end-effector",
+        }
+        return ", ".join(text for flag, text in said.items() if left & flag)

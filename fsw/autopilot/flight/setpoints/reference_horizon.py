@@ -7,11 +7,11 @@ import math
 from fsw.autopilot.flight.land_detector import height_above_ground
 from fsw.autopilot.flight.modes.base import FlightMode
 from fsw.autopilot.flight.setpoints.generator import PositionGoal, ReferenceState, arrived
-from fsw.autopilot.flight.setpoints.reference_governor import ReferenceGovernor
+from fsw.autopilot.flight.setpoints.reference_governor import ReferenceGovernor, lead_at
 from fsw.autopilot.flight.state import FlightState, SetpointMemory
-from fsw.autopilot.geometry.vectors import norm, subtract
+from fsw.autopilot.geometry.vectors import subtract
 from fsw.autopilot.model.kinematics import end_effector
-from fsw.autopilot.mpc.reference import sample, still_at
+from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import (
     EndEffectorTarget,
@@ -23,8 +23,6 @@ from fsw.autopilot.signals import (
 )
 from fsw.frozen import replace
 
-_LEAD = 0.4  # m that a reference may be ahead of a vehicle at rest, as of one from outside
-_NEAR = 0.1  # m, of a vehicle at the largest speed
 _OFF_PLAN = 0.05  # m; beyond what a disturbance alone does nearly always
 
 Horizon = tuple[tuple[EndEffectorTarget, ...], tuple[JointVector, ...]]
@@ -41,9 +39,7 @@ class ReferenceHorizon:
     def warm_up(self, estimate: StateEstimate) -> None:
         """Compile every kernel."""
         here, rest = estimate.p_WB, (0.0, 0.0, 0.0)
-        stream = still_at(estimate.p_WB), still_at(estimate.p_WB, 100_000)
-        between = sample(stream, 50_000)
-        self._governor.limit_external((between,), here, rest, SafeSet())
+        self._governor.limit_external((still_at(here),), here, rest, SafeSet())
 
     def __call__(
         self, mode: FlightMode, state: FlightState, estimate: StateEstimate, t_us: int
@@ -148,8 +144,7 @@ def _led_aside(
     The end-effector is at ``p_WE`` [m, NED] and moves at ``v_WE`` [m/s, NED]. The height is left to
     the mode: a landing asks for what is below the ground, at a speed of its own.
     """
-    near = max(_LEAD * (1.0 - norm(v_WE) / fastest), _NEAR)
-    limited = []
+    near, limited = lead_at(v_WE, fastest), []
     for one in targets:
         reach = near + 1e-6 * fastest * (one.t_us - targets[0].t_us)
         north, east, _ = subtract(one.p_WE, p_WE)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fsw.autopilot.model.linearisation import Linearisation
 from fsw.autopilot.model.prediction import Array
-from fsw.autopilot.shapes.frame import outward_axis
+from fsw.autopilot.shapes.ball import outward_axis
 from fsw.autopilot.shapes.target_sphere import target_sphere
 from tests.fsw.autopilot.barriers.horizons import (
     NODES,

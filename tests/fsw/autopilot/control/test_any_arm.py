@@ -11,7 +11,7 @@ import pytest
 from fsw.autopilot.control.arm_compensation import CompensationLimits
 from fsw.autopilot.control.joint_reference import JointReferenceLimits
 from fsw.autopilot.control.joints import limit_acceleration
-from fsw.autopilot.model.airframe import AIRFRAME, Airframe, AngleLimits, airframe_of
+from fsw.autopilot.model.airframe import AIRFRAME, Airframe, AngleLimit, airframe_of
 from fsw.autopilot.model.arm_coordinates import (
     along_other,
     arm_coordinates,
@@ -24,7 +24,7 @@ from fsw.autopilot.model.kinematics import end_effector, level_frame, position
 from fsw.autopilot.model.prediction import Array
 from fsw.autopilot.signals import JointVector, PredictionState, StateEstimate
 from fsw.autopilot.tick_record import ArmTask
-from fsw.record import ANGLE_LIMITS, JOINTS, padded
+from fsw.record import JOINTS
 from tests.fsw.autopilot.model.geometry_by_rotation import attitude
 from tests.fsw.random_states import estimate_of, vec3
 from tests.fsw.records import compensated_joints, joint_reference
@@ -36,14 +36,7 @@ LIMITS, JOINT_LIMITS, DT = CompensationLimits(), JointReferenceLimits(), 0.002
 
 def with_limits(rows: list[tuple[tuple[float, ...], float, float]], joints: int) -> Airframe:
     """A vehicle with so many joints, as far as limits of angles go."""
-    limits = AngleLimits(
-        rows=len(rows),
-        row=padded(
-            tuple(x for row, _, _ in rows for x in padded(row, JOINTS)), ANGLE_LIMITS * JOINTS
-        ),
-        low=padded(tuple(low for _, low, _ in rows), ANGLE_LIMITS),
-        high=padded(tuple(high for _, _, high in rows), ANGLE_LIMITS),
-    )
+    limits = tuple(AngleLimit(*row) for row in rows)
     bodies = replace(AIRFRAME.bodies, joints=joints)
     rates = (5.0,) * JOINTS
     return replace(AIRFRAME, bodies=bodies, angle_limits=limits, joint_rate_max=rates)

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
-from fsw.autopilot.control.pid import PidGains
+from fsw.autopilot.control.pid import PidGains, attitude_pid, attitude_reference
 from fsw.autopilot.geometry.rotation import (
     euler_zyx,
     matrix_from_quaternion,

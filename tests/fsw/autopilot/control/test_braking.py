@@ -61,7 +61,7 @@ def points(x: PredictionState) -> Array:
 
 def nearest_wall(x: PredictionState, normal: Array) -> float:
     """Offset of the nearest plane from which every point still has h >= lambda [m]."""
-    after = MODEL.step(x, PlanInput(x.a, 0.0, (0.0, 0.0)))
+    after = MODEL.advance(x, PlanInput(x.a, 0.0, (0.0, 0.0)))
     velocity = (points(after) - points(x)) / DT
     later = velocity + TAKEN_BACK_S * np.array(x.a)
     offset = math.inf
@@ -109,7 +109,7 @@ def test_whoever_keeps_lambda_stops_before_the_wall(seed: int) -> None:
         offset = nearest_wall(x, normal)
         begin, closest = x, math.inf
         for k in range(1000):
-            x = MODEL.step(x, BRAKE(x))
+            x = MODEL.advance(x, BRAKE(x))
             if k % 10 == 9:
                 closest = min(closest, float((points(x) @ normal).min()) - offset)
         assert closest >= 0.0, begin
@@ -139,7 +139,7 @@ def test_braking_is_within_tilt_and_jerk_and_does_not_swing_back(v: Vec3, a: Vec
         u = BRAKE(x)
         assert math.hypot(u.a[0], u.a[1]) <= tilt * (GRAVITY - u.a[2]) + 1e-9
         assert abs(u.a[2]) <= BrakeTuning().vertical
-        x = MODEL.step(x, u)
+        x = MODEL.advance(x, u)
         assert math.hypot(*x.j) < 25.0  # m/s^3
     assert math.dist(x.v, STILL) < 1e-2
     assert math.hypot(x.a[0], x.a[1]) < 1e-2

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fsw.autopilot.control.attitude import attitude_pid, attitude_reference
 from fsw.autopilot.control.cascade import Cascade, Inner, at_rest, in_hover
 from fsw.autopilot.control.gains import LoopGains
-from fsw.autopilot.control.pid import PidGains
+from fsw.autopilot.control.pid import PidGains, attitude_pid, attitude_reference
 from fsw.autopilot.control.safety_gate import stopped
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.model.prediction import Array

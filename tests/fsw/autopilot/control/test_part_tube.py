@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.control.gains import TrackingTuning, tracking_gains
+from fsw.autopilot.control.gains import TrackingTuning
 from fsw.autopilot.control.part_tube import LoopOfParts, PartReach, part_reaches, towards
 from fsw.autopilot.control.tube import WIND_COVERED, impulse_responses, tube
 from fsw.autopilot.model.airframe import AIRFRAME, GRAVITY
@@ -22,8 +22,7 @@ from fsw.autopilot.signals import Vec3
 
 DT, PUSH, HOLD = 0.002, 0.8, 0.1
 TUNING = TrackingTuning()
-GAINS = tracking_gains(TUNING, AIRFRAME.rotor_lag, DT)
-LOOP = LoopOfParts(AIRFRAME, TUNING, GAINS, PUSH, HOLD, DT)
+LOOP = LoopOfParts(AIRFRAME, TUNING, PUSH, HOLD, DT)
 FULL = body_of("full", AIRFRAME)
 
 
@@ -32,7 +31,7 @@ def alone(at: Vec3) -> tuple[PartReach, ...]:
 
 
 def test_the_reach_of_a_place_at_or_below_the_origin_is_the_tube_of_base_or_end_effector() -> None:
-    loop = tube(AIRFRAME, TUNING, GAINS, 0.225, HOLD, DT)
+    loop = tube(AIRFRAME, TUNING, 0.225, HOLD, DT)
     level = towards(alone((0.0, 0.0, 0.0)), (0.6, -0.8, 0.0))
     assert level.worst == pytest.approx(PUSH * loop.base + loop.base_wind - loop.wind_beyond)
     assert level.expected == pytest.approx(PUSH * loop.base_expected)
@@ -53,7 +52,7 @@ def turned(a: float) -> Array:
 @cache
 def after_a_push(wind: bool) -> tuple[Array, Array]:
     """How far it is off along x in every tick after a small push, and how it is turned."""
-    states = SHARE * impulse_responses(AIRFRAME, TUNING, GAINS, DT, wind=wind)[:, [0, 2]]
+    states = SHARE * impulse_responses(AIRFRAME, TUNING, DT, wind=wind)[:, [0, 2]]
     off = np.zeros((len(states), 3))
     off[:, 0] = states[:, 0]
     return off, np.array([turned(a) for a in states[:, 1]])
@@ -100,5 +99,5 @@ def test_feet_and_rotors_move_further_than_the_base() -> None:
     base = alone((0.0, 0.0, 0.0))
     assert all(one.worst > other.worst for one, other in zip(reaches, base, strict=True))
     assert {reach.name for reach in reaches} == {"leg4_end", "rotors"}
-    tilt = (PUSH * tube(AIRFRAME, TUNING, GAINS, 0.225, HOLD, DT).acceleration) / GRAVITY
+    tilt = (PUSH * tube(AIRFRAME, TUNING, 0.225, HOLD, DT).acceleration) / GRAVITY
     assert reaches[-1].worst == pytest.approx(0.465 * tilt, rel=0.1), "upwards the rim's own way"

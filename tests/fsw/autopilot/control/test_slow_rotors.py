@@ -45,14 +45,14 @@ def responses(slower: float, *, wind: bool) -> tuple[Array, Array]:
 def reach_and_torque(slower: float) -> tuple[float, float]:
     """In m, and as a share of what the rotors have."""
     (base, snap), (in_wind, _) = responses(slower, wind=False), responses(slower, wind=True)
-    loop = tube(AIRFRAME, TUNING, GAINS, 0.225, 0.1, DT)
+    loop = tube(AIRFRAME, TUNING, 0.225, 0.1, DT)
     share = limits_used(AIRFRAME, TUNING, loop, PUSH)["rotor torque"]
     reach = PUSH * np.abs(base).sum() + WIND_COVERED * np.abs(in_wind).sum()
     return float(reach), float(share * np.abs(snap).sum() / loop.snap)
 
 
 def test_rotors_as_configured_give_the_tube_itself() -> None:
-    loop = tube(AIRFRAME, TUNING, GAINS, 0.225, 0.1, DT)
+    loop = tube(AIRFRAME, TUNING, 0.225, 0.1, DT)
     reach, torque = reach_and_torque(1.0)
     assert reach == pytest.approx(PUSH * loop.base + loop.base_wind - loop.wind_beyond, rel=1e-6)
     assert torque == pytest.approx(limits_used(AIRFRAME, TUNING, loop, PUSH)["rotor torque"])

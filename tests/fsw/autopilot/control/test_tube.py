@@ -57,7 +57,7 @@ def _gains() -> TrackingGains:
 
 
 def _tube() -> Tube:
-    return tube(AIRFRAME, TUNING, _gains(), hanging=0.225, hold_s=0.1, dt=DT)
+    return tube(AIRFRAME, TUNING, hanging=0.225, hold_s=0.1, dt=DT)
 
 
 def _position_under(
@@ -115,7 +115,7 @@ def test_a_push_that_turns_once_it_is_taken_for_wind_needs_the_wider_tube() -> N
     """The memory of one push is added to the opposite one."""
     push = np.concatenate((np.full(10_000, -0.8), np.full(1000, 0.8)))
     gusty = replace(TUNING, wind_limit=0.15)
-    loop = tube(AIRFRAME, gusty, _gains(), hanging=0.225, hold_s=0.1, dt=DT)
+    loop = tube(AIRFRAME, gusty, hanging=0.225, hold_s=0.1, dt=DT)
     reach = np.abs(_position_under(push, gusty)).max()
     assert 0.8 * loop.base < reach < 0.8 * loop.base + loop.base_wind
 
@@ -123,7 +123,7 @@ def test_a_push_that_turns_once_it_is_taken_for_wind_needs_the_wider_tube() -> N
 @pytest.mark.parametrize("cheaper", [0.5, 0.2])
 def test_a_cheaper_effort_narrows_the_tube_and_needs_more_snap(cheaper: float) -> None:
     bold = replace(TUNING, input_weight=TUNING.input_weight * cheaper)
-    reach = tube(AIRFRAME, bold, tracking_gains(bold, AIRFRAME.rotor_lag, DT), 0.225, 0.1, DT)
+    reach = tube(AIRFRAME, bold, 0.225, 0.1, DT)
     assert reach.base < _tube().base
     assert reach.snap > _tube().snap
 
@@ -143,10 +143,7 @@ def test_a_vehicle_follows_its_plan_as_closely_as_its_rotors_allow(name: str) ->
     )
 
     def loop_of(tuning: TrackingTuning) -> tuple[Tube, float]:
-        gains = tracking_gains(tuning, airframe.rotor_lag, DT)
-        loop = tube(
-            airframe, tuning, gains, surroundings.hanging, surroundings.disturbance_hold, DT
-        )
+        loop = tube(airframe, tuning, surroundings.hanging, surroundings.disturbance_hold, DT)
         used = limits_used(airframe, tuning, loop, surroundings.disturbance)
         return loop, max(used.values())
 
@@ -191,8 +188,7 @@ def _pushed_once(wind: bool) -> tuple[Array, Array, Array]:
 
 def test_every_figure_of_the_tube_is_that_of_the_loop_that_is_flown() -> None:
     """The worst disturbance pushes with the response's sign; a random one is drawn and averaged."""
-    gains = tracking_gains(QUICK, AIRFRAME.rotor_lag, DT)
-    got = tube(AIRFRAME, QUICK, gains, hanging=HANGING, hold_s=0.1, dt=DT)
+    got = tube(AIRFRAME, QUICK, hanging=HANGING, hold_s=0.1, dt=DT)
     base, acceleration, snap = _pushed_once(wind=False)
     tip = base - HANGING / GRAVITY * acceleration
     wind_base, wind_acceleration, _ = _pushed_once(wind=True)
@@ -249,8 +245,7 @@ def test_the_worst_push_attains_the_bound_through_every_limit_that_is_flown(
 ) -> None:
     """The oracle is the law called tick by tick, limits and all, under its own worst sequence."""
     push = amplitude * _worst_push(2500)
-    gains = tracking_gains(LIMITED, AIRFRAME.rotor_lag, DT)
-    bound = tube(AIRFRAME, LIMITED, gains, hanging=0.225, hold_s=0.1, dt=DT)
+    bound = tube(AIRFRAME, LIMITED, hanging=0.225, hold_s=0.1, dt=DT)
     calm = replace(LIMITED, wind_limit=0.0)
     reach = np.abs(_position_under(push, calm)).max()
     assert reach == pytest.approx(amplitude * bound.base, rel=0.03)
@@ -263,7 +258,7 @@ def test_a_jerk_limit_that_is_too_low_is_named_and_breaks_the_bound() -> None:
     """The limit that was flown before: 60 under the root, and an input weight of 1.2e-7."""
     before = replace(LIMITED, input_weight=1.2e-7, stopping_snap=30.0, wind_limit=0.0)
     gains = tracking_gains(before, AIRFRAME.rotor_lag, DT)
-    loop = tube(AIRFRAME, before, gains, hanging=0.225, hold_s=0.1, dt=DT)
+    loop = tube(AIRFRAME, before, hanging=0.225, hold_s=0.1, dt=DT)
     used = limits_used(AIRFRAME, before, loop, 0.8)
     assert used["jerk"] > 1.2
     most = 0.8 / used["rotor torque"]
@@ -272,7 +267,7 @@ def test_a_jerk_limit_that_is_too_low_is_named_and_breaks_the_bound() -> None:
     assert _chased(law, before, 0.8) > 1.2 * 0.8 * loop.base
     now = replace(LIMITED, wind_limit=0.0)
     gains = tracking_gains(now, AIRFRAME.rotor_lag, DT)
-    loop = tube(AIRFRAME, now, gains, hanging=0.225, hold_s=0.1, dt=DT)
+    loop = tube(AIRFRAME, now, hanging=0.225, hold_s=0.1, dt=DT)
     assert max(limits_used(AIRFRAME, now, loop, 0.8).values()) < 1.0
     law = TrackingLaw(AIRFRAME.attitude_lag, now, gains)
     assert _chased(law, now, 0.8) < 0.8 * loop.base
@@ -424,7 +419,7 @@ def _position_misled(entry: int, error: np.ndarray) -> np.ndarray:
 @pytest.mark.drawn(1)
 @pytest.mark.parametrize("entry", range(3))
 def test_the_worst_error_of_the_estimate_attains_its_bound_and_none_exceeds_it(entry: int) -> None:
-    tubes = estimate_tube(AIRFRAME, TUNING, _gains(), DT)
+    tubes = estimate_tube(AIRFRAME, TUNING, DT)
     bound = (tubes.position, tubes.velocity, tubes.acceleration)[entry]
     impulse = np.zeros(1000)
     impulse[0] = 1.0
@@ -438,7 +433,7 @@ def test_the_worst_error_of_the_estimate_attains_its_bound_and_none_exceeds_it(e
 
 
 def test_noise_of_the_gyro_moves_the_base_by_what_its_spectrum_says() -> None:
-    tubes = estimate_tube(AIRFRAME, TUNING, _gains(), DT)
+    tubes = estimate_tube(AIRFRAME, TUNING, DT)
     noise = np.random.default_rng(4).standard_normal(4000)
     moved = _position_misled(3, noise)[500:]
     assert moved.std() == pytest.approx(tubes.jerk, rel=0.25)
@@ -453,8 +448,7 @@ def test_a_force_that_comes_and_goes_moves_the_base_no_further_than_is_said(wors
     pressed[1500:] = 0.0
     if worst:
         both = (
-            impulse_responses(AIRFRAME, TUNING, _gains(), DT, wind=wind)[:1500, 0]
-            for wind in (False, True)
+            impulse_responses(AIRFRAME, TUNING, DT, wind=wind)[:1500, 0] for wind in (False, True)
         )
         pressed[1500:] = force / mass * (sum(both)[::-1] > 0.0)
     moved = np.abs(_position_under(np.zeros(3000), forgetful, pressed)[1500:]).max()
@@ -474,10 +468,10 @@ def test_a_push_that_turns_stays_within_what_clearances_have_grown_by(
     push: float, held: float, worst: bool
 ) -> None:
     """By the memory in force when it turns: to a steady push, or to the worst one there is."""
-    gains, first = _gains(), np.full(round(held / DT), -push)
+    first = np.full(round(held / DT), -push)
     after = np.full(1500, 0.8)
     if worst:
-        response = impulse_responses(AIRFRAME, TUNING, gains, DT, wind=False)[:1500, 0]
+        response = impulse_responses(AIRFRAME, TUNING, DT, wind=False)[:1500, 0]
         after = 0.8 * np.sign(response[::-1])
     memory = min(push * (1.0 - math.exp(-held / TUNING.wind_time)), TUNING.wind_limit)
     grown = beyond_covered(_tube(), (memory, 0.0))[0]
@@ -489,7 +483,7 @@ def test_a_push_that_turns_stays_within_what_clearances_have_grown_by(
 
 def test_a_disturbance_that_begins_pushes_no_further_than_is_said_for_each_instant() -> None:
     """Steps, and the adversary of each instant, which reaches it exactly."""
-    after = base_after(AIRFRAME, TUNING, _gains(), DT)
+    after = base_after(AIRFRAME, TUNING, DT)
     assert after[-1] == pytest.approx(_tube().base, rel=1e-3)
     assert (np.diff(after) >= 0.0).all()
     pushed = np.abs(_position_under(0.8 * np.ones(len(after))))

@@ -11,13 +11,16 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from fsw.autopilot.estimation import fusion
+from fsw.autopilot.estimation.error_state import BA, BG, V
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.sensors.base import chi_square
+from fsw.autopilot.estimation.sensors.rangefinder import Rangefinder, RangefinderTuning
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.flight.estimate.estimator_report import estimator_report
-from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix
 from fsw.autopilot.measurements import (
     GnssSample,
     ImuSample,
@@ -28,7 +31,7 @@ from fsw.autopilot.measurements import (
     Sample,
     Sensor,
 )
-from fsw.autopilot.signals import StateEstimate
+from fsw.autopilot.signals import StateEstimate, Vec3
 from fsw.autopilot.tick_record import Expected
 from fsw.autopilot.tuning import tuned
 from tests.fsw.autopilot.estimation.sensor_runs import (
@@ -465,6 +468,45 @@ def test_a_jump_that_was_believed_and_was_none_is_undone_after_half_a_second() -
     np.testing.assert_allclose(reset.position, (0.0, 1.07, 0.0), atol=0.1)
     np.testing.assert_allclose(flown.memory.unproven, 0.0, atol=0.15)  # what it drifted meanwhile
     np.testing.assert_allclose(flown.error()[:3], 0.0, atol=0.05)
+
+
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize("gained", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("seed", [8, 9])
+def test_each_jump_needs_poses_of_its_own_that_say_so(gained: float, seed: int) -> None:
+    """Once a run was believed, each pose of it was: 18 jumps after a frame that ran away."""
+    heard = [0.0]
+
+    def runs_away(now: float, sample: Sample) -> Sample | None:
+        if not isinstance(sample, PoseSample) or now < START:
+            return sample
+        if sample.time - heard[-1] < 0.12:  # seldom, so that it steps from one to the next
+            return None
+        heard.append(sample.time)
+        x, y, z = sample.position
+        lasts = max(sample.time - START - 1.0, 0.0)
+        return replace(sample, position=(x, y + 0.5 * gained * lasts**2, z))
+
+    assert Flown(run(MOCAP, seed, 4.0), runs_away).memory.reset.number <= 1
+
+
+@pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize("place", [(0.3, 0.0, 0.0), (0.0, -0.2, 0.0), (0.2, 0.2, -0.1)])
+def test_what_a_place_contradicts_is_doubted_along_it(place: Vec3) -> None:
+    """Doubted across as well, a rangefinder off by 10 cm made a velocity of 1.4 m/s down."""
+    memory = Flown(run(VIO, 8, 1.0)).memory
+    before = memory.numbers["covariance"][0].copy()
+    fusion.doubt(memory.numbers, place, (0.0, 0.0, 0.0), 0.0, 0.0, True)
+    grown = memory.numbers["covariance"][0] - before
+    assert np.linalg.eigvalsh(grown).min() > -1e-12
+    R = np.reshape(matrix_from_quaternion(tuple(memory.numbers["q"][0].tolist())), (3, 3))
+    across = np.cross(place, (0.0, 0.0, 1.0))
+    for axis, expected in ((np.array(place), True), (across, False)):
+        axis = axis / np.linalg.norm(axis)
+        tilt = np.cross((0.0, 0.0, 1.0), axis)
+        for first, direction in ((V, axis), (BA, R.T @ axis), (BG, R.T @ tilt)):
+            block = grown[first : first + 3, first : first + 3]
+            assert (direction @ block @ direction > 1e-3) == expected
 
 
 def test_a_frame_that_drifts_makes_the_place_uncertain_and_no_number_of_poses_helps() -> None:
@@ -1185,6 +1227,29 @@ def test_a_jump_is_believed_the_later_the_farther_it_is(size: float, taken: int)
     flown = Flown(run(RTK, 2, 3.6), seldom_and_moved)
     assert flown.memory.reset.number == taken
     np.testing.assert_allclose(flown.memory.reset.position[:2], (0.0, taken * size), atol=0.3)
+
+
+@pytest.mark.requirement("REQ-EST-10")
+def test_a_rangefinder_makes_no_velocity_of_a_jump_that_nobody_confirms() -> None:
+    """A frame that rises by 0.2 m, and a velocity that is not known any more: the two disagree."""
+    rangefinder = Rangefinder(RangefinderTuning(ground=4.0))
+    landed = Flown(run(VIO, 8, 1.0)).memory
+
+    def velocity_made(jumped: float) -> float:
+        memory = replace(landed, numbers=landed.numbers.copy(), unproven=(0.0, 0.0, jumped))
+        fusion.doubt(memory.numbers, (0.2, 0.0, -0.2), (0.0, 0.0, 0.0), 0.0, 0.0, True)
+        x = memory.numbers[0]
+        down = matrix_from_quaternion(tuple(x["q"].tolist()))[8]
+        before = float(x["v"][2])
+        for k in range(1, 8):
+            distance = (4.0 - float(x["p"][2])) / down + 0.2
+            sample = RangeSample(float(x["time"]) + 0.02 * k, distance, 1e-4)
+            rangefinder.fuse(memory, sample, half=False)
+        return abs(float(x["v"][2]) - before)
+
+    made, kept = velocity_made(0.0), velocity_made(-0.2)
+    assert made > 0.25
+    assert kept < 0.6 * made
 
 
 def in_sigmas_beside_a_long_rangefinder(tuning: EstimatorTuning, seed: int) -> float:

@@ -7,9 +7,9 @@ from typing import Any
 
 from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.modes.base import CommandContext
-from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.autopilot.model.body import body_of
+from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.signals import MissionProgress, Mode, SafeSet
+from fsw.autopilot.tuning import tuned
 
 STANDING = CommandContext(
     mode=Mode.DISARMED,
@@ -27,16 +27,11 @@ STANDING = CommandContext(
     joints=(0.0, 0.0),
     home=None,
     safe_set=SafeSet(),
-    body=body_of("points", AIRFRAME),
     now_us=0,
-    climb_range=(0.3, 50.0),
-    airframe=AIRFRAME,
-    health=ArmingHealth(),
+    config=flight_config(body="points"),
+    health=ArmingHealth(joints=(0.0, 0.0)),
     blocked="",
     speed=1.0,
-    max_speed=1.5,
-    yaw_rate=0.3,
-    acceleration=1.0,
 )
 READY = replace(STANDING, mission_refusal=None, setpoint_fresh=True, targets_ahead=True)
 _FLYING = replace(READY, mode=Mode.HOLD, landed=False)
@@ -45,3 +40,8 @@ _FLYING = replace(READY, mode=Mode.HOLD, landed=False)
 def flying(**changes: Any) -> CommandContext:
     """In the air, with everything that any mode needs."""
     return replace(_FLYING, **changes)
+
+
+def tuned_by(context: CommandContext, path: str, value: float) -> CommandContext:
+    """The same of a vehicle with another number in its configuration."""
+    return replace(context, config=tuned(context.config, ((path, value),)))

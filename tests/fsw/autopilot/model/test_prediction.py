@@ -86,7 +86,7 @@ def test_plain_float_model_equals_the_matrices_at_the_ticks_rate() -> None:
         x, u = prediction_vector(random), random.uniform(-3.0, 3.0, INPUTS)
         command = PlanInput((u[0], u[1], u[2]), u[3], (u[4], u[5]))
         np.testing.assert_allclose(
-            to_vector(plain.step(as_state(x), command)), a @ x + b @ u, atol=1e-11
+            to_vector(plain.advance(as_state(x), command)), a @ x + b @ u, atol=1e-11
         )
 
 

@@ -29,7 +29,6 @@ from fsw.autopilot.mpc.reference import still_at
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import PlanRequest, PredictionState, SafeSet, Vec3
-from fsw.record import JOINTS
 from tests.fsw.autopilot.mpc.requests import PERIOD_US, planned
 from tests.fsw.random_states import prediction_vector
 from tests.vehicles.random_vehicles import random_vehicle
@@ -88,7 +87,7 @@ def test_it_brings_the_end_effector_to_its_target_with_the_arm_within_its_limits
     name: str,
 ) -> None:
     airframe, _, _ = of(name)
-    joints, limits = airframe.bodies.joints, airframe.angle_limits
+    joints = airframe.bodies.joints
     home = airframe.home_posture[:joints]
     x, y, z = end_effector_when_level(airframe.bodies, home, 0.0)
     target = (0.5 + x, -0.3 + y, -1.4 + z)
@@ -97,9 +96,9 @@ def test_it_brings_the_end_effector_to_its_target_with_the_arm_within_its_limits
     np.testing.assert_allclose(tip, target, atol=5e-3)
     np.testing.assert_allclose(v, 0.0, atol=5e-3)
     q, qd = states[:, Q_ARM::2], states[:, QD_ARM::2]
-    for k in range(limits.rows):
-        angle = q @ limits.row[JOINTS * k : JOINTS * k + joints]
-        assert limits.low[k] <= angle.min() <= angle.max() <= limits.high[k]
+    for limit in airframe.angle_limits:
+        angle = q @ limit.row
+        assert limit.low <= angle.min() <= angle.max() <= limit.high
     assert (np.abs(qd) <= np.array(airframe.joint_rate_max[:joints])).all()
 
 

@@ -6,21 +6,22 @@ import math
 
 import numpy as np
 import pytest
-from scipy import sparse
 
-from fsw.autopilot.mpc.clarabel_solver import MAX_ITERATIONS, ClarabelSolver
-from fsw.autopilot.mpc.qp_data import QuadraticProgram
+from fsw.autopilot.mpc.clarabel_solver import (
+    MAX_ITERATIONS,
+    ClarabelSolver,
+    QuadraticProgram,
+    columns_of,
+)
 from fsw.autopilot.signals import SolverStatus
 
 
 def program(wanted: tuple[float, float], bound: float, least: float = -9.0) -> QuadraticProgram:
     """The point (x, y) nearest to a wanted one with least <= x <= bound and |(x, y)| <= 5."""
     return QuadraticProgram(
-        p=sparse.csc_matrix(np.diag([2.0, 2.0])),
+        p=columns_of(np.diag([2.0, 2.0])),
         q=np.array([-2.0 * wanted[0], -2.0 * wanted[1]]),
-        a=sparse.csc_matrix(
-            np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])
-        ),
+        a=columns_of(np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])),
         b=np.array([bound, -least, 5.0, 0.0, 0.0]),
         nonnegative_rows=2,
         cones=1,

@@ -32,7 +32,7 @@ LEVEL = estimate_of(Rotation.identity())._replace(t_us=NOW_US)
 
 
 def unwell(**changes: Any) -> arming.CommandContext:
-    return replace(STANDING, health=ArmingHealth(**changes))
+    return replace(STANDING, health=replace(STANDING.health, **changes))
 
 
 @pytest.mark.requirement(
@@ -93,7 +93,7 @@ def test_every_subject_has_a_check() -> None:
 @pytest.mark.requirement("REQ-ARM-2")
 def test_a_vehicle_that_stands_and_is_well_arms_and_all_that_is_not_well_is_said() -> None:
     assert arming.refusal(STANDING) is None
-    several = replace(INCONSISTENT, health=ArmingHealth(remaining=0.0, tilt=1.0))
+    several = replace(INCONSISTENT, health=replace(STANDING.health, remaining=0.0, tilt=1.0))
     assert (arming.refusal(several) or "").count(";") == 3
 
 
@@ -103,7 +103,7 @@ def test_only_a_configuration_is_a_reason_that_waiting_does_not_change() -> None
         STANDING,
         replace(INCONSISTENT, estimate_valid=False),
         replace(INCONSISTENT, standing_unclear=True),
-        replace(INCONSISTENT, health=ArmingHealth(remaining=0.0)),
+        replace(INCONSISTENT, health=replace(STANDING.health, remaining=0.0)),
     ):
         assert not arming.is_permanent(passing)
 

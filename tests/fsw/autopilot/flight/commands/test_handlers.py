@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsw.autopilot.flight.commands.arming_health import ArmingHealth
 from fsw.autopilot.flight.commands.handlers import Decision, NewHeading, decide
 from fsw.autopilot.flight.modes.base import CommandContext
 from fsw.autopilot.shapes.ball import point
@@ -44,7 +43,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.wire.decode_commands import _READERS
 from tests.fsw.autopilot.flight.asked import FLIGHT_MODES, ask
-from tests.fsw.autopilot.flight.contexts import STANDING
+from tests.fsw.autopilot.flight.contexts import STANDING, tuned_by
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 TEMPORARILY_REJECTED = CommandResult.TEMPORARILY_REJECTED
@@ -221,10 +220,12 @@ def test_starting_a_mission_arms_where_arming_is_possible() -> None:
 
 @pytest.mark.parametrize("remaining", [0.0, 0.09])
 def test_an_empty_battery_forbids_arming(remaining: float) -> None:
-    decision = ask(replace(STANDING, health=ArmingHealth(remaining=remaining)), ARM, 1.0)
+    decision = ask(
+        replace(STANDING, health=replace(STANDING.health, remaining=remaining)), ARM, 1.0
+    )
     assert decision.result == TEMPORARILY_REJECTED
     assert "battery" in decision.reason
-    assert ask(replace(STANDING, health=ArmingHealth(remaining=0.1)), ARM, 1.0).arm
+    assert ask(replace(STANDING, health=replace(STANDING.health, remaining=0.1)), ARM, 1.0).arm
 
 
 @pytest.mark.requirement("REQ-MODE-5")
@@ -287,7 +288,7 @@ def drawn(**vehicle: Any) -> st.SearchStrategy[CommandContext]:
 
 
 # One vehicle, which is many numbers and takes most of the time to draw; any in the long tests.
-situations = drawn(body=st.just(HOLDING.body), airframe=st.just(HOLDING.airframe))
+situations = drawn(config=st.just(HOLDING.config))
 commands = st.sampled_from([ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN, 1, 999])
 Seven = tuple[float, float, float, float, float, float, float]
 params = st.tuples(*[st.floats(allow_nan=True, allow_infinity=True)] * 7)
@@ -369,7 +370,7 @@ def test_no_orbit_is_faster_than_the_vehicle_however_wide() -> None:
     wide = decided(replace(CIRCLE, radius=50.0, speed=9.0))
     assert wide.goal is not None
     assert wide.goal.orbit is not None
-    assert wide.goal.orbit.speed == HIGH.max_speed
+    assert wide.goal.orbit.speed == HIGH.config.steering.speed
 
 
 @pytest.mark.parametrize(
@@ -382,7 +383,7 @@ def test_no_orbit_is_faster_than_the_vehicle_however_wide() -> None:
             "no orbit: the vehicle is on the ground",
         ),
         (replace(HIGH, mode=Mode.DISARMED), TEMPORARILY_REJECTED, "no orbit: the vehicle is not"),
-        (replace(HIGH, climb_range=(5.0, 50.0)), DENIED, "no orbit: 5.0 m"),
+        (tuned_by(HIGH, "limits.airborne_height", 5.0), DENIED, "no orbit: 5.0 m"),
     ],
 )
 def test_an_orbit_that_cannot_be_flown_now_is_refused(
@@ -543,7 +544,7 @@ def test_a_mission_is_paused_by_holding(mode: Mode, stops: bool) -> None:
 
 def test_arming_checks_are_made_on_the_ground_and_answered_in_words() -> None:
     assert decided(Order.CHECK_ARMING, STANDING).reason == "ready to arm"
-    nearly_empty = replace(STANDING, health=ArmingHealth(remaining=0.0))
+    nearly_empty = replace(STANDING, health=replace(STANDING.health, remaining=0.0))
     assert "battery" in decided(Order.CHECK_ARMING, nearly_empty).reason
     ended = decided(Order.CHECK_ARMING, replace(STANDING, mode=Mode.FAULT))
     assert ended.result == DENIED
@@ -570,7 +571,10 @@ def test_home_needs_an_estimate_and_keeps_the_heading() -> None:
     ("changes", "why"),
     [
         ({}, ""),
-        ({"highest": 4.0}, "5.0 m above the origin is too high; the maximum is 4 m"),
+        (
+            {"config": tuned_by(HIGH, "steering.highest", 4.0).config},
+            "5.0 m above the origin is too high; the maximum is 4 m",
+        ),
         ({"fence": SafeSet((wall((-1.0, 0.0, 0.0), -8.0, 0.1),))}, "outside the fence, by 1.10 m"),
         ({"against_sender": "while armed only 255/190"}, "while armed only 255/190"),
     ],
@@ -593,7 +597,7 @@ def test_a_failure_is_injected_only_where_the_parameter_allows_it(
     refused = ask(situation, 420, 0.0, 1.0, 0.0)
     assert refused.result == DENIED
     assert "SYS_FAILURE_EN" in refused.reason
-    allowed = replace(situation, failures_allowed=True)
+    allowed = tuned_by(situation, "limits.failure_injection", 1)
     assert ask(allowed, 420, 0.0, 1.0, NAN) == Decision(CommandResult.IN_PROGRESS)
     assert ask(allowed, 420, 0.5, 1.0, 0.0).result == DENIED
     assert ask(allowed, 420, math.inf, 1.0, 0.0).result == DENIED
@@ -608,7 +612,7 @@ def test_no_parameter_of_any_command_may_be_infinite(
     """DO_REPOSITION to an infinite heading was accepted."""
     params = [math.nan] * 7
     params[number - 1] = value
-    decision = ask(replace(HOLDING, failures_allowed=True), command, *params)
+    decision = ask(tuned_by(HOLDING, "limits.failure_injection", 1), command, *params)
     assert decision.result == DENIED
     assert f"param{number} is infinite" in decision.reason
 
@@ -635,13 +639,13 @@ def test_heading_speed_and_flags_of_a_place_are_in_range(
 
 
 def test_a_speed_that_is_not_flown_is_told() -> None:
-    decision = ask(replace(HOLDING, position=(0.0, 0.0, -2.0), max_speed=1.5), 192, 5.0, 1.0)
+    decision = ask(replace(HOLDING, position=(0.0, 0.0, -2.0)), 192, 5.0, 1.0)
     assert decision.result == ACCEPTED
     assert decision.reason == "goto at 1.5 m/s: faster is not flown (STR_V_MAX)"
 
 
 def test_a_place_above_the_highest_height_is_refused() -> None:
-    low = replace(HOLDING, highest=5.0)
+    low = tuned_by(HOLDING, "steering.highest", 5.0)
     for command in (192, 34):
         decision = ask(low, command, *[math.nan] * 6, 5.5)
         assert decision.result == DENIED
@@ -649,7 +653,7 @@ def test_a_place_above_the_highest_height_is_refused() -> None:
 
 
 def test_above_px4_disarming_gives_back_and_its_rotors_are_not_ours_to_stop() -> None:
-    above = replace(HOLDING, above_px4=True)
+    above = replace(HOLDING, config=replace(HOLDING.config, inner="px4"))
     given_back = ask(above, ARM, 0.0)
     assert (given_back.result, given_back.mode, given_back.reason) == (ACCEPTED, Mode.DISARMED, "")
     refused = ask(above, 185, 1.0)

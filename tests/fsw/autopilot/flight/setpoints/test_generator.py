@@ -27,6 +27,7 @@ from fsw.autopilot.parameters.flight_config import SetpointLimits, flight_config
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import MotionSetpoint, SafeSet, Vec3
+from tests.fsw.autopilot.flight.in_flight import CONFIG, vehicle_at
 
 LIMITS = SetpointLimits()
 STILL = ReferenceState(False, (0.0, 0.0, -2.0), (0.0, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0))
@@ -148,6 +149,14 @@ def test_the_lead_is_limited() -> None:
     assert limit_lead(away.p, (0.0, 0.0, -2.0), 0.5) == pytest.approx((0.3, 0.4, -2.0))
     near = replace(STILL, p=(0.1, 0.0, -2.0))
     assert limit_lead(near.p, (0.0, 0.0, -2.0), 0.5) is near.p
+
+
+def test_the_point_stays_within_the_configured_distance_of_the_vehicle() -> None:
+    away, here = (8.0, 0.0, -2.0), vehicle_at((0.0, 0.0, -2.0))
+    ahead = ReferenceState(False, away, (0.0, 0.0, 0.0), 0.0)
+    goal = PositionGoal(MotionSetpoint(False, p=away))
+    moved = SetpointGenerator(CONFIG).advance(ahead, goal, here, SafeSet())
+    assert moved.p == pytest.approx((CONFIG.steering.max_lead_distance, 0.0, -2.0))
 
 
 @given(number, st.floats(-3.0, 3.0), st.floats(-0.3, 0.3))

@@ -152,14 +152,6 @@ def test_a_setpoint_is_kept_off_walls_and_off_points_whichever_there_is() -> Non
     assert limited((0.95, 0.0, -1.2), into) == ((0.95, 0.0, -1.2), into)
 
 
-def test_a_setpoint_stays_within_the_configured_distance_of_the_vehicle() -> None:
-    most = CONFIG.steering.max_lead_distance
-    led = GOVERNOR.limit_lead((10.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    assert led == pytest.approx((1.0 + most, 0.0, 0.0))
-    near = (1.0 + 0.99 * most, 0.0, 0.0)
-    assert GOVERNOR.limit_lead(near, (1.0, 0.0, 0.0)) == near
-
-
 def test_a_horizon_is_limited_with_the_barriers_own_braking() -> None:
     walls = replace(CONFIG.planner.walls, alpha=1.0)
     weaker = ReferenceGovernor(replace(CONFIG, planner=replace(CONFIG.planner, walls=walls)))
