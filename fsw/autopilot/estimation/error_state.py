@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate
+from fsw.autopilot.geometry.vectors import three
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable
@@ -166,15 +167,15 @@ Law = NDArray[Any]  # (1,) of a packed EstimatorTuning
 
 
 @compilable
-def vec3(row: Array, first: int) -> Vec3:
-    """Three entries of a ``row`` (n,) [any unit], from ``first`` on."""
-    return row[first], row[first + 1], row[first + 2]
+def vec4(row: Array, first: int = 0) -> Vec4:
+    """Four entries of a ``row`` (n,) [any unit], from ``first`` on."""
+    return row[first], row[first + 1], row[first + 2], row[first + 3]
 
 
 @compilable
-def vec4(row: Array) -> Vec4:
-    """Four entries of a ``row`` (4,) [any unit]."""
-    return row[0], row[1], row[2], row[3]
+def put_four(row: Array, q: Vec4) -> None:
+    """Write ``q`` [any unit] into a ``row`` (4,) [any unit]."""
+    row[0], row[1], row[2], row[3] = q
 
 
 @compilable
@@ -256,21 +257,7 @@ def propagate(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
     The ``blocks`` of F [SI] are those of ``transition``.
     """
     carry(M, blocks, dt)
-    a00, a01, a02, a10, a11, a12, a20, a21, a22 = blocks[0]
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = blocks[1]
-    e00, e01, e02, e10, e11, e12, e20, e21, e22 = blocks[2]
-    for i in range(ERRORS):
-        t0, t1, t2 = M[i, 6], M[i, 7], M[i, 8]
-        b0, b1, b2 = M[i, 9], M[i, 10], M[i, 11]
-        M[i, 0] += dt * M[i, 3]
-        M[i, 1] += dt * M[i, 4]
-        M[i, 2] += dt * M[i, 5]
-        M[i, 3] += a00 * t0 + a01 * t1 + a02 * t2 - (r00 * b0 + r01 * b1 + r02 * b2)
-        M[i, 4] += a10 * t0 + a11 * t1 + a12 * t2 - (r10 * b0 + r11 * b1 + r12 * b2)
-        M[i, 5] += a20 * t0 + a21 * t1 + a22 * t2 - (r20 * b0 + r21 * b1 + r22 * b2)
-        M[i, 6] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[i, 12]
-        M[i, 7] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[i, 13]
-        M[i, 8] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[i, 14]
+    carry(M.T, blocks, dt)
 
 
 @compilable
@@ -330,7 +317,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     f, w = mean_of(x, row, before)
     steps = max(1, math.ceil(gap / law.imu_gap - 1e-6))
     dt = gap / steps
-    p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
+    p, v, q = three(x.p, 0), three(x.v, 0), vec4(x.q)
     a = (0.0, 0.0, 0.0)
     for i in range(3):
         M[V + i, V + i] += row[MISSED]
@@ -350,8 +337,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     for i in range(3):
         x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
         x.rate[i] = row[RATE + i] - x.gyro_bias[i]
-    for i in range(4):
-        x.q[i] = q[i]
+    put_four(x.q, q)
     x.time = max(row[TIME], x.time)
 
 
@@ -410,13 +396,10 @@ def restore_bias(x: Any, M: Array, i: int) -> None:
 @compilable
 def reset_covariance(x: Any, M: Array, k: int, variance: float) -> None:
     """Give error ``k`` [1] a ``variance`` [SI, of x] of its own, in ``M`` (ERRORS, ERRORS) [SI]."""
-    for j in range(ERRORS):
-        M[k, j] = 0.0
-        M[j, k] = 0.0
-    for j in range(FRAME):
-        x.shared[k, j] = 0.0
-    for j in range(FIELD):
-        x.with_offset[k, j] = 0.0
+    M[k, :] = 0.0
+    M[:, k] = 0.0
+    x.shared[k, :] = 0.0
+    x.with_offset[k, :] = 0.0
     M[k, k] = variance
 
 
@@ -438,7 +421,7 @@ def present(x: Any, now: float) -> tuple[Vec3, Vec3, Vec4, Vec3, Vec3]:
     All readings since the state's time are integrated anew, with the newest biases. After the last
     reading, that one is held.
     """
-    p, v, q = vec3(x.p, 0), vec3(x.v, 0), vec4(x.q)
+    p, v, q = three(x.p, 0), three(x.v, 0), vec4(x.q)
     t, last = x.time, x.imu[(x.first - 1) % IMU_CAPACITY]
     for k in range(x.first, x.end):
         row = x.imu[k % IMU_CAPACITY]
@@ -557,6 +540,4 @@ def inject(x: Any) -> None:
         x.rate[i] -= error[BG + i]
     x.baro_bias += error[BARO]
     x.pose_delay += error[DELAY]
-    q = turned(vec4(x.q), error[TH], error[TH + 1], error[TH + 2])
-    for i in range(4):
-        x.q[i] = q[i]
+    put_four(x.q, turned(vec4(x.q), error[TH], error[TH + 1], error[TH + 2]))

@@ -292,11 +292,7 @@ def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
     """Take ``p`` [m, NED] of ``time`` [s] as it is, ``variance`` [m^2, NED]; how far it jumped."""
     s = x[0]
     dt = time - s.time
-    jump = (
-        p[0] - s.p[0] - dt * s.v[0],
-        p[1] - s.p[1] - dt * s.v[1],
-        p[2] - s.p[2] - dt * s.v[2],
-    )
+    jump = add_scaled(subtract(p, s.p), s.v, -dt)
     for i in range(3):
         s.p[i] += jump[i]
     forget(s, P, variance)

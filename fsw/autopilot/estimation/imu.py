@@ -94,7 +94,8 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
     row[MISSED] = _missed(x, 0, f, law.accel_range, row, since, of_force)
     row[MISSED + 1] = _missed(x, 1, w, law.gyro_range, row, since, of_rate)
     if x.end == 0:
-        _keep_as(last, row)  # what goes before the first reading
+        for i in range(COLUMNS):
+            last[i] = row[i]  # what goes before the first reading
     x.end += 1
     if x.end - x.first >= IMU_CAPACITY:  # the filter has not begun
         x.first += 1
@@ -123,12 +124,6 @@ def _missed(
             x.missed[i] += since * (shown - row[FORCE + i])
         after += x.missed[i] * x.missed[i]
     return max(after - already, 0.0)
-
-
-@compilable
-def _keep_as(row: Any, other: Any) -> None:
-    for i in range(COLUMNS):
-        row[i] = other[i]
 
 
 @compilable

@@ -33,14 +33,15 @@ from fsw.autopilot.estimation.error_state import (
     mean_of,
     present,
     propagate,
+    put_four,
     transition,
     varies,
-    vec3,
     vec4,
 )
 from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.encoder_watch import encoders_stuck, watch_encoders
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
+from fsw.autopilot.geometry.vectors import put_three, three
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate, Expected
@@ -107,7 +108,7 @@ def tick(
     """
     x, t, a = filters[0], law[0], requests[0]
     e = a.expected
-    model = e.model[0], e.model[1], e.model[2], e.model[3]
+    model = vec4(e.model)
     a.of_imu, a.of_encoders, stuck = 0, 0, False
     if parts & JOINTS:
         was_stuck = encoders_stuck(x)
@@ -120,7 +121,7 @@ def tick(
     if parts & JOINTS and not stuck:
         a.of_encoders = joint_filter.read(x, t, now, a.encoders, a.encoders_age)
     if parts & READING:
-        f, w = (a.force[0], a.force[1], a.force[2]), (a.rate[0], a.rate[1], a.rate[2])
+        f, w = three(a.force, 0), three(a.rate, 0)
         a.of_imu = imu.add_imu(x, t, now, a.time, f, w, model)
     found = (FAULT if a.of_imu or a.of_encoders else 0) | (STUCK if stuck else 0)
     if parts & ADVANCE:
@@ -131,7 +132,7 @@ def tick(
         if finite:
             found |= FINITE
         if a.dt > 0.0:
-            residuals.witness(x, R, a.dt, model, (e.pushed[0], e.pushed[1], e.pushed[2]))
+            residuals.witness(x, R, a.dt, model, three(e.pushed, 0))
     return found
 
 
@@ -145,8 +146,9 @@ def _predict(x: Any, now: float, known: Estimate) -> tuple[bool, Mat3]:
     for i in range(x.joint_count):
         total += known.q_arm[i] + known.qd_arm[i]
     finite = math.isfinite(total)
-    for i in range(3):
-        known.p_WB[i], known.v_WB[i], known.w_WB_B[i] = p[i], v[i], rate[i]
+    put_three(known.p_WB, 0, p)
+    put_three(known.v_WB, 0, v)
+    put_three(known.w_WB_B, 0, rate)
     for i in range(9):
         known.R_WB[i] = R[i]
     known.yaw, known.specific_force = yaw_of(R), -force[2]
@@ -187,21 +189,16 @@ def begin(
     """
     s, t = x[0], law[0]
     M = s.covariance
-    for i in range(ERRORS):
-        for j in range(ERRORS):
-            M[i, j] = 0.0
+    M[:] = 0.0
     for i in range(3):
         s.p[i], s.v[i], s.accel_bias[i], s.gyro_bias[i] = p[i], v[i], 0.0, 0.0
-        M[P + i, P + i], M[V + i, V + i], M[TH + i, TH + i] = (
-            p_variance[i],
-            v_variance[i],
-            q_variance[i],
-        )
+        M[P + i, P + i] = p_variance[i]
+        M[V + i, V + i] = v_variance[i]
+        M[TH + i, TH + i] = q_variance[i]
         M[BA + i, BA + i] = t.accel_bias * t.accel_bias
         M[BG + i, BG + i] = t.gyro_bias * t.gyro_bias
         s.acceleration[i] = 0.0
-    for i in range(4):
-        s.q[i] = q[i]
+    put_four(s.q, q)
     M[BARO, BARO] = t.barometer.bias * t.barometer.bias
     M[DELAY, DELAY] = t.pose.delay_sigma * t.pose.delay_sigma
     s.baro_bias, s.pose_delay, s.lost = 0.0, t.pose.delay, 0
@@ -257,7 +254,7 @@ def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> N
         for j in range(FRAME):
             X[i, j] = s.shared[i, j]
     q, time = vec4(s.q), s.time
-    p, v = vec3(s.p, 0), vec3(s.v, 0)
+    p, v = three(s.p, 0), three(s.v, 0)
     for k in range(s.first - 1, s.end):
         row = s.imu[k % IMU_CAPACITY]
         end = s.imu[(k + 1) % IMU_CAPACITY, TIME] if k + 1 < s.end else now

@@ -25,7 +25,7 @@ from fsw.autopilot.estimation.error_state import (
     HEIGHT_LASTS,
     NO_FORCE,
     WITNESS,
-    vec3,
+    vec4,
 )
 from fsw.autopilot.estimation.faults.sources import (
     AA,
@@ -51,7 +51,17 @@ from fsw.autopilot.estimation.faults.sources import (
 )
 from fsw.autopilot.geometry.quaternion import conjugate, multiply, rotation_vector, turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, rotate_back
-from fsw.autopilot.geometry.vectors import add_scaled, clamp, norm, subtract
+from fsw.autopilot.geometry.vectors import (
+    add,
+    add_scaled,
+    clamp,
+    cross,
+    dot,
+    norm,
+    put_three,
+    subtract,
+    three,
+)
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
@@ -201,23 +211,20 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
     """
     W = x.witness
     if not model[3] > 0.0:
-        for i in range(4):
-            W[SAID + i] = 0.0
+        W[SAID:FELT] = 0.0
         return
     if _begins(W):
-        for i in range(WITNESS):
-            W[i] = 0.0
+        W[:] = 0.0
         W[SAID] = 1.0
         for i in range(3):
             x.baseline[i], x.baseline[3 + i] = x.accel_bias[i], x.gyro_bias[i]
             x.baseline[6 + i] = 0.0
-    f = (x.newest[0], x.newest[1], x.newest[2])
-    w = (x.newest[3], x.newest[4], x.newest[5])
-    q = turned(_quaternion(W, SAID), dt * w[0], dt * w[1], dt * w[2])
+    f, w = three(x.newest, 0), three(x.newest, 3)
+    q = turned(vec4(W, SAID), dt * w[0], dt * w[1], dt * w[2])
     for i in range(4):
         W[SAID + i] = q[i]
     b = x.baseline
-    felt = rotate(R, (f[0] - b[0], f[1] - b[1], f[2] - b[2]))
+    felt = rotate(R, subtract(f, b))
     own = rotate_back(R, pushed)
     lift = (1.0 + b[9]) * model[3]
     made = rotate(R, (own[0], own[1], own[2] - lift))
@@ -280,18 +287,10 @@ def look(
     for i in range(WITNESS):
         row[1 + i] = x.witness[i]
     s.count += 1
-    posed, fixed, fielded = _take(s, 0, pose), _take(s, 1, fix), _take(s, 2, field)
+    kept = _take(s, 0, pose), _take(s, 1, fix), _take(s, 2, field)
     if now - s.began < _SETTLING:
         return
-    bias, lasting = vec3(x.baseline, 3), vec3(x.baseline, 6)
-    _with_model(s, now, lasting, learns)
-    # What waits is compared with nothing: the one before it would count a second time.
-    if posed:
-        _with_pose(s, now, pose, bias, learns)
-    if fixed:
-        _with_fix(s, now, fix, learns)
-    if fielded:
-        _with_field(s, now, field[4], bias, learns)
+    _compare(s, x.baseline, now, (pose, fix, field), kept, learns)
     _note_bias(s, x, now, 0, AA, _ACCEL_BIAS)
     _note_bias(s, x, now, 1, GG, _GYRO_BIAS)
     for k in range(COUNT):
@@ -299,6 +298,35 @@ def look(
     # How quickly the model has been off, which is what a filter without a half of the unit needs.
     x.model_walk[0] = MIN_WALKS[0]
     x.model_walk[1] = max(s.turns[1] * MIN_WALKS[1], 2.0 * math.sqrt(s.squares[GM, 1] / WINDOWS[1]))
+
+
+@compilable
+def _compare(
+    s: Any,
+    baseline: Array,
+    now: float,
+    aids: tuple[Aid, Aid, Aid],
+    kept: tuple[bool, bool, bool],
+    learns: bool,
+) -> None:
+    """Compute the residuals of rotors, and of those measurements that were ``kept``.
+
+    What waits is compared with nothing: the one before it would count a second time.
+    """
+    bias, lasting = three(baseline, 3), three(baseline, 6)
+    (posed, fixed, fielded), (pose, fix, field) = kept, aids
+    for k in range(4):
+        _unit_and_model(s, now, k, lasting, learns)
+        if posed:
+            _unit_and_pose(s, now, k, pose[4], pose[5], bias, learns)
+        if fixed:
+            _unit_and_fix(s, now, k, fix[4], fix[5], learns)
+        if fielded:
+            _unit_and_field(s, now, k, field[4], bias, learns)
+    if posed:
+        _over_long(s, now, 0, pose[5], bias)
+    if fielded:
+        _over_long(s, now, 2, field[4], bias)
 
 
 @compilable
@@ -330,46 +358,15 @@ def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> No
     """
     if not half and x.leant_at > 0.0 and x.time - x.leant_at < _LEANT:
         return
-    bias = vec3(x.gyro_bias if half else x.accel_bias, 0)
+    bias = three(x.gyro_bias if half else x.accel_bias, 0)
     if x.lost & (1 << half):
-        bias = vec3(x.kept_bias, 3 * half)
+        bias = three(x.kept_bias, 3 * half)
     else:
         for i in range(BA + 3 * half, BA + 3 * half + 3):
             if x.covariance[i, i] > (_KNOWN * most) ** 2:
                 return
     share = norm(bias) / most
     _note(s, now, k, 0, (share * share * most, 0.0, 0.0), most)
-
-
-@compilable
-def _with_model(s: Any, now: float, lasting: Vec3, learns: bool) -> None:
-    for k in range(4):
-        _unit_and_model(s, now, k, lasting, learns)
-
-
-@compilable
-def _with_fix(s: Any, now: float, fix: Aid, learns: bool) -> None:
-    for k in range(4):
-        _unit_and_fix(s, now, k, fix[4], fix[5], learns)
-
-
-@compilable
-def _with_pose(s: Any, now: float, pose: Aid, bias: Vec3, learns: bool) -> None:
-    for k in range(4):
-        _unit_and_pose(s, now, k, pose[4], pose[5], bias, learns)
-    _over_long(s, now, 0, pose[5], bias)
-
-
-@compilable
-def _with_field(s: Any, now: float, noise: float, bias: Vec3, learns: bool) -> None:
-    for k in range(4):
-        _unit_and_field(s, now, k, noise, bias, learns)
-    _over_long(s, now, 2, noise, bias)
-
-
-@compilable
-def _quaternion(row: Array, at: int) -> Vec4:
-    return row[at], row[at + 1], row[at + 2], row[at + 3]
 
 
 @compilable
@@ -381,14 +378,9 @@ def _begins(W: Array) -> bool:
 @compilable
 def _begin_anew(s: Any) -> None:
     s.began, s.count, s.apart = -1.0, 0, 0.0
-    for k in range(3):
-        s.aid_count[k], s.aid_first[k], s.waits[k] = 0, 0, 0
-    for k in range(COUNT):
-        s.came[k], s.ratio[k] = -1.0, 0.0
-        for i in range(5):
-            s.raw[k, i], s.both[k, i] = 0.0, 0.0
-        for i in range(4):
-            s.squares[k, i] = 0.0
+    s.aid_count[:], s.aid_first[:], s.waits[:] = 0, 0, 0
+    s.came[:], s.ratio[:] = -1.0, 0.0
+    s.raw[:], s.both[:], s.squares[:] = 0.0, 0.0, 0.0
 
 
 @compilable
@@ -430,8 +422,7 @@ def _take(s: Any, kind: int, aid: Aid) -> bool:
     follows = near and (n == first or time - last[0] < _FOLLOWS)
     known = _integrals(s, time, new)
     new[0] = time
-    for i in range(3):
-        new[_MEASURED + i] = place[i]
+    put_three(new, _MEASURED, place)
     for i in range(4):
         new[_MEASURED + 3 + i] = q[i]
     s.waits[kind] = 0
@@ -462,11 +453,11 @@ def _is_near(row: Array, time: float, place: Vec3, q: Vec4, v: Vec3, room: Vec4)
         far += off * off
     near: bool = math.sqrt(far) <= room[0] + room[1] * dt + _GAINS * dt * dt
     if room[3] < math.inf:
-        gained = norm(subtract((q[0], q[1], q[2]), vec3(row, _MEASURED + 3)))
+        gained = norm(subtract((q[0], q[1], q[2]), three(row, _MEASURED + 3)))
         return near and gained <= 2.0 * _GAINS * dt + room[3]
     if not room[2] < math.inf:
         return near
-    turn = rotation_vector(multiply(conjugate(_quaternion(row, _MEASURED + 3)), q))
+    turn = rotation_vector(multiply(conjugate(vec4(row, _MEASURED + 3)), q))
     return near and norm(turn) <= _RATE * dt + room[2]
 
 
@@ -541,11 +532,7 @@ def _beside(force: Vec3, lasting: Vec3) -> Vec3:
 @compilable
 def _difference(b: Array, a: Array, column: int, over: float) -> Vec3:
     """Three integrals of row ``b`` [SI] less those of ``a`` [SI], ``over`` [s]."""
-    return (
-        (b[column] - a[column]) / over,
-        (b[column + 1] - a[column + 1]) / over,
-        (b[column + 2] - a[column + 2]) / over,
-    )
+    return _over(subtract(three(b, column), three(a, column)), over)
 
 
 @compilable
@@ -562,7 +549,7 @@ def _turned_beside(rate: Vec3, rate0: Vec3, spun: Vec3, spun0: Vec3) -> Vec3:
 @compilable
 def _apart(a: Array, b: Array, column: int) -> Vec4:
     """The turn from row ``a`` [SI] to ``b`` [SI]: quaternions, from a ``column`` on."""
-    return multiply(conjugate(_quaternion(a, column)), _quaternion(b, column))
+    return multiply(conjugate(vec4(a, column)), vec4(b, column))
 
 
 @compilable
@@ -570,8 +557,7 @@ def _bend(c: Array, b: Array, a: Array, column: int) -> Vec3:
     """The second difference of three places [m/s^2] in rows ``a``, ``b`` and ``c`` [SI]."""
     first, second = b[0] - a[0], c[0] - b[0]
     v0, v1 = _difference(b, a, column, first), _difference(c, b, column, second)
-    mean = 0.5 * (first + second)
-    return (v1[0] - v0[0]) / mean, (v1[1] - v0[1]) / mean, (v1[2] - v0[2]) / mean
+    return _over(subtract(v1, v0), 0.5 * (first + second))
 
 
 @compilable
@@ -590,7 +576,7 @@ def _unit_and_pose(
     over = c[0] - b[0]
     seen, said = _apart(b, c, _MEASURED + 3), _apart(b, c, _AT + SAID)
     off = rotation_vector(multiply(conjugate(said), seen))
-    r = (off[0] / over + bias[0], off[1] / over + bias[1], off[2] / over + bias[2])
+    r = add(_over(off, over), bias)
     turning = math.sqrt(6.0) * about / over
     _note(s, now, GP, k, r, _GYRO_OFF + _NOISE_SIGMAS * turning)
     first = _before(s, 0, middle, T, 0.03)
@@ -635,8 +621,7 @@ def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns
         x += h * (c[velocity] + d[velocity])
         y += h * (c[velocity + 1] + d[velocity + 1])
         z += h * (c[velocity + 2] + d[velocity + 2])
-    moved = _difference(b, a, _MEASURED, over)
-    r = (moved[0] - x / over, moved[1] - y / over, moved[2] - z / over)
+    r = subtract(_difference(b, a, _MEASURED, over), _over((x, y, z), over))
     _note(s, now, NN, k, r, _SPEED_OFF + _NOISE_SIGMAS * math.sqrt(6.0) * sigma / over)
 
 
@@ -644,14 +629,9 @@ def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns
 def _field_off(a: Array, b: Array) -> Vec3:
     """The turn [rad, FRD] that the field in row ``b`` [SI] shows beside what the gyro said."""
     said = matrix_from_quaternion(_apart(a, b, _AT + SAID))
-    u = rotate_back(said, vec3(a, _MEASURED))
-    v = vec3(b, _MEASURED)
-    size = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    return (
-        (u[1] * v[2] - u[2] * v[1]) / -size,
-        (u[2] * v[0] - u[0] * v[2]) / -size,
-        (u[0] * v[1] - u[1] * v[0]) / -size,
-    )
+    u = rotate_back(said, three(a, _MEASURED))
+    v = three(b, _MEASURED)
+    return _over(cross(u, v), -dot(v, v))
 
 
 @compilable
@@ -665,7 +645,7 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
     if middle < 0:
         return
     c, b = s.aids[2, last % _AIDS], s.aids[2, middle % _AIDS]
-    over, off, v = c[0] - b[0], _field_off(b, c), vec3(c, _MEASURED)
+    over, off, v = c[0] - b[0], _field_off(b, c), three(c, _MEASURED)
     off = _over(off, over)
     iron = _IRON * norm(rotation_vector(_apart(b, c, _AT + SAID)))
     noise = _NOISE_SIGMAS * noise / max(norm(v), 1e-3)
@@ -691,7 +671,7 @@ def _unit_and_field(s: Any, now: float, k: int, noise: float, bias: Vec3, learns
 def _across(a: Vec3, v: Vec3, r: Vec3) -> Vec3:
     """What of ``a`` is at right angles to the field ``v`` [Gauss], added to ``r``, both [rad/s]."""
     size = max(norm(v), 1e-3)
-    along = (a[0] * v[0] + a[1] * v[1] + a[2] * v[2]) / (size * size)
+    along = dot(a, v) / (size * size)
     return r[0] + a[0] - along * v[0], r[1] + a[1] - along * v[1], r[2] + a[2] - along * v[2]
 
 
@@ -706,8 +686,8 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
     first = _before(s, kind, last, _LONG + _MEAN, 0.1)
     if first < 0:
         return
-    a, n, m = s.aids[kind, first % _AIDS], 0, 0
-    x0, y0, z0, x1, y1, z1, t0, t1 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    a, n, m, t0, t1 = s.aids[kind, first % _AIDS], 0, 0, 0.0, 0.0
+    off0 = off1 = (0.0, 0.0, 0.0)
     for j in range(first, last + 1):
         b = s.aids[kind, j % _AIDS]
         early, late = b[0] <= a[0] + _MEAN, b[0] >= time - _MEAN
@@ -721,23 +701,19 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
             else _field_off(a, b)
         )
         if early:
-            x0, y0, z0, t0, n = x0 + off[0], y0 + off[1], z0 + off[2], t0 + b[0], n + 1
+            off0, t0, n = add(off0, off), t0 + b[0], n + 1
         else:
-            x1, y1, z1, t1, m = x1 + off[0], y1 + off[1], z1 + off[2], t1 + b[0], m + 1
+            off1, t1, m = add(off1, off), t1 + b[0], m + 1
     if n < 2 or m < 2:
         return
     over = t1 / m - t0 / n
-    r = (
-        (x1 / m - x0 / n) / over,
-        (y1 / m - y0 / n) / over,
-        (z1 / m - z0 / n) / over,
-    )
+    r = _over(subtract(_over(off1, m), _over(off0, n)), over)
     b = s.aids[kind, last % _AIDS]
     turned_on = norm(rotation_vector(_apart(a, b, _AT + SAID)))
     if kind == 0:
-        r = (r[0] + bias[0], r[1] + bias[1], r[2] + bias[2])
+        r = add(r, bias)
         noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about
         _note(s, now, GP, 4, r, _GYRO_OFF_LONG + (_GYRO_AXES * turned_on + noise) / over)
     else:
         iron = _IRON * turned_on / over
-        _note(s, now, GB, 4, _across(bias, vec3(b, _MEASURED), r), _FIELD_OFF_LONG + iron)
+        _note(s, now, GB, 4, _across(bias, three(b, _MEASURED), r), _FIELD_OFF_LONG + iron)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fsw.autopilot.estimation.error_state import BARO, ERRORS, FIELD, FRAME, Filter, P, V
+from fsw.autopilot.estimation.error_state import BARO, ERRORS, FIELD, Filter, P, V
 from fsw.autopilot.estimation.fusion import clear, judged
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors.base import (
@@ -105,8 +105,7 @@ def set_pressure(x: Filter, time: float, altitude: float, variance: float) -> No
     """Explain an ``altitude`` [m, up] of ``time`` [s], ``variance`` [m^2], by the bias."""
     s = x[0]
     s.baro_bias = altitude + s.p[2] + (time - s.time) * s.v[2]
-    for j in range(FRAME):
-        s.shared[BARO, j] = 0.0
+    s.shared[BARO, :] = 0.0
     for j in range(FIELD):
         s.with_offset[BARO, j] = s.with_offset[P + 2, j]
     for j in range(ERRORS):  # what is wrong with the height is in it

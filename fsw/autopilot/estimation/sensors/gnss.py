@@ -28,7 +28,7 @@ from fsw.autopilot.estimation.sensors.base import (
     Ratios,
     chi_square,
 )
-from fsw.autopilot.geometry.vectors import norm
+from fsw.autopilot.geometry.vectors import norm, put_three, subtract
 from fsw.autopilot.measurements import GnssSample, Sensor
 from fsw.autopilot.signals import Vec2, Vec3
 from fsw.compiled import compilable, kernel, machine_code
@@ -174,8 +174,7 @@ def fuse_gnss(
 def set_velocity(x: Filter, v: Vec3, variance: Vec3) -> Vec3:
     """Take ``v`` [m/s, NED] as it is, ``variance`` [m^2/s^2, NED]; by how much it has jumped."""
     s = x[0]
-    jump = (v[0] - s.v[0], v[1] - s.v[1], v[2] - s.v[2])
-    for i in range(3):
-        s.v[i] = v[i]
+    jump = subtract(v, s.v)
+    put_three(s.v, 0, v)
     forget(s, V, variance)
     return jump

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from fsw.autopilot.estimation.error_state import BG, DELAY, TH, Filter, Law, V, vec3, vec4
+from fsw.autopilot.estimation.error_state import BG, DELAY, TH, Filter, Law, V, put_four, vec4
 from fsw.autopilot.estimation.faults.residuals import Aid
 from fsw.autopilot.estimation.faults.sensor_fault import Health
 from fsw.autopilot.estimation.faults.sources import Source
@@ -37,7 +37,7 @@ from fsw.autopilot.geometry.quaternion import (
     rotation_vector,
     turned,
 )
-from fsw.autopilot.geometry.vectors import norm
+from fsw.autopilot.geometry.vectors import norm, three
 from fsw.autopilot.measurements import PoseSample, Sensor
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
@@ -192,7 +192,7 @@ def attitude_rows(x: Any, z: Vec4, variance: Vec3, dt: float, delayed: float) ->
     ``delayed`` [1] is 1 where its delay is estimated, else 0.
     """
     clear(x, 3)
-    w = vec3(x.rate, 0)
+    w = three(x.rate, 0)
     there = turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2])
     residual = rotation_vector(multiply(conjugate(there), z))
     for i in range(3):
@@ -249,6 +249,5 @@ def fuse_pose(
 def set_attitude(x: Filter, q: Vec4, variance: Vec3) -> None:
     """Take an attitude ``q`` [1] of ``variance`` [rad^2, FRD] as it is."""
     s = x[0]
-    for i in range(4):
-        s.q[i] = q[i]
+    put_four(s.q, q)
     forget(s, TH, variance)
