@@ -123,13 +123,6 @@ class FusionMemory:
         x = self.numbers[0]
         return bool(x["encoder_repeats"][: x["joint_count"]].min() >= REPEATS)
 
-    def fault_at(self, sensor: Sensor) -> float:
-        """When a fault of a sensor was seen last [s]; minus infinity: never."""
-        for one in self.health:
-            if one.sensor is sensor:
-                return one.fault_at
-        return -math.inf
-
     def came(self, sensor: Sensor) -> float:
         """When a reading of a sensor came last [s]; negative: never."""
         if sensor is Sensor.IMU:
@@ -147,10 +140,9 @@ class FusionMemory:
     def noting_faults(self, of_imu: int, of_encoders: int, now: float) -> FusionMemory:
         """The memory with faults that the filter has seen at ``now`` [s]; 0: none."""
         memory = self
-        if of_imu:
-            memory = memory.noting_fault(Sensor.IMU, SensorFault(of_imu), now)
-        if of_encoders:
-            memory = memory.noting_fault(Sensor.ENCODERS, SensorFault(of_encoders), now)
+        for sensor, fault in ((Sensor.IMU, of_imu), (Sensor.ENCODERS, of_encoders)):
+            if fault:
+                memory = memory.noting_fault(sensor, SensorFault(fault), now)
         return memory
 
     def hearing(self, sample: AidingSample) -> FusionMemory:

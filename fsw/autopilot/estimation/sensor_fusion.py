@@ -369,13 +369,17 @@ class SensorFusion:
             # so since it has come.
             return replace(memory, waiting=memory.waiting[1:])
         announced, drifts = False, False
+        refused: tuple[bool, ...] = ()
         if isinstance(sample, PoseSample):
             memory = self._with_delay_known(memory)
             announced = memory.reset_counter not in (None, sample.reset_counter)
             drifts = sample.drifts
             if drifts:
-                memory = self._with_frame(memory, sample, announced)
-        refused = _refused_last(memory) if isinstance(sample, PoseSample) else ()
+                stated = self._pose.stated(sample)
+                moved = memory.frame.moved(memory.numbers[0], stated, announced)
+                memory = replace(memory, frame=moved)
+            # Whether each half of the last pose was.
+            refused = tuple([1.0 < one < math.inf for one in memory.of(Sensor.POSE).ratio])
         kept = memory.numbers[0].copy() if (announced and drifts) or any(refused) else None
         ratio = sensor.fuse(memory, sample, one.half)
         innovation = tuple(memory.numbers["innovation"].ravel().tolist())
@@ -432,8 +436,8 @@ class SensorFusion:
         innovation: tuple[float, ...],
         now: float,
         *,
-        announced: bool = False,
-        previous: Any = None,
+        announced: bool,
+        previous: Any,
     ) -> FusionMemory:
         """The memory after the first of the waiting samples was fused, or refused.
 
@@ -534,7 +538,7 @@ class SensorFusion:
         none can say.
         """
         last, before = memory.pose, memory.of(Sensor.POSE).innovation
-        if memory.now - memory.fault_at(Sensor.IMU) < self.tuning.reset_time:
+        if memory.now - memory.of(Sensor.IMU).fault_at < self.tuning.reset_time:
             return False
         if last is None or len(before) < 3 or not 0.0 < sample.time - last.time < _SOON:
             return False
@@ -542,13 +546,6 @@ class SensorFusion:
         noise = self.tuning.pose.gate * math.sqrt(2.0) * sigma
         room = noise + CREEPS * (sample.time - last.time)
         return math.dist(innovation[:3], before[:3]) > room
-
-    def _with_frame(
-        self, memory: FusionMemory, sample: PoseSample, announced: bool
-    ) -> FusionMemory:
-        """The memory after a frame that drifts has moved, to where a pose says it is."""
-        moved = memory.frame.moved(memory.numbers[0], self._pose.stated(sample), announced)
-        return replace(memory, frame=moved)
 
 
 def _rests(memory: FusionMemory, now: float) -> bool:
@@ -593,11 +590,6 @@ def _fault_of_encoders(sample: JointSample, now: float, came: float) -> SensorFa
     if sample.time < now - ENCODERS_TOO_OLD:
         return SensorFault.TOO_OLD
     return SensorFault.RATE_TOO_LOW if now - came > ENCODERS_TOO_OLD else SensorFault.NONE
-
-
-def _refused_last(memory: FusionMemory) -> tuple[bool, ...]:
-    """Whether each half of the last pose was refused."""
-    return tuple([1.0 < ratio < math.inf for ratio in memory.of(Sensor.POSE).ratio])
 
 
 def _is_small(sample: AidingSample, innovation: tuple[float, ...]) -> bool:

@@ -56,7 +56,7 @@ from fsw.autopilot.flight.state import AIDED, Damage, FlightState, PlanMemory, S
 from fsw.autopilot.geometry.rotation import wrap_angle
 from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.autopilot.model.actuator_health import SOUND
-from fsw.autopilot.model.battery import Levels, corrected, drained
+from fsw.autopilot.model.battery import corrected, drained
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.model.nominal import rest_input
@@ -66,7 +66,6 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES, Array, moving_zones
 from fsw.autopilot.signals import (
     ActuatorCommand,
-    BatteryState,
     CommandAck,
     ConstraintKind,
     EndEffectorTarget,
@@ -139,16 +138,17 @@ class Autopilot:
         self._sensed = SensedState(config.estimator, self._cascade)
         self._exact = ExactState(self._cascade)
         self._descent = Descent(config)
-        reallocates = bool(config.limits.failed_rotor_mode)
+        limits = config.limits
+        reallocates = bool(limits.failed_rotor_mode)
         self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
-        self._watches = bool(config.limits.watches_actuators)
+        self._watches = bool(limits.watches_actuators)
         self.calm = CalmTick(
             *(config, self._cascade, self._plans.model, self._damage),
             *(self._watch, self._sensed, self.zones_now),
         )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
-            config.limits.clearance_sigmas,
+            limits.clearance_sigmas,
             body_of(config.planner.body, config.airframe),
             config.airframe.bodies,
             config.planner.tunings,
@@ -158,6 +158,8 @@ class Autopilot:
             + self._cascade.law.filter.lag,
         )
         self._room = ZoneRoom(config)
+        low, critical = limits.battery_low, limits.battery_critical
+        self._battery_levels = low, critical, limits.battery_emergency
         self._tick_us = config.tick_period_us
         self._damping = arm_damping(config.airframe)
         self._ticks_per_plan = config.mpc_period_us // config.tick_period_us
@@ -215,7 +217,7 @@ class Autopilot:
         state = self._commander.check_mode_completion(state, estimate, texts)
 
         ticks = looped = self._elapsed_ticks(state, now_us)
-        vehicle, armed = state.vehicle, state.vehicle.armed
+        vehicle = state.vehicle
         flown = vehicle.flies and vehicle.unloaded is None and bool(state.record.has_plan)
         if flown and now_us - state.t_us > self._max_us:
             state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
@@ -227,7 +229,7 @@ class Autopilot:
             plan = self._follow(state, r, estimate, inputs.plan, looped)
         else:
             r.plan_input = rest_input(r.joint_count)
-        sent, r, replaced = self._actuate(state, r, estimate, looped, armed=armed, flown=flown)
+        sent, r, replaced = self._actuate(state, r, estimate, looped, flown=flown)
         outputs = self._commanded(state, r, sent, flown=flown)
         outputs = replace(outputs, acks=tuple(acks), texts=tuple(texts))
         return Controlled(
@@ -420,8 +422,8 @@ class Autopilot:
         if ranges:
             state = replace(state, vehicle=with_range(state.vehicle, ranges[-1]))
         if inputs.battery is not None:
-            levels = self._battery_levels
-            battery = corrected(self.config.airframe.battery, levels, state.battery, inputs.battery)
+            cells, levels = self.config.airframe.battery, self._battery_levels
+            battery = corrected(cells, levels, state.battery, inputs.battery)
             state = replace(state, battery=battery)
         if inputs.host is not None:
             state = replace(state, host=inputs.host)
@@ -601,40 +603,25 @@ class Autopilot:
         """Reference, margins, arming checks and battery, once a planning period."""
         target = self._horizon.target(self._commander.mode(state), state, estimate, now_us)
         refusal, arming = self._commander.arming_report(state, estimate)
+        airframe, period = self.config.airframe, 1e-6 * self.config.mpc_period_us
+        thrust, levels = state.record.actuator_command.rotor_thrust, self._battery_levels
         return replace(
             state,
             constraints=self._safe_sets.margins(state.kept, estimate, target),
             reference=target if state.vehicle.flies else None,
             arming_refusal=refusal,
             arming=arming,
-            battery=self._battery(state),
+            battery=drained(airframe, levels, state.battery, thrust, period),
         )
 
-    def _battery(self, state: FlightState) -> BatteryState:
-        thrust = state.record.actuator_command.rotor_thrust
-        period = 1e-6 * self.config.mpc_period_us
-        return drained(self.config.airframe, self._battery_levels, state.battery, thrust, period)
-
-    @property
-    def _battery_levels(self) -> Levels:
-        limits = self.config.limits
-        return limits.battery_low, limits.battery_critical, limits.battery_emergency
-
     def _actuate(
-        self,
-        state: FlightState,
-        r: Tick,
-        estimate: StateEstimate,
-        ticks: int,
-        *,
-        armed: bool,
-        flown: bool,
+        self, state: FlightState, r: Tick, estimate: StateEstimate, ticks: int, *, flown: bool
     ) -> tuple[ActuatorCommand, Tick, bool]:
         """Close the loops of a record, idle or stay still; the safety gate is the last law.
 
         Also the record for the next tick, and whether the gate replaced the command.
         """
-        last, airframe = state.record, self.config.airframe
+        last, airframe, armed = state.record, self.config.airframe, state.vehicle.armed
         if flown:
             tube = self._watch.tube(state)
             r.payload.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0

@@ -26,24 +26,10 @@ from fsw.frozen import replace
 _TOLD: Final = 0.02  # m, of a jump that the operator reads about
 
 
-def difference(found: StateEstimate, expected: StateEstimate, number: int = 1) -> Reset:
-    """The jump from an expected estimate to the one that was found."""
-    turn = multiply(
-        quaternion_from_matrix(found.R_WB), conjugate(quaternion_from_matrix(expected.R_WB))
-    )
-    return Reset(
-        number,
-        add_scaled(found.p_WB, expected.p_WB, -1.0),
-        add_scaled(found.v_WB, expected.v_WB, -1.0),
-        turn,
-    )
-
-
 def told(reset: Reset) -> str:
     """What the operator reads."""
-    yaw = _yaw(reset)
-    place = 1e3 * norm(reset.position)
-    return f"estimate moved by {place:.0f} mm, {abs(yaw):.3f} rad: the plan moves along"
+    place, yaw = 1e3 * norm(reset.position), abs(_yaw(reset))
+    return f"estimate moved by {place:.0f} mm, {yaw:.3f} rad: the plan moves along"
 
 
 def all_along(
@@ -95,10 +81,8 @@ def moved_along(r: Tick, reset: Reset) -> Tick:
     """The record with the plan's state and the observer's velocity moved along."""
     r, nominal = r.copy(), r.plan_state
     if nominal is not None:
-        yaw = _yaw(reset)
-        r.plan_state = nominal._replace(
-            p=add_scaled(nominal.p, reset.position, 1.0), yaw=wrap_angle(nominal.yaw + yaw)
-        )
+        p, yaw = add_scaled(nominal.p, reset.position, 1.0), wrap_angle(nominal.yaw + _yaw(reset))
+        r.plan_state = nominal._replace(p=p, yaw=yaw)
     r.observed.v += reset.velocity
     return r
 
@@ -109,10 +93,11 @@ def on_return(found: StateEstimate, before: StateEstimate) -> tuple[Reset, list[
     What was found takes the place of what had been carried on from ``before``.
     """
     expected = moved_on(before, 1e-6 * (found.t_us - before.t_us))
-    reset = difference(found, expected)
-    if is_far(reset):
-        return reset, [StatusText(Severity.WARNING, told(reset))]
-    return reset, []
+    q, carried = quaternion_from_matrix(found.R_WB), quaternion_from_matrix(expected.R_WB)
+    moved = add_scaled(found.p_WB, expected.p_WB, -1.0)
+    faster = add_scaled(found.v_WB, expected.v_WB, -1.0)
+    reset = Reset(1, moved, faster, multiply(q, conjugate(carried)))
+    return reset, [StatusText(Severity.WARNING, told(reset))] if is_far(reset) else []
 
 
 def returned(

@@ -73,14 +73,12 @@ class SensedState:
     """The estimator of one configuration as the tick uses it."""
 
     def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
-        self._joints = cascade.law.airframe.bodies.joints
         airframe = cascade.law.airframe
+        self._joints, self._legs = airframe.bodies.joints, airframe.leg_length
         self._turns = scale_of_turns(agility(airframe), swing(airframe))
         self._fusion = SensorFusion(tuning, self._joints)
         self._cascade = cascade
-        self._tuning = tuning
-        self._stale = tuning.stale_time
-        self._legs = cascade.law.airframe.leg_length
+        self._tuning, self._stale = tuning, tuning.stale_time
 
     def warm_up(self) -> None:
         """Compile every kernel."""
@@ -94,11 +92,9 @@ class SensedState:
         clock that is set back by little is waited for: of what was known nothing is lost.
         """
         before = state.fusion
-        return (
-            at_start(self._joints, self._turns)
-            if before is None or now < before.now - _SET_BACK
-            else before
-        )
+        if before is None or now < before.now - _SET_BACK:
+            return at_start(self._joints, self._turns)
+        return before
 
     def covariance(self, memory: FusionMemory | None) -> Array | None:
         """Covariance (17, 17) [SI] of the error of the estimate of a memory; None before both."""

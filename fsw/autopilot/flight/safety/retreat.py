@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 from fsw.autopilot.geometry.vectors import add_scaled
 from fsw.autopilot.model.body import Body, hull_reach
 from fsw.autopilot.model.kinematics import frame_of, position
@@ -25,25 +27,22 @@ def retreat_place(
     and is left out. Between zones that leave no such place it is one in their middle.
     """
     frame = frame_of(bodies, estimate)
-    arm = [
+    places: list[tuple[Vec3, float | None]] = [(estimate.p_WB, None)]  # None: the base's hull
+    places += [
         (position(frame, part.on, part.begin), part.radius)
         for part in body.parts
         if part.on != ON_BASE and part.end is None
     ]
+    zones = [SafeSet((zone,)) for zone in safe_set.zones]
     shift: Vec3 = (0.0, 0.0, 0.0)
     for _ in range(_PASSES):
         before = shift
-        for k in range(len(safe_set.zones)):
-            zone = SafeSet(safe_set.zones[k : k + 1])
-            for at in surfaces(zone, add_scaled(estimate.p_WB, shift, 1.0), estimate.t_us):
-                shortfall = room - (at.distance - hull_reach(body, at.normal))
+        for zone, (p, radius) in product(zones, places):
+            for at in surfaces(zone, add_scaled(p, shift, 1.0), estimate.t_us):
+                reach = hull_reach(body, at.normal) if radius is None else radius
+                shortfall = room - (at.distance - reach)
                 if shortfall > _TOLERANCE:
                     shift = add_scaled(shift, at.normal, shortfall)
-            for p, radius in arm:
-                for at in surfaces(zone, add_scaled(p, shift, 1.0), estimate.t_us):
-                    shortfall = room - (at.distance - radius)
-                    if shortfall > _TOLERANCE:
-                        shift = add_scaled(shift, at.normal, shortfall)
         if shift is before:
             break
     length = sum(value * value for value in shift) ** 0.5

@@ -64,10 +64,17 @@ _ACCEPTED = 8  # sources whose last announcement is remembered
 
 
 class _Vehicle(NamedTuple):
-    """The vehicle that must be inside what is announced."""
+    """The vehicle for which another safe set is looked at."""
 
-    estimate: StateEstimate | None  # None: it stands disarmed, and need not be
+    estimate: StateEstimate | None
     target: EndEffectorTarget | None  # that zones follow
+    armed: bool
+    flies: bool
+
+    @property
+    def inside(self) -> StateEstimate | None:
+        """The state in which it must be inside; None: it stands disarmed, and need not be."""
+        return self.estimate if self.armed else None
 
 
 class SafeSetCheck:
@@ -102,12 +109,12 @@ class SafeSetCheck:
         that follow the ``target`` if there is one. Of an upload all is taken or nothing.
         """
         armed = flies if armed is None else armed
-        here = _Vehicle(estimate if armed else None, target)
+        here = _Vehicle(estimate, target, armed, flies)
         update = inputs.mission
         if update is not None:
             against = upload_problem(update) or self._against_rally(mission, update, armed=armed)
             if against is None:
-                mission = self._take_upload(mission, update, here, estimate, texts, flies=flies)
+                mission = self._take_upload(mission, update, here, texts)
             else:
                 mission = _refused(mission, against, texts)
         for announcement in inputs.announced:
@@ -118,28 +125,19 @@ class SafeSetCheck:
                 if owns and now_us != mission.owner_heard_us:
                     mission = replace(mission, owner_heard_us=now_us)
                 problem = "" if owns else self._against(mission, announcement.safe_set)
-            mission = self._take(
-                mission, announcement, problem, here, texts, owns=owns, flies=flies
-            )
+            mission = self._take(mission, announcement, problem, here, texts, owns=owns)
         return mission
 
     def _take_upload(
-        self,
-        mission: MissionMemory,
-        update: MissionUpdate,
-        here: _Vehicle,
-        estimate: StateEstimate | None,
-        texts: list[StatusText],
-        *,
-        flies: bool,
+        self, mission: MissionMemory, update: MissionUpdate, here: _Vehicle, texts: list[StatusText]
     ) -> MissionMemory:
         """What was uploaded, unless something speaks against any part of it."""
         wanted = mission
         if update.fence is not None:
             who = "fence" if update.source is None else f"fence of {update.source}"
-            problem = self._against_fence(mission, update, here, estimate, flies=flies)
+            problem = self._against_fence(mission, update, here)
             if not problem:
-                wanted = self._with_fence(mission, update, who, texts, flies=flies)
+                wanted = self._with_fence(mission, update, who, here, texts)
                 problem = "the old safe set is kept" if wanted is mission else ""
             if problem:
                 return _refused(mission, f"{who} refused: {problem}", texts)
@@ -148,7 +146,7 @@ class SafeSetCheck:
             text = f"rally points of {update.source}: {way_home.told(wanted.rally)}"
             texts.append(StatusText(Severity.INFO, text))
             if update.source is not None:
-                armed = here.estimate is not None
+                armed = here.inside is not None
                 wanted = way_home.changed(wanted, update.source.sender, armed=armed)
         return replace(wanted, upload_taken=True)
 
@@ -165,29 +163,21 @@ class SafeSetCheck:
         against = against or next(filter(None, found), "")
         return f"rally points of {update.source} refused: {against}" if against else None
 
-    def _against_fence(
-        self,
-        mission: MissionMemory,
-        update: MissionUpdate,
-        here: _Vehicle,
-        estimate: StateEstimate | None,
-        *,
-        flies: bool,
-    ) -> str:
+    def _against_fence(self, mission: MissionMemory, update: MissionUpdate, here: _Vehicle) -> str:
         """Why a fence cannot be in force; in flight only its owner may grow it."""
         fence = update.fence or SafeSet()
         problem = safe_set_problem(fence, self._config.surroundings.zone_speed)
         if problem is not None:
             return problem
-        if not self._may_grow(mission, update, flies=flies):
+        if not self._may_grow(mission, update, here):
             grown = growth(mission.fence, fence)
             if grown:
                 return f"{grown}, which {mission.fence_owner} owns"
         unkept = () if self._config.soft else refusals(self.analyse(fence))
         if unkept:
             return f"it cannot be kept: {'; '.join(unkept)}"
-        if here.estimate is None:
-            return "" if estimate is None else _excluded(fence, estimate)
+        if here.inside is None:
+            return "" if here.estimate is None else _excluded(fence, here.estimate)
         return self._outside(mission, mission.fence, fence, here)
 
     def _with_fence(
@@ -195,23 +185,22 @@ class SafeSetCheck:
         mission: MissionMemory,
         update: MissionUpdate,
         who: str,
+        here: _Vehicle,
         texts: list[StatusText],
-        *,
-        flies: bool,
     ) -> MissionMemory:
         """The memory with a fence; the same one where both safe sets together cannot be kept."""
         fence, owner = update.fence or SafeSet(), mission.fence_owner
-        if self._may_grow(mission, update, flies=flies):
+        if self._may_grow(mission, update, here):
             owner = update.source
         wanted = replace(mission, fence=fence, fence_owner=owner if fence.zones else None)
         if fence == mission.fence:
             return wanted
-        return self._kept(mission, wanted, f"{who}: {summary(fence)}", texts, flies=flies)
+        return self._kept(mission, wanted, f"{who}: {summary(fence)}", here, texts)
 
-    def _may_grow(self, mission: MissionMemory, update: MissionUpdate, *, flies: bool) -> bool:
+    def _may_grow(self, mission: MissionMemory, update: MissionUpdate, here: _Vehicle) -> bool:
         """Whether an upload may put any other fence in place."""
         source = update.source
-        return not flies or source is None or self._is_owner(source, mission.fence_owner)
+        return not here.flies or source is None or self._is_owner(source, mission.fence_owner)
 
     def _take(
         self,
@@ -222,7 +211,6 @@ class SafeSetCheck:
         texts: list[StatusText],
         *,
         owns: bool,
-        flies: bool,
     ) -> MissionMemory:
         """An announced safe set, unless something speaks ``against`` it or it is repeated."""
         source, owner = announcement.source, mission.owner
@@ -238,7 +226,7 @@ class SafeSetCheck:
             if not repeated:
                 texts.append(StatusText(Severity.CRITICAL, f"{who} refused: {against}"))
             return refused
-        if announcement == mission.refused and flies:
+        if announcement == mission.refused and here.flies:
             return refused
         others = [one for one in mission.accepted if not one.source.is_same(source)]
         wanted = replace(
@@ -251,7 +239,7 @@ class SafeSetCheck:
         change = f"{who}: {summary(safe_set)}"
         if becomes_owner:
             change += "; it owns the safe set now"
-        kept = self._kept(mission, wanted, change, texts, flies=flies)
+        kept = self._kept(mission, wanted, change, here, texts)
         return refused if kept is mission else kept
 
     def _against(self, mission: MissionMemory, safe_set: SafeSet) -> str:
@@ -276,7 +264,7 @@ class SafeSetCheck:
         Zones in force are not asked again. One that has only moved on must leave the vehicle no
         further outside than it is already; how it turns is what was measured of it.
         """
-        estimate, target = here
+        estimate, target = here.inside, here.target
         if estimate is None or new == old:
             return ""
         # Nor where it will stand if its stamp is too far from now.
@@ -359,9 +347,8 @@ class SafeSetCheck:
         mission: MissionMemory,
         wanted: MissionMemory,
         change: str,
+        here: _Vehicle,
         texts: list[StatusText],
-        *,
-        flies: bool,
     ) -> MissionMemory:
         """The memory with what is wanted; as it was where that cannot be kept in flight."""
         safe_set = joined(wanted.announced, wanted.fence)
@@ -377,7 +364,7 @@ class SafeSetCheck:
             weak = [
                 StatusText(Severity.INFO, text) for text in warnings(findings) if text not in known
             ]
-            refused = bool(against) and not self._config.soft and flies
+            refused = bool(against) and not self._config.soft and here.flies
             # What is taken on the ground all the same is told by a row of the failsafe table.
             texts += (new if refused or self._config.soft else []) + weak
             if refused:
