@@ -33,7 +33,7 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from fsw.autopilot.control.rotor_loss import flies_without
-from fsw.autopilot.geometry.vectors import add, clamp, dot, subtract
+from fsw.autopilot.geometry.vectors import add, clamp, dot, put_three, subtract, three
 from fsw.autopilot.model.actuator_health import LIMP, SOUND, STUCK
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.multibody import (
@@ -140,13 +140,12 @@ def watch_law(airframe: Airframe) -> WatchLaw:
     hover, lever = airframe.mass * GRAVITY / airframe.rotors, airframe.rotor_lever
     turning = hover * lever / float(min(J[0], J[4]))
     noise = float(max(J[0], J[4])) / lever
+    spares = tuple([float(flies_without(airframe, k)) for k in range(airframe.rotors)])
     return WatchLaw(
         airframe,
         thrusts=round(max(hover / _HOVER, noise / _INERTIA), 3),
         times=round(max(math.sqrt(_TURNING / turning), _QUICKEST), 3),
-        spares=padded(
-            tuple([float(flies_without(airframe, k)) for k in range(airframe.rotors)]), ROTORS
-        ),
+        spares=padded(spares, ROTORS),
         torques=torques_by_friction(airframe),
     )
 
@@ -155,9 +154,6 @@ def torques_by_friction(airframe: Airframe) -> Several:
     """What scales the torques that the watch looks for in each joint (JOINTS,) [1]."""
     friction = zip(airframe.joint_friction, airframe.joint_drag, strict=True)
     return tuple([round(max((slow + fast) / _FRICTION, 1.0), 3) for slow, fast in friction])
-
-
-Law = NDArray[Any]
 
 
 def pause(s: Watched) -> None:
@@ -173,16 +169,16 @@ def pause(s: Watched) -> None:
 def watch(
     before: NDArray[Any],
     after: NDArray[Any],
-    laws: Law,
+    laws: NDArray[Any],
     decay: float,
     dt: float,
     angles_known: bool,
 ) -> bool:
     """Watch the actuators over a tick of ``dt`` [s]; whether any of them has failed by now.
 
-    It reads the command of the record ``before`` (1,) [SI], and estimate and joints of the one
-    ``after`` (1,) [SI], whose watch it writes. A rotor's error shrinks by ``decay`` [1]. Where the
-    joints' angles are not known by encoders only rotors are judged.
+    By the ``laws`` (1,) [SI] it reads the command of the record ``before`` (1,) [SI], and estimate
+    and joints of the one ``after`` (1,) [SI], whose watch it writes. A rotor's error shrinks by
+    ``decay`` [1]. Where the joints' angles are not known by encoders only rotors are judged.
     """
     law, sent, r = laws[0], before[0].sent, after[0]
     airframe = law.airframe
@@ -237,9 +233,9 @@ def _observe_base(r: Tick, law: WatchLaw, decay: float, dt: float, sent: Sent) -
     modelled = free = subtract(add(turn, turned), load)
     if r.pressing.near > 0:  # drives are judged by what turns the base where nothing is touched
         free = subtract(turn, load_on_base(r.bodies, airframe.bodies, force, sent.joint_torque))
-    grown = rate[0] - s.rate[0], rate[1] - s.rate[1], rate[2] - s.rate[2]
+    grown = subtract(rate, s.rate)
     for i in range(2):
-        gained = J[3 * i] * grown[0] + J[3 * i + 1] * grown[1] + J[3 * i + 2] * grown[2]
+        gained = dot(three(J, 3 * i), grown)
         if s.running == 0.0:
             gained = dt * modelled[i]
         s.torque[i] += OBSERVER * (gained - dt * (free[i] + s.torque[i]))
@@ -263,8 +259,7 @@ def _observe_base(r: Tick, law: WatchLaw, decay: float, dt: float, sent: Sent) -
         s.extra[i] = dot(pattern, seen) / dot(pattern, pattern)
         s.by_thrust[i] += forget * (s.extra[i] * s.thrust[i] - s.by_thrust[i])
         s.thrust2[i] += forget * (s.thrust[i] * s.thrust[i] - s.thrust2[i])
-    for i in range(3):
-        s.rate[i] = rate[i]
+    put_three(s.rate, 0, three(rate, 0))
     if s.failed >= 0:
         _observe_failed(s, law, dt, seen)
 
@@ -277,7 +272,9 @@ def _observe_failed(s: Watched, law: WatchLaw, dt: float, seen: Vec3) -> None:
     lost_from = LOST_FROM * law.thrusts
     own = pattern_of(airframe, k)
     x, y, z = seen
-    off, thrust = _about(own, x, y), s.thrust[k]
+    # How much more of it explains what turns the base.
+    off = (own[0] * x + own[1] * y) / (own[0] * own[0] + own[1] * own[1])
+    thrust = s.thrust[k]
     # Of both about that axis: with what is lacking along z the opposite one turns the base.
     lacking = min(0.5 * (z - off), 0.0)
     more = max(off, 0.0) if lacking > -UNLIKE * off else 0.0
@@ -306,13 +303,6 @@ def _observe_failed(s: Watched, law: WatchLaw, dt: float, seen: Vec3) -> None:
         gone = gone and (not opposite or turned < UNLIKE * (LOST - 1.0) * g)
         known = i == k or (opposite and along > 0.0)  # or beside it: both leave the same
         s.others_lost_for[i] = s.others_lost_for[i] + dt if gone and not known else 0.0
-
-
-@compilable
-def _about(pattern: Vec3, x: float, y: float) -> float:
-    """How much more of a rotor explains what turns the base [N]."""
-    turns = pattern[0] * pattern[0] + pattern[1] * pattern[1]
-    return (pattern[0] * x + pattern[1] * y) / turns
 
 
 @compilable
@@ -414,21 +404,18 @@ def _judge_others(s: Watched, law: WatchLaw) -> None:
 
 
 @compilable
-def effect_seen(s: Watched) -> float:
-    """Thrust over command of the failed rotor [1], by the means of a tenth of a second."""
-    return clamp(1.0 + float(s.failed_by_thrust) / max(float(s.failed_thrust2), 1e-6), 0.0, 1.0)
-
-
-@compilable
 def _follow_failed(s: Watched, law: WatchLaw, dt: float) -> None:
     """What of the failed rotor is left, and whether it is back."""
     astray, quiet_below = ASTRAY * law.thrusts, QUIET * law.thrusts
-    by_effect = s.failed_by_thrust * s.failed_by_thrust / max(s.failed_thrust2, 1e-6)
+    thrust2 = max(s.failed_thrust2, 1e-6)
+    by_effect = s.failed_by_thrust * s.failed_by_thrust / thrust2
     explained = s.failed2 - by_effect < astray * astray
     # A rotor that comes and goes is no weak one, and flies better as a sound one. One that gives
     # too much at times does not obey.
     if explained and not s.disobeys:
-        towards = max(effect_seen(s), LEAST_EFFECTIVE) - s.effect
+        # By the means of a tenth of a second.
+        seen = clamp(1.0 + s.failed_by_thrust / thrust2, 0.0, 1.0)
+        towards = max(seen, LEAST_EFFECTIVE) - s.effect
         most = EFFECT_RATE / law.times * dt
         s.effect += clamp(towards, -most, most)
     # Without one that others fly without it is safe to be quick; else it ends the flight.
@@ -521,10 +508,9 @@ def felt_inside(r: Tick, airframe: Airframe, felt: Floats) -> None:
 def _forget_arm(s: Watched) -> None:
     """Begin anew when encoders are back."""
     s.arm_seen, s.odd2 = 0.0, 0.0
-    for k in range(s.undone.size):
-        s.undone[k], s.asked[k], s.joint_for[k] = 0.0, 0.0, 0.0
-        s.undone2[k], s.asked2[k], s.undoing[k] = 0.0, 0.0, 0.0
-        s.rate2[k], s.behind2[k], s.yielding2[k], s.stands_for[k] = 0.0, 0.0, 0.0, 0.0
+    s.undone[:], s.asked[:], s.joint_for[:] = 0.0, 0.0, 0.0
+    s.undone2[:], s.asked2[:], s.undoing[:] = 0.0, 0.0, 0.0
+    s.rate2[:], s.behind2[:], s.yielding2[:], s.stands_for[:] = 0.0, 0.0, 0.0, 0.0
 
 
 @compilable

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate
-from fsw.autopilot.geometry.vectors import three
+from fsw.autopilot.geometry.vectors import add_scaled, cross, dot, four, put_four, three
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import Mat3, Vec3, Vec4
 from fsw.compiled import compilable
@@ -167,18 +167,6 @@ Law = NDArray[Any]  # (1,) of a packed EstimatorTuning
 
 
 @compilable
-def vec4(row: Array, first: int = 0) -> Vec4:
-    """Four entries of a ``row`` (n,) [any unit], from ``first`` on."""
-    return row[first], row[first + 1], row[first + 2], row[first + 3]
-
-
-@compilable
-def put_four(row: Array, q: Vec4) -> None:
-    """Write ``q`` [any unit] into a ``row`` (4,) [any unit]."""
-    row[0], row[1], row[2], row[3] = q
-
-
-@compilable
 def integrated(
     p: Vec3, v: Vec3, q: Vec4, f: Vec3, w: Vec3, dt: float
 ) -> tuple[Vec3, Vec3, Vec4, Vec3]:
@@ -187,21 +175,11 @@ def integrated(
     ``p`` [m, NED], ``v`` [m/s, NED], ``q`` [1]; specific force ``f`` [m/s^2, FRD] and rate ``w``
     [rad/s, FRD] are means over the step. Solà, eq 260, with the force turned by half the step.
     """
-    h = 0.5 * dt
-    half = (
-        f[0] + h * (w[1] * f[2] - w[2] * f[1]),
-        f[1] + h * (w[2] * f[0] - w[0] * f[2]),
-        f[2] + h * (w[0] * f[1] - w[1] * f[0]),
-    )
-    ax, ay, az = rotate(matrix_from_quaternion(q), half)
-    az += GRAVITY
-    placed = (
-        p[0] + dt * (v[0] + h * ax),
-        p[1] + dt * (v[1] + h * ay),
-        p[2] + dt * (v[2] + h * az),
-    )
-    moving = (v[0] + dt * ax, v[1] + dt * ay, v[2] + dt * az)
-    return placed, moving, turned(q, dt * w[0], dt * w[1], dt * w[2]), (ax, ay, az)
+    half = 0.5 * dt
+    ax, ay, az = rotate(matrix_from_quaternion(q), add_scaled(f, cross(w, f), half))
+    a = (ax, ay, az + GRAVITY)
+    placed = add_scaled(p, add_scaled(v, a, half), dt)
+    return placed, add_scaled(v, a, dt), turned(q, dt * w[0], dt * w[1], dt * w[2]), a
 
 
 @compilable
@@ -210,11 +188,9 @@ def transition(R: Mat3, f: Vec3, w: Vec3, dt: float) -> tuple[Mat3, Mat3, Mat3]:
 
     ``R`` [1, body to NED] and the means ``f`` [m/s^2, FRD] and ``w`` [rad/s, FRD] are of the step.
     """
-    # -R [f]x dt, Solà's slope of the velocity over the attitude.
-    fx, fy, fz = dt * f[0], dt * f[1], dt * f[2]
-    a00, a01, a02 = R[2] * fy - R[1] * fz, R[0] * fz - R[2] * fx, R[1] * fx - R[0] * fy
-    a10, a11, a12 = R[5] * fy - R[4] * fz, R[3] * fz - R[5] * fx, R[4] * fx - R[3] * fy
-    a20, a21, a22 = R[8] * fy - R[7] * fz, R[6] * fz - R[8] * fx, R[7] * fx - R[6] * fy
+    # -R [f]x dt, Solà's slope of the velocity over the attitude, row by row.
+    g = (dt * f[0], dt * f[1], dt * f[2])
+    slope = (*cross(g, three(R, 0)), *cross(g, three(R, 3)), *cross(g, three(R, 6)))
     r00, r01, r02 = dt * R[0], dt * R[1], dt * R[2]
     r10, r11, r12 = dt * R[3], dt * R[4], dt * R[5]
     r20, r21, r22 = dt * R[6], dt * R[7], dt * R[8]
@@ -224,7 +200,7 @@ def transition(R: Mat3, f: Vec3, w: Vec3, dt: float) -> tuple[Mat3, Mat3, Mat3]:
     e10, e11, e12 = -z + 0.5 * x * y, 1.0 - 0.5 * (x * x + z * z), x + 0.5 * y * z
     e20, e21, e22 = y + 0.5 * x * z, -x + 0.5 * y * z, 1.0 - 0.5 * (x * x + y * y)
     return (
-        (a00, a01, a02, a10, a11, a12, a20, a21, a22),
+        slope,
         (r00, r01, r02, r10, r11, r12, r20, r21, r22),
         (e00, e01, e02, e10, e11, e12, e20, e21, e22),
     )
@@ -233,21 +209,13 @@ def transition(R: Mat3, f: Vec3, w: Vec3, dt: float) -> tuple[Mat3, Mat3, Mat3]:
 @compilable
 def carry(M: Array, blocks: tuple[Mat3, Mat3, Mat3], dt: float) -> None:
     """Replace ``M`` (17, n) [SI] by F M, with the ``blocks`` of F [SI], ``dt`` [s] later."""
-    a00, a01, a02, a10, a11, a12, a20, a21, a22 = blocks[0]
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = blocks[1]
-    e00, e01, e02, e10, e11, e12, e20, e21, e22 = blocks[2]
+    slope, by_bias, turn = blocks
     for j in range(M.shape[1]):
-        t0, t1, t2 = M[6, j], M[7, j], M[8, j]
-        b0, b1, b2 = M[9, j], M[10, j], M[11, j]
-        M[0, j] += dt * M[3, j]
-        M[1, j] += dt * M[4, j]
-        M[2, j] += dt * M[5, j]
-        M[3, j] += a00 * t0 + a01 * t1 + a02 * t2 - (r00 * b0 + r01 * b1 + r02 * b2)
-        M[4, j] += a10 * t0 + a11 * t1 + a12 * t2 - (r10 * b0 + r11 * b1 + r12 * b2)
-        M[5, j] += a20 * t0 + a21 * t1 + a22 * t2 - (r20 * b0 + r21 * b1 + r22 * b2)
-        M[6, j] = e00 * t0 + e01 * t1 + e02 * t2 - dt * M[12, j]
-        M[7, j] = e10 * t0 + e11 * t1 + e12 * t2 - dt * M[13, j]
-        M[8, j] = e20 * t0 + e21 * t1 + e22 * t2 - dt * M[14, j]
+        t, b = (M[6, j], M[7, j], M[8, j]), (M[9, j], M[10, j], M[11, j])
+        for i in range(3):
+            M[P + i, j] += dt * M[V + i, j]
+            M[V + i, j] += dot(three(slope, 3 * i), t) - dot(three(by_bias, 3 * i), b)
+            M[TH + i, j] = dot(three(turn, 3 * i), t) - dt * M[BG + i, j]
 
 
 @compilable
@@ -290,18 +258,16 @@ def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
 
     The readings are ``row`` (10,) [SI] and the one ``before`` (10,) [SI], or the same.
     """
-    b, g = x.accel_bias, x.gyro_bias
+    return _mean(row, before, FORCE, x.accel_bias), _mean(row, before, RATE, x.gyro_bias)
+
+
+@compilable
+def _mean(row: Array, before: Array, at: int, bias: Array) -> Vec3:
+    a, b = three(row, at), three(before, at)
     return (
-        (
-            0.5 * (row[1] + before[1]) - b[0],
-            0.5 * (row[2] + before[2]) - b[1],
-            0.5 * (row[3] + before[3]) - b[2],
-        ),
-        (
-            0.5 * (row[4] + before[4]) - g[0],
-            0.5 * (row[5] + before[5]) - g[1],
-            0.5 * (row[6] + before[6]) - g[2],
-        ),
+        0.5 * (a[0] + b[0]) - bias[0],
+        0.5 * (a[1] + b[1]) - bias[1],
+        0.5 * (a[2] + b[2]) - bias[2],
     )
 
 
@@ -317,7 +283,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
     f, w = mean_of(x, row, before)
     steps = max(1, math.ceil(gap / law.imu_gap - 1e-6))
     dt = gap / steps
-    p, v, q = three(x.p, 0), three(x.v, 0), vec4(x.q)
+    p, v, q = three(x.p, 0), three(x.v, 0), four(x.q)
     a = (0.0, 0.0, 0.0)
     for i in range(3):
         M[V + i, V + i] += row[MISSED]
@@ -379,18 +345,8 @@ def watch_biases(x: Any, M: Array, lost: int) -> None:
         if lost & half:
             x.kept_bias[i], x.kept_variance[i] = bias[i % 3], M[k, k]
         else:
-            restore_bias(x, M, i)
-
-
-@compilable
-def restore_bias(x: Any, M: Array, i: int) -> None:
-    """Bias ``i`` [1] of the six is what it was before its readings were lost.
-
-    ``M`` (ERRORS, ERRORS) [SI] is the covariance.
-    """
-    bias = x.accel_bias if i < 3 else x.gyro_bias
-    bias[i % 3] = x.kept_bias[i]
-    reset_covariance(x, M, BA + i, x.kept_variance[i])
+            bias[i % 3] = x.kept_bias[i]
+            reset_covariance(x, M, k, x.kept_variance[i])
 
 
 @compilable
@@ -421,7 +377,7 @@ def present(x: Any, now: float) -> tuple[Vec3, Vec3, Vec4, Vec3, Vec3]:
     All readings since the state's time are integrated anew, with the newest biases. After the last
     reading, that one is held.
     """
-    p, v, q = three(x.p, 0), three(x.v, 0), vec4(x.q)
+    p, v, q = three(x.p, 0), three(x.v, 0), four(x.q)
     t, last = x.time, x.imu[(x.first - 1) % IMU_CAPACITY]
     for k in range(x.first, x.end):
         row = x.imu[k % IMU_CAPACITY]
@@ -540,4 +496,4 @@ def inject(x: Any) -> None:
         x.rate[i] -= error[BG + i]
     x.baro_bias += error[BARO]
     x.pose_delay += error[DELAY]
-    put_four(x.q, turned(vec4(x.q), error[TH], error[TH + 1], error[TH + 2]))
+    put_four(x.q, turned(four(x.q), error[TH], error[TH + 1], error[TH + 2]))

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
-from fsw.autopilot.signals import Mat3, SensorFrame, StateEstimate, Vec3, Vec4
+from fsw.autopilot.geometry.vectors import four, put_three, three
+from fsw.autopilot.signals import SensorFrame, StateEstimate, Vec3
 from fsw.autopilot.tick_record import Estimate, Tick
 from fsw.compiled import compilable, kernel, machine_code
 from fsw.record import JOINTS as _ROOM
@@ -70,44 +71,26 @@ def _read(records: NDArray[Any], reading: Floats, now_us: int) -> int:
 @compilable
 def read_into(x: Estimate, reading: Floats, now_us: int) -> int:
     """The estimate of a ``reading`` (READINGS,) [SI]; which parts of that cannot be."""
-    s = reading
-    p, v, w = (s[0], s[1], s[2]), (s[3], s[4], s[5]), (s[10], s[11], s[12])
-    missing, R, x.yaw = attitude(p, v, (s[6], s[7], s[8], s[9]), w, (s[13], s[14], s[15]))
-    for i in range(3):
-        x.p_WB[i], x.v_WB[i], x.w_WB_B[i] = p[i], v[i], w[i]
+    s, missing = reading, 0
+    p, v, q, w = three(s, 0), three(s, 3), four(s, 6), three(s, 10)
+    norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+    # Of what is no number every comparison is false.
+    if not (_within(p, _PLACE_LIMIT) and _within(v, _SPEED_LIMIT) and 0.5 < norm2 < 2.0):
+        missing |= POSE
+    if not (_within(w, _RATE_LIMIT) and abs(s[15]) < FORCE_LIMIT):
+        missing |= INERTIAL
+    R = matrix_from_quaternion(q)
+    put_three(x.p_WB, 0, p)
+    put_three(x.v_WB, 0, v)
+    put_three(x.w_WB_B, 0, w)
     for i in range(9):
         x.R_WB[i] = R[i]
     for i in range(x.q_arm.size):
         x.q_arm[i], x.qd_arm[i] = s[_ANGLES_AT + i], s[_RATES_AT + i]
-        # Of what is no number every comparison is false.
         if not (abs(x.q_arm[i]) < _ANGLE_LIMIT and abs(x.qd_arm[i]) < _RATE_LIMIT):
             missing |= JOINTS
-    x.t_us, x.specific_force = now_us, -s[15]
+    x.t_us, x.yaw, x.specific_force = now_us, yaw_of(R), -s[15]
     return missing
-
-
-@compilable
-def attitude(
-    p_WB: Vec3, v_WB: Vec3, q_WB: Vec4, gyro_B: Vec3, accel_B: Vec3
-) -> tuple[int, Mat3, float]:
-    """Parts that are no numbers, out of range or no attitude; the rotation R_WB and its yaw [rad].
-
-    Args:
-        p_WB: Position [m].
-        v_WB: Velocity [m/s].
-        q_WB: Attitude, [w, x, y, z] [1].
-        gyro_B: Body rates [rad/s].
-        accel_B: Specific force [m/s^2].
-    """
-    missing = 0
-    norm2 = q_WB[0] * q_WB[0] + q_WB[1] * q_WB[1] + q_WB[2] * q_WB[2] + q_WB[3] * q_WB[3]
-    # Of what is no number every comparison is false.
-    if not (_within(p_WB, _PLACE_LIMIT) and _within(v_WB, _SPEED_LIMIT) and 0.5 < norm2 < 2.0):
-        missing |= POSE
-    if not (_within(gyro_B, _RATE_LIMIT) and abs(accel_B[2]) < FORCE_LIMIT):
-        missing |= INERTIAL
-    R = matrix_from_quaternion(q_WB)
-    return missing, R, yaw_of(R)
 
 
 @compilable

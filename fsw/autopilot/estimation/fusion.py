@@ -16,7 +16,6 @@ from fsw.autopilot.estimation.error_state import (
     BA,
     BG,
     DELAY,
-    ERRORS,
     LAGS,
     NOTHING,
     TH,
@@ -26,13 +25,13 @@ from fsw.autopilot.estimation.error_state import (
     correct,
     distance,
     reset_covariance,
-    vec4,
 )
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
 from fsw.autopilot.geometry.vectors import (
     add,
     add_scaled,
     dot,
+    four,
     norm,
     put_three,
     subtract,
@@ -99,9 +98,7 @@ def followed(scale: float, squared: float, start: float) -> float:
 @compilable
 def clear(x: Any, rows: int) -> None:
     """Slopes of some ``rows`` [1] of a state ``x`` [SI]: none."""
-    for k in range(rows):
-        for j in range(ERRORS):
-            x.H[k, j] = 0.0
+    x.H[:rows, :] = 0.0
 
 
 @compilable
@@ -187,7 +184,7 @@ def _doubt_force(x: Any) -> None:
     One cause, so that the next measurement tells all of it: what grows is known too late to wait
     until velocities have been seen.
     """
-    M, R, variance = x.covariance, matrix_from_quaternion(vec4(x.q)), _LEANT_FORCE * _LEANT_FORCE
+    M, R, variance = x.covariance, matrix_from_quaternion(four(x.q)), _LEANT_FORCE * _LEANT_FORCE
     fast, far = _LEANT_FOR, 0.5 * _LEANT_FOR * _LEANT_FOR
     for i in range(3):
         M[P + i, P + i] += far * far * variance
@@ -320,7 +317,7 @@ def doubt(filters: Filter, along: Vec3, about: Vec3, place: float, turn: float, 
     turned, ``held``, their places would be explained by any attitude.
     """
     x = filters[0]
-    M, R = x.covariance, matrix_from_quaternion(vec4(x.q))
+    M, R = x.covariance, matrix_from_quaternion(four(x.q))
     north, east, down = _unit(along)
     level, up = (north, east, 0.0), (0.0, 0.0, down)
     tilt, spin = rotate_back(R, (-east, north, 0.0)), _unit(about)

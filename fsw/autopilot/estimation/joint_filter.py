@@ -112,9 +112,7 @@ def read(x: Any, law: Any, now: float, angles: Floats, age: float) -> int:
     if before_it > 0 and far:
         _move_zero(x)
         _take_off_zero(x, angles)
-    x.encoder_leapt = 0.0
-    for i in range(x.joint_count):
-        x.encoder_leap[i] = 0.0
+    x.encoder_leapt, x.encoder_leap[:] = 0.0, 0.0
     if before_it > 0 and _is_far(x, angles):
         begin(x, law, time, angles)
     else:
@@ -188,9 +186,7 @@ def begin(
     while x.pushed < x.pushes_end and x.pushes[x.pushed % PUSHES, 0] <= time:
         x.pushed += 1
     C = x.joint_variance
-    for i in range(3):
-        for j in range(3):
-            C[i, j] = 0.0
+    C[:] = 0.0
     C[0, 0] = law.encoder_noise * law.encoder_noise
     C[1, 1] = _RATE_AT_START * _RATE_AT_START
     C[2, 2] = _DISTURBANCE_AT_START * _DISTURBANCE_AT_START
@@ -244,13 +240,11 @@ def _move(x: Any, law: Any, push: Floats, dt: float) -> None:
     q *= q * dt
     C[0, 0] += q * h * h / 5.0
     C[0, 1] += q * h * dt / 4.0
-    C[1, 0] = C[0, 1]
     C[0, 2] += q * h / 3.0
-    C[2, 0] = C[0, 2]
     C[1, 1] += q * dt * dt / 3.0
     C[1, 2] += q * dt / 2.0
-    C[2, 1] = C[1, 2]
     C[2, 2] += q
+    C[1, 0], C[2, 0], C[2, 1] = C[0, 1], C[0, 2], C[1, 2]
 
 
 @compilable

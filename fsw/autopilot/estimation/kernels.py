@@ -33,15 +33,13 @@ from fsw.autopilot.estimation.error_state import (
     mean_of,
     present,
     propagate,
-    put_four,
     transition,
     varies,
-    vec4,
 )
 from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.encoder_watch import encoders_stuck, watch_encoders
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, yaw_of
-from fsw.autopilot.geometry.vectors import put_three, three
+from fsw.autopilot.geometry.vectors import dot, four, put_four, put_three, three
 from fsw.autopilot.model.airframe import GRAVITY
 from fsw.autopilot.signals import JointVector, Mat3, Vec3, Vec4
 from fsw.autopilot.tick_record import Estimate, Expected
@@ -93,12 +91,7 @@ PRESENT_AT = Asked.place("present")
 
 @kernel
 def tick(
-    filters: Filter,
-    law: Law,
-    requests: NDArray[Any],
-    parts: int,
-    now: float,
-    until: float,
+    filters: Filter, law: Law, requests: NDArray[Any], parts: int, now: float, until: float
 ) -> int:
     """Do some ``parts`` [1] of a tick as asked by one of ``requests`` (1,) [SI]; what came of it.
 
@@ -108,7 +101,7 @@ def tick(
     """
     x, t, a = filters[0], law[0], requests[0]
     e = a.expected
-    model = vec4(e.model)
+    model = four(e.model)
     a.of_imu, a.of_encoders, stuck = 0, 0, False
     if parts & JOINTS:
         was_stuck = encoders_stuck(x)
@@ -229,7 +222,7 @@ def couple_level(x: Filter, law: Law) -> None:
     With d the vertical in body axes, a bias b turns it by -(d x b) / g.
     """
     s = x[0]
-    M, R = s.covariance, matrix_from_quaternion(vec4(s.q))
+    M, R = s.covariance, matrix_from_quaternion(four(s.q))
     g, variance = GRAVITY, law[0].accel_bias * law[0].accel_bias
     a, b, c = R[6] / g, R[7] / g, R[8] / g
     rows = ((0.0, c, -b), (-c, 0.0, a), (b, -a, 0.0))
@@ -237,10 +230,7 @@ def couple_level(x: Filter, law: Law) -> None:
         for j in range(3):
             M[TH + i, BA + j] = rows[i][j] * variance
             M[BA + j, TH + i] = rows[i][j] * variance
-            total = 0.0
-            for k in range(3):
-                total += rows[i][k] * rows[j][k]
-            M[TH + i, TH + j] += total * variance
+            M[TH + i, TH + j] += dot(rows[i], rows[j]) * variance
 
 
 @machine_code
@@ -253,7 +243,7 @@ def present_covariance(x: Filter, law: Law, now: float, M: Array, X: Array) -> N
             M[i, j] = s.covariance[i, j]
         for j in range(FRAME):
             X[i, j] = s.shared[i, j]
-    q, time = vec4(s.q), s.time
+    q, time = four(s.q), s.time
     p, v = three(s.p, 0), three(s.v, 0)
     for k in range(s.first - 1, s.end):
         row = s.imu[k % IMU_CAPACITY]

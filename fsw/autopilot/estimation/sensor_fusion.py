@@ -18,14 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from fsw.autopilot.estimation import fusion, kernels
-from fsw.autopilot.estimation.error_state import (
-    DELAY,
-    ERRORS,
-    FRAME,
-    TH,
-    Array,
-    Filter,
-)
+from fsw.autopilot.estimation.error_state import DELAY, ERRORS, FRAME, TH, Array, Filter
 from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, ended, extended
@@ -138,7 +131,7 @@ class SensorFusion:
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """``take_in`` and ``catch_up``; the state at ``now`` [s] after both."""
         memory, estimate = self.take_in(memory, samples, now, expected)
-        return self.catch_up(memory, samples, now, estimate)
+        return self.catch_up(memory, samples, estimate)
 
     def take_in(
         self,
@@ -225,7 +218,6 @@ class SensorFusion:
         self,
         memory: FusionMemory,
         samples: Sequence[Sample],
-        now: float,
         estimate: StateEstimate | None,
         *,
         aloft: Callable[[], bool] = lambda: True,
@@ -233,7 +225,7 @@ class SensorFusion:
         damaged: bool = False,
         touches: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        """Check the other ``samples``, fuse what the filter reaches; the state at ``now`` [s].
+        """Check the other ``samples``, fuse what the filter reaches; the state of this tick.
 
         The loops need not wait for it: a pose is late anyway, and the next tick knows of it. Where
         there is nothing to fuse the state is the ``estimate`` of ``take_in``. Every 20 ms it is
@@ -241,40 +233,37 @@ class SensorFusion:
         Of a ``damaged`` one a rotor or a joint is known to have failed, and one that ``touches``
         something is turned by that.
         """
-        memory, found = self._caught_up(memory, samples, now, estimate)
+        memory, found = self._caught_up(memory, samples, estimate)
         if not memory.started:
             return memory, found
         if found is None:
             return begun(memory), None
         return self._arbitration.step(
-            memory, now, found, aloft=aloft, flies=flies, damaged=damaged, touches=touches
+            memory, found, aloft=aloft, flies=flies, damaged=damaged, touches=touches
         )
 
     def rests(self, memory: FusionMemory, samples: Sequence[Sample]) -> bool:
         """Whether ``catch_up`` would find nothing to do: nothing came, or is due."""
-        if not memory.started or self._arbitration.is_due(memory, memory.now):
+        if not memory.started or self._arbitration.is_due(memory):
             return False
         came = [one for one in samples if not isinstance(one, _OF_EVERY_TICK)]
-        return not came and _rests(memory, memory.now)
+        return not came and _rests(memory)
 
     def _again(
         self, memory: FusionMemory, tick: TickInputs
     ) -> tuple[FusionMemory, StateEstimate | None]:
         samples, now, expected = tick
         memory, found = self.take_in(memory, samples, now, Expected(expected))
-        return self._caught_up(memory, samples, now, found)
+        return self._caught_up(memory, samples, found)
 
     def _caught_up(
-        self,
-        memory: FusionMemory,
-        samples: Sequence[Sample],
-        now: float,
-        estimate: StateEstimate | None,
+        self, memory: FusionMemory, samples: Sequence[Sample], estimate: StateEstimate | None
     ) -> tuple[FusionMemory, StateEstimate | None]:
+        now = memory.now
         for sample in samples:
             if not isinstance(sample, _OF_EVERY_TICK):
                 memory = self.take(memory, sample, now)
-        if estimate is not None and _rests(memory, now):
+        if estimate is not None and _rests(memory):
             return memory, estimate
         x = copied(memory.numbers)
         memory = replace(memory, numbers=x)
@@ -286,7 +275,7 @@ class SensorFusion:
         until = now - memory.delay - _MARGIN
         while memory.waiting and memory.waiting[0].time <= until:
             self._tick(x, self.law, self._requests, ADVANCE, now, memory.waiting[0].time)
-            memory = self._fuse_first(memory, now)
+            memory = self._fuse_first(memory)
         if self._tick(x, self.law, self._requests, ADVANCE | END, now, until) & FINITE:
             return memory, estimate_in(self._asked, PRESENT_AT, self._joints)
         return _anew(memory), None
@@ -324,7 +313,9 @@ class SensorFusion:
                 health = health.with_fault(fault, now)
         delay = memory.delay
         if fault in (SensorFault.NONE, SensorFault.TOO_OLD):
-            delay = self._delay(delay, now - time, now - before.came)
+            # As long as measurements have taken; it fades with the time since the last one.
+            faded = delay - self.tuning.delay_decay * min(now - before.came, 1.0)
+            delay = min(max(now - time, faded), self.tuning.longest_delay)
         others, used = memory.without(health.sensor), False
         if not fault:
             memory = memory.hearing(sample)
@@ -352,17 +343,9 @@ class SensorFusion:
         M[DELAY, DELAY] = sigma**2
         return replace(memory, delay_sigma=sigma)
 
-    def _delay(self, before: float, delay: float, apart: float) -> float:
-        """How long measurements take, after one did so, ``apart`` [s] from its sensor's last one.
-
-        ``before`` [s] and ``delay`` [s].
-        """
-        faded = before - self.tuning.delay_decay * min(apart, 1.0)
-        return min(max(delay, faded), self.tuning.longest_delay)
-
-    def _fuse_first(self, memory: FusionMemory, now: float) -> FusionMemory:
+    def _fuse_first(self, memory: FusionMemory) -> FusionMemory:
         """Fuse the first of the waiting samples, whose time the filter has."""
-        one = memory.waiting[0]
+        one, now = memory.waiting[0], memory.now
         sample, sensor = one.sample, self._sensors[type(one.sample)]
         if sensor.source is Source.COMPASS and memory.verdict.suspects & Source.COMPASS:
             # A heading that may be wrong is not needed, and turns what else is measured. It may be
@@ -392,15 +375,13 @@ class SensorFusion:
                 ended(memory.runs, sample),
             )
         passes = [r <= 1.0 and before for r, before in zip(ratio, refused, strict=False)]
-        if any(passes) and not self._is_expected(memory, sample, innovation, passes, now):
+        if any(passes) and not self._is_expected(memory, sample, innovation, passes):
             # The gate widens meanwhile, until some of what is garbage is within it: a run has to
             # say so.
             memory.numbers[0] = kept
             ratio = tuple([max(r, _JUST_REFUSED) for r in ratio])
         previous = kept if announced and drifts else None
-        return self._judged(
-            memory, one, ratio, innovation, now, announced=announced, previous=previous
-        )
+        return self._judged(memory, one, ratio, innovation, announced=announced, previous=previous)
 
     def _is_expected(
         self,
@@ -408,7 +389,6 @@ class SensorFusion:
         sample: AidingSample,
         innovation: tuple[float, ...],
         passes: Sequence[bool],
-        now: float,
     ) -> bool:
         """Whether a pose whose last one was refused is used without a run that says the same.
 
@@ -421,7 +401,7 @@ class SensorFusion:
         if _is_small(sample, innovation):
             return True
         used = memory.of(Sensor.POSE).fused
-        if not isinstance(sample, PoseSample) or now - min(used) > self.tuning.reset_time:
+        if not isinstance(sample, PoseSample) or memory.now - min(used) > self.tuning.reset_time:
             return False
         sigmas = self._pose.deviations(memory, self._pose.stated(sample))
         most = math.sqrt(chi_square(self.tuning.pose.gate, 3))
@@ -434,7 +414,6 @@ class SensorFusion:
         one: Waiting,
         ratio: tuple[float, ...],
         innovation: tuple[float, ...],
-        now: float,
         *,
         announced: bool,
         previous: Any,
@@ -445,7 +424,7 @@ class SensorFusion:
         jumped (``announced``), from the filter's ``previous`` state if it drifts. How far, two
         poses must agree upon: the one that announces it may be wrong as well.
         """
-        sample, sensor = one.sample, self._sensors[type(one.sample)]
+        sample, sensor, now = one.sample, self._sensors[type(one.sample)], memory.now
         health = memory.of(sensor.sensor)
         # What is infinite says nothing here.
         refused = any(1.0 < r < math.inf for r in ratio)
@@ -479,7 +458,7 @@ class SensorFusion:
             and run.is_believable(
                 self.tuning.reset_time, announced=announced, jumped=memory.unproven
             )
-            and not _tilts(memory, sample, innovation, now)
+            and not _tilts(memory, sample, innovation)
         )
         if announced and run is not None and not believed:
             memory = replace(memory, reset_counter=counter)
@@ -548,8 +527,8 @@ class SensorFusion:
         return math.dist(innovation[:3], before[:3]) > room
 
 
-def _rests(memory: FusionMemory, now: float) -> bool:
-    """Whether there is nothing to fuse at ``now`` [s].
+def _rests(memory: FusionMemory) -> bool:
+    """Whether there is nothing to fuse now.
 
     Then the filter may stay where it is: the state is made of the IMU's readings since.
     """
@@ -557,8 +536,8 @@ def _rests(memory: FusionMemory, now: float) -> bool:
         return False
     waits = memory.waiting
     if waits:
-        return waits[0].time > now - memory.delay - _MARGIN
-    return bool(now - memory.numbers[0]["time"] < _FARTHEST_BEHIND)
+        return waits[0].time > memory.now - memory.delay - _MARGIN
+    return bool(memory.now - memory.numbers[0]["time"] < _FARTHEST_BEHIND)
 
 
 def _anew(memory: FusionMemory) -> FusionMemory:
@@ -615,13 +594,11 @@ def _as_judged(
     return health, not wrong & ~Source.ATTITUDE, half or bool(wrong)
 
 
-def _tilts(
-    memory: FusionMemory, sample: AidingSample, innovation: tuple[float, ...], now: float
-) -> bool:
+def _tilts(memory: FusionMemory, sample: AidingSample, innovation: tuple[float, ...]) -> bool:
     """Whether a pose has jumped in a way that no frame does: down stays where it is.
 
     In flight the filter knows where, but for what a gyro may have turned it by that others
-    contradict at ``now`` [s].
+    contradict now.
     """
     x, evidence = memory.numbers[0], memory.verdict.evidence
     if not isinstance(sample, PoseSample) or evidence is None or evidence[0]["began"] < 0.0:
@@ -629,7 +606,7 @@ def _tilts(
     verdict, room = memory.verdict, 0.0
     if verdict.is_on:  # what fires by chance has turned nothing so far
         used = max(memory.of(Sensor.POSE).fused[1], verdict.since)
-        room = (now - used) * residuals.size_of(evidence, Source.GYRO)
+        room = (memory.now - used) * residuals.size_of(evidence, Source.GYRO)
     rx, ry, rz = innovation[3:]
     down = rotate_back(matrix_from_quaternion(attitude_of(x)), (0.0, 0.0, 1.0))
     along = rx * down[0] + ry * down[1] + rz * down[2]

@@ -219,8 +219,9 @@ class Autopilot:
         ticks = looped = self._elapsed_ticks(state, now_us)
         vehicle = state.vehicle
         flown = vehicle.flies and vehicle.unloaded is None and bool(state.record.has_plan)
-        if flown and now_us - state.t_us > self._max_us:
-            state, ticks, looped = self._resumed(state, estimate), self._until_plan(state), 1
+        if flown and now_us - state.t_us > self._max_us:  # on to the next that asks for a plan
+            ticks, looped = self._ticks_per_plan - state.index % self._ticks_per_plan, 1
+            state = self._resumed(state, estimate)
         if state.record is not began:  # loops or plan begin anew
             r = state.record.copy()
             r.state_estimate = estimate
@@ -326,18 +327,18 @@ class Autopilot:
 
         The record of the ``state`` is that of the tick before.
         """
-        mission, fusion, request = state.mission, state.fusion, None
+        mission, request = state.mission, None
         held = self._safe_sets.hold_silent_zones(mission, now_us)
         if held is not mission:
             state = replace(state, mission=held)
-        covariance = self._sensed.covariance(fusion)
-        pose = self._pose_error(state, estimate, fusion, covariance)
+        covariance = self._sensed.covariance(state.fusion)
+        pose = self._pose_error(state, estimate, covariance)
         state = self._keep_clear(state, estimate, pose)
         texts: list[StatusText] = []
         if nominal is not None:
             state, request = self._request_plan(state, estimate, nominal, now_us, texts)
         state = self._report_slowly(state, estimate, now_us)
-        state = self._sensed.reported(state, fusion, estimate, covariance)
+        state = self._sensed.reported(state, estimate, covariance)
         state = self._see_accuracy(state, estimate, covariance, pose, texts)
         announced, safety = len(state.mission.announced.zones), state.safety
         flies = nominal is not None
@@ -478,10 +479,6 @@ class Autopilot:
         state = plan_resumed(self.config, state, estimate, motion)
         return replace(state, record=loops_resumed(self.config, state.record, estimate))
 
-    def _until_plan(self, state: FlightState) -> int:
-        """Ticks from the last one to the next that asks for a plan."""
-        return self._ticks_per_plan - state.index % self._ticks_per_plan
-
     def _elapsed_ticks(self, state: FlightState, now_us: int) -> int:
         """Ticks since the last one: more than one where sensor frames were missed."""
         elapsed = (now_us - state.t_us) // self._tick_us
@@ -579,17 +576,14 @@ class Autopilot:
         return beyond_covered(self._safe_sets.loop_tube, memory.wind)
 
     def _pose_error(
-        self,
-        state: FlightState,
-        estimate: StateEstimate,
-        fusion: FusionMemory | None,
-        covariance: Array | None,
+        self, state: FlightState, estimate: StateEstimate, covariance: Array | None
     ) -> Array | None:
         """Covariance (6, 6) of position [m, NED] and attitude [rad, NED], as clearances grow by it.
 
         ``covariance`` (17, 17) [SI] is that of the filter, if there is one; without, exact states
         are uncertain while a part of them is missing. None: certain.
         """
+        fusion = state.fusion
         if covariance is not None and fusion is not None:
             return pose_covariance(covariance, estimate, self._sensed.correlated_error(fusion))
         if fusion is None and state.aiding is not AIDED:

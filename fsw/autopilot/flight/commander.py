@@ -16,13 +16,7 @@ from fsw.autopilot.flight.commands.handlers import Decision, decide, decide_with
 from fsw.autopilot.flight.failsafe.conditions import NOTHING_DONE, Action
 from fsw.autopilot.flight.failsafe.evidence import FailsafeContext
 from fsw.autopilot.flight.failsafe.response import overridden, respond
-from fsw.autopilot.flight.failsafe.table import (
-    BLOCKING,
-    SLOW_US,
-    active,
-    quickly_active,
-    unhealthy,
-)
+from fsw.autopilot.flight.failsafe.table import BLOCKING, SLOW_US, active, quickly_active, unhealthy
 from fsw.autopilot.flight.land_detector import in_the_air, standing_unclear, stands
 from fsw.autopilot.flight.mission.sequencer import refusal as mission_refusal
 from fsw.autopilot.flight.modes import MODES

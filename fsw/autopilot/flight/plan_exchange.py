@@ -16,14 +16,7 @@ from fsw.autopilot.model.nominal import NominalModel, rest_state
 from fsw.autopilot.model.rotors import MotionState
 from fsw.autopilot.mpc.qp_data import InputLimits
 from fsw.autopilot.parameters.flight_config import FlightConfig
-from fsw.autopilot.signals import (
-    Plan,
-    PlanFailure,
-    PlanInput,
-    PredictionState,
-    StateEstimate,
-    Vec3,
-)
+from fsw.autopilot.signals import Plan, PlanFailure, PlanInput, PredictionState, StateEstimate, Vec3
 from fsw.autopilot.tick_record import Tick
 from fsw.frozen import replace
 

@@ -12,12 +12,7 @@ from fsw.autopilot.parameters.consistency import refusals, weakened
 from fsw.autopilot.parameters.contradictions import agreed
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import PARAMETERS
-from fsw.autopilot.signals import (
-    Severity,
-    StatusText,
-    TickInputs,
-    TickOutputs,
-)
+from fsw.autopilot.signals import Severity, StatusText, TickInputs, TickOutputs
 from fsw.autopilot.tuning import Tuning, part, tuned
 from fsw.frozen import replace
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fsw.autopilot.signals import Vec3
+from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable
 
 Vector = Vec3 | NDArray[Any]  # compiled code may hand over a row of an array (3,)
@@ -29,6 +29,18 @@ def three(a: Several, at: int) -> Vec3:
 def put_three(a: NDArray[Any], at: int, v: Vec3) -> None:
     """Write ``v`` [unit of a, any frame] into ``a`` (n,) [any unit] from ``at`` [1] on."""
     a[at], a[at + 1], a[at + 2] = v
+
+
+@compilable
+def four(a: Several, at: int = 0) -> Vec4:
+    """Four entries of ``a`` (n,) [any unit], a quaternion as a rule, from ``at`` [1] on."""
+    return a[at], a[at + 1], a[at + 2], a[at + 3]
+
+
+@compilable
+def put_four(a: NDArray[Any], q: Vec4) -> None:
+    """Write ``q`` [any unit] into ``a`` (4,) [unit of q]."""
+    a[0], a[1], a[2], a[3] = q
 
 
 @compilable

@@ -36,7 +36,7 @@ from fsw.autopilot.estimation.error_state import (
 )
 from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.residuals import LASTS, NO_AID
-from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
+from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.faults.verdict import UNDECIDED, Verdict, judged, lifted
 from fsw.autopilot.estimation.fusion import clear
@@ -70,10 +70,8 @@ _PARTS: Final = {
     Sensor.POSE: (Source.POSE, Source.ATTITUDE),
     Sensor.GNSS: (Source.GNSS, Source.GNSS),
 }
-_FOLLOWED: Final = (
-    SensorFault.RATE_TOO_LOW,
-    SensorFault.NOISY,
-)  # encoders that are used all the same
+# Of encoders that are used all the same.
+_FOLLOWED: Final = (SensorFault.RATE_TOO_LOW, SensorFault.NOISY)
 _ROUNDING: Final = 1e-9  # s
 
 Again = Callable[[FusionMemory, TickInputs], tuple[FusionMemory, StateEstimate | None]]
@@ -84,10 +82,7 @@ class Arbitration:
     """Asks who is wrong, for one configuration; holds nothing that changes in flight."""
 
     def __init__(
-        self,
-        sensors: Mapping[type, AidingSensor[Any, Any]],
-        stale: float,
-        again: Again,
+        self, sensors: Mapping[type, AidingSensor[Any, Any]], stale: float, again: Again
     ) -> None:
         """Of some ``sensors``, each silent after ``stale`` [s]."""
         self._sensors, self._stale = sensors, stale
@@ -96,7 +91,6 @@ class Arbitration:
     def step(
         self,
         memory: FusionMemory,
-        now: float,
         found: StateEstimate,
         *,
         aloft: Callable[[], bool],
@@ -104,7 +98,7 @@ class Arbitration:
         damaged: bool,
         touches: bool = False,
     ) -> tuple[FusionMemory, StateEstimate | None]:
-        """The memory, and the state ``found`` at ``now`` [s], after what is due.
+        """The memory, and the state ``found`` in this tick, after what is due.
 
         Nothing is, unless the vehicle ``flies``, and is ``aloft``: else the ground may hold it. Of
         a ``damaged`` one a rotor or a joint is known to have failed; the tool of one that
@@ -113,16 +107,16 @@ class Arbitration:
         evidence = memory.verdict.evidence
         if evidence is None:
             return begun(memory), found
-        if not self.is_due(memory, now):
+        if not self.is_due(memory):
             return memory, found
         before = memory.verdict
-        memory = _lifted(memory, now, found, flies=flies, known=damaged or touches)
+        memory = _lifted(memory, found, flies=flies, known=damaged or touches)
         if memory.verdict.wrong is not before.wrong:
             oldest = memory.trail_before or memory.trail
-            memory, state = self._convicted(memory, before, now, found)
+            memory, state = self._convicted(memory, before, found)
             if state is None or (oldest and oldest.began <= before.measured):
                 return memory, state
-            return _as_made(memory, before, now, state)
+            return _as_made(memory, before, state)
         if not aloft():
             # What is in doubt is so until the rotors stand, on the ground too: else its bias would
             # be the one of before.
@@ -131,25 +125,19 @@ class Arbitration:
             if evidence[0]["count"] or memory.verdict.is_on:
                 memory = _anew(memory)
             on_ground = memory.verdict.wrong and not (flies and _is_unseen(memory))
-            return (_on_ground(memory, now) if on_ground else memory), found
-        return self._look(memory, now, found, damaged=damaged, touches=touches)
+            return (_on_ground(memory) if on_ground else memory), found
+        return self._look(memory, found, damaged=damaged, touches=touches)
 
-    def is_due(self, memory: FusionMemory, now: float) -> bool:
-        """Whether ``step`` at ``now`` [s] would do anything."""
+    def is_due(self, memory: FusionMemory) -> bool:
+        """Whether ``step`` would do anything now."""
         evidence = memory.verdict.evidence
-        return evidence is None or now - evidence["looked"][0] >= residuals.EVERY - _ROUNDING
+        return evidence is None or memory.now - evidence["looked"][0] >= residuals.EVERY - _ROUNDING
 
     def _look(
-        self,
-        memory: FusionMemory,
-        now: float,
-        found: StateEstimate,
-        *,
-        damaged: bool,
-        touches: bool,
+        self, memory: FusionMemory, found: StateEstimate, *, damaged: bool, touches: bool
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory after a look at whether all sensors agree, and the state with it."""
-        before = memory.verdict
+        before, now = memory.verdict, memory.now
         assert before.evidence is not None
         evidence = copied(before.evidence)
         newest = memory.newest_pose, memory.gnss, memory.newest_field
@@ -159,7 +147,7 @@ class Arbitration:
             else self._sensors[type(sample)].aid(memory, sample)
             for sample, last in zip(newest, before.seen, strict=True)
         ]
-        silent = _silent(memory, now) | _stuck(memory) | _stepped(memory)
+        silent = _silent(memory) | _stuck(memory) | _stepped(memory)
         silent |= Source.MODEL if touches else NOBODY
         lost = residuals.note_silence(evidence, silent, now)
         learns = not (before.is_on or before.wrong or lost)
@@ -167,7 +155,7 @@ class Arbitration:
         ratios = tuple(evidence[0]["ratio"].tolist())
         verdict = before._replace(evidence=evidence, seen=newest)
         if before.is_on or before.wrong or max(ratios) > 1.0:
-            held = Source.ATTITUDE in self._aided(memory, now)
+            held = Source.ATTITUDE in self._aided(memory)
             verdict = judged(
                 verdict,
                 ratios,
@@ -181,12 +169,12 @@ class Arbitration:
         memory = replace(memory, verdict=verdict)
         state: StateEstimate | None = found
         if verdict.is_on or verdict.wrong or before.is_on or before.wrong:
-            memory, state = self._convicted(memory, before, now, found)
-        return _with_trail(memory, now), state
+            memory, state = self._convicted(memory, before, found)
+        return _with_trail(memory), state
 
-    def _aided(self, memory: FusionMemory, now: float) -> Source:
-        """Who measures places, and attitudes, that are used at ``now`` [s], and is not named."""
-        found, wrong = NOBODY, memory.verdict.wrong
+    def _aided(self, memory: FusionMemory) -> Source:
+        """Who measures places, and attitudes, that are used now, and is not named."""
+        found, wrong, now = NOBODY, memory.verdict.wrong, memory.now
         for sensor, parts in _PARTS.items():
             health = memory.of(sensor)
             fused = zip(parts, health.fused, strict=False)
@@ -196,10 +184,10 @@ class Arbitration:
         return found & ~wrong
 
     def _convicted(
-        self, memory: FusionMemory, before: Verdict, now: float, found: StateEstimate
+        self, memory: FusionMemory, before: Verdict, found: StateEstimate
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """The memory with a filter that knows the verdict, and the state with it."""
-        verdict = memory.verdict
+        verdict, now = memory.verdict, memory.now
         x = memory.numbers.copy()
         memory = replace(memory, numbers=x)
         new, back = verdict.wrong & ~before.wrong, before.wrong & ~verdict.wrong
@@ -216,7 +204,7 @@ class Arbitration:
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL | (CONTRADICTED if verdict.contradicts else 0)
-            verdict = _widened(x.view(np.recarray)[0], verdict, self._aided(memory, now))
+            verdict = _widened(x.view(np.recarray)[0], verdict, self._aided(memory))
             memory = replace(memory, verdict=verdict)
         # What the rotors explain, nobody else was wrong about.
         acquits = verdict.explained and not before.explained and any(before.unknown)
@@ -225,10 +213,10 @@ class Arbitration:
         x["believed"] = NOTHING if believes else 0
         if new & _UNIT:
             memory = memory.noting_fault(Sensor.IMU, SensorFault.DISAGREES, now)
-        return self._replayed(memory, now, found)
+        return self._replayed(memory, found)
 
     def _replayed(
-        self, memory: FusionMemory, now: float, found: StateEstimate
+        self, memory: FusionMemory, found: StateEstimate
     ) -> tuple[FusionMemory, StateEstimate | None]:
         """Go back to before sensors contradicted, and do without what is wrong since then."""
         trails = [one for one in (memory.trail_before, memory.trail) if one is not None]
@@ -252,11 +240,11 @@ class Arbitration:
         numbers["believed"] = 0
         for name in ("witness", "model_walk"):
             numbers[name] = memory.numbers[name]
-        health = tuple([_fused_as(one, back.of(one.sensor)) for one in memory.health])
+        fused = [(one, back.of(one.sensor)) for one in memory.health]
         start = replace(
             memory,
             numbers=numbers,
-            health=health,
+            health=tuple([a.with_fused(b.fused, b.ratio, b.innovation) for a, b in fused]),
             waiting=back.waiting,
             arrivals=back.arrivals,
             runs=back.runs,
@@ -267,7 +255,7 @@ class Arbitration:
             trail=None,
             trail_before=None,
         )
-        return replace(start, trail=Trail(start, now)), state
+        return replace(start, trail=Trail(start, memory.now)), state
 
 
 def begun(memory: FusionMemory) -> FusionMemory:
@@ -283,9 +271,9 @@ def _anew(memory: FusionMemory) -> FusionMemory:
     return begun(replace(memory, numbers=x, verdict=memory.verdict.acquitted()))
 
 
-def _on_ground(memory: FusionMemory, now: float) -> FusionMemory:
-    """The memory at ``now`` [s] with what was named in flight believed again, once it is time."""
-    verdict = memory.verdict.on_ground(now)
+def _on_ground(memory: FusionMemory) -> FusionMemory:
+    """The memory with what was named in flight believed again, once it is time."""
+    verdict = memory.verdict.on_ground(memory.now)
     x = memory.numbers
     if verdict.wrong is not memory.verdict.wrong:
         x = x.copy()
@@ -293,12 +281,12 @@ def _on_ground(memory: FusionMemory, now: float) -> FusionMemory:
     return replace(memory, numbers=x, verdict=verdict)
 
 
-def _with_trail(memory: FusionMemory, now: float) -> FusionMemory:
+def _with_trail(memory: FusionMemory) -> FusionMemory:
     """The memory with a new trail where the newest one is long enough.
 
     None is begun while it may have to be said soon who is wrong.
     """
-    newest, verdict = memory.trail, memory.verdict
+    newest, verdict, now = memory.trail, memory.verdict, memory.now
     if newest is not None:
         decides = verdict.is_on and now - verdict.since < UNDECIDED
         if decides or now - newest.began < _TRAIL:
@@ -315,16 +303,16 @@ def _is_unseen(memory: FusionMemory) -> bool:
 
 
 def _lifted(
-    memory: FusionMemory, now: float, found: StateEstimate, *, flies: bool, known: bool
+    memory: FusionMemory, found: StateEstimate, *, flies: bool, known: bool
 ) -> FusionMemory:
     """The memory with a verdict on what climbs, or not, while nothing measures the height.
 
     That rotors are off is ``known`` of a vehicle that is damaged or touches something.
     """
     v, p = _made_down(memory)
-    told = not (flies and _is_unseen(memory)) or known or bool(_silent(memory, now) & _BOTH)
+    told = not (flies and _is_unseen(memory)) or known or bool(_silent(memory) & _BOTH)
     down = found.v_WB[2] - v, found.p_WB[2] - p
-    return replace(memory, verdict=lifted(memory.verdict, down, now, told=told))
+    return replace(memory, verdict=lifted(memory.verdict, down, memory.now, told=told))
 
 
 def _made_down(memory: FusionMemory) -> Vec2:
@@ -334,15 +322,15 @@ def _made_down(memory: FusionMemory) -> Vec2:
 
 
 def _as_made(
-    memory: FusionMemory, before: Verdict, now: float, state: StateEstimate
+    memory: FusionMemory, before: Verdict, state: StateEstimate
 ) -> tuple[FusionMemory, StateEstimate]:
-    """The memory and the ``state`` at ``now`` [s], as rotors have moved it since it was measured.
+    """The memory and the ``state`` of now, as rotors have moved it since it was measured.
 
     Down, of which the verdict ``before`` tells: no trail of the filter goes back so far.
     """
     (v, p), (faster, lower) = _made_down(memory), before.seen_down
     (x, y, z), (vx, vy, vz) = state.p_WB, state.v_WB
-    p += lower + faster * (now - before.measured)
+    p += lower + faster * (memory.now - before.measured)
     numbers = memory.numbers.copy()
     numbers["p"][0, 2] += p - z
     numbers["v"][0, 2] += v + faster - vz
@@ -350,11 +338,12 @@ def _as_made(
     return replace(memory, numbers=numbers), state
 
 
-def _silent(memory: FusionMemory, now: float) -> Source:
-    """What has said nothing of how the vehicle moves at ``now`` [s].
+def _silent(memory: FusionMemory) -> Source:
+    """What says nothing of how the vehicle moves now.
 
     Rotors explain it only where it is known how the arm moves.
     """
+    now = memory.now
     unit = now - memory.imu_came > IMU_SILENT
     encoders, came = memory.of(Sensor.ENCODERS), now - memory.joints_came
     wrong = now - encoders.fault_at < residuals.EVERY and encoders.fault not in _FOLLOWED
@@ -456,8 +445,3 @@ def _doubt(x: Any, half: int) -> None:
 def _halves(sources: Source) -> int:
     """Halves of the inertial unit, as ``FILTER`` counts them, among some ``sources``."""
     return sum(half for source, half in _HALVES if source & sources)
-
-
-def _fused_as(health: Health, other: Health) -> Health:
-    """The ``health`` of a sensor of which other samples have been fused."""
-    return health.with_fused(other.fused, other.ratio, other.innovation)

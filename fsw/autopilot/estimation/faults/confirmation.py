@@ -45,11 +45,6 @@ class Run(NamedTuple):
     stepped: bool = False  # a place changed at once by what no inertial unit leads a filter astray
 
     @property
-    def is_confirmed(self) -> bool:
-        """Whether a second sample says so."""
-        return self.samples > 1
-
-    @property
     def is_no_chance(self) -> bool:
         """Whether more samples agree than do by chance."""
         return self.samples >= _NO_CHANCE
@@ -89,7 +84,7 @@ class Run(NamedTuple):
             if all(size <= most for size, most in zip(sizes, _ANNOUNCED, strict=True)):
                 sizes = [0.0, 0.0]
         takes = [size / speed for size, speed in zip(sizes, _BELIEVED, strict=True)]
-        return self.is_confirmed and self.last - self.since >= max(least, *takes)
+        return self.samples > 1 and self.last - self.since >= max(least, *takes)
 
 
 def ended(runs: tuple[Run, ...], sample: object) -> tuple[Run, ...]:
@@ -103,11 +98,7 @@ def ended(runs: tuple[Run, ...], sample: object) -> tuple[Run, ...]:
 
 
 def extended(
-    runs: tuple[Run, ...],
-    new: Run,
-    rooms: Callable[[float], tuple[float, ...]],
-    *,
-    seldom: bool,
+    runs: tuple[Run, ...], new: Run, rooms: Callable[[float], tuple[float, ...]], *, seldom: bool
 ) -> Run:
     """The run that a ``new`` one of a single refused sample goes on with, or is itself.
 

@@ -19,14 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation.error_state import (
-    BA,
-    CONTRADICTED,
-    HEIGHT_LASTS,
-    NO_FORCE,
-    WITNESS,
-    vec4,
-)
+from fsw.autopilot.estimation.error_state import BA, CONTRADICTED, HEIGHT_LASTS, NO_FORCE, WITNESS
 from fsw.autopilot.estimation.faults.sources import (
     AA,
     AM,
@@ -57,6 +50,7 @@ from fsw.autopilot.geometry.vectors import (
     clamp,
     cross,
     dot,
+    four,
     norm,
     put_three,
     subtract,
@@ -220,7 +214,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
             x.baseline[i], x.baseline[3 + i] = x.accel_bias[i], x.gyro_bias[i]
             x.baseline[6 + i] = 0.0
     f, w = three(x.newest, 0), three(x.newest, 3)
-    q = turned(vec4(W, SAID), dt * w[0], dt * w[1], dt * w[2])
+    q = turned(four(W, SAID), dt * w[0], dt * w[1], dt * w[2])
     for i in range(4):
         W[SAID + i] = q[i]
     b = x.baseline
@@ -447,17 +441,15 @@ def _is_near(row: Array, time: float, place: Vec3, q: Vec4, v: Vec3, room: Vec4)
     Or with a velocity, in ``q``. ``room`` [m, m/s, rad, m/s]: of the place, of the velocity ``v``,
     of the attitude, and of the velocity.
     """
-    dt, far = time - row[0], 0.0
-    for i in range(3):
-        off = place[i] - row[_MEASURED + i] - dt * v[i]
-        far += off * off
-    near: bool = math.sqrt(far) <= room[0] + room[1] * dt + _GAINS * dt * dt
+    dt = time - row[0]
+    off = add_scaled(subtract(place, three(row, _MEASURED)), v, -dt)
+    near: bool = norm(off) <= room[0] + room[1] * dt + _GAINS * dt * dt
     if room[3] < math.inf:
         gained = norm(subtract((q[0], q[1], q[2]), three(row, _MEASURED + 3)))
         return near and gained <= 2.0 * _GAINS * dt + room[3]
     if not room[2] < math.inf:
         return near
-    turn = rotation_vector(multiply(conjugate(vec4(row, _MEASURED + 3)), q))
+    turn = rotation_vector(multiply(conjugate(four(row, _MEASURED + 3)), q))
     return near and norm(turn) <= _RATE * dt + room[2]
 
 
@@ -549,7 +541,7 @@ def _turned_beside(rate: Vec3, rate0: Vec3, spun: Vec3, spun0: Vec3) -> Vec3:
 @compilable
 def _apart(a: Array, b: Array, column: int) -> Vec4:
     """The turn from row ``a`` [SI] to ``b`` [SI]: quaternions, from a ``column`` on."""
-    return multiply(conjugate(vec4(a, column)), vec4(b, column))
+    return multiply(conjugate(four(a, column)), four(b, column))
 
 
 @compilable
@@ -614,14 +606,12 @@ def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns
     noise = 2.5 * speed / over
     _note(s, now, AN, k, subtract(change, felt), _ACCEL_OFF + noise)
     _note_model(s, now, MN, k, subtract(change, made), _FORCE_OFF_AIDED, noise, learns)
-    x, y, z = 0.0, 0.0, 0.0
+    path = (0.0, 0.0, 0.0)
     for j in range(first, last):
         c, d = s.aids[1, j % _AIDS], s.aids[1, (j + 1) % _AIDS]
-        h = 0.5 * (d[0] - c[0])
-        x += h * (c[velocity] + d[velocity])
-        y += h * (c[velocity + 1] + d[velocity + 1])
-        z += h * (c[velocity + 2] + d[velocity + 2])
-    r = subtract(_difference(b, a, _MEASURED, over), _over((x, y, z), over))
+        both = add(three(c, velocity), three(d, velocity))
+        path = add_scaled(path, both, 0.5 * (d[0] - c[0]))
+    r = subtract(_difference(b, a, _MEASURED, over), _over(path, over))
     _note(s, now, NN, k, r, _SPEED_OFF + _NOISE_SIGMAS * math.sqrt(6.0) * sigma / over)
 
 

@@ -287,11 +287,7 @@ def _sources(holds_attitude: bool, wrong: Source, headings: list[int]) -> tuple[
 
 
 def _with_return(
-    verdict: Verdict,
-    ratios: tuple[float, ...],
-    of: tuple[Source, ...],
-    now: float,
-    lost: Source,
+    verdict: Verdict, ratios: tuple[float, ...], of: tuple[Source, ...], now: float, lost: Source
 ) -> Verdict:
     """The verdict with what was named and has agreed with all others for long believed again."""
     if not verdict.wrong:

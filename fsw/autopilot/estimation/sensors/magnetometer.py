@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from fsw.autopilot.estimation.error_state import ERRORS, FIELD, TH, Filter, Law, correct, vec4
+from fsw.autopilot.estimation.error_state import ERRORS, FIELD, TH, Filter, Law, correct
 from fsw.autopilot.estimation.faults.residuals import Aid
 from fsw.autopilot.estimation.faults.sources import Source
 from fsw.autopilot.estimation.fusion import clear
@@ -35,7 +35,7 @@ from fsw.autopilot.estimation.sensors.base import (
 )
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate, wrap_angle
-from fsw.autopilot.geometry.vectors import norm, three
+from fsw.autopilot.geometry.vectors import four, norm, three
 from fsw.autopilot.measurements import MagneticSample, Sensor
 from fsw.autopilot.signals import Vec3
 from fsw.compiled import compilable, kernel, machine_code
@@ -111,7 +111,7 @@ def heading_rows(x: Any, law: Any, field: Vec3, dt: float) -> bool:
     """
     clear(x, 1)
     w = three(x.rate, 0)
-    R = matrix_from_quaternion(turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2]))
+    R = matrix_from_quaternion(turned(four(x.q), dt * w[0], dt * w[1], dt * w[2]))
     north, east, down = rotate(R, field)
     level = north * north + east * east
     if not level > _LEAST * _LEAST:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from fsw.autopilot.estimation.error_state import BG, DELAY, TH, Filter, Law, V, put_four, vec4
+from fsw.autopilot.estimation.error_state import BG, DELAY, TH, Filter, Law, V
 from fsw.autopilot.estimation.faults.residuals import Aid
 from fsw.autopilot.estimation.faults.sensor_fault import Health
 from fsw.autopilot.estimation.faults.sources import Source
@@ -37,7 +37,7 @@ from fsw.autopilot.geometry.quaternion import (
     rotation_vector,
     turned,
 )
-from fsw.autopilot.geometry.vectors import norm, three
+from fsw.autopilot.geometry.vectors import four, norm, put_four, three
 from fsw.autopilot.measurements import PoseSample, Sensor
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
@@ -193,7 +193,7 @@ def attitude_rows(x: Any, z: Vec4, variance: Vec3, dt: float, delayed: float) ->
     """
     clear(x, 3)
     w = three(x.rate, 0)
-    there = turned(vec4(x.q), dt * w[0], dt * w[1], dt * w[2])
+    there = turned(four(x.q), dt * w[0], dt * w[1], dt * w[2])
     residual = rotation_vector(multiply(conjugate(there), z))
     for i in range(3):
         x.residual[i] = residual[i]

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from fsw.autopilot.estimation.error_state import TH, Filter, Law, P, V, vec4
+from fsw.autopilot.estimation.error_state import TH, Filter, Law, P, V
 from fsw.autopilot.estimation.fusion import clear, judged
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors.base import (
@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.sensors.base import (
     chi_square,
 )
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion
+from fsw.autopilot.geometry.vectors import four
 from fsw.autopilot.measurements import RangeSample, Sensor
 from fsw.compiled import compilable, kernel, machine_code
 
@@ -82,7 +83,7 @@ def range_rows(x: Any, law: Any, measured: float, variance: float, dt: float) ->
     tilt the estimate, and the more, the more that is tilted already.
     """
     clear(x, 1)
-    R = matrix_from_quaternion(vec4(x.q))
+    R = matrix_from_quaternion(four(x.q))
     if not R[8] > math.sqrt(0.5):
         return False
     expected = (law.ground - (x.p[2] + dt * x.v[2])) / R[8]

@@ -95,7 +95,6 @@ def _aiding(dropout: Dropout, now_us: int) -> Aiding:
     pose, fault = dropout.pose, SensorFault.IMPLAUSIBLE
     return Aiding(
         unaided_us=now_us - pose.since_us if pose.since_us >= 0 else 0,
-        pose=Sensor.POSE,
         pose_fault=fault,
         position_sigma=position,
         velocity_sigma=velocity,

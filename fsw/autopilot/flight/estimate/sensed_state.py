@@ -13,11 +13,7 @@ from fsw.autopilot.estimation.faults.residuals import scale_of_turns
 from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source, names
-from fsw.autopilot.estimation.fusion_memory import (
-    FusionMemory,
-    Reset,
-    at_start,
-)
+from fsw.autopilot.estimation.fusion_memory import FusionMemory, Reset, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
@@ -33,13 +29,7 @@ from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import Sample, Sensor
 from fsw.autopilot.model.rotors import agility, swing
-from fsw.autopilot.signals import (
-    EstimatorReport,
-    Severity,
-    StateEstimate,
-    StatusText,
-    TickInputs,
-)
+from fsw.autopilot.signals import EstimatorReport, Severity, StateEstimate, StatusText, TickInputs
 from fsw.autopilot.tick_record import Expected
 from fsw.frozen import replace
 
@@ -180,9 +170,9 @@ class SensedState:
         memory, found = self._fused(state, memory, inputs.samples, known)
         news = memory.health is not before.health
         if due or news or found is None:
-            memory = self._told(before, memory, now, texts, due=due)
+            memory = self._told(before, memory, texts, due=due)
         reset = None
-        back = (news and _is_back(before, memory, now)) or not before.started
+        back = (news and _is_back(before, memory)) or not before.started
         back = back or memory.replays != before.replays
         if memory.reset.number != before.reset.number:
             reset = memory.reset
@@ -206,7 +196,6 @@ class SensedState:
         return self._fusion.catch_up(
             memory,
             samples,
-            now,
             estimate,
             aloft=lambda: is_aloft(state, now, self._legs, self._stale),
             flies=state.vehicle.flies,
@@ -216,16 +205,13 @@ class SensedState:
         )
 
     def reported(
-        self,
-        state: FlightState,
-        memory: FusionMemory | None,
-        estimate: StateEstimate,
-        covariance: Array | None,
+        self, state: FlightState, estimate: StateEstimate, covariance: Array | None
     ) -> FlightState:
         """The state with what the estimator says about itself now; nothing before it started.
 
         ``covariance`` (17, 17) [SI] is of the error of the ``estimate``; None: nothing is known.
         """
+        memory = state.fusion
         if memory is None:
             return state
         if covariance is None:
@@ -239,29 +225,23 @@ class SensedState:
         return replace(state, estimator=report, aiding=_aiding(state, memory, report, drifted))
 
     def _told(
-        self,
-        before: FusionMemory,
-        memory: FusionMemory,
-        now: float,
-        texts: list[StatusText],
-        *,
-        due: bool,
+        self, before: FusionMemory, memory: FusionMemory, texts: list[StatusText], *, due: bool
     ) -> FusionMemory:
         """Report what is new, and where a look at silent sensors is ``due`` what that finds."""
         if memory.restarts != before.restarts:
             texts.append(StatusText(Severity.CRITICAL, _ANEW))
-        _report(before, memory, now, texts)
+        _report(before, memory, texts)
         if not due:
             return memory
-        self._report_silence(memory, now, texts)
-        return _report_noise(_report_seldom(memory, now, texts), now, texts)
+        self._report_silence(memory, texts)
+        return _report_noise(_report_seldom(memory, texts), texts)
 
-    def _report_silence(self, memory: FusionMemory, now: float, texts: list[StatusText]) -> None:
+    def _report_silence(self, memory: FusionMemory, texts: list[StatusText]) -> None:
         """Report sensors that have been silent for too long since the last check."""
         times = [(Sensor.IMU, memory.imu_came), (Sensor.ENCODERS, memory.joints_came)]
         times += [(health.sensor, health.came) for health in memory.health]
         for sensor, came in times:
-            silent = now - came - self._stale
+            silent = memory.now - came - self._stale
             if came >= 0.0 and 0.0 < silent <= 1e-6 * _CHECKED_US:
                 texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
 
@@ -276,32 +256,30 @@ def _carried_on(state: FlightState, now_us: int) -> StateEstimate | None:
     return last._replace(t_us=now_us)
 
 
-def _report(
-    before: FusionMemory, memory: FusionMemory, now: float, texts: list[StatusText]
-) -> None:
+def _report(before: FusionMemory, memory: FusionMemory, texts: list[StatusText]) -> None:
     """Report each fault once, and again after it was gone for a while or where it lasts."""
     for new in memory.health:
-        if new.fault_at != now or before.of(new.sensor).fault_at == now:
-            continue
-        if new.is_news():
+        seen = new.fault_at == memory.now != before.of(new.sensor).fault_at
+        if seen and new.is_news():
             texts.append(StatusText(Severity.WARNING, sentence(new.sensor, new.fault)))
 
 
-def _report_seldom(memory: FusionMemory, now: float, texts: list[StatusText]) -> FusionMemory:
+def _report_seldom(memory: FusionMemory, texts: list[StatusText]) -> FusionMemory:
     """Report sensors that have begun to come less often than they did."""
+    now = memory.now
     sample_rates, seldom = looked(memory.sample_rates, memory.health, now)
     memory = replace(memory, sample_rates=sample_rates)
     for sensor in seldom:
-        memory = memory.noting(memory.of(sensor).with_fault(SensorFault.RATE_TOO_LOW, now))
+        memory = memory.noting_fault(sensor, SensorFault.RATE_TOO_LOW, now)
         texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.RATE_TOO_LOW)))
     return memory
 
 
-def _report_noise(memory: FusionMemory, now: float, texts: list[StatusText]) -> FusionMemory:
+def _report_noise(memory: FusionMemory, texts: list[StatusText]) -> FusionMemory:
     """Report sensors whose readings scatter more than they state, or are known to."""
+    x, now = memory.numbers[0], memory.now
     if memory.joints_came < 0.0 or now - memory.began < _BEGUN:
         return memory
-    x = memory.numbers[0]
     pose, fix = x["noise_scale"][:2].max(), x["noise_scale"][2:].max()
     scales = (Sensor.POSE, pose), (Sensor.GNSS, fix), (Sensor.ENCODERS, x["encoder_scale"])
     for sensor, scale in scales:
@@ -369,8 +347,9 @@ def _recently(aid: Health) -> float:
     return max(_LATELY, 1.5 * aid.apart) if aid.fault_at >= aid.came else _LATELY
 
 
-def _is_back(before: FusionMemory, memory: FusionMemory, now: float) -> bool:
-    """Whether a position is used at ``now`` [s] that was overdue for long."""
+def _is_back(before: FusionMemory, memory: FusionMemory) -> bool:
+    """Whether a position is used now that was overdue for long."""
+    now = memory.now
     if unaided(before, now) <= _AWAY:  # the usual case, known at less cost
         return False
     return _overdue(before, now) > _AWAY > _overdue(memory, now)

@@ -34,7 +34,7 @@ class DamageWatch:
     def __init__(self, airframe: Airframe, tick: float, *, reallocates: bool) -> None:
         """Watch in ticks of ``tick`` [s]; loops reckon with what is found if it ``reallocates``."""
         law = watch_law(airframe)
-        self._law = packed(law)
+        self._law, self._spares = packed(law), law.spares
         self._tops, self._names = airframe.rotor_thrust_max, rotor_names(airframe)
         self._hover = airframe.mass * GRAVITY / airframe.rotors
         self._tick = tick
@@ -44,7 +44,6 @@ class DamageWatch:
             balancing_posture(airframe, k) if law.spares[k] > 0.0 else None
             for k in range(airframe.rotors)
         ]
-        self._spares = law.spares
         example = Tick().array
         self._watch = machine_code(watch, example, example, self._law, 1.0, 1.0, True)
 
@@ -149,7 +148,6 @@ def _of_joints(before: Damage, s: Watched, joints: int, now_us: int, angles_repe
 
 
 def _sentence(s: Watched, found: ActuatorReport, name: str) -> str:
-    """What is wrong with a rotor."""
     k = found.rotor - 1
     if found.lost:
         return f"{name} gives nothing"

@@ -52,8 +52,6 @@ _NEAR: Final = 2.0  # m; zones farther off leave room enough
 _RIM: Final = 8  # places around a disc: an octagon around its rim, in which a convex function is
 _SHARES: Final = 6  # bisections of what there is room for
 _PASSES: Final = 60  # over all planes; in a corner they have to settle
-
-
 _LOST: Final = np.eye(6)  # m^2, rad^2
 _SURE: Final = np.zeros((6, 6))
 _NO_NORMALS: Final = np.empty((0, 3))

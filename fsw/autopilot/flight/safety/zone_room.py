@@ -68,7 +68,8 @@ class ZoneRoom:
         for k, count in enumerate(report.per_zone):
             margin, first = min(report.margins[first : first + count]), first + count
             distance = margin - (kept.added[k] if kept.added else 0.0)
-            tuning = self._tuning(zones[k])
+            follows = kind_of(zones[k].shape).follows_target
+            tuning = self._workspace if follows else self._walls
             # Farther away, a barrier asks for no speed: S is more than lambda and the zone's own.
             moving = math.hypot(*_velocity(zones[k], target))
             if not tuning.approach_speed(distance) < tuning.lambda_ + moving:
@@ -82,9 +83,6 @@ class ZoneRoom:
         if not any(given) and all(map(operator.is_, zones, kept.safe_set.zones)):
             return kept
         return kept._replace(safe_set=SafeSet(tuple(zones)), given=tuple(given))
-
-    def _tuning(self, zone: Zone) -> BarrierTuning:
-        return self._workspace if kind_of(zone.shape).follows_target else self._walls
 
     def _least(
         self,

@@ -14,7 +14,7 @@ from fsw.autopilot.control.actuator_watch import watch, watch_law
 from fsw.autopilot.control.cascade import Cascade, Inner, close_loops, compare_with_plan, in_hover
 from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.tube import TubeAround
-from fsw.autopilot.estimation.estimator import attitude, estimate_state
+from fsw.autopilot.estimation.estimator import estimate_state, read_into, reading_of
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.model.airframe import AIRFRAME, AttitudeLag
@@ -142,12 +142,11 @@ def test_the_estimate_is_the_one_of_python() -> None:
         w, x, y, z = (float(value) for value in q / np.linalg.norm(q))
         p, v, gyro, accel = (vec3(random.uniform(-2.0, 2.0, 3)) for _ in range(4))
         sensors = SensorFrame(1, p, v, (w, x, y, z), gyro, accel, (0.1, 0.2), (0.3, 0.4))
-        missing, rotation, yaw = attitude(p, v, (w, x, y, z), gyro, accel)
-        estimate = estimate_state(sensors)
-        assert missing == 0
+        plain, estimate = Tick().estimate, estimate_state(sensors)
+        assert read_into(plain, reading_of(sensors), 1) == 0
         assert estimate is not None
-        np.testing.assert_allclose(estimate.R_WB, rotation, rtol=0, atol=1e-9)
-        assert estimate.yaw == pytest.approx(yaw, abs=1e-9)
+        np.testing.assert_allclose(estimate.R_WB, plain.R_WB, rtol=0, atol=1e-9)
+        assert estimate.yaw == pytest.approx(plain.yaw, abs=1e-9)
 
 
 def test_the_watch_over_actuators_is_the_one_of_python() -> None:

@@ -76,7 +76,7 @@ def hovering(
                 place = place[0] + moved_by, *place[1:]
             samples.insert(0, PoseSample(now, place, attitude, FINE, FINE))
         memory, found = FUSION.take_in(memory, samples, now, HOVERS)
-        memory, _ = FUSION.catch_up(memory, samples, now, found, damaged=damaged, touches=touches)
+        memory, _ = FUSION.catch_up(memory, samples, found, damaged=damaged, touches=touches)
         yield memory
 
 
@@ -183,7 +183,7 @@ def test_doubts_do_not_end_with_a_descent_but_where_the_rotors_stand() -> None:
             ]
             memory, found = FUSION.take_in(memory, samples, now, expected)
             how = {"aloft": lambda: False, "flies": flies}
-            memory, _ = FUSION.catch_up(memory, samples, now, found, **how)
+            memory, _ = FUSION.catch_up(memory, samples, found, **how)
         assert memory.verdict.since == (began if flies else -1.0)
         assert int(memory.numbers["suspect"][0]) == (suspect if flies else 0)
 
@@ -214,7 +214,7 @@ def test_what_was_named_in_flight_is_believed_again_after_five_seconds_on_the_gr
             ImuSample(now, (0.0, 0.0, -9.81 + 1e-3 * (now % 0.1)), (1e-4 * (now % 0.3), 0.0, 0.0)),
         ]
         memory, found = FUSION.take_in(memory, samples, now)
-        memory, _ = FUSION.catch_up(memory, samples, now, found, aloft=lambda: False)
+        memory, _ = FUSION.catch_up(memory, samples, found, aloft=lambda: False)
         assert now - began < 5.1
     assert now - began > 4.9
     assert memory.numbers[0]["out"] == 0
@@ -255,7 +255,7 @@ def test_of_a_pose_whose_attitude_repeats_itself_the_place_is_used() -> None:
             said = turned(LEVEL, a, b, c) if now < 2.0 else said
             samples.insert(0, PoseSample(now, (a, b, c - 1.5), said, FINE, FINE))
         memory, found = FUSION.take_in(memory, samples, now, HOVERS)
-        memory, _ = FUSION.catch_up(memory, samples, now, found)
+        memory, _ = FUSION.catch_up(memory, samples, found)
     health = memory.of(Sensor.POSE)
     assert memory.now - health.fused[0] < 0.1
     assert memory.now - health.fused[1] > 0.5
