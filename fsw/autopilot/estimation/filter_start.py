@@ -18,12 +18,12 @@ from fsw.autopilot.estimation.sensors.pose import Pose
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import normalised
 from fsw.autopilot.geometry.rotation import quaternion_from_matrix
+from fsw.autopilot.geometry.vectors import ZERO
 from fsw.autopilot.measurements import GnssSample, MagneticSample, PoseSample
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.frozen import replace
 
 _LOOKED_AT: Final = 16  # samples
-_REST: Vec3 = (0.0, 0.0, 0.0)
 
 
 class FilterStart:
@@ -71,7 +71,7 @@ class FilterStart:
     def _from_pose(self, memory: FusionMemory, sample: PoseSample) -> FusionMemory:
         stated = self._pose.stated(sample)
         noise = self._min_stated(memory.waiting) if sample.drifts else stated
-        state = sample.position, _REST, normalised(sample.attitude)
+        state = sample.position, ZERO, normalised(sample.attitude)
         self._begin(memory, sample.time, state, *noise)
         if not sample.drifts:
             return memory

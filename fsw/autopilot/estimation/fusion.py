@@ -28,6 +28,7 @@ from fsw.autopilot.estimation.error_state import (
 )
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
 from fsw.autopilot.geometry.vectors import (
+    ZERO,
     add,
     add_scaled,
     dot,
@@ -60,7 +61,6 @@ _LEANS = 8.0
 _COUNTS = 0.55
 _LEAPS = 4.5  # deviations, that no growth makes from one to the next
 _SUM, _LAST, _LEAPT = 0, 1, 2  # what is remembered of each kind
-_NONE: Vec3 = (0.0, 0.0, 0.0)
 _MIN_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
 # What is not known of a force then, for how long it has been so, and how well that is known.
 _LEANT_FORCE = 3.0  # m/s^2
@@ -148,13 +148,13 @@ def _leans(x: Any, scaled: int) -> bool:
     grown, leaps = _without_leap(memory, three(x.residual, 0), _LEAPS * scatter)
     most = _LEANS * scatter
     share = 1.0 / max(norm(grown) / (_COUNTS * most), 1.0)
-    total = _NONE
+    total = ZERO
     if not leaps:
-        kept = add_scaled(_NONE, three(memory[_SUM], 0), _KEEPS)
+        kept = add_scaled(ZERO, three(memory[_SUM], 0), _KEEPS)
         total = add_scaled(kept, grown, share)
     leans = dot(total, total) >= most * most
     if leans:
-        x.leant_at, total = x.time, _NONE
+        x.leant_at, total = x.time, ZERO
     put_three(memory[_SUM], 0, total)
     return leans
 
@@ -168,7 +168,7 @@ def _without_leap(memory: Any, z: Vec3, most: float) -> tuple[Vec3, bool]:
     """
     step = subtract(z, three(memory[_LAST], 0))
     leaps = dot(step, step) > most * most
-    leapt = add_scaled(_NONE, three(memory[_LEAPT], 0), _KEEPS)
+    leapt = add_scaled(ZERO, three(memory[_LEAPT], 0), _KEEPS)
     if leaps:
         leapt = add(leapt, step)
     put_three(memory[_LAST], 0, z)
@@ -290,8 +290,7 @@ def set_place(x: Filter, time: float, p: Vec3, variance: Vec3) -> Vec3:
     s = x[0]
     dt = time - s.time
     jump = add_scaled(subtract(p, s.p), s.v, -dt)
-    for i in range(3):
-        s.p[i] += jump[i]
+    put_three(s.p, 0, add(s.p, jump))
     forget(s, P, variance)
     s.height_time = s.time
     return jump
@@ -341,4 +340,4 @@ def doubt(filters: Filter, along: Vec3, about: Vec3, place: float, turn: float, 
 @compilable
 def _unit(v: Vec3) -> Vec3:
     """The direction of a vector ``v`` [any], or none where it is none."""
-    return add_scaled(_NONE, v, 1.0 / max(norm(v), 1e-9))
+    return add_scaled(ZERO, v, 1.0 / max(norm(v), 1e-9))

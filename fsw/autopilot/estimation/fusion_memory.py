@@ -17,7 +17,7 @@ from fsw.autopilot.estimation.faults.residuals import MIN_WALKS
 from fsw.autopilot.estimation.faults.sample_rate import SampleRate
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault
 from fsw.autopilot.estimation.faults.verdict import Verdict
-from fsw.autopilot.geometry.vectors import add_scaled
+from fsw.autopilot.geometry.vectors import ZERO, add_scaled
 from fsw.autopilot.measurements import (
     AidingSample,
     GnssSample,
@@ -29,7 +29,6 @@ from fsw.autopilot.measurements import (
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.frozen import dataclass, replace
 
-_REST: Vec3 = (0.0, 0.0, 0.0)
 NO_TURN: Final[Vec4] = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -46,8 +45,8 @@ class Reset(NamedTuple):
     """Jumps of the estimate, as PX4 reports them: how many there were, and the last one."""
 
     number: int = 0
-    position: Vec3 = _REST  # m, NED, new minus old
-    velocity: Vec3 = _REST  # m/s, NED, new minus old
+    position: Vec3 = ZERO  # m, NED, new minus old
+    velocity: Vec3 = ZERO  # m/s, NED, new minus old
     turn: Vec4 = NO_TURN  # new attitude times the inverse of the old one, NED
     expected: bool = True  # within what the filter doubted; else no other sensor says so
 
@@ -93,7 +92,7 @@ class FusionMemory:
     field: Vec3 | None = None  # Gauss, body, the last one
     frame: FrameDrift = FrameDrift()  # of poses that drift
     reset: Reset = Reset()
-    unproven: Vec3 = _REST  # m, NED, by which jumps have moved the estimate that none expected
+    unproven: Vec3 = ZERO  # m, NED, by which jumps have moved the estimate that none expected
     delay_sigma: float = 0.0  # s, with which the estimate of the pose's own delay began
     sample_rates: tuple[SampleRate, ...] = ()  # how often sensors are heard
     restarts: int = 0  # how often the filter had to start anew, because it had no numbers any more
@@ -172,8 +171,8 @@ class FusionMemory:
 
     def jumped(
         self,
-        position: Vec3 = _REST,
-        velocity: Vec3 = _REST,
+        position: Vec3 = ZERO,
+        velocity: Vec3 = ZERO,
         turn: Vec4 = NO_TURN,
         *,
         expected: bool = False,

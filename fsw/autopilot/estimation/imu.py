@@ -44,13 +44,13 @@ _BACK: Final = 0.5  # of a jump: so near to what is flown, a half has come back 
 BLOW: Final = 25  # readings: what is felt as a blow is over by then
 CALM: Final = 250  # readings that were believed, in a row
 # Plain numbers: kernels return them.
-_NONE: Final = SensorFault.NONE.value
+NONE: Final = SensorFault.NONE.value
 _NOT_FINITE: Final = SensorFault.NOT_FINITE.value
 _IMPLAUSIBLE: Final = SensorFault.IMPLAUSIBLE.value
 _FUTURE: Final = SensorFault.FUTURE.value
-_REPEATED: Final = SensorFault.REPEATED.value
+REPEATED: Final = SensorFault.REPEATED.value
 _STUCK: Final = SensorFault.STUCK.value
-_JUMP: Final = SensorFault.JUMP.value
+JUMP: Final = SensorFault.JUMP.value
 
 
 @compilable
@@ -66,16 +66,16 @@ def add_imu(x: Any, law: Any, now: float, time: float, f: Vec3, w: Vec3, model: 
     if not time <= now + TIME_TOLERANCE:
         return _FUTURE
     if x.end > 0 and time <= last[TIME]:
-        return _REPEATED
+        return REPEATED
     flies = model[3] > 0.0
     of_force = _fault(x, 0, f, law.accel_range, law.accel_jump, flies)
     of_rate = _fault(x, 1, w, law.gyro_range, law.gyro_jump, flies)
-    keep_force, keep_rate = of_force in (_NONE, _STUCK), of_rate in (_NONE, _STUCK)
-    fault = of_force if of_force != _NONE else of_rate
+    keep_force, keep_rate = of_force in (NONE, _STUCK), of_rate in (NONE, _STUCK)
+    fault = of_force if of_force != NONE else of_rate
     if x.end == 0 and not (keep_force and keep_rate):
         return fault
     row = x.imu[x.end % IMU_CAPACITY]
-    lost = (0 if of_force == _NONE else NO_FORCE) | (0 if of_rate == _NONE else NO_RATE)
+    lost = (0 if of_force == NONE else NO_FORCE) | (0 if of_rate == NONE else NO_RATE)
     lost |= x.out
     modelled = flies and x.end > 0
     # Of what may be wrong the reading is used, and the bias may be anything: on the ground too it
@@ -112,7 +112,7 @@ def _missed(
     refused, of which the unit shows ``most`` [SI], in ``since`` [s]. It ends within ``BLOW``
     readings. What lasts is a fault, and ``faults/verdict.py`` says which.
     """
-    refused = fault in (_JUMP, _IMPLAUSIBLE)
+    refused = fault in (JUMP, _IMPLAUSIBLE)
     x.refused[half] = x.refused[half] + 1 if refused else 0
     already, after = 0.0, 0.0
     for i in range(3 * half, 3 * half + 3):
@@ -184,7 +184,7 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bo
         x.steady[half] = 0
         return _IMPLAUSIBLE
     if x.end == 0:
-        return _NONE
+        return NONE
     x.steady[half] = x.steady[half] + 1 if change <= jump else 0
     if flies and x.doubted[half] > 0 and not x.believed & (1 << half):
         if x.doubted[half] == STAYS and _is_back(x, half, reading, jump):
@@ -194,8 +194,8 @@ def _fault(x: Any, half: int, reading: Vec3, most: float, jump: float, flies: bo
             x.doubted[half], x.steady[half], x.calm[half], stray > jump
         )
     if x.doubted[half] > 0:
-        return _JUMP
-    return _STUCK if is_stuck(x.same, half) else _NONE
+        return JUMP
+    return _STUCK if is_stuck(x.same, half) else NONE
 
 
 @compilable

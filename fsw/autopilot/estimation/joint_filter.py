@@ -23,7 +23,7 @@ from typing import Any, Final, NamedTuple
 from fsw.autopilot.estimation.error_state import PUSHES
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.fusion import followed
-from fsw.autopilot.estimation.imu import doubt
+from fsw.autopilot.estimation.imu import JUMP, NONE, REPEATED, doubt
 from fsw.autopilot.geometry.vectors import clamp
 from fsw.autopilot.signals import JointVector
 from fsw.compiled import compilable
@@ -46,10 +46,7 @@ _SCALE_LIMIT: Final = 1e4  # of the variance
 _FASTEST: Final = 10.0  # rad/s
 _SWINGS: Final = 50.0  # rad/s; 47 was the most that a joint without torque swung at
 _NEAR: Final = 0.02  # rad
-_NONE: Final = SensorFault.NONE.value
-_REPEATED: Final = SensorFault.REPEATED.value
 _TOO_OLD: Final = SensorFault.TOO_OLD.value
-_JUMP: Final = SensorFault.JUMP.value
 
 
 class JointState(NamedTuple):
@@ -92,7 +89,7 @@ def read(x: Any, law: Any, now: float, angles: Floats, age: float) -> int:
     """
     time, before = now - age, x.encoders_read
     if not time > before:
-        return _REPEATED
+        return REPEATED
     _note_reading(x, angles, min(time - before, 1.0))
     x.encoders_read = time
     if time < x.joint_time:  # older than what the ring reaches back to
@@ -108,7 +105,7 @@ def read(x: Any, law: Any, now: float, angles: Floats, age: float) -> int:
         x.encoder_doubted, x.encoder_steady, x.encoder_calm, far
     )
     if x.encoder_doubted > 0:
-        return _JUMP
+        return JUMP
     if before_it > 0 and far:
         _move_zero(x)
         _take_off_zero(x, angles)
@@ -117,7 +114,7 @@ def read(x: Any, law: Any, now: float, angles: Floats, age: float) -> int:
         begin(x, law, time, angles)
     else:
         _correct(x, law, angles)
-    return _NONE
+    return NONE
 
 
 @compilable

@@ -55,7 +55,7 @@ from fsw.autopilot.estimation.sensors.pose import Pose, is_attitude_stuck
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import conjugate, multiply
 from fsw.autopilot.geometry.rotation import matrix_from_quaternion, rotate_back
-from fsw.autopilot.geometry.vectors import add_scaled, norm, three
+from fsw.autopilot.geometry.vectors import ZERO, add_scaled, norm, three
 from fsw.autopilot.measurements import (
     AidingSample,
     GnssSample,
@@ -85,7 +85,6 @@ _LEVEL: Final = 0.05  # rad
 _SIGMAS: Final = 3.0
 _JUST_REFUSED: Final = math.nextafter(1.0, 2.0)  # chi-square over gate
 _SOON: Final = 0.25  # s, in which what an inertial unit does wrong shows by little
-_REST: Vec3 = (0.0, 0.0, 0.0)
 _UNKNOWN: Final = Expected()
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
@@ -117,7 +116,7 @@ class SensorFusion:
         assert estimate is not None
         for sensor in self._sensors.values():
             sensor.take(memory, sensor.at_rest, t, (2.0, 2.0))
-        fusion.doubt(memory.numbers, _REST, _REST, 0.0, 0.0, True)
+        fusion.doubt(memory.numbers, ZERO, ZERO, 0.0, 0.0, True)
         residuals.look(np.zeros(1, EVIDENCE), memory.numbers, t, NO_AID, NO_AID, NO_AID, False)
         self.covariance(memory, t)
         return estimate
@@ -488,7 +487,7 @@ class SensorFusion:
     ) -> None:
         """Doubt what an inertial unit may have made of a pose's refused parts."""
         along, about = [
-            three(innovation, at) if 1.0 < r < math.inf else _REST
+            three(innovation, at) if 1.0 < r < math.inf else ZERO
             for at, r in zip((0, 3), ratio, strict=True)
         ]
         fusion.doubt(memory.numbers, along, about, place, turn, max(ratio) < math.inf)

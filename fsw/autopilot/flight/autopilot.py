@@ -123,11 +123,8 @@ class Autopilot:
     def __init__(self, config: FlightConfig) -> None:
         self.config = config
         tick = config.tick_period_us * 1e-6
-        self._zones: tuple[InflatedSafeSet, EndEffectorTarget | None, Array] = (
-            InflatedSafeSet(),
-            None,
-            NO_ZONES,
-        )
+        nothing: EndEffectorTarget | None = None
+        self._zones = InflatedSafeSet(), nothing, NO_ZONES
         self._safe_sets = SafeSetCheck(config)
         self._targets = TargetCheck(config, self._safe_sets.loop_tube)
         self._commander = Commander(config)

@@ -8,7 +8,7 @@ contract: a recorded flight replays to the last bit.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 from numpy.typing import NDArray
 
@@ -16,6 +16,7 @@ from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable
 
 Vector = Vec3 | NDArray[Any]  # compiled code may hand over a row of an array (3,)
+ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 Several = tuple[float, ...] | NDArray[Any]  # vectors one after the other
 
 

@@ -28,13 +28,12 @@ from fsw.autopilot.estimation.sensors.base import (
     Ratios,
     chi_square,
 )
-from fsw.autopilot.geometry.vectors import norm, put_three, subtract
+from fsw.autopilot.geometry.vectors import ZERO, norm, put_three, subtract
 from fsw.autopilot.measurements import GnssSample, Sensor
 from fsw.autopilot.signals import Vec2, Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
 _FASTEST: Final = 50.0  # m/s
-_REST: Vec3 = (0.0, 0.0, 0.0)
 _FINE: Vec3 = (1e-4, 1e-4, 1e-4)
 
 
@@ -57,7 +56,7 @@ class Gnss(AidingSensor[GnssSample, GnssTuning]):
     sensor = Sensor.GNSS
     sample = GnssSample
     measures = ("position", "velocity")
-    at_rest = GnssSample(0.0, _REST, _REST, _FINE, _FINE)
+    at_rest = GnssSample(0.0, ZERO, ZERO, _FINE, _FINE)
     of_an_axis = 2
     source = Source.GNSS
     noise_scales = slice(GNSS, GNSS + 2)
@@ -120,7 +119,7 @@ class Gnss(AidingSensor[GnssSample, GnssTuning]):
         self, memory: FusionMemory, sample: GnssSample, time: float, ratio: Ratios
     ) -> FusionMemory:
         """Be where it says of ``time`` [s], and move so."""
-        x, place, velocity = memory.numbers, _REST, _REST
+        x, place, velocity = memory.numbers, ZERO, ZERO
         about_place, about_speed = self.stated(sample)
         if ratio[0] > 1.0:
             place = set_place(x, time, sample.position, about_place)

@@ -37,7 +37,7 @@ from fsw.autopilot.geometry.quaternion import (
     rotation_vector,
     turned,
 )
-from fsw.autopilot.geometry.vectors import four, norm, put_four, three
+from fsw.autopilot.geometry.vectors import ZERO, four, norm, put_four, three
 from fsw.autopilot.measurements import PoseSample, Sensor
 from fsw.autopilot.signals import Vec3, Vec4
 from fsw.compiled import compilable, kernel, machine_code
@@ -46,7 +46,6 @@ _KNOWN_VELOCITY = 0.05  # m/s, a standard deviation
 # How fast a vehicle moves between two poses.
 _SPEED: Final = 2.0  # m/s
 _RATE: Final = 2.0  # rad/s
-_REST: Vec3 = (0.0, 0.0, 0.0)
 _FINE: Vec3 = (1e-4, 1e-4, 1e-4)
 _UNKNOWN: Vec3 = (math.inf, math.inf, math.inf)
 
@@ -73,7 +72,7 @@ class Pose(AidingSensor[PoseSample, PoseTuning]):
     sensor = Sensor.POSE
     sample = PoseSample
     measures = ("position", "attitude")
-    at_rest = PoseSample(0.0, _REST, NO_TURN, _FINE, _FINE)
+    at_rest = PoseSample(0.0, ZERO, NO_TURN, _FINE, _FINE)
     of_an_axis = 1
     source = Source.POSE | Source.ATTITUDE
     noise_scales = slice(POSE, POSE + 2)
@@ -150,7 +149,7 @@ class Pose(AidingSensor[PoseSample, PoseTuning]):
         self, memory: FusionMemory, sample: PoseSample, time: float, ratio: Ratios
     ) -> FusionMemory:
         """Be where it says of ``time`` [s]."""
-        x, place, turn = memory.numbers, _REST, NO_TURN
+        x, place, turn = memory.numbers, ZERO, NO_TURN
         about_place, about = self.noise(memory, sample)
         if ratio[0] > 1.0:
             place = set_place(x, time, sample.position, about_place)
@@ -159,7 +158,7 @@ class Pose(AidingSensor[PoseSample, PoseTuning]):
             after = normalised(sample.attitude)
             set_attitude(x, after, about)
             turn = multiply(after, conjugate(before))
-        return memory.jumped(place, _REST, turn)
+        return memory.jumped(place, ZERO, turn)
 
     def aid(self, memory: FusionMemory, sample: PoseSample) -> Aid:
         """Place and attitude."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Final
 
 from fsw.autopilot.estimation.error_state import BA, BG, ERRORS, TH, Array, P, V
@@ -111,12 +111,10 @@ def unknown_report(
 
 def _fix(memory: FusionMemory, now: float, stale: float) -> SatelliteFix | None:
     """What the receiver said last; without a fix where it says so, or says nothing."""
-    fix, none = memory.gnss, memory.without_fix
-    if fix is None and none is None:
+    fix, heard = memory.gnss, [one for one in (memory.gnss, memory.without_fix) if one is not None]
+    if not heard:
         return None
-    lost = none if fix is None or (none is not None and none.time > fix.time) else None
-    last = lost or fix
-    assert last is not None
+    last = max(heard, key=attrgetter("time"))
     kind, satellites = last.fix_type, last.satellites
     if now - memory.came(Sensor.GNSS) > stale:
         kind, satellites = NO_FIX, _NOT_SAID
@@ -163,26 +161,20 @@ def _ratios(sensors: tuple[SensorReport, ...]) -> TestRatios:
 def _flags(variances: list[float], sensors: tuple[SensorReport, ...], *, aided: bool) -> int:
     """ESTIMATOR_STATUS_FLAGS: what is known, and what of the sensors is doubted."""
     d = variances
-    flags = 0
-    if max(d[TH : TH + 3]) < _KNOWN_ANGLE**2:
-        flags |= ATTITUDE
-    if max(d[V], d[V + 1]) < _KNOWN_SPEED**2:
-        flags |= LEVEL_VELOCITY
-    if d[V + 2] < _KNOWN_SPEED**2:
-        flags |= VERTICAL_VELOCITY
-    if max(d[P], d[P + 1]) < _KNOWN_PLACE**2:
-        flags |= RELATIVE | PREDICTED_RELATIVE
-        flags |= (ABSOLUTE | PREDICTED_ABSOLUTE) if aided else 0
-    if d[P + 2] < _KNOWN_PLACE**2:
-        flags |= HEIGHT
-    for one in sensors:
-        if one.name == Sensor.RANGEFINDER.value and not one.fault:
-            flags |= ABOVE_GROUND
-        elif one.name == Sensor.GNSS.value and one.fault:
-            flags |= SATELLITES_DOUBTED
-        elif one.name == Sensor.IMU.value and one.fault:
-            flags |= ACCELERATION_DOUBTED
-    return flags
+    placed = max(d[P], d[P + 1]) < _KNOWN_PLACE**2
+    faulty = {one.name: bool(one.fault) for one in sensors}
+    known = (
+        (ATTITUDE, max(d[TH : TH + 3]) < _KNOWN_ANGLE**2),
+        (LEVEL_VELOCITY, max(d[V], d[V + 1]) < _KNOWN_SPEED**2),
+        (VERTICAL_VELOCITY, d[V + 2] < _KNOWN_SPEED**2),
+        (RELATIVE | PREDICTED_RELATIVE, placed),
+        (ABSOLUTE | PREDICTED_ABSOLUTE, placed and aided),
+        (HEIGHT, d[P + 2] < _KNOWN_PLACE**2),
+        (ABOVE_GROUND, not faulty.get(Sensor.RANGEFINDER.value, True)),
+        (SATELLITES_DOUBTED, faulty.get(Sensor.GNSS.value, False)),
+        (ACCELERATION_DOUBTED, faulty.get(Sensor.IMU.value, False)),
+    )
+    return sum(flag for flag, so in known if so)
 
 
 def _motion(covariance: Array, estimate: StateEstimate) -> tuple[float, ...]:
