@@ -63,8 +63,7 @@ FILTER: Final = np.dtype(
         ("p", float, (3,)),  # m, NED
         ("v", float, (3,)),  # m/s, NED
         ("q", float, (4,)),  # body to NED
-        ("accel_bias", float, (3,)),  # m/s^2, body
-        ("gyro_bias", float, (3,)),  # rad/s, body
+        ("bias", float, (6,)),  # of accelerometer [m/s^2] and gyro [rad/s], body
         ("baro_bias", float),  # m
         ("pose_delay", float),  # s
         ("covariance", float, (ERRORS, ERRORS)),
@@ -258,12 +257,12 @@ def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
 
     The readings are ``row`` (10,) [SI] and the one ``before`` (10,) [SI], or the same.
     """
-    return _mean(row, before, FORCE, x.accel_bias), _mean(row, before, RATE, x.gyro_bias)
+    return _mean_of(x, row, before, 0), _mean_of(x, row, before, 3)
 
 
 @compilable
-def _mean(row: Array, before: Array, at: int, bias: Array) -> Vec3:
-    a, b = three(row, at), three(before, at)
+def _mean_of(x: Any, row: Array, before: Array, at: int) -> Vec3:
+    a, b, bias = three(row, FORCE + at), three(before, FORCE + at), three(x.bias, at)
     return (
         0.5 * (a[0] + b[0]) - bias[0],
         0.5 * (a[1] + b[1]) - bias[1],
@@ -302,7 +301,7 @@ def step_to(x: Any, law: Any, row: Array, before: Array, M: Array) -> None:
         _fade(x, M, math.exp(-gap / MADE_LASTS))
     for i in range(3):
         x.p[i], x.v[i], x.acceleration[i] = p[i], v[i], a[i]
-        x.rate[i] = row[RATE + i] - x.gyro_bias[i]
+        x.rate[i] = row[RATE + i] - x.bias[3 + i]
     put_four(x.q, q)
     x.time = max(row[TIME], x.time)
 
@@ -314,17 +313,15 @@ def _fade(x: Any, M: Array, left: float) -> None:
     Else a tilt could not be told from it where satellites alone measure how the vehicle moves.
     ``M`` (17, 17) [SI] is the covariance.
     """
-    for i in range(BA, BA + 3):
-        x.accel_bias[i - BA] = x.kept_bias[i - BA] + left * (
-            x.accel_bias[i - BA] - x.kept_bias[i - BA]
-        )
+    for i in range(3):
+        x.bias[i] = x.kept_bias[i] + left * (x.bias[i] - x.kept_bias[i])
         for j in range(ERRORS):
-            M[i, j] *= left
-            M[j, i] *= left
+            M[BA + i, j] *= left
+            M[j, BA + i] *= left
         for j in range(FRAME):
-            x.shared[i, j] *= left
+            x.shared[BA + i, j] *= left
         for j in range(FIELD):
-            x.with_offset[i, j] *= left
+            x.with_offset[BA + i, j] *= left
 
 
 @compilable
@@ -338,14 +335,13 @@ def watch_biases(x: Any, M: Array, lost: int) -> None:
         return
     x.lost = lost
     for i in range(6):
-        k, bias = BA + i, x.accel_bias if i < 3 else x.gyro_bias
-        half = NO_FORCE if i < 3 else NO_RATE
+        k, half = BA + i, NO_FORCE if i < 3 else NO_RATE
         if not changed & half:
             continue
         if lost & half:
-            x.kept_bias[i], x.kept_variance[i] = bias[i % 3], M[k, k]
+            x.kept_bias[i], x.kept_variance[i] = x.bias[i], M[k, k]
         else:
-            bias[i % 3] = x.kept_bias[i]
+            x.bias[i] = x.kept_bias[i]
             reset_covariance(x, M, k, x.kept_variance[i])
 
 
@@ -491,9 +487,9 @@ def inject(x: Any) -> None:
     for i in range(3):
         x.p[i] += error[P + i]
         x.v[i] += error[V + i]
-        x.accel_bias[i] += error[BA + i]
-        x.gyro_bias[i] += error[BG + i]
         x.rate[i] -= error[BG + i]
+    for i in range(6):
+        x.bias[i] += error[BA + i]
     x.baro_bias += error[BARO]
     x.pose_delay += error[DELAY]
     put_four(x.q, turned(four(x.q), error[TH], error[TH + 1], error[TH + 2]))

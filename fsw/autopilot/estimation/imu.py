@@ -134,7 +134,7 @@ def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> 
     bias. Along z their lift knows it.
     """
     if lost & NO_FORCE:
-        kept = x.kept_bias[2] if x.lost & NO_FORCE else x.accel_bias[2]
+        kept = (x.kept_bias if x.lost & NO_FORCE else x.bias)[2]
         for i in range(3):
             lift = (1.0 + x.baseline[9]) * model[3]
             row[FORCE + i] = kept - lift if i == 2 else x.baseline[6 + i]
@@ -157,7 +157,7 @@ def _count_rate(x: Any, row: Any, last: Any, made: bool, reads: bool) -> None:
     elif was_made:
         for i in range(3):
             off = row[RATE + i] - last[RATE + i]
-            x.gyro_bias[i] += off
+            x.bias[3 + i] += off
             for k in range(max(x.first - 1, x.end - IMU_CAPACITY + 1), x.end):
                 x.imu[k % IMU_CAPACITY, RATE + i] += off
 
@@ -212,7 +212,7 @@ def _is_back(x: Any, half: int, reading: Vec3, jump: float) -> bool:
     last, at = x.imu[(x.end - 1) % IMU_CAPACITY], 3 * half
     stray = 0.0
     for i in range(3):
-        bias = (x.gyro_bias[i] if half else x.accel_bias[i]) - x.kept_bias[at + i]
+        bias = x.bias[at + i] - x.kept_bias[at + i]
         if not x.lost & (NO_RATE if half else NO_FORCE):
             bias = 0.0
         stray = max(stray, abs(reading[i] - last[FORCE + at + i] + bias))

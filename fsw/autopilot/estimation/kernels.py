@@ -182,15 +182,14 @@ def begin(
     """
     s, t = x[0], law[0]
     M = s.covariance
-    M[:] = 0.0
+    M[:], s.bias[:] = 0.0, 0.0
     for i in range(3):
-        s.p[i], s.v[i], s.accel_bias[i], s.gyro_bias[i] = p[i], v[i], 0.0, 0.0
+        s.p[i], s.v[i], s.acceleration[i] = p[i], v[i], 0.0
         M[P + i, P + i] = p_variance[i]
         M[V + i, V + i] = v_variance[i]
         M[TH + i, TH + i] = q_variance[i]
         M[BA + i, BA + i] = t.accel_bias * t.accel_bias
         M[BG + i, BG + i] = t.gyro_bias * t.gyro_bias
-        s.acceleration[i] = 0.0
     put_four(s.q, q)
     M[BARO, BARO] = t.barometer.bias * t.barometer.bias
     M[DELAY, DELAY] = t.pose.delay_sigma * t.pose.delay_sigma

@@ -408,9 +408,8 @@ def _recall(x: Any, bias: int) -> None:
     clear(x, 3)
     for i in range(3):
         x.H[i, bias + i] = 1.0
-        now = x.accel_bias[i] if bias == BA else x.gyro_bias[i]
-        x.residual[i] = x.kept_bias[bias - BA + i] - now
-        x.variance[i] = x.kept_variance[bias - BA + i]
+        k = bias - BA + i
+        x.residual[i], x.variance[i] = x.kept_bias[k] - x.bias[k], x.kept_variance[k]
     if distance(x, 3) <= _IS_WHAT_IT_WAS:
         correct(x, 3)
 

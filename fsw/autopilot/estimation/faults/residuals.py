@@ -210,9 +210,9 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
     if _begins(W):
         W[:] = 0.0
         W[SAID] = 1.0
-        for i in range(3):
-            x.baseline[i], x.baseline[3 + i] = x.accel_bias[i], x.gyro_bias[i]
-            x.baseline[6 + i] = 0.0
+        x.baseline[6:9] = 0.0
+        for i in range(6):
+            x.baseline[i] = x.bias[i]
     f, w = three(x.newest, 0), three(x.newest, 3)
     q = turned(four(W, SAID), dt * w[0], dt * w[1], dt * w[2])
     for i in range(4):
@@ -239,8 +239,8 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
         W[BESIDE + i] += dt * beside
         W[TURN + i] += dt * w[i]
         if not (x.suspect or x.out):
-            b[i] += known * (x.accel_bias[i] - b[i])
-            b[3 + i] += known * (x.gyro_bias[i] - b[3 + i])
+            b[i] += known * (x.bias[i] - b[i])
+            b[3 + i] += known * (x.bias[3 + i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])
     unseen = x.time - x.height_time > HEIGHT_LASTS
     if not (unseen or x.suspect & CONTRADICTED or x.out & NO_FORCE):
@@ -352,7 +352,7 @@ def _note_bias(s: Any, x: Any, now: float, half: int, k: int, most: float) -> No
     """
     if not half and x.leant_at > 0.0 and x.time - x.leant_at < _LEANT:
         return
-    bias = three(x.gyro_bias if half else x.accel_bias, 0)
+    bias = three(x.bias, 3 * half)
     if x.lost & (1 << half):
         bias = three(x.kept_bias, 3 * half)
     else:

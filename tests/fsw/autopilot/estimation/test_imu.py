@@ -191,10 +191,10 @@ def test_a_modelled_force_is_what_the_rotors_give_and_leaves_the_mass_as_it_is(k
     """The mass goes by the force: with what was felt beside the rotors it ran away, blind."""
     unit = Unit()
     unit.x.baseline[6:9] = 0.3, -0.2, 0.15
-    unit.x.accel_bias[:] = 0.05, -0.04, 0.02
+    unit.x.bias[:3] = 0.05, -0.04, 0.02
     if known:  # the filter has come to the loss, and what it calls a bias is the model's error
-        unit.x.kept_bias[:3], unit.x.lost = unit.x.accel_bias, NO_FORCE
-        unit.x.accel_bias[2] = 0.5
+        unit.x.kept_bias[:3], unit.x.lost = unit.x.bias[:3], NO_FORCE
+        unit.x.bias[2] = 0.5
     unit.read(force=(float("nan"),) * 3, model=(0.0, 0.0, 0.0, 9.5))
     np.testing.assert_array_equal(unit.last[FORCE : FORCE + 2], (0.3, -0.2))
     assert unit.last[FORCE + 2] == pytest.approx(0.02 - 9.5)
@@ -205,14 +205,14 @@ def test_a_rate_that_rotors_made_leaves_no_bias_behind() -> None:
     unit, none, model = Unit(), (float("nan"),) * 3, (40.0, 0.0, 0.0, 9.5)
     for _ in range(300):
         unit.read(rate=none, model=model)
-    unit.x.gyro_bias[:] = unit.last[RATE : RATE + 3]  # poses say that it does not turn
+    unit.x.bias[3:] = unit.last[RATE : RATE + 3]  # poses say that it does not turn
     before = [row.copy() for row in unit.x.imu]
-    assert abs(unit.x.gyro_bias[0]) > 20.0
+    assert abs(unit.x.bias[3]) > 20.0
     unit.x.out = NO_RATE
     for _ in range(STAYS + 1):  # on the ground: of one that is named the reading is used
         unit.read(rate=(-0.4 + 0.01 * unit.random.standard_normal(), 0.0, 0.0))
     assert unit.last[LOST] == NO_RATE
-    np.testing.assert_allclose(unit.x.gyro_bias, (-0.4, 0.0, 0.0), atol=0.05)
+    np.testing.assert_allclose(unit.x.bias[3:], (-0.4, 0.0, 0.0), atol=0.05)
     rates = np.array([row[RATE : RATE + 3] for row in unit.x.imu])
     was = np.array([row[RATE : RATE + 3] for row in before])
     new = [k % len(rates) for k in range(unit.x.end - STAYS - 1, unit.x.end)]

@@ -34,7 +34,7 @@ SETTLED = 4.0  # s, before anything is wrong
 FEW = 2 if settings.default.max_examples < 100 else 20  # a half second of one core each
 NONE: Vec3 = (0.0, 0.0, 0.0)
 # What is read of the filter's record, in which Python finds a field slowly.
-WITNESSED = ("witness", "newest", "baseline", "accel_bias", "gyro_bias")
+WITNESSED = ("witness", "newest", "baseline", "bias")
 
 
 class Wrong(NamedTuple):
@@ -116,7 +116,7 @@ def flown(
             speed_off += TICK * np.array(wrong.gaining)
             place_off += TICK * speed_off
         s.newest[:3], s.newest[3:] = felt, said
-        s.gyro_bias[:] = (1.0 - math.exp(-now / 0.3)) * np.array(bias)
+        s.bias[3:] = (1.0 - math.exp(-now / 0.3)) * np.array(bias)
         s.suspect = ON_TRIAL if verdict.is_on or verdict.wrong else 0
         s.suspect |= CONTRADICTED if verdict.contradicts else 0
         residuals.witness(s, R, TICK, (*alpha.tolist(), thrust), NONE)  # type: ignore[arg-type]
@@ -369,7 +369,7 @@ def test_a_bias_that_no_such_unit_has_is_named_and_is_not_taken_for_unknown(
     x: Any = np.zeros(1, FILTER)
     evidence = residuals.at_start()
     x["witness"][0, 0] = 1.0
-    x["accel_bias"], x["gyro_bias"] = (0.0, -1.0, 0.0), (0.1, 0.1, 0.0)
+    x["bias"] = 0.0, -1.0, 0.0, 0.1, 0.1, 0.0
     for look_ in range(60):
         look(evidence, x, EVERY * look_, NO_AID, NO_AID, NO_AID, False)
     assert evidence[0]["ratio"][sources.AA] > 1.0
