@@ -204,16 +204,14 @@ class UncertainClearance:
             for k, then in enumerate(before.spread):
                 wanted[k] += self._lead * max(spread[k] - then, 0.0) / elapsed
         stepped = [min(_stepped(more), _MOST) for more in wanted]
-        if len(before.added) == len(stepped):
-            rise = _RISE * elapsed if elapsed > 0.0 else 0.0
-            own = before.added
-            if before.moved:
-                own = tuple([max(a - b, 0.0) for a, b in zip(own, before.moved, strict=True)])
-            bounded = [
-                min(more, _stepped(old + rise)) for more, old in zip(stepped, own, strict=True)
-            ]
-            return tuple(map(_settled, bounded, own))
-        return tuple(stepped)
+        if len(before.added) != len(stepped):
+            return tuple(stepped)
+        rise = _RISE * elapsed if elapsed > 0.0 else 0.0
+        own = before.added
+        if before.moved:
+            own = tuple([max(a - b, 0.0) for a, b in zip(own, before.moved, strict=True)])
+        bounded = [min(more, _stepped(old + rise)) for more, old in zip(stepped, own, strict=True)]
+        return tuple(map(_settled, bounded, own))
 
     def _spread(
         self, safe_set: SafeSet, estimate: StateEstimate, pose: Array
