@@ -9,8 +9,6 @@ noise has an observer of its own (``control/tracking.py``), which knows the roto
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
-from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -50,7 +48,7 @@ def estimate_state(sensors: SensorFrame) -> StateEstimate | None:
 
 def read_frame(sensors: SensorFrame, r: Tick) -> int:
     """Write the state that a frame tells; which parts of it are no numbers or out of range."""
-    return _machine_code()(r.array, reading_of(sensors), sensors.t_us)
+    return _read(r.array, reading_of(sensors), sensors.t_us)
 
 
 def reading_of(sensors: SensorFrame) -> Floats:
@@ -60,6 +58,7 @@ def reading_of(sensors: SensorFrame) -> Floats:
     return np.frombuffer(_FRAMES[len(s.q_arm)].pack(*parts))
 
 
+@machine_code
 @kernel
 def _read(records: NDArray[Any], reading: Floats, now_us: int) -> int:
     """Write the estimate that a ``reading`` (READINGS,) [SI] is."""
@@ -100,9 +99,3 @@ def _within(values: Vec3, limit: float) -> bool:
     for one in values:
         within = within and abs(one) < limit
     return within
-
-
-@cache
-def _machine_code() -> Callable[..., int]:
-    """``_read``, compiled when it is first wanted."""
-    return machine_code(_read, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0)

@@ -11,7 +11,7 @@ import numpy as np
 from fsw.autopilot.estimation import kernels
 from fsw.autopilot.estimation.drift import FrameDrift, least
 from fsw.autopilot.estimation.error_state import IMU_CAPACITY, Filter, Law
-from fsw.autopilot.estimation.fusion_memory import FusionMemory, Waiting
+from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.estimation.sensors.gnss import Gnss
 from fsw.autopilot.estimation.sensors.magnetometer import Magnetometer
 from fsw.autopilot.estimation.sensors.pose import Pose
@@ -70,7 +70,10 @@ class FilterStart:
 
     def _from_pose(self, memory: FusionMemory, sample: PoseSample) -> FusionMemory:
         stated = self._pose.stated(sample)
-        noise = self._min_stated(memory.waiting) if sample.drifts else stated
+        noise = stated
+        if sample.drifts:  # of what poses have stated so far the least: the noise alone
+            poses = [one.sample for one in memory.waiting if isinstance(one.sample, PoseSample)]
+            noise = reduce(least, map(self._pose.stated, poses))
         state = sample.position, ZERO, normalised(sample.attitude)
         self._begin(memory, sample.time, state, *noise)
         if not sample.drifts:
@@ -107,11 +110,6 @@ class FilterStart:
         slow = self._tuning.velocity**2
         variances = p_variance, (slow, slow, slow), q_variance
         kernels.begin(memory.numbers, self._law, time, *state, *variances)
-
-    def _min_stated(self, waiting: tuple[Waiting, ...]) -> tuple[Vec3, Vec3]:
-        """The least variances of the poses so far: of a frame that drifts, the noise alone."""
-        poses = [one.sample for one in waiting if isinstance(one.sample, PoseSample)]
-        return reduce(least, (self._pose.stated(pose) for pose in poses))
 
 
 def _levelled(x: Filter, field: Vec3, declination: float) -> Vec4:
