@@ -502,7 +502,7 @@ def test_of_steps_that_piled_up_the_newest_counts_and_every_message_is_kept(
 
 
 def test_shutdown_is_acknowledged_and_ends_the_flight(wire: Wire) -> None:
-    wire.send(StepEncoder(lockstep=True).command(SHUTDOWN))
+    wire.send(StepEncoder(lockstep=True).spoken((SHUTDOWN,)))
     assert wire.link.wait_for_step() is None
     assert wire.link.shutdown
     (ack,) = split(wire.hear())
@@ -512,7 +512,7 @@ def test_shutdown_is_acknowledged_and_ends_the_flight(wire: Wire) -> None:
 
 def test_a_reboot_is_not_a_shutdown(wire: Wire) -> None:
     reboot = SendCommand(246, (1.0, 1.0, NAN, NAN, NAN, NAN, NAN))
-    wire.send(StepEncoder(lockstep=True).command(reboot))
+    wire.send(StepEncoder(lockstep=True).spoken((reboot,)))
     assert wire.link.wait_for_step() is None
     assert not wire.link.shutdown
 
