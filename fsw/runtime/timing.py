@@ -28,11 +28,12 @@ class Histogram:
         return sum(times * duration for duration, times in self._counts.items())
 
     def add(self, duration_us: float) -> None:
-        """Count one duration [us]."""
+        """Count one duration [us], as the clock counts them."""
         if duration_us > self.max_us:
             self.max_us = duration_us
-        whole = round(duration_us)
-        self._counts[whole if whole < _EXACT_US else float(f"{whole:.3g}")] += 1
+        if duration_us >= _EXACT_US:
+            duration_us = float(f"{duration_us:.3g}")
+        self._counts[duration_us] += 1
 
     def percentile_us(self, share: float) -> float:
         """Duration [us] that a ``share`` [1] of all counts does not exceed; 0 before the first."""
