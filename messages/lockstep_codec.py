@@ -1,4 +1,4 @@
-"""Codec of the lockstep exchange: messages of one datagram, read and written by fixed layouts.
+"""The simulator's codec of the lockstep exchange: one datagram, by fixed layouts.
 
 One step of lockstep is three frames to the flight software and one back, 500 times a simulated
 second. Their first fields change with every step and the others never do, so only the first ones

@@ -491,6 +491,24 @@ def test_each_jump_needs_poses_of_its_own_that_say_so(gained: float, seed: int) 
 
 
 @pytest.mark.requirement("REQ-EST-10")
+@pytest.mark.parametrize("step", [0.3, 0.5])
+@pytest.mark.parametrize("seed", [2, 3])
+def test_each_jump_of_satellites_needs_fixes_of_its_own_that_say_so(step: float, seed: int) -> None:
+    """A staircase, too quick for a run, behind a jump that was believed: 8 jumps followed it."""
+
+    def climbs(now: float, sample: Sample) -> Sample:
+        if not isinstance(sample, GnssSample) or sample.time < START + 1.5:
+            return sample
+        x, y, z = sample.position
+        stairs = max((sample.time - START - 2.2) // 0.2, 0.0)
+        return replace(sample, position=(x, y + 0.8 + step * stairs, z))
+
+    reset = Flown(run(RTK, seed, 4.0), climbs).memory.reset
+    assert reset.number == 1
+    np.testing.assert_allclose(reset.position[:2], (0.0, 0.8), atol=0.15)
+
+
+@pytest.mark.requirement("REQ-EST-10")
 @pytest.mark.parametrize("place", [(0.3, 0.0, 0.0), (0.0, -0.2, 0.0), (0.2, 0.2, -0.1)])
 def test_what_a_place_contradicts_is_doubted_along_it(place: Vec3) -> None:
     """Doubted across as well, a rangefinder off by 10 cm made a velocity of 1.4 m/s down."""
