@@ -6,13 +6,13 @@ import select
 import time
 from collections.abc import Sequence
 from dataclasses import astuple
+from operator import attrgetter
 from typing import Final
 
 from fsw.autopilot.ports import Clock, LinkLosses
 from fsw.autopilot.signals import CommandAck, FlightSnapshot, StatusText, TickOutputs
 from fsw.link.gcs_link import GcsLink
 from fsw.link.telemetry.stream_rates import SLOT_US
-from fsw.link.wire.px4_mode import shown_mode
 
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
 _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
@@ -20,6 +20,8 @@ _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 # sending nor what a planning period begins with falls on the same tick.
 _ENCODES: Final = 2
 _SENDS: Final = 3
+# Of a mission, and what a heartbeat says: a vehicle that is disarmed shows the intended mode.
+_TOLD_AT_ONCE: Final = attrgetter("mission", "mode", "intended_mode", "armed", "landed", "failures")
 _ONE: Final = 1  # byte of budget: one frame
 _GUARD_US: Final = 200  # before a tick: the dearest frame takes less
 # Of files, a tick and link: some 3 MB/s in real time, if the client asks as fast.
@@ -35,7 +37,7 @@ class GroundLinks:
         self._tick_us = tick_period_us
         self._slot_ticks = SLOT_US // tick_period_us
         self._tick = 0
-        self._told: tuple[object, object] | None = None  # of the last tick: heartbeat and mission
+        self._told: tuple[object, ...] | None = None  # of the last tick
         self._t_us = 0  # of the last tick
         self._attends = False
 
@@ -121,11 +123,12 @@ class GroundLinks:
 
         One step of a mission may follow another by a tick, and each is told.
         """
-        before, self._told = self._told, (_heartbeat(now), now.mission)
+        before, self._told = self._told, _TOLD_AT_ONCE(now)
+        if self._told == before:
+            return False, False
         if before is None:
             return True, now.mission is not None
-        heartbeat, mission = before
-        return self._told[0] != heartbeat, now.mission is not mission and now.mission != mission
+        return self._told[1:] != before[1:], self._told[0] != before[0]
 
     def acknowledge(self, t_us: int, ack: CommandAck) -> None:
         """Answer a command on the link it came from; on all where that is not known."""
@@ -139,7 +142,3 @@ class GroundLinks:
         """Close all sockets."""
         for link in self.links:
             link.close()
-
-
-def _heartbeat(snapshot: FlightSnapshot) -> object:
-    return shown_mode(snapshot), snapshot.armed, snapshot.landed, snapshot.failures

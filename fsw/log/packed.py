@@ -61,17 +61,17 @@ class _Codec:
         self.pack = Struct("<5s" + topic.codes).pack
         self._unpack: Callable[[bytes], Values] = unpacker(topic).unpack
 
-    def values(self, sample: Sample) -> Values:
+    def values(self, sample: Sample) -> list[float]:
         """As the record has them."""
         values: list[float] = []
-        for value, size in zip(self._of(sample), self._sizes, strict=True):
-            if size:
+        for value in self._of(sample):
+            if type(value) is tuple:
                 values += value
             else:
                 values.append(value)
         if self._is_stamped:
             values.append(_sampled_us(sample))
-        return tuple(values)
+        return values
 
     def read(self, body: bytes) -> Sample:
         """The sample again."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter
+from collections.abc import Sequence
 from typing import Final
 
 from fsw.autopilot.ports import GroupTiming
@@ -13,9 +14,10 @@ _EXACT_US: Final = 4096  # longer ones are counted to three digits, so that they
 class Histogram:
     """Counts of durations, in whole microseconds."""
 
-    def __init__(self) -> None:
-        self.max_us = 0.0
-        self._counts = defaultdict[float, int](int)
+    def __init__(self, durations_us: Sequence[float] = ()) -> None:
+        """Count some durations [us], as the clock counts them."""
+        self.max_us = max(durations_us, default=0.0)
+        self._counts = Counter(map(_rounded, durations_us))
 
     @property
     def count(self) -> int:
@@ -28,12 +30,9 @@ class Histogram:
         return sum(times * duration for duration, times in self._counts.items())
 
     def add(self, duration_us: float) -> None:
-        """Count one duration [us], as the clock counts them."""
-        if duration_us > self.max_us:
-            self.max_us = duration_us
-        if duration_us >= _EXACT_US:
-            duration_us = float(f"{duration_us:.3g}")
-        self._counts[duration_us] += 1
+        """Count one more."""
+        self.max_us = max(self.max_us, duration_us)
+        self._counts[_rounded(duration_us)] += 1
 
     def percentile_us(self, share: float) -> float:
         """Duration [us] that a ``share`` [1] of all counts does not exceed; 0 before the first."""
@@ -48,8 +47,11 @@ class Histogram:
     def absorb(self, other: Histogram) -> None:
         """Add the counts of another histogram."""
         self.max_us = max(self.max_us, other.max_us)
-        for duration, times in other._counts.items():
-            self._counts[duration] += times
+        self._counts.update(other._counts)
+
+
+def _rounded(duration_us: float) -> float:
+    return duration_us if duration_us < _EXACT_US else float(f"{duration_us:.3g}")
 
 
 class GroupTimer:
@@ -61,13 +63,14 @@ class GroupTimer:
         self.late = 0
         self.skipped = 0
         self.execution, self.lateness = Histogram(), Histogram()  # up to the last interval
-        self._execution, self._lateness = Histogram(), Histogram()  # of this interval
+        self._execution: list[float] = []  # of this interval
+        self._lateness: list[float] = []
 
     def add(self, execution_us: float, lateness_us: float = 0.0) -> None:
         """Count one tick by its times [us]."""
         self.ticks += 1
-        self._execution.add(execution_us)
-        self._lateness.add(lateness_us)
+        self._execution.append(execution_us)
+        self._lateness.append(lateness_us)
         if lateness_us + execution_us > self.period_us:
             self.late += 1  # it ended after the next release
 
@@ -78,8 +81,8 @@ class GroupTimer:
 
     def close_interval(self) -> GroupTiming:
         """Report the interval since the last call and start another."""
-        execution, lateness = self._execution, self._lateness
-        self._execution, self._lateness = Histogram(), Histogram()
+        execution, lateness = Histogram(self._execution), Histogram(self._lateness)
+        self._execution, self._lateness = [], []
         report = GroupTiming(
             period_us=self.period_us,
             ticks=self.ticks,

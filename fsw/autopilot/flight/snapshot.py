@@ -58,7 +58,7 @@ class Shown(FlightSnapshot):
         """The last command."""
         return self.state.record.actuator_command
 
-    @cached_property
+    @property
     def failures(self) -> tuple[str, ...]:
         """Conditions that are faults, by name."""
         held = self.state.vehicle.conditions
