@@ -165,6 +165,7 @@ class Arbitration:
                 damaged=damaged,
                 sizes=tuple(evidence[0]["size"].tolist()),
                 headed=tuple(evidence[0]["headed"].tolist()),
+                unheard=tuple(evidence[0]["unheard"].tolist()),
             )
         memory = replace(memory, verdict=verdict)
         state: StateEstimate | None = found

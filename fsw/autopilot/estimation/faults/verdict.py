@@ -146,6 +146,7 @@ def judged(
     damaged: bool = False,
     sizes: tuple[float, ...] = (0.0,) * COUNT,
     headed: tuple[float, ...] = (math.inf,) * COUNT,
+    unheard: tuple[float, ...] = (0.0,) * COUNT,
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
@@ -166,7 +167,7 @@ def judged(
     verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:
         # What cannot be heard at present acquits nobody.
-        heard = [ratios[k] for k in verdict.shown.intersection(used) if ratios[k] > 0.0]
+        heard = [max(ratios[k], unheard[k]) for k in verdict.shown if ratios[k] > 0.0]
         if verdict.is_on and max(heard, default=math.inf) > _STAYS:
             verdict = verdict._replace(fired=now)
         elif verdict.is_on and now - verdict.fired > _QUIET:
