@@ -327,8 +327,7 @@ def doubt(filters: Filter, along: Vec3, about: Vec3, place: float, turn: float, 
             pushed = force[i] * force[j] + lift[i] * lift[j]
             turned = tilt[i] * tilt[j] + spin[i] * spin[j]
             if place > 0.0:
-                turned = 1.0 if i == j else 0.0
-                moved = pushed = turned if dot(along, along) > 0.0 else 0.0
+                moved = pushed = turned = 1.0 if i == j else 0.0
             M[P + i, P + j] += place * place * moved
             M[V + i, V + j] += _DOUBTED_SPEED * _DOUBTED_SPEED * moved
             if not held:

@@ -165,7 +165,6 @@ class Arbitration:
                 damaged=damaged,
                 sizes=tuple(evidence[0]["size"].tolist()),
                 headed=tuple(evidence[0]["headed"].tolist()),
-                unheard=tuple(evidence[0]["unheard"].tolist()),
             )
         memory = replace(memory, verdict=verdict)
         state: StateEstimate | None = found
@@ -182,7 +181,7 @@ class Arbitration:
             used = min([at for part, at in fused if not part & wrong], default=-math.inf)
             if now - used <= _USED and now - health.came <= self._stale:
                 found |= parts[0] | parts[1]
-        return found & ~(wrong | (Source.ATTITUDE if memory.verdict.contested else NOBODY))
+        return found & ~wrong
 
     def _convicted(
         self, memory: FusionMemory, before: Verdict, found: StateEstimate

@@ -147,14 +147,11 @@ EVIDENCE: Final = np.dtype(
         ("came", float, (COUNT,)),  # s, when it was computed last
         ("ratio", float, (COUNT,)),  # the largest of all windows
         ("size", float, (COUNT,)),  # SI, of that
-        # The largest of all windows that hold a time in which somebody has said nothing of use.
-        ("unheard", float, (COUNT,)),
         # How far gyro and field have turned apart [rad], how the vehicle has accelerated across by
         # satellites, by window [m/s^2], and what such a heading makes of a residual [m/s^2].
         ("apart", float),
         ("across", float, (5,)),
         ("headed", float, (COUNT,)),
-        ("tipped", float),  # s, when gyro and pose differed by how the vehicle is tilted
     ],
     align=True,
 )
@@ -329,7 +326,7 @@ def _compare(
 @compilable
 def _note_largest(s: Any, now: float, k: int) -> None:
     """Keep what is largest of a residual in all windows."""
-    s.ratio[k], s.size[k], s.unheard[k] = 0.0, 0.0, 0.0
+    s.ratio[k], s.size[k] = 0.0, 0.0
     if not now - s.came[k] < _LATEST:
         return
     kind, heard = _KINDS[k], now
@@ -340,9 +337,7 @@ def _note_largest(s: Any, now: float, k: int) -> None:
         if _MASKS[k] & (1 << i):
             silent = max(silent, s.silent[i])
     for i in range(5):
-        if heard - silent < CONTAINED[i]:
-            s.unheard[k] = max(s.unheard[k], s.both[k, i])
-        elif s.both[k, i] > s.ratio[k]:
+        if heard - silent >= CONTAINED[i] and s.both[k, i] > s.ratio[k]:
             s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
             s.headed[k] = min(s.apart, 2.0) * s.across[i] if k in (AN, MN) else math.inf
 
@@ -376,7 +371,7 @@ def _begins(W: Array) -> bool:
 
 @compilable
 def _begin_anew(s: Any) -> None:
-    s.began, s.count, s.apart, s.tipped = -1.0, 0, 0.0, -math.inf
+    s.began, s.count, s.apart = -1.0, 0, 0.0
     s.aid_count[:], s.aid_first[:], s.waits[:] = 0, 0, 0
     s.came[:], s.ratio[:] = -1.0, 0.0
     s.raw[:], s.both[:], s.squares[:] = 0.0, 0.0, 0.0
@@ -483,14 +478,6 @@ def _note(s: Any, now: float, k: int, window: int, r: Vec3, threshold: float) ->
 
 
 @compilable
-def _note_turn(s: Any, now: float, window: int, r: Vec3, threshold: float) -> None:
-    """The same of gyro and pose, and when they have differed by how the vehicle is tilted."""
-    _note(s, now, GP, window, r, threshold)
-    if math.hypot(r[0], r[1]) > threshold:
-        s.tipped = now
-
-
-@compilable
 def _note_model(
     s: Any, now: float, k: int, window: int, r: Vec3, least: float, noise: float, learns: bool
 ) -> None:
@@ -583,7 +570,7 @@ def _unit_and_pose(
     off = rotation_vector(multiply(conjugate(said), seen))
     r = add(_over(off, over), bias)
     turning = math.sqrt(6.0) * about / over
-    _note_turn(s, now, k, r, _GYRO_OFF + _NOISE_SIGMAS * turning)
+    _note(s, now, GP, k, r, _GYRO_OFF + _NOISE_SIGMAS * turning)
     first = _before(s, 0, middle, T, 0.03)
     if first < 0:
         return
@@ -716,7 +703,7 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
     if kind == 0:
         r = add(r, bias)
         noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about
-        _note_turn(s, now, 4, r, _GYRO_OFF_LONG + (_GYRO_AXES * turned_on + noise) / over)
+        _note(s, now, GP, 4, r, _GYRO_OFF_LONG + (_GYRO_AXES * turned_on + noise) / over)
     else:
         iron = _IRON * turned_on / over
         _note(s, now, GB, 4, _across(bias, three(b, _MEASURED), r), _FIELD_OFF_LONG + iron)

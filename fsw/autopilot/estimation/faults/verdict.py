@@ -47,8 +47,6 @@ _LEAD: Final = 1.0
 _DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
 _MOST: Final = 25.0  # of one residual
 _OF_PLACES: Final = (AP, MP_FORCE)
-_TURN: Final = G | Q
-_TIPPED: Final = 1.0  # s without a difference in tilt, after which it is not contested any more
 _TILTED: Final = 1.5  # m/s^2, that a pose shows whose attitude is off by 0.15 rad
 # What is off shows at once in the first, while the trial is this young [s], and in others later.
 _SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
@@ -94,17 +92,6 @@ class Verdict(NamedTuple):
         """Whether sensors, or one and the rotors' model, contradict each other."""
         return self.since >= 0.0
 
-    @property
-    def contested(self) -> bool:
-        """Whether gyro and a pose contradict each other on the tilt, and nobody else is suspected.
-
-        Neither is asked for it then: places and what is felt tell it.
-        """
-        if self.evidence is None or self.suspects & _TURN != _TURN or self.suspects & ~(_TURN | B):
-            return False
-        known = self.evidence[0]
-        return bool(known["looked"] - known["tipped"] < _TIPPED)
-
     def acquitted(self) -> Verdict:
         """The verdict after the trial is over."""
         return self._replace(
@@ -146,7 +133,6 @@ def judged(
     damaged: bool = False,
     sizes: tuple[float, ...] = (0.0,) * COUNT,
     headed: tuple[float, ...] = (math.inf,) * COUNT,
-    unheard: tuple[float, ...] = (0.0,) * COUNT,
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
@@ -156,19 +142,16 @@ def judged(
     it is known that the rotors' model is off.
     """
     headings = [k for k in range(COUNT) if sizes[k] <= headed[k]]
-    unused = verdict.wrong | (Q if verdict.contested else NOBODY)
-    of = _sources(holds_attitude, unused, headings)
+    of = _sources(holds_attitude, verdict.wrong, headings)
     # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's;
     # one that was taken for unknown in this trial is whatever the suspects made of it.
-    found = holds_attitude or unused & Q or any(verdict.unknown)
+    found = holds_attitude or verdict.wrong & Q or any(verdict.unknown)
     known = range(AA if found else COUNT)
     used = [k for k in known if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:
-        # What cannot be heard at present acquits nobody.
-        heard = [max(ratios[k], unheard[k]) for k in verdict.shown if ratios[k] > 0.0]
-        if verdict.is_on and max(heard, default=math.inf) > _STAYS:
+        if any(ratios[k] > _STAYS for k in verdict.shown.intersection(used)):
             verdict = verdict._replace(fired=now)
         elif verdict.is_on and now - verdict.fired > _QUIET:
             return verdict.acquitted()

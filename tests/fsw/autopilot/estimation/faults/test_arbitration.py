@@ -14,7 +14,6 @@ from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
-from fsw.autopilot.estimation.sensors.base import attitude_of
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
@@ -240,31 +239,6 @@ def test_of_a_pose_whose_attitude_is_wrong_the_place_is_used(rate: Vec3) -> None
     x, y = memory.numbers[0]["q"][1:3].tolist()
     assert 2.0 * math.hypot(x, y) < 0.02
     assert math.dist(memory.numbers[0]["p"], (0.0, 0.0, -1.5)) < 0.02
-
-
-@pytest.mark.requirement("REQ-EST-13")
-@pytest.mark.parametrize("rate", [0.07, -0.1])
-@pytest.mark.parametrize("axis", [0, 1])
-def test_while_gyro_and_pose_contest_the_tilt_places_and_what_is_felt_tell_it(
-    axis: int, rate: float
-) -> None:
-    """The vehicle leant as a frame that tilted, and flew into a wall."""
-
-    def tilting(t: float) -> Vec3:
-        return rate * t * (axis == 0), rate * t * (axis == 1), 0.0
-
-    memory = last(hovering(turned_by=tilting))
-    assert memory.verdict.contested
-    assert abs(2.0 * attitude_of(memory.numbers[0])[1 + axis]) < 0.2 * abs(rate)
-
-
-@pytest.mark.requirement("REQ-EST-13")
-def test_a_heading_that_gyro_and_pose_contest_is_the_pose_s() -> None:
-    """Its places turn with it, and nothing else of the suite knows a heading."""
-    memory = last(hovering(turned_by=lambda t: (0.0, 0.0, 0.1 * t)))
-    assert memory.verdict.suspects == Source.GYRO | Source.ATTITUDE
-    assert not memory.verdict.contested
-    assert 2.0 * attitude_of(memory.numbers[0])[3] == pytest.approx(0.1, abs=0.01)
 
 
 @pytest.mark.requirement("REQ-EST-13")
