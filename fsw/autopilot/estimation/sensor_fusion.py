@@ -585,6 +585,7 @@ def _as_judged(
 
     Of a pose whose attitude repeats itself, or is named, the place is used alone.
     """
+    half = half or verdict.contested
     if not verdict.wrong:
         return health, True, half
     wrong = verdict.wrong & source

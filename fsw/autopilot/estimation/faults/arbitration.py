@@ -181,7 +181,7 @@ class Arbitration:
             used = min([at for part, at in fused if not part & wrong], default=-math.inf)
             if now - used <= _USED and now - health.came <= self._stale:
                 found |= parts[0] | parts[1]
-        return found & ~wrong
+        return found & ~(wrong | (Source.ATTITUDE if memory.verdict.contested else NOBODY))
 
     def _convicted(
         self, memory: FusionMemory, before: Verdict, found: StateEstimate

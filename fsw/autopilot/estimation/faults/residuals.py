@@ -121,6 +121,7 @@ _GAINS: Final = 15.0  # m/s^2, half of it
 _SPEED: Final = 10.0  # m/s
 _RATE: Final = 4.0  # rad/s
 _FOLLOWS: Final = 0.5  # s, for which that tells garbage
+_SELDOM: Final = 0.055  # s between two poses, in the mean of eight
 _NOISE: Final = 20.0  # deviations of a place that is extrapolated
 
 EVIDENCE: Final = np.dtype(
@@ -152,6 +153,7 @@ EVIDENCE: Final = np.dtype(
         ("apart", float),
         ("across", float, (5,)),
         ("headed", float, (COUNT,)),
+        ("tipped", float),  # s, when gyro and poses that come seldom differed by a tilt
     ],
     align=True,
 )
@@ -371,7 +373,7 @@ def _begins(W: Array) -> bool:
 
 @compilable
 def _begin_anew(s: Any) -> None:
-    s.began, s.count, s.apart = -1.0, 0, 0.0
+    s.began, s.count, s.apart, s.tipped = -1.0, 0, 0.0, -math.inf
     s.aid_count[:], s.aid_first[:], s.waits[:] = 0, 0, 0
     s.came[:], s.ratio[:] = -1.0, 0.0
     s.raw[:], s.both[:], s.squares[:] = 0.0, 0.0, 0.0
@@ -478,6 +480,17 @@ def _note(s: Any, now: float, k: int, window: int, r: Vec3, threshold: float) ->
 
 
 @compilable
+def _note_turn(s: Any, now: float, window: int, r: Vec3, threshold: float) -> None:
+    """The same of gyro and pose, and when they differed by a tilt while poses came seldom."""
+    _note(s, now, GP, window, r, threshold)
+    last = s.aid_count[0] - 1
+    before = max(last - 8, s.aid_first[0])
+    apart = s.aids[0, last % _AIDS, 0] - s.aids[0, before % _AIDS, 0]
+    if apart > _SELDOM * (last - before) and math.hypot(r[0], r[1]) > threshold:
+        s.tipped = now
+
+
+@compilable
 def _note_model(
     s: Any, now: float, k: int, window: int, r: Vec3, least: float, noise: float, learns: bool
 ) -> None:
@@ -570,7 +583,7 @@ def _unit_and_pose(
     off = rotation_vector(multiply(conjugate(said), seen))
     r = add(_over(off, over), bias)
     turning = math.sqrt(6.0) * about / over
-    _note(s, now, GP, k, r, _GYRO_OFF + _NOISE_SIGMAS * turning)
+    _note_turn(s, now, k, r, _GYRO_OFF + _NOISE_SIGMAS * turning)
     first = _before(s, 0, middle, T, 0.03)
     if first < 0:
         return
@@ -703,7 +716,7 @@ def _over_long(s: Any, now: float, kind: int, about: float, bias: Vec3) -> None:
     if kind == 0:
         r = add(r, bias)
         noise = _NOISE_SIGMAS * math.sqrt(3.0 / n + 3.0 / m) * about
-        _note(s, now, GP, 4, r, _GYRO_OFF_LONG + (_GYRO_AXES * turned_on + noise) / over)
+        _note_turn(s, now, 4, r, _GYRO_OFF_LONG + (_GYRO_AXES * turned_on + noise) / over)
     else:
         iron = _IRON * turned_on / over
         _note(s, now, GB, 4, _across(bias, three(b, _MEASURED), r), _FIELD_OFF_LONG + iron)

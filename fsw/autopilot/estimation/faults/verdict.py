@@ -47,6 +47,8 @@ _LEAD: Final = 1.0
 _DISTURBED: Final = 0.6  # by so much less a disturbed field costs: there is iron everywhere
 _MOST: Final = 25.0  # of one residual
 _OF_PLACES: Final = (AP, MP_FORCE)
+_TURN: Final = G | Q
+_TIPPED: Final = 1.0  # s without a difference in tilt, after which it is not contested any more
 _TILTED: Final = 1.5  # m/s^2, that a pose shows whose attitude is off by 0.15 rad
 # What is off shows at once in the first, while the trial is this young [s], and in others later.
 _SHOWN: Final = {G: (GM, (GP, GB)), A: (AM, (AP, AN))}
@@ -91,6 +93,18 @@ class Verdict(NamedTuple):
     def is_on(self) -> bool:
         """Whether sensors, or one and the rotors' model, contradict each other."""
         return self.since >= 0.0
+
+    @property
+    def contested(self) -> bool:
+        """Whether gyro and poses that come seldom contradict each other on the tilt, and none else.
+
+        Neither is asked for it then: places and what is felt tell it. Poses that come often are:
+        their places show at once where the attitude leads astray, and the pose is named for it.
+        """
+        if self.evidence is None or self.suspects & _TURN != _TURN or self.suspects & ~(_TURN | B):
+            return False
+        known = self.evidence[0]
+        return bool(known["looked"] - known["tipped"] < _TIPPED)
 
     def acquitted(self) -> Verdict:
         """The verdict after the trial is over."""
@@ -142,10 +156,11 @@ def judged(
     it is known that the rotors' model is off.
     """
     headings = [k for k in range(COUNT) if sizes[k] <= headed[k]]
-    of = _sources(holds_attitude, verdict.wrong, headings)
+    unused = verdict.wrong | (Q if verdict.contested else NOBODY)
+    of = _sources(holds_attitude, unused, headings)
     # Where a pose holds the attitude, or has, a bias that is found with it is as much the pose's;
     # one that was taken for unknown in this trial is whatever the suspects made of it.
-    found = holds_attitude or verdict.wrong & Q or any(verdict.unknown)
+    found = holds_attitude or unused & Q or any(verdict.unknown)
     known = range(AA if found else COUNT)
     used = [k for k in known if not of[k] & (verdict.wrong | lost)]
     fires = [k for k in used if ratios[k] > 1.0]

@@ -14,6 +14,7 @@ from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
+from fsw.autopilot.estimation.sensors.base import attitude_of
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.geometry.quaternion import turned
 from fsw.autopilot.measurements import ImuSample, JointSample, PoseSample, Sample, Sensor
@@ -43,6 +44,7 @@ def hovering(
     turned_by: Callable[[float], Vec3] | None = None,
     moved_by: float = 0.0,
     pushed_by: float = 0.0,
+    apart: int = 5,
 ) -> Iterator[FusionMemory]:
     """The memories of 5 s.
 
@@ -51,7 +53,7 @@ def hovering(
     ``garbage`` in their place, and they may last ``until`` [s] only; a part of the vehicle may be
     known to be ``damaged``, and its tool ``touches`` something. Poses may be ``turned_by`` an angle
     [rad, FRD] at each time [s] of that second, and ``moved_by`` so much [m]; the accelerometer is
-    ``pushed_by`` so much [m/s^2].
+    ``pushed_by`` so much [m/s^2]. Poses are so many ticks ``apart``.
     """
     memory, random = at_start(2), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -67,7 +69,7 @@ def hovering(
             ImuSample(now, (0.02 * d + pushed, 0.02 * e, -9.81 + 0.02 * f), rate),
         ]
         good = t < (until if poses else POSES_UNTIL)
-        if tick % 5 == 0 and (good or garbage):
+        if tick % apart == 0 and (good or garbage):
             scatter = 1e-3 if good else 20.0
             place = scatter * d, scatter * e, -1.5 + scatter * f
             attitude = turned(LEVEL, *shakes)
@@ -239,6 +241,32 @@ def test_of_a_pose_whose_attitude_is_wrong_the_place_is_used(rate: Vec3) -> None
     x, y = memory.numbers[0]["q"][1:3].tolist()
     assert 2.0 * math.hypot(x, y) < 0.02
     assert math.dist(memory.numbers[0]["p"], (0.0, 0.0, -1.5)) < 0.02
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("rate", [0.1, -0.12])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_of_poses_that_come_seldom_a_tilt_that_the_gyro_contradicts_is_not_followed(
+    axis: int, rate: float
+) -> None:
+    """The vehicle leant as a frame that tilted, and flew into a wall."""
+
+    def tilting(t: float) -> Vec3:
+        return rate * t * (axis == 0), rate * t * (axis == 1), 0.0
+
+    memory = last(hovering(turned_by=tilting, apart=30))
+    assert memory.verdict.contested
+    assert abs(2.0 * attitude_of(memory.numbers[0])[1 + axis]) < 0.3 * abs(rate)
+    assert not last(hovering(turned_by=tilting)).verdict.contested
+
+
+@pytest.mark.requirement("REQ-EST-13")
+def test_a_heading_that_gyro_and_pose_contest_is_the_pose_s() -> None:
+    """Its places turn with it, and nothing else of the suite knows a heading."""
+    memory = last(hovering(turned_by=lambda t: (0.0, 0.0, 0.1 * t), apart=30))
+    assert memory.verdict.suspects == Source.GYRO | Source.ATTITUDE
+    assert not memory.verdict.contested
+    assert 2.0 * attitude_of(memory.numbers[0])[3] == pytest.approx(0.1, abs=0.01)
 
 
 @pytest.mark.requirement("REQ-EST-13")
