@@ -64,8 +64,8 @@ class _Codec:
     def values(self, sample: Sample) -> list[float]:
         """As the record has them."""
         values: list[float] = []
-        for value in self._of(sample):
-            if type(value) is tuple:
+        for value, size in zip(self._of(sample), self._sizes, strict=True):
+            if size:
                 values += value
             else:
                 values.append(value)

@@ -357,9 +357,10 @@ class FlightLoop:
         self._notices += self._ground.news()
         self._vibration.accel_range = self._parameters.values[ACCEL_RANGE]
         for group in RATE_GROUPS:
-            # The planner's cycles are of interest, not the time that a request takes to send.
-            timer = record.mpc.timer if group is MPC else record.groups[group.name]
-            timing = timer.close_interval()
+            timing = record.groups[group.name].close_interval()
+            if group is MPC:
+                # Its cycles are of interest, not the time that a request takes to send.
+                timing = record.mpc.timer.close_interval()
             setattr(record.health, group.name, timing)
             self._files.ulog.add_timing(cycle.release.sensors.t_us, group.number, timing)
 

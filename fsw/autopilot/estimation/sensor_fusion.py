@@ -583,7 +583,7 @@ def _as_judged(
 ) -> tuple[Health, bool, bool]:
     """A ``source``'s health at ``now`` [s], whether its sample is used, and whether by ``half``.
 
-    Of a pose whose attitude repeats itself, or is named, the place is used alone.
+    Of a pose whose attitude repeats itself, is contested or is named, the place is used alone.
     """
     half = half or verdict.contested
     if not verdict.wrong:

@@ -426,6 +426,21 @@ def test_what_comes_and_goes_about_its_threshold_is_one_contradiction() -> None:
 
 
 @pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("wrong", [Source(0), Source.GYRO])
+def test_a_bias_that_is_found_without_the_attitude_it_contests_is_no_evidence(
+    wrong: Source,
+) -> None:
+    evidence = residuals.at_start()
+    evidence["looked"] = evidence["tipped"] = 9.0
+    if wrong:  # they do not differ by a tilt
+        evidence["tipped"] = -math.inf
+    before = Verdict(evidence, since=9.0, fired=9.0, suspects=Source.GYRO | Source.ATTITUDE)
+    assert before.contested == (not wrong)
+    ratios = {sources.GP: 2.0, sources.GG: 3.0}
+    assert looked_at(ratios, {}, verdict=before, holds_attitude=False).wrong == wrong
+
+
+@pytest.mark.requirement("REQ-EST-13")
 def test_a_place_is_not_lost_for_what_a_slow_tilt_explains() -> None:
     ratios, sizes = {sources.GP: 0.6, sources.AP: 1.4}, {sources.AP: 0.6}
     verdict = looked_at(ratios, sizes, holds_attitude=True)
