@@ -62,7 +62,7 @@ def flipped(writer: FrameWriter, chance: random.Random) -> bytes:
         frame = bytearray(dangerous(writer, chance))
         for _ in range(chance.randrange(1, 4)):
             frame[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
-        if not list(split(bytes(frame))):
+        if not split(bytes(frame)):
             return bytes(frame)
 
 

@@ -37,6 +37,10 @@ _FALSE_START_LIMIT: Final = 64
 checksum: Callable[[bytes], int] = fastcrc.crc16.mcrf4xx
 
 
+# Of MAVLink 2, but for its flags that may be ignored.
+_HEADER: Final = Struct("<BBBxBBB3s")
+
+
 class Layout(NamedTuple):
     """How one message lies in a frame; a plain tuple because it is taken apart for each frame."""
 
@@ -44,6 +48,7 @@ class Layout(NamedTuple):
     crc_extra: bytes  # (1,), closes the checksummed bytes
     id_bytes: bytes  # (3,), the message id as it stands in the header
     base_size: int  # bytes of the payload without extensions: its size in MAVLink 1
+    message_id: int
 
 
 def _layout(message_id: int, message: Any) -> Layout:
@@ -52,12 +57,13 @@ def _layout(message_id: int, message: Any) -> Layout:
     codes = zip(message.array_lengths[:base], message.native_format[1:].decode(), strict=False)
     base_size = calcsize("<" + "".join(f"{length or 1}{code}" for length, code in codes))
     id_bytes = message_id.to_bytes(3, "little")
-    return Layout(message.unpacker, bytes([message.crc_extra]), id_bytes, base_size)
+    return Layout(message.unpacker, bytes([message.crc_extra]), id_bytes, base_size, message_id)
 
 
 LAYOUTS: Final[dict[int, Layout]] = {
     message_id: _layout(message_id, message) for message_id, message in dialect.mavlink_map.items()
 }
+_BY_ID_BYTES: Final = {layout.id_bytes: layout for layout in LAYOUTS.values()}
 
 
 class Frame(NamedTuple):
@@ -185,9 +191,9 @@ def as_version_1(frame: bytes) -> bytes | None:
     return b"\xfe%b%b" % (body, checksum(body + layout.crc_extra).to_bytes(2, "little"))
 
 
-def split(datagram: bytes, losses: Losses | None = None) -> Iterator[Frame]:
-    """Yield the valid frames of one datagram, in order; see ``cut``."""
-    return (frame for frame, _ in cut(datagram, losses))
+def split(datagram: bytes, losses: Losses | None = None) -> list[Frame]:
+    """The valid frames of one datagram, in order; see ``cut``."""
+    return [frame for frame, _, _ in _frames_in(datagram, losses)]
 
 
 def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, bytes]]:
@@ -204,6 +210,11 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
 
     What was dropped is added to ``losses`` once the datagram has been read through.
     """
+    return ((frame, datagram[at:end]) for frame, at, end in _frames_in(datagram, losses))
+
+
+def _frames_in(datagram: bytes, losses: Losses | None) -> Iterator[tuple[Frame, int, int]]:
+    """Yield the frames of :func:`cut`, with where each begins and ends."""
     delivered_bytes = refused = 0
     at, size = 0, len(datagram)
     while at < size and refused < _FALSE_START_LIMIT:
@@ -215,7 +226,7 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
             if at < 0:
                 break
         else:
-            yield frame, datagram[at : at + length]
+            yield frame, at, at + length
             delivered_bytes += length
             at += length
     if losses is not None:
@@ -225,10 +236,11 @@ def cut(datagram: bytes, losses: Losses | None = None) -> Iterator[tuple[Frame, 
 
 def frame_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     """Decode the frame of either version that starts here: its size [bytes]; None: none does."""
-    if datagram[start] == _MAGIC_1:
-        return _frame_1_at(datagram, start)
-    if datagram[start] == _MAGIC:
+    marker = datagram[start]
+    if marker == _MAGIC:
         return _frame_2_at(datagram, start)
+    if marker == _MAGIC_1:
+        return _frame_1_at(datagram, start)
     return 0, None
 
 
@@ -270,11 +282,10 @@ def _frame_2_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     payload_at = start + _HEADER_SIZE
     if len(datagram) < payload_at + _CHECKSUM_SIZE:
         return 0, None
-    _, length, incompatible, _, sequence, system_id, component_id, id_0, id_1, id_2 = datagram[
-        start:payload_at
-    ]
-    message_id = id_0 | id_1 << 8 | id_2 << 16
-    layout = LAYOUTS.get(message_id)
+    _, length, incompatible, sequence, system_id, component_id, id_bytes = _HEADER.unpack_from(
+        datagram, start
+    )
+    layout = _BY_ID_BYTES.get(id_bytes)
     payload_end = payload_at + length
     end = payload_end + _CHECKSUM_SIZE
     if incompatible:
@@ -288,7 +299,7 @@ def _frame_2_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
     if values is None:
         return 0, None
     # By position: up to 2000 a second.
-    return end - start, Frame(system_id, component_id, sequence, message_id, values)
+    return end - start, Frame(system_id, component_id, sequence, layout.message_id, values)
 
 
 def _frame_1_at(datagram: bytes, start: int) -> tuple[int, Frame | None]:
@@ -321,12 +332,14 @@ def _payload_values(
     datagram: bytes, start: int, begin: int, end: int, layout: Layout
 ) -> tuple[Any, ...] | None:
     """The values of a payload; None where the checksum behind it is wrong."""
+    payload, crc_extra, *_ = layout
     received = datagram[end] | datagram[end + 1] << 8
-    if checksum(datagram[start + 1 : end] + layout.crc_extra) != received:
+    if checksum(datagram[start + 1 : end] + crc_extra) != received:
         return None
-    # Longer than known: a peer with newer extensions. Shorter: trailing zeros were left out.
-    size = layout.payload.size
-    return layout.payload.unpack(datagram[begin:end][:size].ljust(size, b"\0"))
+    size = payload.size
+    if end - begin >= size:  # longer than known: a peer with newer extensions
+        return payload.unpack_from(datagram, begin)
+    return payload.unpack(datagram[begin:end].ljust(size, b"\0"))  # zeros were left out
 
 
 def wire_fields(message_id: int) -> tuple[str, ...]:

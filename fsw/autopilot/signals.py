@@ -104,6 +104,7 @@ class SensorFrame:
 
 
 _NO_VECTOR: Final[Vec3] = (math.nan, math.nan, math.nan)
+_NO_ATTITUDE: Final[Vec4] = (math.nan, *_NO_VECTOR)
 
 
 def frame_of_samples(t_us: int, samples: Sequence[Sample], joints: int) -> SensorFrame:
@@ -117,8 +118,14 @@ def frame_of_samples(t_us: int, samples: Sequence[Sample], joints: int) -> Senso
     if type(newest) is ImuSample:
         rate, force = newest.rate, newest.acceleration
     arm = (math.nan,) * joints
-    attitude = (math.nan, *_NO_VECTOR)
-    return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, attitude, rate, force, arm, arm)
+    return SensorFrame(t_us, _NO_VECTOR, _NO_VECTOR, _NO_ATTITUDE, rate, force, arm, arm)
+
+
+def is_frame_of(frame: SensorFrame, imu: ImuSample | None) -> bool:
+    """Whether a frame is one of ``frame_of_samples``, and has of them what ``imu`` measured."""
+    if imu is None or frame.p_WB is not _NO_VECTOR:
+        return False
+    return frame.gyro_B == imu.rate and frame.accel_B == imu.acceleration
 
 
 @dataclass(frozen=True, slots=True)

@@ -162,7 +162,7 @@ class SimLink:
 
     def _read(self, datagram: bytes) -> SensorFrame | None:
         """Decode one datagram; None unless it carries a whole new step."""
-        frames = list(split(datagram))
+        frames = split(datagram)
         found = {frame.message_id: frame for frame in frames}  # of each kind the last one
         if message_ids.HEARTBEAT in found:
             self._note_pacing(cast(int, found[message_ids.HEARTBEAT].payload_values[0]))
@@ -171,7 +171,7 @@ class SimLink:
             self._read_between_steps(frames)
             return None
         if self.measured:
-            samples = [one for frame in frames for one in self._decoder.samples(frame)]
+            samples = self._decoder.samples(frames)
             sensors = self._new_measured(barrier, samples)
         else:
             odometry = found.get(message_ids.ODOMETRY)
@@ -255,10 +255,10 @@ class SimLink:
 
     def _read_between_steps(self, frames: list[Frame]) -> None:
         """What ends the run, and measurements for which the next step has no room."""
+        if self.measured:
+            self._early += self._decoder.samples(frames)
+            del self._early[:-MAX_SAMPLES]
         for frame in frames:
-            if self.measured:
-                self._early += self._decoder.samples(frame)
-                del self._early[:-MAX_SAMPLES]
             if frame.message_id == message_ids.COMMAND_LONG and decode.for_this_vehicle(frame):
                 request = decode.command_long(frame)
                 if request.command == CMD_REBOOT_SHUTDOWN and request.params[1] == _POWER_OFF:

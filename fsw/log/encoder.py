@@ -39,11 +39,11 @@ from fsw.autopilot.signals import (
     TestRatios,
     TickInputs,
     TickOutputs,
-    frame_of_samples,
+    is_frame_of,
 )
 from fsw.log import topics
 from fsw.log.json_codec import JsonCodec
-from fsw.log.packed import Every, Packed, Samples
+from fsw.log.packed import Packed, Samples, Timetable
 from fsw.log.px4_records import Px4Records, validity
 from messages.ulog import logged_text
 
@@ -96,10 +96,14 @@ class LogEncoder:
 
         Of a vehicle with this ``airframe``, THIN or FULL. The local frame begins at ``origin``.
         """
-        self._details, self._rates, self._plans = (
-            Every(1 if profile == FULL else us) for us in (_DETAIL_US, _FAST_US, _PLAN_US)
-        )
         self._px4 = Px4Records(airframe, origin)
+        thin = profile != FULL
+        self._timed = Timetable(
+            (_DETAIL_US if thin else 1, self._detail),
+            (_PLAN_US if thin else 1, self._in_flight),
+            (_FAST_US if thin else 1, _rates),
+            *self._px4.rows(),
+        )
         joints = self._joints = airframe.bodies.joints
         # Records that are as long as a vehicle has joints and rotors.
         packed = partial(Packed, rotor=airframe.rotors, joint=joints)
@@ -141,8 +145,10 @@ class LogEncoder:
         out += self._every_tick(inputs, outputs)
         for sample in inputs.samples:
             out += self._samples.record(inputs.sensors.t_us, sample)
-        self._timed(snapshot, out)
-        self._px4.add(snapshot, out)
+        out += self._timed.due(snapshot.t_us, snapshot)
+        told = _TOLD(snapshot)
+        if told != self._told:
+            out += self._px4.news(snapshot)
         self._add_inputs(inputs, out)
         constraints, plan = snapshot.constraints, _PLAN(snapshot)
         if constraints is not self._constraints:
@@ -152,7 +158,7 @@ class LogEncoder:
         self._constraints, self._plan = constraints, plan
         if outputs.plan_request is not None:
             out += _request(self._request_records, snapshot.t_us, outputs.plan_request)
-        self._add_status(snapshot, out)
+        self._add_status(snapshot, told, out)
         for ack in outputs.acks:
             addressee = (ack.target_system & 0xFF, ack.target_component & _U16)
             values = (ack.command & _U32, ack.result & 0xFF, *addressee)
@@ -160,26 +166,11 @@ class LogEncoder:
         for text in outputs.texts:
             out += logged_text(text.severity & 7, snapshot.t_us, text.text)
 
-    def _timed(self, snapshot: FlightSnapshot, out: bytearray) -> None:
-        """What has a rate of its own, as far as it is due."""
-        t_us = snapshot.t_us
-        if self._details.is_due(t_us):
-            out += self._detail(snapshot)
-            if snapshot.touching is not None:
-                contact, force, *numbers = snapshot.touching
-                out += _CONTACT.pack(t_us, (*force, *numbers, contact))
-            if snapshot.payload is not None:
-                out += _PAYLOAD.pack(t_us, (snapshot.payload.mass, snapshot.payload.closed))
-        if self._plans.is_due(t_us) and snapshot.plan_state is not None:
-            out += self._in_flight(snapshot)
-        if self._rates.is_due(t_us):
-            out += _RATES.pack(t_us, snapshot.estimate.w_WB_B)
-
-    def _add_status(self, snapshot: FlightSnapshot, out: bytearray) -> None:
-        """Mode, landing and faults, on change and every second."""
+    def _add_status(self, snapshot: FlightSnapshot, told: tuple[Any, ...], out: bytearray) -> None:
+        """Mode, landing and faults, as ``told`` now, on change and every second."""
         self._ticks_to_status -= 1
-        before, self._told = self._told, _TOLD(snapshot)
-        if self._ticks_to_status < 0 or self._told != before:
+        before, self._told = self._told, told
+        if self._ticks_to_status < 0 or told != before:
             self._ticks_to_status = STATUS_TICKS - 1
             if not snapshot.failures or snapshot.failsafe_from is not None:
                 self._took_over = False
@@ -198,7 +189,7 @@ class LogEncoder:
             self._px4.vibration.add(one.gyro_B, one.accel_B)
         command = (*sent.rotor_thrust, *sent.joint_torque, outputs.armed)
         # Where sensors have times of their own, the frame has nothing that a sample does not say.
-        if self._imu and one == frame_of_samples(t_us, (self._imu,), self._joints):
+        if is_frame_of(one, self._imu):
             return self._short_tick_records.pack(t_us, (), command)
         arm = (*one.q_arm, *one.qd_arm)
         frame = (*one.p_WB, *one.v_WB, *one.q_WB, *one.gyro_B, *one.accel_B, *arm)
@@ -206,17 +197,25 @@ class LogEncoder:
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
         x, sent, ground = snapshot.estimate, snapshot.actuators, _sees_ground(snapshot)
-        return self._detail_records.pack(
-            snapshot.t_us,
+        t_us, touching, payload = snapshot.t_us, snapshot.touching, snapshot.payload
+        found = self._detail_records.pack(
+            t_us,
             quaternion_from_matrix(x.R_WB),
             (*x.p_WB, *x.v_WB, x.yaw, *validity(snapshot), -x.p_WB[2], ground),
             self._airframe.shares(sent).rotor_thrust,
             (*x.q_arm, *x.qd_arm, *sent.joint_torque),
         )
+        if touching is not None:
+            contact, force, *numbers = touching
+            found += _CONTACT.pack(t_us, (*force, *numbers, contact))
+        if payload is not None:
+            found += _PAYLOAD.pack(t_us, (payload.mass, payload.closed))
+        return found
 
     def _in_flight(self, snapshot: FlightSnapshot) -> bytes:
         x, u = snapshot.plan_state, snapshot.plan_input
-        assert x is not None
+        if x is None:
+            return b""
         a, yaw_acc, qdd = (
             ((0.0,) * 3, 0.0, (0.0,) * len(x.q_arm)) if u is None else (u.a, u.yaw_acc, u.qdd_arm)
         )
@@ -293,6 +292,10 @@ class LogEncoder:
             )
         status = int(snapshot.plan_status)
         return _MPC.pack(snapshot.t_us, (t_plan, plan_id, *counts, *about, status))
+
+
+def _rates(snapshot: FlightSnapshot) -> bytes:
+    return _RATES.pack(snapshot.t_us, snapshot.estimate.w_WB_B)
 
 
 def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:

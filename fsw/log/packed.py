@@ -1,4 +1,4 @@
-"""Records of topics as bytes: several in one call, those of samples and back; when they are due."""
+"""Records of topics as bytes: several in one call, those of samples and back, those with a rate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from operator import attrgetter
 from struct import Struct
-from typing import Any, Final
+from typing import Any, Final, Generic, TypeVar
 
 from fsw.autopilot.measurements import Sample
 from fsw.log import topics
@@ -18,7 +18,9 @@ from messages.ulog_reader import unpacker
 _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 
 
+Subject = TypeVar("Subject")
 Values = tuple[Any, ...]
+_NEVER: Final = -1
 _LATEST: Final = 1e12  # s; what is later fits no field
 
 
@@ -107,16 +109,26 @@ class Samples:
         return self._by_number[number].read(body)
 
 
-class Every:
-    """A grid of instants, with one record for each interval."""
+class Timetable(Generic[Subject]):
+    """Records that have a rate each: one for the first tick in each of its intervals."""
 
-    def __init__(self, period_us: int) -> None:
-        self._period_us, self._last = period_us, -1
+    def __init__(self, *rows: tuple[int, Callable[[Subject], bytes]]) -> None:
+        """Take the interval [us] of each, and what makes it."""
+        self._rows = [(period_us, record, [_NEVER]) for period_us, record in rows]
+        self._until_us = _NEVER  # when the first of all intervals ends
 
-    def is_due(self, t_us: int) -> bool:
-        """Whether ``t_us`` is the first that was asked about in its interval."""
-        last, self._last = self._last, t_us // self._period_us
-        return self._last != last
+    def due(self, t_us: int, subject: Subject) -> bytes:
+        """Those that are due at ``t_us``, of a ``subject``, in their order; time only goes on."""
+        if t_us < self._until_us:
+            return b""
+        found = b""
+        for period_us, record, last in self._rows:
+            interval = t_us // period_us
+            if interval != last[0]:
+                last[0] = interval
+                found += record(subject)
+        self._until_us = min((last[0] + 1) * period_us for period_us, _, last in self._rows)
+        return found
 
 
 def _within_float(value: Any) -> Any:

@@ -1,9 +1,9 @@
-"""Records of the topics that PX4's tools draw, each at its own rate."""
+"""Records of the topics that PX4's tools draw, and the rate of each."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, Final
 
@@ -30,7 +30,7 @@ from fsw.autopilot.signals import (
     Vec3,
     Vec4,
 )
-from fsw.log.packed import Every, Packed
+from fsw.log.packed import Packed
 
 _TORQUE_US: Final = 10_000
 _SETPOINTS_US: Final = 50_000
@@ -54,7 +54,7 @@ _LOAD: Final = Packed("cpuload")
 
 
 class Px4Records:
-    """Remembers when each was written last, and how much the inertial unit shakes."""
+    """Remembers what was told of failures, and how much the inertial unit shakes."""
 
     def __init__(self, airframe: Airframe, origin: Origin) -> None:
         # Of each rotor's thrust [1/N], the share of the largest torque about x, y and z, and of
@@ -63,26 +63,25 @@ class Px4Records:
         self._of_torque = [_shares([row[3 + axis] for row in rows], airframe) for axis in range(3)]
         self._of_thrust = _shares([-row[2] for row in rows], airframe)
         self._origin = origin
-        self._torque, self._setpoints = Every(_TORQUE_US), Every(_SETPOINTS_US)
-        self._place, self._second = Every(_PLACE_US), Every(_SECOND_US)
-        self._failures: tuple[str, ...] = ()
+        self._failures: tuple[str, ...] = ()  # as told last
         self.vibration = VibrationMeter()
 
-    def add(self, snapshot: FlightSnapshot, out: bytearray) -> None:
-        """Append what is due in this tick."""
-        t_us = snapshot.t_us
-        if self._torque.is_due(t_us):
-            out += self._torques(snapshot)
-        if self._setpoints.is_due(t_us):
-            out += self._setpoint_records(snapshot)
-        if self._place.is_due(t_us):
-            out += _place(snapshot, self._origin)
-        second, before = self._second.is_due(t_us), self._failures
+    def rows(self) -> list[tuple[int, Callable[[FlightSnapshot], bytes]]]:
+        """What has a rate, with its interval [us]."""
+        return [
+            (_TORQUE_US, self._torques),
+            (_SETPOINTS_US, self._setpoint_records),
+            (_PLACE_US, lambda snapshot: _place(snapshot, self._origin)),
+            (_SECOND_US, lambda snapshot: self._slow(snapshot) + self._flags(snapshot)),
+        ]
+
+    def news(self, snapshot: FlightSnapshot) -> bytes:
+        """What is to be told at once: other failures than before."""
+        return self._flags(snapshot) if snapshot.failures != self._failures else b""
+
+    def _flags(self, snapshot: FlightSnapshot) -> bytes:
         self._failures = snapshot.failures
-        if second:
-            out += self._slow(snapshot)
-        if second or self._failures != before:
-            out += _failsafe_flags(snapshot)
+        return _failsafe_flags(snapshot)
 
     def _torques(self, snapshot: FlightSnapshot) -> bytes:
         thrust = snapshot.actuators.rotor_thrust

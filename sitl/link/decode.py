@@ -41,7 +41,7 @@ def read_reply(datagram: bytes, vehicle: Vehicle) -> VehicleReply | None:
     if alone is not None:
         (values,) = alone
         return VehicleReply(int(values[0]), _controls(values, vehicle))
-    frames = list(split(datagram))
+    frames = split(datagram)
     if not frames or frames[-1].message_id != message_ids.HIL_ACTUATOR_CONTROLS:
         return None
     values = cast("tuple[float, ...]", frames[-1].payload_values)

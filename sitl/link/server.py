@@ -184,7 +184,7 @@ def shut_down(endpoint: PeerSocket, encoder: StepEncoder, tries: int) -> bool:
             received = endpoint.receive()
             if received is None:
                 break
-            for ack in decode.acknowledgements(list(split(received))):
+            for ack in decode.acknowledgements(split(received)):
                 if ack.command == CMD_REBOOT_SHUTDOWN and ack.result == ACCEPTED:
                     return True
     return False

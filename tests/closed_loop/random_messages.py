@@ -204,7 +204,7 @@ class Talkers:
         if chance.random() < 0.3:
             number = chance.choice(self.listened)
             datagram = any_payload(number, chance, chance.randrange(256))
-            frames = list(split(datagram))
+            frames = split(datagram)
             if not any(_ends(frame.message_id, frame.payload_values) for frame in frames):
                 self.raw(sender, datagram)
             return

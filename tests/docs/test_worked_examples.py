@@ -124,7 +124,7 @@ model = MODELS[type(keys)](keys, numpy.random.default_rng(1))
 one = model.measure(reading(1_000_000), HOVER, 1_000_000, False)
 encoder = StepEncoder(lockstep=True, measured=True)
 frame, _ = split(encoder.measured_datagrams(one.t_us, (one,), ())[1])
-(arrived,) = SampleDecoder(Inbox().locate, 2).samples(frame)
+(arrived,) = SampleDecoder(Inbox().locate, 2).samples([frame])
 assert isinstance(arrived, CeilingSample)
 assert abs(arrived.distance - one.distance) < 0.006
 log = Samples(2)

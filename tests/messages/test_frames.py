@@ -116,7 +116,7 @@ def test_a_reader_that_does_not_know_a_message_loses_no_other():
     for t in range(count):
         frame = writer.frame(joints.id, 1000 * t, *zeros)
         assert frame[-1] != 0xFD
-        assert len(list(split(frame))) == 1
+        assert len(split(frame)) == 1
         reader.take(frame + writer.frame(attitude, t, *[0.0] * 6))
     assert reader.heard == [attitude] * count
 
@@ -201,7 +201,7 @@ def test_the_sequence_wraps_after_255_as_pymavlinks_does():
         frame = writer.frame(message.id, *in_wire_order(message, values))
         assert frame == message(**values).pack(sender)
         sender.seq = (sender.seq + 1) % 256
-        assert next(split(frame)).sequence == k % 256
+        assert split(frame)[0].sequence == k % 256
 
 
 def test_two_components_count_their_own_sequences():
@@ -209,7 +209,7 @@ def test_two_components_count_their_own_sequences():
     heartbeat = (0, 2, 12, 81, 4, 3)
     for _ in range(5):
         autopilot.frame(0, *heartbeat)
-    assert next(split(private.frame(0, *heartbeat))).sequence == 0
+    assert split(private.frame(0, *heartbeat))[0].sequence == 0
 
 
 def test_a_refused_value_does_not_use_up_a_sequence_number():
@@ -217,7 +217,7 @@ def test_a_refused_value_does_not_use_up_a_sequence_number():
     for wrong in ((0, 2, 12, 81, 4), (0, 256, 12, 81, 4, 3), (0, 2, 12, 81, 4, "3")):
         with pytest.raises(struct.error):
             writer.frame(0, *wrong)
-    assert next(split(writer.frame(0, 0, 2, 12, 81, 4, 3))).sequence == 0
+    assert split(writer.frame(0, 0, 2, 12, 81, 4, 3))[0].sequence == 0
 
 
 def test_an_unknown_message_cannot_be_written():

@@ -49,7 +49,7 @@ def test_encoders_are_read_as_they_were_sent(count: int) -> None:
     encoder = SensorEncoder(FrameWriter(1, 200), DEFAULT_ORIGIN)
     sent = encoder.frames(4_000, (JointMeasurement(2_000, angles(count)),))
     (frame,) = [one for one in split(b"".join(sent)) if one.message_id == ENCODERS]
-    (sample,) = SampleDecoder(Inbox().locate, count).samples(frame)
+    (sample,) = SampleDecoder(Inbox().locate, count).samples([frame])
     assert sample.angles == angles(count)
 
 

@@ -56,10 +56,10 @@ def test_the_stand_in_answers_a_recorded_start_as_px4_did() -> None:
         if way == ">":
             answers.append(stand_in.hear(data))
     ours, real = b"".join(answers), b"".join(d for way, d in recording("boot") if way == "<")
-    assert list(split(ours)) == list(split(real))
+    assert split(ours) == split(real)
     different = sum(a != b for a, b in zip(ours, real, strict=True))
     assert different <= 3  # a flag and two bytes of checksum
-    assert [len(list(split(one))) for one in answers[:12]] == [2, *(0,) * 10, 1]
+    assert [len(split(one)) for one in answers[:12]] == [2, *(0,) * 10, 1]
 
 
 def test_in_flight_it_answers_each_step_in_the_recorded_format() -> None:
@@ -116,7 +116,7 @@ RAY, ARM = RangeMeasurement(3, 1.2, 1e-4, 0.05, 40.0), JointMeasurement(4, (0.1,
 
 def told(*measurements: object) -> list[Frame]:
     encoder = Px4Encoder(DEFAULT_ORIGIN)
-    return list(split(encoder.step(1_000_000, list(measurements))))  # type: ignore[arg-type]
+    return split(encoder.step(1_000_000, list(measurements)))  # type: ignore[arg-type]
 
 
 def test_hil_sensor_ends_each_step_and_says_what_is_new() -> None:

@@ -360,7 +360,7 @@ def test_a_force_sensor_changes_nothing_that_others_say() -> None:
 def test_a_force_sensor_is_on_the_wire() -> None:
     one = WrenchMeasurement(5000, (1.0, -2.0, 3.0), (0.25, 0.5, -0.75))
     _, datagram = StepEncoder(lockstep=True, measured=True).measured_datagrams(6000, (one,), ())
-    first = next(iter(split(datagram)))
+    first = split(datagram)[0]
     assert first.message_id == dialect.MAVLINK_MSG_ID_FORCE_TORQUE
     assert first.payload_values == (5000, *one.force, *one.torque)
 

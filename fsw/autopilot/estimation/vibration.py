@@ -30,10 +30,10 @@ class VibrationMeter:
 
     def add(self, gyro_B: Vec3, accel_B: Vec3) -> None:
         """Add a reading of ``gyro_B`` [rad/s] and ``accel_B`` [m/s^2]; NaN is ignored."""
-        x, y, z = accel_B
         end = _AT_THE_END * self.accel_range
-        if abs(x) >= end or abs(y) >= end or abs(z) >= end:
-            self.clipped += (abs(x) >= end) + (abs(y) >= end) + (abs(z) >= end)
+        x, y, z = accel_B
+        if not (-end < x < end and -end < y < end and -end < z < end):
+            self.clipped += sum([abs(one) >= end for one in accel_B])
         last, self._last = self._last, (gyro_B, accel_B)
         if last is None:
             return

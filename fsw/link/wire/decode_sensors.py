@@ -6,7 +6,7 @@ A reading that is not a number is handed on: the estimator names the sensor that
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, cast
 
 from fsw.autopilot.measurements import (
@@ -62,14 +62,19 @@ class SampleDecoder:
             message_ids.JOINT_ENCODERS: self._joints,
         }
 
-    def samples(self, frame: Frame) -> list[Sample]:
-        """What a frame has measured; nothing where it is no measurement."""
-        values = cast(Numbers, frame.payload_values)
-        if frame.message_id == message_ids.HIL_SENSOR:
-            return self._hil_sensor(values)
-        reader = self._readers.get(frame.message_id)
-        found = None if reader is None else reader(values)
-        return [] if found is None else [found]
+    def samples(self, frames: Iterable[Frame]) -> list[Sample]:
+        """What is measured in some frames, in their order."""
+        found: list[Sample] = []
+        for frame in frames:
+            values = cast(Numbers, frame.payload_values)
+            if frame.message_id == message_ids.HIL_SENSOR:
+                found += self._hil_sensor(values)
+                continue
+            reader = self._readers.get(frame.message_id)
+            one = None if reader is None else reader(values)
+            if one is not None:
+                found.append(one)
+        return found
 
     def _joints(self, values: Numbers) -> JointSample | None:
         """JOINT_ENCODERS of this arm; those of one of more or fewer joints say nothing of it."""
@@ -117,8 +122,7 @@ def battery_reading(values: Numbers) -> BatteryReading | None:
 
 def inertial_sample(values: Numbers) -> ImuSample:
     """The inertial unit's part of a HIL_SENSOR."""
-    _, ax, ay, az, wx, wy, wz = values[:7]
-    return ImuSample(1e-6 * values[0], (ax, ay, az), (wx, wy, wz))
+    return ImuSample(1e-6 * values[0], cast(Vec3, values[1:4]), cast(Vec3, values[4:7]))
 
 
 def pose_sample(values: Numbers) -> PoseSample | None:

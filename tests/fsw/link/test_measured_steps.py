@@ -63,7 +63,7 @@ def decoded(one: Measurement, origin: earth.Place = earth.DEFAULT_ORIGIN) -> lis
     first, *barrier = split(encoder.measured_datagrams(NOW, (one,), ())[1])
     assert [frame.message_id for frame in barrier] == [ids.HIL_SENSOR]
     inbox = Inbox(Origin(*origin))
-    return SampleDecoder(inbox.locate, 2).samples(first)
+    return SampleDecoder(inbox.locate, 2).samples([first])
 
 
 def close(values: tuple[float, ...], size: float = 1e-6) -> object:
@@ -117,7 +117,7 @@ def test_a_receiver_says_whether_it_has_a_fix_and_how_many_satellites_it_sees(
 ) -> None:
     values = (NOW, 473977420, 85455940, 0, 100, 100, 0, 0, 0, 0, 0, fix, 9, 0, 0)
     (frame,) = split(FrameWriter(1, 200).frame(ids.HIL_GPS, *values))
-    (sample,) = SampleDecoder(Inbox().locate, 2).samples(frame)
+    (sample,) = SampleDecoder(Inbox().locate, 2).samples([frame])
     assert isinstance(sample, GnssSample)
     assert (sample.fix_type, sample.satellites, sample.has_fix) == (fix, 9, known)
 
@@ -167,7 +167,7 @@ def test_a_distance_that_looks_ahead_is_no_height() -> None:
     for orientation, count in ((25, 1), (0, 0)):
         values = (1200, 5, 4000, 123, 0, 0, orientation, 6, 0.0, 0.0, *(0.0,) * 4, 0)
         (frame,) = split(writer.frame(ids.DISTANCE_SENSOR, *values))
-        assert len(SampleDecoder(Inbox().locate, 2).samples(frame)) == count
+        assert len(SampleDecoder(Inbox().locate, 2).samples([frame])) == count
 
 
 def test_odometry_in_another_frame_is_no_sample() -> None:
@@ -176,7 +176,7 @@ def test_odometry_in_another_frame_is_no_sample() -> None:
     values = list(odometry.payload_values)
     values[56] = 20  # MAV_FRAME_LOCAL_FRD
     moved = odometry._replace(payload_values=tuple(values))
-    assert SampleDecoder(Inbox().locate, 2).samples(moved) == []
+    assert SampleDecoder(Inbox().locate, 2).samples([moved]) == []
 
 
 class Wire:

@@ -431,7 +431,7 @@ def test_texts_without_room_in_the_answer_come_ahead_of_it_and_again_when_it_is_
 
     def answer() -> list[bytes]:
         datagrams = [wire.hear()]
-        while list(split(datagrams[-1]))[-1].message_id != ids.HIL_ACTUATOR_CONTROLS:
+        while split(datagrams[-1])[-1].message_id != ids.HIL_ACTUATOR_CONTROLS:
             datagrams.append(wire.hear())
         return datagrams
 
@@ -453,7 +453,7 @@ def test_what_a_tick_says_behind_its_answer_comes_with_the_next_one_and_once(wir
 
     def said(t_us: int, *texts: StatusText) -> tuple[str, ...]:
         wire.link.send_actuators(t_us, replace(outputs_at(t_us), texts=texts))
-        return status_text.joined(list(split(wire.hear())))
+        return status_text.joined(split(wire.hear()))
 
     assert said(1_002_000) == ()
     wire.link.queue_texts((late,))

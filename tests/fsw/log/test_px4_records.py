@@ -28,6 +28,7 @@ from fsw.autopilot.signals import (
     PredictionState,
     SensorFrame,
     TickInputs,
+    frame_of_samples,
 )
 from fsw.log.encoder import FULL, THIN
 from fsw.log.flight_log import FlightLog, LogSubject
@@ -38,7 +39,7 @@ from tests.fsw.link.snapshots import SNAPSHOT, VEHICLE, outputs_at
 ORIGIN = Origin(47.0, 8.0, 400.0)
 NUMBERS = {"origin.latitude": 47.0, "origin.longitude": 8.0, "origin.altitude": 400.0}
 EXACT = replace(SNAPSHOT, estimator=None, failures=())
-NONE, NAN = (0.0, 0.0, 0.0), math.nan
+NONE = (0.0, 0.0, 0.0)
 FRAME = SensorFrame(0, NONE, NONE, (1.0, *NONE), NONE, (0.0, 0.0, -9.81), NONE[:2], NONE[:2])
 
 
@@ -182,7 +183,7 @@ def test_vibration_is_px4_s_measure_of_what_the_inertial_unit_feels(tmp_path: Pa
 
 
 def test_a_frame_of_which_the_samples_say_everything_takes_a_few_bytes(tmp_path: Path) -> None:
-    path, unknown = tmp_path / "flight.ulg", (NAN, NAN, NAN)
+    path = tmp_path / "flight.ulg"
     log = FlightLog(path, LogSubject({}, NUMBERS, {}, VEHICLE))
     log.begin(1_000_000, lockstep=True)
     given = []
@@ -190,10 +191,7 @@ def test_a_frame_of_which_the_samples_say_everything_takes_a_few_bytes(tmp_path:
         imu = ImuSample(1.0 + 0.002 * k, (0.1 * k, -0.0, -9.81), (0.0, 0.01 * k, -0.0))
         if k % 8 == 5:
             imu = replace(imu, rate=(0.0, 0.5, 0.0))
-        frame = SensorFrame(
-            1_000_000 + 2_000 * k, unknown, unknown, (NAN, *unknown), imu.rate, imu.acceleration,
-            unknown[:2], unknown[:2],
-        )  # fmt: skip
+        frame = frame_of_samples(1_000_000 + 2_000 * k, (imu,), 2)
         if k == 17:
             frame = replace(frame, gyro_B=(0.0, 0.0, 1.0))  # it has been spoilt on its way
         given.append(TickInputs(frame, samples=(imu,)))

@@ -35,7 +35,7 @@ def test_the_link_and_the_studies_make_the_same_samples(suite: str) -> None:
         assert said is not None
         ahead, step = encoder.measured_datagrams(simulation.t_us, said, ())
         frames = [frame for datagram in (*ahead, step) for frame in split(datagram)]
-        received = [one for frame in frames for one in decoder.samples(frame)]
+        received = decoder.samples(frames)
         direct = [sample(one) for one in said]
         assert len(received) == len(direct)
         for one in direct:

@@ -299,7 +299,7 @@ def test_a_tick_works_on_one_checksum(client: Client, monkeypatch: pytest.Monkey
     summed: list[int] = []
     monkeypatch.setattr(zlib, "crc32", lambda data, crc: summed.append(len(data)) or crc)
     frames = [
-        next(iter(split(FrameWriter(system, 1).frame(ids.FILE_TRANSFER_PROTOCOL, *request))))
+        split(FrameWriter(system, 1).frame(ids.FILE_TRANSFER_PROTOCOL, *request))[0]
         for system in range(10, 15)
         for request in [(0, 1, 1, *HEADER.pack(1, 0, 14, 4, 0, 0, 0), *b"/top".ljust(239, b"\0"))]
     ]

@@ -63,7 +63,7 @@ def decoded(answers: Iterable[ServiceOutput]) -> list[dict[str, object]]:
             fields.append({"message": ids.STATUSTEXT, "text": outgoing.text.encode()})
             continue
         assert isinstance(outgoing, Outgoing)
-        assert list(split(writer.frame(outgoing.message_id, *outgoing.values)))
+        assert split(writer.frame(outgoing.message_id, *outgoing.values))
         named = dict(zip(wire_fields(outgoing.message_id), outgoing.values, strict=True))
         fields.append({"message": outgoing.message_id, **named})
     return fields
