@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from numpy.typing import NDArray
 
@@ -155,6 +155,8 @@ def cascade_law(
 
 class Cascade:
     """The inner loops of one configuration; each law writes into the record it is given."""
+
+    commands_rotors: ClassVar[bool] = True  # by ``close_loops``
 
     def __init__(
         self,

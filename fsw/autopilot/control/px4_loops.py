@@ -86,6 +86,8 @@ def airframe_above_px4(airframe: Airframe, px4: Px4Tuning) -> Airframe:
 class Px4Loops(Cascade):
     """What the tick has in place of the cascade: the same record in, a setpoint out."""
 
+    commands_rotors = False
+
     def __init__(
         self,
         airframe: Airframe,

@@ -68,9 +68,14 @@ class Asked(Record):
     of_encoders: int
     present: Estimate
 
-    def begin(self, now: float, dt: float, expected: Expected) -> None:
-        """A tick of ``dt`` [s] that ends ``now`` [s]; commands make of it what is ``expected``."""
-        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt, expected.memory)
+    def begin(self, now: float, dt: float, expected: Expected | None) -> None:
+        """A tick of ``dt`` [s] that ends ``now`` [s]; commands make of it what is ``expected``.
+
+        None: the call itself finds out what is.
+        """
+        _TICK.pack_into(self.memory, 0, round(1e6 * now), dt)
+        if expected is not None:
+            self.memory[_EXPECTED] = expected.memory
 
     def read_joints(self, angles: JointVector, age: float) -> None:
         """What encoders say: ``angles`` [rad] that are ``age`` [s] old."""
@@ -81,7 +86,8 @@ class Asked(Record):
         _READING.pack_into(self.memory, _READING_AT, time, *force, *rate)
 
 
-_TICK = struct.Struct(f"<qd{len(Expected().memory)}s")
+_TICK = struct.Struct("<qd")
+_EXPECTED = slice(Asked.place("expected"), Asked.place("encoders"))
 _ENCODERS = [struct.Struct(f"<{per_joint(n)}d") for n in range(JOINT_CAPACITY + 1)]
 _ENCODERS_AT = Asked.place("encoders")
 _READING = struct.Struct("<7d")
@@ -93,13 +99,21 @@ PRESENT_AT = Asked.place("present")
 def tick(
     filters: Filter, law: Law, requests: NDArray[Any], parts: int, now: float, until: float
 ) -> int:
-    """Do some ``parts`` [1] of a tick as asked by one of ``requests`` (1,) [SI]; what came of it.
+    """``do`` some ``parts`` [1] of a tick by one of ``requests`` (1,) [SI].
+
+    Until ``now`` [s], or the filter's own time is ``until`` [s].
+    """
+    return do(filters[0], law[0], requests[0], parts, now, until)
+
+
+@compilable
+def do(x: Any, t: Any, a: Asked, parts: int, now: float, until: float) -> int:
+    """Do some ``parts`` [1] of a tick as asked; what came of it.
 
     ``PUSH``: note what torques made of the joints; take in encoders, unless they are ``STUCK``:
     joints then follow from torques; take in a reading of the IMU; ``ADVANCE`` ``until`` [s]; and at
     the ``END`` predict the present ``now`` [s] from there, which may be no number.
     """
-    x, t, a = filters[0], law[0], requests[0]
     e = a.expected
     model = four(e.model)
     a.of_imu, a.of_encoders, stuck = 0, 0, False

@@ -16,9 +16,10 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fsw.autopilot.estimation import fusion, kernels
-from fsw.autopilot.estimation.error_state import DELAY, ERRORS, FRAME, TH, Array, Filter
+from fsw.autopilot.estimation.error_state import DELAY, ERRORS, FRAME, TH, Array, Filter, Law
 from fsw.autopilot.estimation.faults import residuals
 from fsw.autopilot.estimation.faults.arbitration import Arbitration, begun
 from fsw.autopilot.estimation.faults.confirmation import Run, ended, extended
@@ -89,6 +90,9 @@ _UNKNOWN: Final = Expected()
 _LOST: Final[Vec3] = (math.nan, math.nan, math.nan)
 _OF_EVERY_TICK: Final = (ImuSample, JointSample)
 
+FilterCall = Callable[[Filter, Law, NDArray[Any], int, float, float], int]
+"""What ``kernels.tick`` is."""
+
 
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
@@ -103,9 +107,13 @@ class SensorFusion:
         self._pose = Pose(tuning.pose)
         self._start = FilterStart(tuning, self.law)
         self._arbitration = Arbitration(self._sensors, tuning.stale_time, self._again)
-        self._asked, x = Asked(), at_start(joints).numbers  # written anew in each call
+        self._asked = Asked()  # written anew in each call
         self._requests = self._asked.array
-        self._tick = machine_code(kernels.tick, x, self.law, self._requests, 0, 0.0, 0.0)
+        self._tick: FilterCall = machine_code(kernels.tick, *self.call_example())
+
+    def call_example(self) -> tuple[Filter, Law, NDArray[Any], int, float, float]:
+        """What ``FilterCall`` is handed, of this configuration."""
+        return at_start(self._joints).numbers, self.law, self._requests, 0, 0.0, 0.0
 
     def warm_up(self) -> StateEstimate:
         """Compile every kernel: stand for a while with every sensor, then take jumps."""
@@ -145,25 +153,42 @@ class SensorFusion:
         are silent or of no use, what is ``expected`` of the commands stands in. None before there
         was a pose, or a position and a heading, to start from, and a reading of the arm.
         """
+        memory, found = self.taken(memory, samples, now, expected, self._tick)
+        if found & FINITE:
+            return memory, estimate_in(self._asked, PRESENT_AT, self._joints)
+        ready = memory.started and memory.joints_came >= 0.0
+        return (_anew(memory) if ready else memory), None
+
+    def taken(
+        self,
+        memory: FusionMemory,
+        samples: Sequence[Sample],
+        now: float,
+        expected: Expected | None,
+        run: FilterCall,
+    ) -> tuple[FusionMemory, int]:
+        """What ``take_in`` does until ``now`` [s], and what came of it, by ``run``.
+
+        That does what ``kernels.tick`` does; where nothing is ``expected`` it finds out by itself.
+        """
         dt = min(max(now - memory.now, 0.0), _LONGEST_STEP) if memory.now >= 0.0 else 0.0
         x = copied(memory.numbers)
         asked = self._asked
         asked.begin(now, dt, expected)
-        memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now)
+        memory, parts, imu_came, joints_came = self._take_each(memory, x, samples, now, run)
         silent = 0.0 <= imu_came < now - IMU_SILENT
         if silent:
             # In place of a reading what the model makes of the last one; it is no fault.
             asked.read(now, _LOST, _LOST)
             parts |= READING
-        ready = memory.started and joints_came >= 0.0
-        if ready:
+        if memory.started and joints_came >= 0.0:
             parts |= END
-        found = self._tick(x, self.law, self._requests, parts, now, 0.0)
+        found = run(x, self.law, self._requests, parts, now, 0.0)
         if found & FAULT:
             memory = memory.noting_faults(0 if silent else asked.of_imu, asked.of_encoders, now)
         trail = memory.trail
         if trail is not None:
-            tick = samples, now, bytes(expected.memory)
+            tick = samples, now, bytes(asked.expected.memory)
             trail = Trail(trail.start, trail.began, (tick, trail.ticks))
         memory = replace(
             memory,
@@ -173,12 +198,15 @@ class SensorFusion:
             joints_came=memory.joints_came if found & STUCK else joints_came,
             trail=trail,
         )
-        if found & FINITE:
-            return memory, estimate_in(asked, PRESENT_AT, self._joints)
-        return (_anew(memory) if ready else memory), None
+        return memory, found
 
     def _take_each(
-        self, memory: FusionMemory, x: Filter, samples: Sequence[Sample], now: float
+        self,
+        memory: FusionMemory,
+        x: Filter,
+        samples: Sequence[Sample],
+        now: float,
+        run: FilterCall,
     ) -> tuple[FusionMemory, int, float, float]:
         """Ask for readings of IMU and encoders to be taken in, one after the other.
 
@@ -193,7 +221,7 @@ class SensorFusion:
                     memory = memory.noting_fault(Sensor.IMU, SensorFault.TOO_OLD, now)
                     continue
                 if parts & READING:
-                    memory, parts = self._done(memory, x, parts, now), 0
+                    memory, parts = self._done(memory, x, parts, now, run), 0
                 asked.read(sample.time, sample.acceleration, sample.rate)
                 parts, imu_came = parts | READING, now
             elif isinstance(sample, JointSample):
@@ -203,7 +231,7 @@ class SensorFusion:
                     if fault is not SensorFault.RATE_TOO_LOW:
                         continue
                 if joints_came < 0.0 or parts & JOINTS:
-                    memory, parts = self._done(memory, x, parts, now), 0
+                    memory, parts = self._done(memory, x, parts, now, run), 0
                 if joints_came < 0.0:
                     angles = padded(sample.angles, JOINT_CAPACITY)
                     kernels.set_joints(x, self.law, sample.time, angles)
@@ -279,10 +307,12 @@ class SensorFusion:
             return memory, estimate_in(self._asked, PRESENT_AT, self._joints)
         return _anew(memory), None
 
-    def _done(self, memory: FusionMemory, x: Filter, parts: int, now: float) -> FusionMemory:
+    def _done(
+        self, memory: FusionMemory, x: Filter, parts: int, now: float, run: FilterCall
+    ) -> FusionMemory:
         """The memory once the filter has taken in ``parts`` of what is asked."""
         asked = self._asked
-        if self._tick(x, self.law, self._requests, parts, now, 0.0) & FAULT:
+        if run(x, self.law, self._requests, parts, now, 0.0) & FAULT:
             memory = memory.noting_faults(asked.of_imu, asked.of_encoders, now)
         return memory
 

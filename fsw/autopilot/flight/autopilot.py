@@ -107,7 +107,7 @@ class Controlled(NamedTuple):
     inputs: TickInputs
     state: FlightState  # with what was received, commanded and decided
     memory: Tick  # for the next tick
-    estimate: StateEstimate | None = None  # None: there has been none yet
+    estimate: StateEstimate | None = None  # None: there has been none yet, or it is calm
     fusion: FusionMemory | None = None
     flown: bool = False  # the loops are closed
     plan: PlanMemory = PlanMemory()
@@ -188,11 +188,9 @@ class Autopilot:
         """The part of a tick that the vehicle waits for: from the sensors to the actuators."""
         calm = self.calm.fly(state, inputs)
         if calm is not None:
-            r, fusion, estimate = calm
+            r, fusion = calm
             outputs = self._commanded(state, r, r.actuator_command, flown=True)
-            return Controlled(
-                outputs, inputs, state, r, estimate, fusion, True, state.plan, calm=True
-            )
+            return Controlled(outputs, inputs, state, r, None, fusion, True, state.plan, calm=True)
         now_us = inputs.sensors.t_us
         texts: list[StatusText] = []
         if state.vehicle.restarts:
@@ -271,7 +269,8 @@ class Autopilot:
                 state.accuracy.reach,
                 max(self._wind_room(r)),
             )
-        if fusion is not None:
+        if fusion is not None and not (c.calm and self._sensed.rests(state, fusion, inputs)):
+            estimate = r.state_estimate if c.calm else estimate
             caught = c.caught or self._sensed.catch_up(state, fusion, estimate, inputs)
             fusion, found, reset, said = caught
             texts = (*texts, *said) if said else texts
@@ -286,7 +285,7 @@ class Autopilot:
             if damage is not state.damage:
                 state = replace(state, damage=damage)
             return state, replace(outputs, shown=Shown(state, inputs.sensors))
-        if c.estimate is None or estimate is None:
+        if estimate is None or (c.estimate is None and not c.calm):
             # Ticks are counted from the first estimate on; what looks now and then goes by time.
             t_us = inputs.sensors.t_us
             unknown = nothing_known(outputs, state, t_us, texts)

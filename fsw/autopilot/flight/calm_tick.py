@@ -1,13 +1,14 @@
-"""Ticks in which nothing but sensors has to be looked at: three compiled calls.
+"""Ticks in which nothing but sensors has to be looked at: the numbers of a tick by compiled calls.
 
 Between two events most ticks believe the sensors, move the plan's state on, close the loops and
 watch the actuators. No command comes, no limit is met, no failsafe acts. What happens all the same
 the record says by its flags: then the tick is flown whole, from the record before it. Either way
 gives the same state to the last bit.
 
-Exact states are read and believed by the first call. Suites of sensors have their filter in its
-place; what they measure beside inertial unit and encoders waits for ``Autopilot.conclude``, and the
-watch with it.
+Of a suite of sensors one call does all that the actuators wait for: what the commands make of the
+vehicle, inertial unit and encoders, plan, loops. What else is measured waits for
+``Autopilot.conclude``, and the watch with it. Exact states are read and believed in the filter's
+place.
 
 Source: docs/decisions/0037-quiet-ticks.md.
 """
@@ -15,14 +16,19 @@ Source: docs/decisions/0037-quiet-ticks.md.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.control.cascade import Cascade
+from fsw.autopilot.control.cascade import Cascade, close_loops, compare_with_plan, tell_filter
+from fsw.autopilot.control.safety_filter import FilterProbes
+from fsw.autopilot.control.tube import NO_TUBE, TubeAround
+from fsw.autopilot.estimation.error_state import Filter, Law
 from fsw.autopilot.estimation.estimator import READINGS, read_into, reading_of
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
+from fsw.autopilot.estimation.kernels import FINITE, PUSH, do
 from fsw.autopilot.flight.estimate.sensed_state import SensedState
 from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS, FailsafeContext
 from fsw.autopilot.flight.failsafe.table import SLOW_US, quickly_active
@@ -35,11 +41,13 @@ from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.model.nominal import NominalModel, move_plan
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES
-from fsw.autopilot.signals import Mode, StateEstimate, TickInputs
+from fsw.autopilot.signals import Mode, TickInputs
 from fsw.autopilot.tick_record import IMPAIRED, Tick
 from fsw.compiled import kernel, machine_code
 from fsw.frozen import replace
 from fsw.record import Floats
+
+FLOWN: Final = 8  # beside what came of the filter's tick: the loops are closed
 
 
 @kernel
@@ -55,6 +63,40 @@ def _sense(
     missing = read_into(r.estimate, reading, now_us)
     move_plan(models[0], r.plan, r.u, r.joint_count)
     return bool(missing == 0 and r.estimate.R_WB[8] > upright)
+
+
+@kernel
+def _fly(
+    laws: NDArray[Any],
+    models: NDArray[Any],
+    records: NDArray[Any],
+    zones: Floats,
+    probes: FilterProbes,
+    tube: TubeAround,
+    upright: float,
+    filters: Filter,
+    estimators: Law,
+    requests: NDArray[Any],
+    parts: int,
+    now: float,
+    until: float,
+) -> int:
+    """Do some ``parts`` of the filter's tick (``kernels.do``) and close the loops at their end.
+
+    They are closed (FLOWN) of an attitude that is known and as near to level as ``upright`` [1]
+    says. Reads plan, u; writes estimate, plan, and what ``close_loops`` does.
+    """
+    law, r, asked = laws[0], records[0], requests[0]
+    if parts & PUSH:
+        tell_filter(r, law.airframe, law.rotor_decay, asked.expected, True, True)
+    found = do(filters[0], estimators[0], asked, parts, now, until)
+    if found & FINITE and asked.present.R_WB[8] > upright:
+        r.estimate = asked.present
+        move_plan(models[0], r.plan, r.u, r.joint_count)
+        close_loops(r, law, 1, zones, probes)
+        compare_with_plan(r, tube)
+        found |= FLOWN
+    return found
 
 
 class CalmTick:
@@ -77,13 +119,17 @@ class CalmTick:
         self._watch, self._sensed, self._zones_now = watch, sensed, zones_now
         example = model.packed, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0, 1.0
         self._sense = machine_code(_sense, *example)
+        loops = cascade.packed, model.packed, Tick().array, NO_ZONES, cascade.probes, NO_TUBE, 1.0
+        self._fly = None
+        if cascade.commands_rotors:
+            self._fly = machine_code(_fly, *loops, *sensed.call_example())
         # What was found out about the newest state; another one is looked at anew.
         self._state = first_state(config.airframe)
         self._until_us, self._zones, self._tube = -1, NO_ZONES, watch.tube(self._state)
 
     def fly(
         self, state: FlightState, inputs: TickInputs
-    ) -> tuple[Tick, FusionMemory | None, StateEstimate | None] | None:
+    ) -> tuple[Tick, FusionMemory | None] | None:
         """The record after a calm tick; None: the tick is to be flown whole.
 
         Of a suite also what its filter has made of inertial unit and encoders.
@@ -97,18 +143,14 @@ class CalmTick:
             if inputs.samples:
                 return None
             exact = self.step(before, reading_of(frame), now_us)
-            return None if exact is None else (exact, None, None)
-        if any(map(_is_range, inputs.samples)):
-            return None  # the land detector looks at it
-        after, fusion, estimate, caught = self._sensed.estimate(state, inputs)
-        news = after is not state or caught is not None
-        if news or estimate is None or not estimate.R_WB[8] > self._watch.upright:
-            return None
-        r = before.copy()
-        r.state_estimate = estimate
-        self._model.move(r, 1)
-        self._close_loops(r)
-        return None if r.flags else (r, fusion, estimate)
+            return None if exact is None else (exact, None)
+        if self._fly is None or any(map(_is_range, inputs.samples)):
+            return None  # the land detector looks at a range
+        r, cascade = before.copy(), self._cascade
+        loops = cascade.packed, self._model.packed, r.array, self._zones, cascade.probes
+        run = partial(self._fly, *loops, self._tube, self._watch.upright)
+        fusion, found = self._sensed.taken(state, inputs, run)
+        return (r, fusion) if found & FLOWN and not r.flags else None
 
     def ticks(self, state: FlightState) -> int:
         """How many ticks after a state may be calm, if nothing but sensors comes."""

@@ -86,8 +86,11 @@ class AidingSensor(ABC, Generic[S, T]):
 
     def numbers(self, sample: S) -> tuple[float, ...]:
         """All that a ``sample`` measures, without its variance."""
-        values = [getattr(sample, name) for name in self.measures]
-        return tuple(x for one in values for x in (one if isinstance(one, tuple) else (one,)))
+        found: list[float] = []
+        for name in self.measures:
+            value = getattr(sample, name)
+            found += value if isinstance(value, tuple) else (value,)
+        return tuple(found)
 
     @abstractmethod
     def is_plausible(self, sample: S) -> bool:
@@ -138,9 +141,9 @@ class AidingSensor(ABC, Generic[S, T]):
         """What a measurement says to the law for who is wrong."""
         return NO_AID
 
-    def fault_of(self, sample: S) -> SensorFault:
-        """What is wrong with a ``sample`` by itself."""
-        if not math.isfinite(sum(self.numbers(sample))):
+    def fault_of(self, sample: S, numbers: tuple[float, ...]) -> SensorFault:
+        """What is wrong with a ``sample`` of these ``numbers`` [SI] by itself."""
+        if not math.isfinite(sum(numbers)):
             return SensorFault.NOT_FINITE
         return SensorFault.NONE if self.is_plausible(sample) else SensorFault.IMPLAUSIBLE
 
@@ -161,7 +164,7 @@ class AidingSensor(ABC, Generic[S, T]):
         repeats = health.repeats_of(numbers)
         if any(repeats) and still():
             repeats = (0,) * len(numbers)
-        fault = self.fault_of(sample)
+        fault = self.fault_of(sample, numbers)
         if not fault and self._is_stuck(numbers, repeats):
             fault = SensorFault.STUCK
         health = health._replace(

@@ -94,9 +94,9 @@ class Gnss(AidingSensor[GnssSample, GnssTuning]):
         """Slow enough, and not far."""
         return norm(sample.velocity) < _FASTEST and norm(sample.position) < PLACE_LIMIT
 
-    def fault_of(self, sample: GnssSample) -> SensorFault:
+    def fault_of(self, sample: GnssSample, numbers: tuple[float, ...]) -> SensorFault:
         """Without a fix the rest says nothing."""
-        return super().fault_of(sample) if sample.has_fix else SensorFault.NO_FIX
+        return super().fault_of(sample, numbers) if sample.has_fix else SensorFault.NO_FIX
 
     def measured_at(self, memory: FusionMemory, sample: GnssSample) -> float:
         """Earlier by the delay that is known."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fsw.autopilot.control.cascade import Cascade, in_hover
 from fsw.autopilot.estimation.correlated_error import correlated_error
@@ -14,7 +14,7 @@ from fsw.autopilot.estimation.faults.sample_rate import looked
 from fsw.autopilot.estimation.faults.sensor_fault import Health, SensorFault, sentence
 from fsw.autopilot.estimation.faults.sources import NOBODY, Source, names
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, Reset, at_start
-from fsw.autopilot.estimation.sensor_fusion import SensorFusion
+from fsw.autopilot.estimation.sensor_fusion import FilterCall, SensorFusion
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.estimation.turned_covariance import Vec6
 from fsw.autopilot.flight.estimate.estimator_report import (
@@ -118,6 +118,26 @@ class SensedState:
             state = replace(state, invalid_ticks=0)
         return state, memory, estimate, caught
 
+    def taken(
+        self, state: FlightState, inputs: TickInputs, run: FilterCall
+    ) -> tuple[FusionMemory, int]:
+        """What ``estimate`` makes of IMU and encoders by a call of ``run``, and what came of it."""
+        now = 1e-6 * inputs.sensors.t_us
+        return self._fusion.taken(self._memory(state, now), inputs.samples, now, None, run)
+
+    def call_example(self) -> tuple[Any, ...]:
+        """What the ``run`` of ``taken`` is handed."""
+        return self._fusion.call_example()
+
+    def rests(self, state: FlightState, memory: FusionMemory, inputs: TickInputs) -> bool:
+        """Whether ``catch_up`` of a tick with an estimate would do nothing, as in most ticks."""
+        before = state.fusion
+        if before is None or not before.started or memory.health is not before.health:
+            return False
+        if not state.vehicle.flies or _is_due(before, inputs):
+            return False
+        return self._fusion.rests(memory, inputs.samples)
+
     def _expected(self, state: FlightState) -> Expected:
         """What commands make of a vehicle in a ``state``."""
         r, flies = state.record, state.vehicle.flies
@@ -159,13 +179,9 @@ class SensedState:
         """
         now = memory.now
         before = self._memory(state, now)
-        # By the filter's own clock: the state has none before the first estimate.
-        due = inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
+        due = _is_due(before, inputs)
         # A state that is carried on is none of this tick.
         known = None if state.invalid_ticks else estimate
-        same = before.started and memory.health is before.health and state.vehicle.flies
-        if known is not None and same and not due and self._fusion.rests(memory, inputs.samples):
-            return CaughtUp(memory, known, None, ())  # as in most ticks
         texts: list[StatusText] = []  # by itself: to call a type with its parameters takes 1 us
         memory, found = self._fused(state, memory, inputs.samples, known)
         news = memory.health is not before.health
@@ -244,6 +260,14 @@ class SensedState:
             silent = memory.now - came - self._stale
             if came >= 0.0 and 0.0 < silent <= 1e-6 * _CHECKED_US:
                 texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.STALE)))
+
+
+def _is_due(before: FusionMemory, inputs: TickInputs) -> bool:
+    """Whether sensors that are silent are looked for after a tick.
+
+    By the filter's own clock: the state has none before the first estimate.
+    """
+    return inputs.sensors.t_us // _CHECKED_US != round(1e6 * before.now) // _CHECKED_US
 
 
 def _carried_on(state: FlightState, now_us: int) -> StateEstimate | None:
