@@ -27,8 +27,9 @@ def more(joints: Values) -> Values:
 
 def joined(values: Values, base_at: int, more_at: int, count: int) -> Values:
     """So many joints out of a message's values, whose fields begin at these places."""
-    found = values[base_at : base_at + min(count, BASE)]
-    return found + values[more_at : more_at + max(count - BASE, 0)]
+    if count <= BASE:
+        return values[base_at : base_at + count]
+    return values[base_at : base_at + BASE] + values[more_at : more_at + count - BASE]
 
 
 # Places in wire order.

@@ -96,8 +96,10 @@ class Shown(FlightSnapshot):
     @cached_property
     def payload(self) -> PayloadReport | None:
         """What the gripper does, and holds."""
-        gripper, mass = self.state.vehicle.gripper, self.state.record.payload.mass
-        return PayloadReport(gripper > 0.0, float(mass)) if gripper else None
+        gripper = self.state.vehicle.gripper
+        if not gripper:
+            return None
+        return PayloadReport(gripper > 0.0, float(self.state.record.payload.mass))
 
 
 # Where fields are that the state has as they are.

@@ -101,7 +101,9 @@ class Verdict(NamedTuple):
         Neither is asked for it then: places and what is felt tell it. Poses that come often are:
         their places show at once where the attitude leads astray, and the pose is named for it.
         """
-        if self.evidence is None or self.suspects & _TURN != _TURN or self.suspects & ~(_TURN | B):
+        if not self.suspects or self.evidence is None:  # as nearly always
+            return False
+        if self.suspects & _TURN != _TURN or self.suspects & ~(_TURN | B):
             return False
         known = self.evidence[0]
         return bool(known["looked"] - known["tipped"] < _TIPPED)
