@@ -11,13 +11,17 @@ import numpy as np
 from fsw.autopilot.control import tracking
 from fsw.autopilot.control.allocation import allocate
 from fsw.autopilot.control.arm_compensation import CompensationLimits, compensate
+from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.control.gains import TrackingTuning
 from fsw.autopilot.control.joint_reference import JointReferenceLimits, refer
+from fsw.autopilot.estimation.tuning import EstimatorTuning
+from fsw.autopilot.flight.fast_loop import FastLoop
 from fsw.autopilot.flight.state import FlightState
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, note_health
 from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.model.arm_coordinates import arm_coordinates
 from fsw.autopilot.model.multibody import joint_load, move_bodies
+from fsw.autopilot.model.nominal import NominalModel
 from fsw.autopilot.model.rotors import MotionState, motion_state
 from fsw.autopilot.signals import (
     JointVector,
@@ -32,6 +36,12 @@ from fsw.autopilot.tick_record import ArmTask, Joints, Multibody, Observed, Tick
 from fsw.record import JOINTS, Record
 
 Kind = TypeVar("Kind", bound=Record)
+
+
+def fast_loop(cascade: Cascade) -> FastLoop:
+    """A flight's, with these loops."""
+    law = cascade.law
+    return FastLoop(cascade, NominalModel(law.airframe, law.dt), EstimatorTuning())
 
 
 def changed(record: Kind, **fields: Any) -> Kind:

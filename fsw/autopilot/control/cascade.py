@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from numpy.typing import NDArray
 
@@ -41,14 +41,11 @@ from fsw.autopilot.control.tracking import (
     velocity_of_mass,
     wanted_accelerations,
 )
-from fsw.autopilot.control.tube import NO_TUBE, TubeAround, beyond_covered
+from fsw.autopilot.control.tube import TubeAround, beyond_covered
 from fsw.autopilot.geometry.rotation import rotate_back, wrap_angle
 from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, cross, subtract, three
 from fsw.autopilot.model.actuator_health import (
-    HEALTHY,
     SOUND,
-    ActuatorHealth,
-    note_health,
 )
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import ArmCoordinates, arm_coordinates
@@ -62,7 +59,7 @@ from fsw.autopilot.model.rotors import (
     motion_state,
     rotor_decay,
 )
-from fsw.autopilot.shapes.zones import NO_ZONES, Zones
+from fsw.autopilot.shapes.zones import Zones
 from fsw.autopilot.signals import Mat3, Setpoint, StateEstimate, Vec3
 from fsw.autopilot.tick_record import (
     BEGINS_ANEW,
@@ -154,9 +151,7 @@ def cascade_law(
 
 
 class Cascade:
-    """The inner loops of one configuration; each law writes into the record it is given."""
-
-    commands_rotors: ClassVar[bool] = True  # by ``close_loops``
+    """The inner loops of one configuration, as ``flight/fast_loop.py`` flies them."""
 
     def __init__(
         self,
@@ -175,17 +170,12 @@ class Cascade:
         loop = TrackingLaw(airframe.attitude_lag, tuning.tracking, gains)
         lag, follows = gains.k[3] / gains.k[2], inner == "tracking"
         self.law = cascade_law(airframe, tuning, loop, clear, lag, dt, follows_plan=follows)
-        self._load(clear, _close_loops)
+        self._load(clear)
 
-    def _load(self, clear: KeepClear, tick: Any, *models: NDArray[Any]) -> None:
-        """Load the kernels of the law: that of a ``tick``, which takes ``models`` besides."""
-        self.probes, self.packed, r = filter_probes(clear.body), packed(self.law), Tick().array
-        rest = NO_ZONES, self.probes, NO_TUBE
-        self._tick = machine_code(tick, self.packed, *models, r, 1, *rest)
-        example = self.packed, r
-        self._found = Expected()
-        self._expected = machine_code(_expected, *example, self._found.array, True, True)
-        self._motion = machine_code(_motion, *example)
+    def _load(self, clear: KeepClear) -> None:
+        """Make ready what kernels take of the law."""
+        self.probes, self.packed = filter_probes(clear.body), packed(self.law)
+        self._motion = machine_code(_motion, self.packed, Tick().array)
 
     def motion(self, r: Tick, estimate: StateEstimate) -> MotionState:
         """Acceleration to snap right now, from the rotor model."""
@@ -193,31 +183,9 @@ class Cascade:
         now.state_estimate = estimate
         return self._motion(self.packed, now.array)
 
-    def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
-        """What the commands sent last make of joints and vehicle; it is good until the next call.
-
-        ``explains`` and ``judged`` are of ``tell_filter``.
-        """
-        self._expected(self.packed, r.array, self._found.array, explains, judged)
-        return self._found
-
     def setpoint(self, r: Tick) -> Setpoint | None:
         """What another autopilot is asked for; None: these loops command rotors."""
         return None
-
-    def step(
-        self,
-        r: Tick,
-        ticks: int = 1,
-        zones: Zones = NO_ZONES,
-        health: ActuatorHealth = HEALTHY,
-        tube: TubeAround = NO_TUBE,
-    ) -> None:
-        """Close the loops of a record; see ``close_loops``."""
-        if health is not HEALTHY or r.flags & IMPAIRED:
-            note_health(r.health, health)
-            r.flags = 0 if health is HEALTHY else IMPAIRED
-        self._tick(self.packed, r.array, ticks, zones, self.probes, tube)
 
 
 @compilable
@@ -440,26 +408,6 @@ def _joints_are_sound(r: Tick, airframe: Airframe) -> bool:
     for i in range(int(airframe.bodies.joints)):
         sound = sound and r.health.joints[i] == SOUND
     return sound
-
-
-@kernel
-def _close_loops(
-    law: NDArray[Any],
-    records: NDArray[Any],
-    ticks: int,
-    zones: Zones,
-    probes: FilterProbes,
-    tube: TubeAround,
-) -> None:
-    close_loops(records[0], law[0], ticks, zones, probes)
-    compare_with_plan(records[0], tube)
-
-
-@kernel
-def _expected(
-    laws: NDArray[Any], records: NDArray[Any], filled: NDArray[Any], explains: bool, judged: bool
-) -> None:
-    tell_filter(records[0], laws[0].airframe, laws[0].rotor_decay, filled[0], explains, judged)
 
 
 @kernel

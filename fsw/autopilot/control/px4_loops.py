@@ -41,7 +41,6 @@ from fsw.autopilot.control.safety_filter import FilterProbes
 from fsw.autopilot.control.tracking import TrackingLaw, observe
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.geometry.vectors import add_scaled, clamp_magnitude, subtract
-from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth
 from fsw.autopilot.model.airframe import GRAVITY, Airframe, AttitudeLag
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.multibody import move_bodies
@@ -49,7 +48,7 @@ from fsw.autopilot.model.rotors import MotionState, motion_state
 from fsw.autopilot.shapes.zones import NO_ZONES, Zones
 from fsw.autopilot.signals import Setpoint, Vec2, Vec3
 from fsw.autopilot.tick_record import Tick
-from fsw.compiled import compilable, kernel, packed
+from fsw.compiled import compilable, kernel, machine_code, packed
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +85,6 @@ def airframe_above_px4(airframe: Airframe, px4: Px4Tuning) -> Airframe:
 class Px4Loops(Cascade):
     """What the tick has in place of the cascade: the same record in, a setpoint out."""
 
-    commands_rotors = False
-
     def __init__(
         self,
         airframe: Airframe,
@@ -105,19 +102,14 @@ class Px4Loops(Cascade):
         gains = replace(tuning, tracking=tracking)
         self.law = cascade_law(airframe, gains, loop, clear, lag, dt, follows_plan=True)
         self.px4, self._packed_px4 = px4, packed(px4)
-        self._load(clear, _ask_px4, self._packed_px4)
+        self._load(clear)
+        models = self.packed, self._packed_px4
+        self._ask = machine_code(_ask_px4, *models, Tick().array, 1, NO_ZONES, self.probes, NO_TUBE)
 
-    def step(
-        self,
-        r: Tick,
-        ticks: int = 1,
-        zones: Zones = NO_ZONES,
-        health: ActuatorHealth = HEALTHY,
-        tube: TubeAround = NO_TUBE,
-    ) -> None:
-        """See ``Cascade.step``; rotors are PX4's whatever ``health``."""
+    def ask(self, r: Tick, ticks: int, zones: Zones, tube: TubeAround) -> None:
+        """Close the loops of a record; rotors are PX4's, whatever their health."""
         r.flags = 0
-        self._tick(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
+        self._ask(self.packed, self._packed_px4, r.array, ticks, zones, self.probes, tube)
 
     def setpoint(self, r: Tick) -> Setpoint:
         """What PX4 is asked for by a record after its step."""

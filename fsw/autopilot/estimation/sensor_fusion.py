@@ -97,8 +97,8 @@ FilterCall = Callable[[Filter, Law, NDArray[Any], int, float, float], int]
 class SensorFusion:
     """The estimator of one configuration; holds only what never changes in flight."""
 
-    def __init__(self, tuning: EstimatorTuning, joints: int) -> None:
-        """Estimate a vehicle of so many ``joints`` [1]."""
+    def __init__(self, tuning: EstimatorTuning, joints: int, run: FilterCall | None = None) -> None:
+        """Estimate a vehicle of so many ``joints`` [1], by ``run`` or ``kernels.tick`` itself."""
         self.tuning, self._joints = tuning, joints
         self.law = packed(tuning)
         self._sensors: dict[type, AidingSensor[Any, Any]] = {
@@ -109,11 +109,7 @@ class SensorFusion:
         self._arbitration = Arbitration(self._sensors, tuning.stale_time, self._again)
         self._asked = Asked()  # written anew in each call
         self._requests = self._asked.array
-        self._tick: FilterCall = machine_code(kernels.tick, *self.call_example())
-
-    def call_example(self) -> tuple[Filter, Law, NDArray[Any], int, float, float]:
-        """What ``FilterCall`` is handed, of this configuration."""
-        return at_start(self._joints).numbers, self.law, self._requests, 0, 0.0, 0.0
+        self._tick = run or machine_code(kernels.tick)
 
     def warm_up(self) -> StateEstimate:
         """Compile every kernel: stand for a while with every sensor, then take jumps."""

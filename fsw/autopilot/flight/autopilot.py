@@ -26,6 +26,7 @@ from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import all_along
 from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
+from fsw.autopilot.flight.fast_loop import FastLoop
 from fsw.autopilot.flight.land_detector import is_light, with_range
 from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.modes.mission import with_update
@@ -132,16 +133,16 @@ class Autopilot:
         self._plans = PlanExchange(config)
         self._watch = SafetyWatch(config, self._safe_sets.loop_tube)
         self._cascade = loops_of(config)
-        self._sensed = SensedState(config.estimator, self._cascade)
-        self._exact = ExactState(self._cascade)
+        self._fast = FastLoop(self._cascade, self._plans.model, config.estimator)
+        self._sensed = SensedState(config.estimator, self._fast)
+        self._exact = ExactState(self._fast)
         self._descent = Descent(config)
         limits = config.limits
         reallocates = bool(limits.failed_rotor_mode)
         self._damage = DamageWatch(config.airframe, tick, reallocates=reallocates)
         self._watches = bool(limits.watches_actuators)
         self.calm = CalmTick(
-            *(config, self._cascade, self._plans.model, self._damage),
-            *(self._watch, self._sensed, self.zones_now),
+            *(config, self._fast, self._damage, self._watch, self._sensed, self.zones_now)
         )
         self._accuracy = AccuracyWatch(config, self._safe_sets.loop_tube)
         self._clearance = UncertainClearance(
@@ -169,7 +170,7 @@ class Autopilot:
         assert estimate is not None
         r = with_plan_state(in_hover(self.config.airframe, estimate), nominal_at_rest(estimate))
         self._plans.model.move(r, 1)
-        self._cascade.step(r)
+        self._fast.step(r)
         self._safe_sets.warm_up(estimate)
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
@@ -615,7 +616,7 @@ class Autopilot:
         if flown:
             tube = self._watch.tube(state)
             r.payload.gripped = 1.0 if state.vehicle.gripper > 0.0 else 0.0
-            self._cascade.step(r, ticks, self.zones_now(state), state.damage.health, tube)
+            self._fast.step(r, ticks, self.zones_now(state), state.damage.health, tube)
             wanted = r.actuator_command
             if not r.flags & GATE_NEEDED:  # what flies is armed
                 return wanted, r, False

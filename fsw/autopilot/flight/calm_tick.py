@@ -1,14 +1,12 @@
-"""Ticks in which nothing but sensors has to be looked at: the numbers of a tick by compiled calls.
+"""Ticks in which nothing but sensors has to be looked at: one compiled call (``fast_loop.py``).
 
 Between two events most ticks believe the sensors, move the plan's state on, close the loops and
 watch the actuators. No command comes, no limit is met, no failsafe acts. What happens all the same
 the record says by its flags: then the tick is flown whole, from the record before it. Either way
 gives the same state to the last bit.
 
-Of a suite of sensors one call does all that the actuators wait for: what the commands make of the
-vehicle, inertial unit and encoders, plan, loops. What else is measured waits for
-``Autopilot.conclude``, and the watch with it. Exact states are read and believed in the filter's
-place.
+Of a suite of sensors, what is measured beside inertial unit and encoders waits for
+``Autopilot.conclude``, and the watch with it.
 
 Source: docs/decisions/0037-quiet-ticks.md.
 """
@@ -16,87 +14,25 @@ Source: docs/decisions/0037-quiet-ticks.md.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fsw.autopilot.control.cascade import Cascade, close_loops, compare_with_plan, tell_filter
-from fsw.autopilot.control.safety_filter import FilterProbes
-from fsw.autopilot.control.tube import NO_TUBE, TubeAround
-from fsw.autopilot.estimation.error_state import Filter, Law
-from fsw.autopilot.estimation.estimator import READINGS, read_into, reading_of
+from fsw.autopilot.estimation.estimator import reading_of
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
-from fsw.autopilot.estimation.kernels import FINITE, PUSH, do
 from fsw.autopilot.flight.estimate.sensed_state import SensedState
 from fsw.autopilot.flight.failsafe.evidence import PLAN_STALE_PERIODS, FailsafeContext
 from fsw.autopilot.flight.failsafe.table import SLOW_US, quickly_active
+from fsw.autopilot.flight.fast_loop import BELIEVED, FastLoop
 from fsw.autopilot.flight.plan_exchange import planned_input
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.state import AIDED, FlightState, first_state
 from fsw.autopilot.measurements import RangeSample, Sample
 from fsw.autopilot.model.actuator_health import HEALTHY
-from fsw.autopilot.model.nominal import NominalModel, move_plan
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES
 from fsw.autopilot.signals import Mode, TickInputs
 from fsw.autopilot.tick_record import IMPAIRED, Tick
-from fsw.compiled import kernel, machine_code
 from fsw.frozen import replace
 from fsw.record import Floats
-
-FLOWN: Final = 8  # beside what came of the filter's tick: the loops are closed
-
-
-@kernel
-def _sense(
-    models: NDArray[Any], records: NDArray[Any], reading: Floats, now_us: int, upright: float
-) -> bool:
-    """Read a frame and move the plan's state on; whether the frame is believed as it is.
-
-    ``reading`` (READINGS,) [SI]; ``upright`` [1] is the cosine of the tilt up to which nothing is
-    to be done. Reads plan, u; writes estimate, plan.
-    """
-    r = records[0]
-    missing = read_into(r.estimate, reading, now_us)
-    move_plan(models[0], r.plan, r.u, r.joint_count)
-    return bool(missing == 0 and r.estimate.R_WB[8] > upright)
-
-
-@kernel
-def _fly(
-    laws: NDArray[Any],
-    models: NDArray[Any],
-    records: NDArray[Any],
-    zones: Floats,
-    probes: FilterProbes,
-    tube: TubeAround,
-    upright: float,
-    filters: Filter,
-    estimators: Law,
-    requests: NDArray[Any],
-    parts: int,
-    now: float,
-    until: float,
-) -> int:
-    """Do some ``parts`` of the filter's tick (``kernels.do``) and close the loops at their end.
-
-    They are closed (FLOWN) of an attitude that is known and as near to level as ``upright`` [1]
-    says. Reads plan, u; writes estimate, plan, and what ``close_loops`` does.
-    """
-    law, r, asked = laws[0], records[0], requests[0]
-    if parts & PUSH:
-        tell_filter(r, law.airframe, law.rotor_decay, asked.expected, True, True)
-    found = do(filters[0], estimators[0], asked, parts, now, until)
-    if found & FINITE and asked.present.R_WB[8] > upright:
-        r.estimate = asked.present
-        move_plan(models[0], r.plan, r.u, r.joint_count)
-        close_loops(r, law, 1, zones, probes)
-        compare_with_plan(r, tube)
-        found |= FLOWN
-    return found
 
 
 class CalmTick:
@@ -105,8 +41,7 @@ class CalmTick:
     def __init__(
         self,
         config: FlightConfig,
-        cascade: Cascade,
-        model: NominalModel,
+        fast: FastLoop,
         damage: DamageWatch,
         watch: SafetyWatch,
         sensed: SensedState,
@@ -115,14 +50,8 @@ class CalmTick:
         """Of the laws that whole ticks of this configuration have."""
         self._config, self._tick_us = config, config.tick_period_us
         self._per_plan = config.mpc_period_us // config.tick_period_us
-        self._cascade, self._model, self._damage = cascade, model, damage
+        self._fast, self._damage = fast, damage
         self._watch, self._sensed, self._zones_now = watch, sensed, zones_now
-        example = model.packed, Tick().array, np.frombuffer(bytes(8 * READINGS)), 0, 1.0
-        self._sense = machine_code(_sense, *example)
-        loops = cascade.packed, model.packed, Tick().array, NO_ZONES, cascade.probes, NO_TUBE, 1.0
-        self._fly = None
-        if cascade.commands_rotors:
-            self._fly = machine_code(_fly, *loops, *sensed.call_example())
         # What was found out about the newest state; another one is looked at anew.
         self._state = first_state(config.airframe)
         self._until_us, self._zones, self._tube = -1, NO_ZONES, watch.tube(self._state)
@@ -144,13 +73,12 @@ class CalmTick:
                 return None
             exact = self.step(before, reading_of(frame), now_us)
             return None if exact is None else (exact, None)
-        if self._fly is None or any(map(_is_range, inputs.samples)):
+        if not self._fast.commands_rotors or any(map(_is_range, inputs.samples)):
             return None  # the land detector looks at a range
-        r, cascade = before.copy(), self._cascade
-        loops = cascade.packed, self._model.packed, r.array, self._zones, cascade.probes
-        run = partial(self._fly, *loops, self._tube, self._watch.upright)
+        r = before.copy()
+        run = self._fast.calm(r, self._watch.upright, self._zones, self._tube)
         fusion, found = self._sensed.taken(state, inputs, run)
-        return (r, fusion) if found & FLOWN and not r.flags else None
+        return (r, fusion) if found & BELIEVED and not r.flags else None
 
     def ticks(self, state: FlightState) -> int:
         """How many ticks after a state may be calm, if nothing but sensors comes."""
@@ -163,14 +91,10 @@ class CalmTick:
 
         None: it is not. Of the state that was looked at last, or a calm tick after it.
         """
-        r = before.copy()
-        if not self._sense(self._model.packed, r.array, reading, now_us, self._watch.upright):
+        r, upright = before.copy(), self._watch.upright
+        if not self._fast.exact(r, reading, now_us, upright, self._zones, self._tube):
             return None
-        self._close_loops(r)
         return None if r.flags or self._damage.finds(before, r) else r
-
-    def _close_loops(self, r: Tick) -> None:
-        self._cascade.step(r, 1, self._zones, HEALTHY, self._tube)
 
     def after(
         self, state: FlightState, r: Tick, fusion: FusionMemory | None = None, ticks: int = 1

@@ -8,12 +8,12 @@ missing is in ``estimation/frame_dropout.py``. On the ground a frame is taken wh
 
 from __future__ import annotations
 
-from fsw.autopilot.control.cascade import Cascade
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.estimator import read_frame
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.frame_dropout import Dropout, filled
 from fsw.autopilot.flight.estimate.jump import returned
+from fsw.autopilot.flight.fast_loop import FastLoop
 from fsw.autopilot.flight.state import AIDED, COMPLETE, Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import Severity, StateEstimate, StatusText, TickInputs
@@ -24,8 +24,8 @@ from fsw.frozen import replace
 class ExactState:
     """Exact states as the tick of one configuration uses them."""
 
-    def __init__(self, cascade: Cascade) -> None:
-        self._cascade = cascade
+    def __init__(self, fast: FastLoop) -> None:
+        self._fast = fast
 
     def estimate(
         self, state: FlightState, inputs: TickInputs, texts: list[StatusText]
@@ -81,7 +81,7 @@ class ExactState:
             r = state.record
             found = filled(
                 *(missing, inputs.sensors, found, before),
-                lambda: tuple(self._cascade.expected(r).u[: r.joint_count].tolist()),
+                lambda: tuple(self._fast.expected(r).u[: r.joint_count].tolist()),
             )
             aiding = _aiding(dropout, found.t_us)
         if away and dropout.pose.since_us < 0:

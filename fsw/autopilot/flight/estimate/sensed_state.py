@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from fsw.autopilot.control.cascade import Cascade, in_hover
+from fsw.autopilot.control.cascade import in_hover
 from fsw.autopilot.estimation.correlated_error import correlated_error
 from fsw.autopilot.estimation.dead_reckoning import moved_on
 from fsw.autopilot.estimation.error_state import Array, P
@@ -25,6 +25,7 @@ from fsw.autopilot.flight.estimate.estimator_report import (
 )
 from fsw.autopilot.flight.estimate.jump import on_return, told
 from fsw.autopilot.flight.estimate.missed_ticks import missed_inputs
+from fsw.autopilot.flight.fast_loop import FastLoop
 from fsw.autopilot.flight.land_detector import is_aloft
 from fsw.autopilot.flight.state import Aiding, FlightState, LostSensor
 from fsw.autopilot.measurements import Sample, Sensor
@@ -62,18 +63,17 @@ class CaughtUp(NamedTuple):
 class SensedState:
     """The estimator of one configuration as the tick uses it."""
 
-    def __init__(self, tuning: EstimatorTuning, cascade: Cascade) -> None:
-        airframe = cascade.law.airframe
+    def __init__(self, tuning: EstimatorTuning, fast: FastLoop) -> None:
+        airframe = fast.law.airframe
         self._joints, self._legs = airframe.bodies.joints, airframe.leg_length
         self._turns = scale_of_turns(agility(airframe), swing(airframe))
-        self._fusion = SensorFusion(tuning, self._joints)
-        self._cascade = cascade
+        self._fusion, self._fast = SensorFusion(tuning, self._joints, fast.filter), fast
         self._tuning, self._stale = tuning, tuning.stale_time
 
     def warm_up(self) -> None:
         """Compile every kernel."""
         estimate = self._fusion.warm_up()
-        self._cascade.expected(in_hover(self._cascade.law.airframe, estimate))
+        self._fast.expected(in_hover(self._fast.law.airframe, estimate))
 
     def _memory(self, state: FlightState, now: float) -> FusionMemory:
         """The filter's memory at ``now`` [s].
@@ -125,10 +125,6 @@ class SensedState:
         now = 1e-6 * inputs.sensors.t_us
         return self._fusion.taken(self._memory(state, now), inputs.samples, now, None, run)
 
-    def call_example(self) -> tuple[Any, ...]:
-        """What the ``run`` of ``taken`` is handed."""
-        return self._fusion.call_example()
-
     def rests(self, state: FlightState, memory: FusionMemory, inputs: TickInputs) -> bool:
         """Whether ``catch_up`` of a tick with an estimate would do nothing, as in most ticks."""
         before = state.fusion
@@ -146,7 +142,7 @@ class SensedState:
         # On the ground thrust does not explain how the vehicle moves.
         explains = flies and state.vehicle.unloaded is None
         judged = flies and not state.damage.joint
-        return self._cascade.expected(r, explains=explains, judged=judged)
+        return self._fast.expected(r, explains=explains, judged=judged)
 
     def take_missed(self, state: FlightState, inputs: TickInputs) -> tuple[FlightState, TickInputs]:
         """The state after ticks that were missed, and the ``inputs`` that are left for this one.

@@ -16,10 +16,10 @@ from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.signals import SensorFrame, StateEstimate, StatusText, TickInputs
 from fsw.frozen import replace
 from tests.fsw.autopilot.flight.in_flight import CONFIG, flying
-from tests.fsw.records import with_record
+from tests.fsw.records import fast_loop, with_record
 
 TICK_US = CONFIG.tick_period_us
-EXACT = ExactState(loops_of(CONFIG))
+EXACT = ExactState(fast_loop(loops_of(CONFIG)))
 NOTHING = (math.nan,) * 3
 FAR = (0.0, 0.4, -3.0)
 
