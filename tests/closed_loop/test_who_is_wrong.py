@@ -152,3 +152,16 @@ def test_a_descent_without_a_height_goes_down_whatever_the_accelerometer_says(
     assert flight.away_m < 4.0, "carried off by a second or two of the wrong force"
     told = any("IMU inconsistent" in said.text for said in flight.warnings)
     assert told is (size > 0.0)
+
+
+@pytest.mark.drawn(2)
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("seed", [21, *(pytest.param(k, marks=in_long) for k in range(22, 26))])
+def test_the_wind_that_a_wrong_accelerometer_makes_up_is_not_leaned_against(seed: int) -> None:
+    """Without a place it went on getting faster, by 2 m/s^2, until it touched down 14 m away."""
+    pose = Fault("vio", "wrong", start_s=2.57, size=-0.501)
+    unit = Fault("accel", "wrong", start_s=4.18, size=2.38)
+    flight = fly("orbit", (pose, unit), "vio", seed)
+    assert "descend" in flight.actions
+    assert flight.away_m is not None
+    assert flight.away_m < 11.4, "2 m/s by then, and the rest by the wrong speed that it brakes"

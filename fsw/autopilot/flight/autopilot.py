@@ -20,7 +20,7 @@ from fsw.autopilot.estimation.estimator import estimate_state
 from fsw.autopilot.estimation.fusion_memory import FusionMemory
 from fsw.autopilot.flight.calm_tick import CalmTick
 from fsw.autopilot.flight.commander import Commander
-from fsw.autopilot.flight.descent import Descent
+from fsw.autopilot.flight.descent import Descent, forget_wind
 from fsw.autopilot.flight.estimate.before_estimate import nothing_known, nowhere, told
 from fsw.autopilot.flight.estimate.exact_state import ExactState
 from fsw.autopilot.flight.estimate.jump import all_along
@@ -387,6 +387,8 @@ class Autopilot:
             place = None if goal is None else goal.motion.p
             moved = self._descent.step(before, estimate, state.aiding, ticks, place)
             r.plan_state, r.plan_input = moved
+            if self._descent.stays_level(state.aiding):
+                forget_wind(r.observed, estimate)
         if state.damage.joint:
             freeze_arm(r, estimate, state.damage.report.joints)
         return plan

@@ -4,6 +4,7 @@ It needs attitude and height only. Where no position is measured, the place is n
 estimate's drift would be flown. For as long as speed across is known well enough, the vehicle draws
 back from zones on what dead reckoning says, and comes to rest where it is as far from them as they
 leave room for. Then it stays level: wind would carry it away, and so would a speed that is wrong.
+Nor is wind leaned against then: what is observed by such a speed is the error of who tells it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from fsw.autopilot.geometry.vectors import clamp_magnitude
 from fsw.autopilot.model.nominal import NominalModel
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import PlanInput, PredictionState, StateEstimate, Vec2, Vec3
+from fsw.autopilot.tick_record import Observed
 
 _RATE: Final = 4.0  # 1/s, of the speed down
 _MOST: Final = 1.0  # m/s^2
@@ -46,6 +48,13 @@ _THROUGH: Final = 10.0  # m/s
 def is_hurried(aiding: Aiding, unaided_us: int) -> bool:
     """Whether the estimate gets worse with time: without a position for long, or an attitude."""
     return aiding.unaided_us >= unaided_us or not aiding.holds_attitude(unaided_us)
+
+
+def forget_wind(observed: Observed, estimate: StateEstimate) -> None:
+    """Observe the disturbance across anew from the ``estimate``: what is known, and no wind."""
+    for axis in range(2):
+        observed.v[axis], observed.d[axis] = estimate.v_WB[axis], observed.known[axis]
+        observed.disturbance_bias[axis] = 0.0
 
 
 class Descent:
@@ -82,13 +91,18 @@ class Descent:
         if blind:
             (x, y, _), (_, _, z) = estimate.p_WB, nominal.p
             nominal = nominal._replace(p=(x, y, z))
-            if not aiding.velocity_sigma <= _SPEED_KNOWN:
+            if self.stays_level(aiding):
                 (vx, vy, _), (_, _, vz) = estimate.v_WB, nominal.v
                 _, _, az = nominal.a
                 nominal = nominal._replace(
                     v=(vx, vy, vz), a=(0.0, 0.0, az), j=(0.0, 0.0), s=(0.0, 0.0)
                 )
         return nominal, self._input(nominal, speed, most, across)
+
+    def stays_level(self, aiding: Aiding) -> bool:
+        """Whether neither place nor speed across is known."""
+        unknown = not aiding.velocity_sigma <= _SPEED_KNOWN
+        return unknown and aiding.unaided_us >= self._unaided_us
 
     def _hurried_speed(self, height: float, aiding: Aiding) -> Vec2:
         """How fast to sink in a hurry from a ``height`` [m], and to get there: [m/s], [m/s^2]."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
-from fsw.autopilot.flight.descent import Descent
+from fsw.autopilot.flight.descent import Descent, forget_wind
 from fsw.autopilot.flight.modes.descend import Descend
 from fsw.autopilot.flight.plan_exchange import nominal_at_rest
 from fsw.autopilot.flight.safety.uncertain_clearance import InflatedSafeSet
@@ -16,6 +16,7 @@ from fsw.autopilot.flight.state import Aiding, LostSensor
 from fsw.autopilot.measurements import Sensor
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.signals import Mode, SafeSet, StateEstimate, Vec3
+from fsw.autopilot.tick_record import Observed
 from tests.fsw.autopilot.flight.in_flight import CONFIG, GROUND_Z, flying, vehicle_at
 
 DESCENT, MODE = Descent(CONFIG), Descend(CONFIG)
@@ -164,6 +165,20 @@ def test_a_vehicle_that_does_not_know_its_speed_is_level_though_it_has_a_place()
     adrift = vehicle_at(HIGH, (0.2, 0.0, 0.0))
     level, _ = DESCENT.step(nominal_at_rest(HERE), adrift, LOST, 1, (9.0, 9.0, 0.0))
     assert (level.v[:2], level.a[:2]) == ((0.2, 0.0), (0.0, 0.0))
+
+
+@pytest.mark.requirement("REQ-EST-5")
+def test_what_is_observed_by_a_speed_that_is_not_known_is_no_wind() -> None:
+    assert DESCENT.stays_level(LOST)
+    assert not DESCENT.stays_level(BLIND), "it knows its speed"
+    assert not DESCENT.stays_level(LOST._replace(unaided_us=0)), "its place is measured"
+    observed = Observed()
+    observed.d[:], observed.known[:] = (2.0, -3.0, 1.5), (0.5, 0.0, 0.0)
+    observed.disturbance_bias[:] = 0.3, -0.4
+    forget_wind(observed, vehicle_at(HIGH, (0.2, -0.1, 0.7)))
+    assert observed.d.tolist() == [0.5, 0.0, 1.5], "the surface stays, and what is down"
+    assert observed.v[:2].tolist() == [0.2, -0.1]
+    assert not observed.disturbance_bias.any()
 
 
 @pytest.mark.requirement("REQ-EST-5")
