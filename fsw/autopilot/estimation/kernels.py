@@ -99,15 +99,15 @@ PRESENT_AT = Asked.place("present")
 def tick(
     filters: Filter, law: Law, requests: NDArray[Any], parts: int, now: float, until: float
 ) -> int:
-    """``do`` some ``parts`` [1] of a tick by one of ``requests`` (1,) [SI].
+    """Do some ``parts`` [1] of a tick by one of ``requests`` (1,) [SI].
 
     Until ``now`` [s], or the filter's own time is ``until`` [s].
     """
-    return do(filters[0], law[0], requests[0], parts, now, until)
+    return run_filter(filters[0], law[0], requests[0], parts, now, until)
 
 
 @compilable
-def do(x: Any, t: Any, a: Asked, parts: int, now: float, until: float) -> int:
+def run_filter(x: Any, t: Any, a: Asked, parts: int, now: float, until: float) -> int:
     """Do some ``parts`` [1] of a tick as asked; what came of it.
 
     ``PUSH``: note what torques made of the joints; take in encoders, unless they are ``STUCK``:

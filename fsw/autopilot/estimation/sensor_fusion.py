@@ -149,13 +149,13 @@ class SensorFusion:
         are silent or of no use, what is ``expected`` of the commands stands in. None before there
         was a pose, or a position and a heading, to start from, and a reading of the arm.
         """
-        memory, found = self.taken(memory, samples, now, expected, self._tick)
+        memory, found = self.take_in_by(memory, samples, now, expected, self._tick)
         if found & FINITE:
             return memory, estimate_in(self._asked, PRESENT_AT, self._joints)
         ready = memory.started and memory.joints_came >= 0.0
         return (_anew(memory) if ready else memory), None
 
-    def taken(
+    def take_in_by(
         self,
         memory: FusionMemory,
         samples: Sequence[Sample],

@@ -77,7 +77,7 @@ class CalmTick:
             return None  # the land detector looks at a range
         r = before.copy()
         run = self._fast.calm(r, self._watch.upright, self._zones, self._tube)
-        fusion, found = self._sensed.taken(state, inputs, run)
+        fusion, found = self._sensed.take_in_by(state, inputs, run)
         return (r, fusion) if found & BELIEVED and not r.flags else None
 
     def ticks(self, state: FlightState) -> int:

@@ -1,18 +1,18 @@
 """The numbers of a tick, in the order in which they come, as one compiled call.
 
-=========  =====================================================  =============================
-stage      law                                                    of
-=========  =====================================================  =============================
-EXPECT     ``control/cascade.py``, ``tell_filter``                what the commands make of it
-FRAME      ``estimation/estimator.py``, ``read_into``             exact states
-parts      ``estimation/kernels.py``, ``do``                      inertial unit and encoders
-CALM       ``model/nominal.py``, ``move_plan``                    the plan's state, a tick on
-LOOPS      ``control/cascade.py``, ``close_loops``                the command
-=========  =====================================================  =============================
+======  ===========================================  ======================  =======================
+stage   law                                          reads                   writes
+======  ===========================================  ======================  =======================
+EXPECT  ``tell_filter``, ``control/cascade.py``      record before the tick  ``expected`` of request
+FRAME   ``read_into``, ``estimation/estimator.py``   reading                 estimate
+parts   ``run_filter``, ``estimation/kernels.py``    request, filter         filter, estimate
+CALM    ``move_plan``, ``model/nominal.py``          plan, u                 plan
+LOOPS   ``close_loops``, ``control/cascade.py``      estimate, plan, u       sent, flags, the rest
+======  ===========================================  ======================  =======================
 
-All run once a tick. A calm tick (``calm_tick.py``) is one call of all; any other tick asks for some
-at a time, and decides in between. Other sensors (``fuse``), the watch over the actuators and the
-planner have calls of their own: the actuators do not wait for them.
+All are of every tick (500 Hz). A calm one (``calm_tick.py``) is one call of all; any other asks for
+some at a time, and decides in between. Other sensors (``fuse``), the watch over the actuators and
+the planner have calls of their own: the actuators do not wait for them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.estimation.error_state import Filter, Law
 from fsw.autopilot.estimation.estimator import READINGS, read_into
 from fsw.autopilot.estimation.fusion_memory import at_start
-from fsw.autopilot.estimation.kernels import FINITE, PUSH, Asked, do
+from fsw.autopilot.estimation.kernels import FINITE, PUSH, Asked, run_filter
 from fsw.autopilot.estimation.sensor_fusion import FilterCall
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, note_health
@@ -66,11 +66,12 @@ def fast_loop(
 ) -> int:
     """Do some ``stages`` [1] and, between them, ``parts`` [1] of the filter's tick; what came.
 
-    ``reading`` (READINGS,) [SI] is of an exact state. A CALM tick ends early unless the state is
-    believed, and as near to level as the cosine ``upright`` [1] says; ``ticks`` [1] are closed at
-    once, by zones, ``probes`` and a ``tube`` as ``close_loops`` has them. ``requests`` (1,) [SI],
-    ``now`` [s] and ``until`` [s] are of ``do``, which may come in several calls for one tick: what
-    is expected belongs to the first, the loops to the last.
+    ``laws`` and ``models`` (1,) [SI] are of the loops and the plan, the record is that of
+    ``records`` (1,) [SI], and ``reading`` (READINGS,) [SI] is of an exact state. A CALM tick ends
+    early unless the state is believed and as near to level as the cosine ``upright`` [1] says. So
+    many ``ticks`` [1] are closed at once, as ``close_loops`` has it. ``requests`` (1,) [SI],
+    ``now`` [s] and ``until`` [s] are of ``run_filter``, of which one tick may take several calls:
+    what is expected belongs to the first, the loops to the last.
     """
     law, r, asked = laws[0], records[0], requests[0]
     found, known = 0, True
@@ -80,7 +81,7 @@ def fast_loop(
     if stages & FRAME:
         known = read_into(r.estimate, reading, asked.t_us) == 0
     if parts:
-        found = do(filters[0], estimators[0], asked, parts, now, until)
+        found = run_filter(filters[0], estimators[0], asked, parts, now, until)
         known = found & FINITE != 0
         if stages & LOOPS and known:
             r.estimate = asked.present

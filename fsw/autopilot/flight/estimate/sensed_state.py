@@ -118,12 +118,12 @@ class SensedState:
             state = replace(state, invalid_ticks=0)
         return state, memory, estimate, caught
 
-    def taken(
+    def take_in_by(
         self, state: FlightState, inputs: TickInputs, run: FilterCall
     ) -> tuple[FusionMemory, int]:
         """What ``estimate`` makes of IMU and encoders by a call of ``run``, and what came of it."""
         now = 1e-6 * inputs.sensors.t_us
-        return self._fusion.taken(self._memory(state, now), inputs.samples, now, None, run)
+        return self._fusion.take_in_by(self._memory(state, now), inputs.samples, now, None, run)
 
     def rests(self, state: FlightState, memory: FusionMemory, inputs: TickInputs) -> bool:
         """Whether ``catch_up`` of a tick with an estimate would do nothing, as in most ticks."""
