@@ -169,6 +169,7 @@ GATE_NEEDED: Final = 2  # the command is beyond the actuators' limits, or no num
 IMPAIRED: Final = 4  # a part has failed: ``health`` is not that of a healthy vehicle
 OFF_PLAN: Final = 8  # the base is out of the tube around the plan
 BREACH: Final = 16  # the safety filter saw a margin that is negative, or no number
+LIGHT: Final = 32  # the rotors carry so little that what flies would fall
 
 
 class Watched(Record):

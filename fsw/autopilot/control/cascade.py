@@ -54,6 +54,7 @@ from fsw.autopilot.model.multibody import load_on_base, move_bodies, torque_to_t
 from fsw.autopilot.model.rotors import (
     MotionState,
     estimate_mass,
+    is_light,
     lag_rotor,
     load_of_tip,
     motion_state,
@@ -68,6 +69,7 @@ from fsw.autopilot.tick_record import (
     GATE_NEEDED,
     IMPAIRED,
     JUDGES,
+    LIGHT,
     OFF_PLAN,
     Expected,
     Tick,
@@ -369,6 +371,13 @@ def compare_with_plan(r: Tick, tube: TubeAround) -> None:
     for i in range(3):
         if not -most <= r.estimate.p_WB[i] - r.plan.p[i] <= most:
             r.flags |= OFF_PLAN
+
+
+@compilable
+def note_weight(r: Tick, airframe: Airframe) -> None:
+    """Flag a vehicle that its rotors hardly carry. Reads rotors; writes flags."""
+    if is_light(airframe, r.rotors):
+        r.flags |= LIGHT
 
 
 @compilable

@@ -33,6 +33,7 @@ from fsw.autopilot.control.cascade import (
     cascade_law,
     compare_with_plan,
     filter_asked,
+    note_weight,
     refer_joints,
     settle_rotors,
 )
@@ -212,3 +213,4 @@ def _ask_px4(
 ) -> None:
     ask_px4(records[0], laws[0], models[0], ticks, zones, probes)
     compare_with_plan(records[0], tube)
+    note_weight(records[0], laws[0].airframe)

@@ -27,7 +27,7 @@ from fsw.autopilot.flight.estimate.jump import all_along
 from fsw.autopilot.flight.estimate.missed_ticks import loops_resumed, plan_resumed
 from fsw.autopilot.flight.estimate.sensed_state import CaughtUp, SensedState
 from fsw.autopilot.flight.fast_loop import FastLoop
-from fsw.autopilot.flight.land_detector import is_light, with_range
+from fsw.autopilot.flight.land_detector import with_range
 from fsw.autopilot.flight.loops import loops_of
 from fsw.autopilot.flight.modes.mission import with_update
 from fsw.autopilot.flight.modes.offboard import accept_setpoints
@@ -61,6 +61,7 @@ from fsw.autopilot.model.battery import corrected, drained
 from fsw.autopilot.model.body import body_of
 from fsw.autopilot.model.kinematics import end_effector
 from fsw.autopilot.model.nominal import rest_input
+from fsw.autopilot.model.rotors import is_light
 from fsw.autopilot.mpc.reference import merge
 from fsw.autopilot.parameters.consistency import Finding
 from fsw.autopilot.parameters.flight_config import FlightConfig
@@ -361,7 +362,7 @@ class Autopilot:
         if tilted or not estimate.R_WB[8] > watch.upright:
             safety = watch.attitude(safety, estimate, flies=state.vehicle.flies)
         closed = state.vehicle.flies and state.vehicle.unloaded is None
-        light = closed and is_light(self.config, state)
+        light = closed and is_light(self.config.airframe, state.record.rotors)
         if light or safety.light_us >= 0:
             safety = watch.carried(safety, estimate.t_us, light=light)
         if self._jumped(state, estimate.t_us):

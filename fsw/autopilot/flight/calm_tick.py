@@ -30,7 +30,7 @@ from fsw.autopilot.model.actuator_health import HEALTHY
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.shapes.zones import NO_ZONES
 from fsw.autopilot.signals import Mode, TickInputs
-from fsw.autopilot.tick_record import IMPAIRED, Tick
+from fsw.autopilot.tick_record import IMPAIRED, LIGHT, Tick
 from fsw.frozen import replace
 from fsw.record import Floats
 
@@ -156,7 +156,7 @@ def _is_calm(state: FlightState, config: FlightConfig) -> bool:
         and (state.fusion is not None or state.aiding is AIDED)
         and not (state.damage.rotor or state.damage.joint)
         and state.damage.health is HEALTHY
-        and not r.flags & IMPAIRED
+        and not r.flags & (IMPAIRED | LIGHT)
         and bool(config.limits.watches_actuators)
         and bool(state.mission.stream)
         and plan.running is not None

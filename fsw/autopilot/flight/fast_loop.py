@@ -24,14 +24,20 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.control.cascade import Cascade, close_loops, compare_with_plan, tell_filter
+from fsw.autopilot.control.cascade import (
+    Cascade,
+    close_loops,
+    compare_with_plan,
+    note_weight,
+    tell_filter,
+)
 from fsw.autopilot.control.px4_loops import Px4Loops
 from fsw.autopilot.control.safety_filter import FilterProbes
 from fsw.autopilot.control.tube import NO_TUBE, TubeAround
 from fsw.autopilot.estimation.error_state import Filter, Law
 from fsw.autopilot.estimation.estimator import READINGS, read_into
 from fsw.autopilot.estimation.fusion_memory import at_start
-from fsw.autopilot.estimation.kernels import FINITE, PUSH, Asked, run_filter
+from fsw.autopilot.estimation.kernels import FINITE, Asked, run_filter
 from fsw.autopilot.estimation.sensor_fusion import FilterCall
 from fsw.autopilot.estimation.tuning import EstimatorTuning
 from fsw.autopilot.model.actuator_health import HEALTHY, ActuatorHealth, note_health
@@ -71,11 +77,11 @@ def fast_loop(
     early unless the state is believed and as near to level as the cosine ``upright`` [1] says. So
     many ``ticks`` [1] are closed at once, as ``close_loops`` has it. ``requests`` (1,) [SI],
     ``now`` [s] and ``until`` [s] are of ``run_filter``, of which one tick may take several calls:
-    what is expected belongs to the first, the loops to the last.
+    the loops are closed by the last.
     """
     law, r, asked = laws[0], records[0], requests[0]
     found, known = 0, True
-    if stages & EXPECT and (parts & PUSH or not parts):
+    if stages & EXPECT:
         explains, judged = stages & EXPLAINS != 0, stages & JUDGED != 0
         tell_filter(r, law.airframe, law.rotor_decay, asked.expected, explains, judged)
     if stages & FRAME:
@@ -92,6 +98,7 @@ def fast_loop(
     if stages & LOOPS and known:
         close_loops(r, law, ticks, zones, probes)
         compare_with_plan(r, tube)
+        note_weight(r, law.airframe)
     return found | BELIEVED if known else found
 
 

@@ -32,12 +32,11 @@ from fsw.autopilot.flight.failsafe.evidence import FALLING_US
 from fsw.autopilot.flight.plan_exchange import without_plan
 from fsw.autopilot.flight.state import FlightState, VehicleMemory
 from fsw.autopilot.measurements import RangeSample, Sensor
-from fsw.autopilot.model.airframe import GRAVITY
+from fsw.autopilot.model.rotors import is_light
 from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.signals import StateEstimate, Vec2
 from fsw.frozen import replace
 
-_CONTACT: Final = 0.7  # of the weight as configured; what flies is at most so much lighter
 _SINKS: Final = 0.15  # m/s; slower than a landing, faster than the rebound of the legs
 _FALLS: Final = 5.0  # m/s^2; half-way between what is seen at rest and in free fall, at worst
 _SIGMAS: Final = 3.0  # by which a height may be wrong
@@ -162,11 +161,6 @@ def _measured_height(
     return seen.distance * upright - legs, math.sqrt(max(seen.variance, 0.0))
 
 
-def is_light(config: FlightConfig, state: FlightState) -> bool:
-    """Whether rotors carry so little of the weight that what flies would fall."""
-    return bool(sum(state.record.rotors.tolist()) < _CONTACT * config.airframe.mass * GRAVITY)
-
-
 def feel_ground(
     config: FlightConfig, state: FlightState, estimate: StateEstimate
 ) -> tuple[FlightState, bool]:
@@ -182,7 +176,7 @@ def feel_ground(
     if state.aiding.feels_nothing and height_above_ground(config, estimate) < -sunk:
         return state, True
     if vehicle.unloaded is None:
-        if not is_light(config, state):
+        if not is_light(config.airframe, state.record.rotors):
             return in_the_air(state, estimate), False
         blind = state.aiding.unaided_us >= config.limits.aiding_loss_us
         expected = may_be_low(config, state, estimate) and (blind or sinking < _SINKS)

@@ -37,6 +37,7 @@ _SIDES: Final = (
     *("rear", "rear left", "left", "front left"),
 )
 WEIGHING_TIME = 1.0  # s
+_CARRIED = 0.7  # of the weight as configured; what flies is at most so much lighter
 _WEIGHING_THRUST = 5.0  # m/s^2
 
 
@@ -54,6 +55,15 @@ class MotionState(NamedTuple):
 def lag_rotor(thrust: float, command: float, decay: float) -> float:
     """``thrust`` [N] of a rotor a tick later under ``command`` [N]; ``decay`` [1] per tick."""
     return command + (thrust - command) * decay
+
+
+@compilable
+def is_light(airframe: Airframe, rotors: Floats) -> bool:
+    """Whether ``rotors`` (ROTORS,) [N] carry so little of the weight that what flies would fall."""
+    carried = 0.0
+    for i in range(int(airframe.rotors)):
+        carried += rotors[i]
+    return carried < _CARRIED * airframe.mass * GRAVITY
 
 
 def rotor_decay(airframe: Airframe, dt: float) -> float:

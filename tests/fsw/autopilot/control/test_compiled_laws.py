@@ -11,7 +11,14 @@ import numpy as np
 import pytest
 
 from fsw.autopilot.control.actuator_watch import watch, watch_law
-from fsw.autopilot.control.cascade import Cascade, Inner, close_loops, compare_with_plan, in_hover
+from fsw.autopilot.control.cascade import (
+    Cascade,
+    Inner,
+    close_loops,
+    compare_with_plan,
+    in_hover,
+    note_weight,
+)
 from fsw.autopilot.control.gains import LoopGains
 from fsw.autopilot.control.tube import TubeAround
 from fsw.autopilot.estimation.estimator import estimate_state, read_into, reading_of
@@ -101,6 +108,7 @@ def test_the_loops_do_as_machine_code_what_they_say_in_python(
         flown.step(ours, ticks, zones, HEALTHY, TUBE)
         close_loops(plain, cascade.law, ticks, zones, cascade.probes)
         compare_with_plan(plain, TUBE)
+        note_weight(plain, cascade.law.airframe)
         np.testing.assert_allclose(ours.numbers, plain.numbers, rtol=0, atol=1e-9)
         assert ours.flags == plain.flags
         pushed += ours.flags & FILTER_ACTED
