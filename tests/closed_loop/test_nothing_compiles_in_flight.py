@@ -135,7 +135,7 @@ def _fail(name: str) -> list[str]:
 
 
 def _step(simulation: Simulation) -> None:
-    joints = len(simulation.vehicle.links)
+    joints = len(simulation.vehicle.joints)
     for _ in range(4):
         simulation.advance(Controls((0.5, 0.5, 0.5, 0.5), (0.1,) * joints, armed=True))
         simulation.sense(), simulation.measurements(), simulation.battery()
@@ -161,7 +161,7 @@ def _fly(name: str) -> list[str]:
     rehearse(Simulation(flight.scenario, 0))
     ready = _variants()
     assert ready["fsw.autopilot.mpc.costs._add_tracking"] > 0
-    assert ready["fsw.autopilot.control.cascade._close_loops"] > 0
+    assert ready["fsw.autopilot.flight.fast_loop.fast_loop"] > 0
     fly(flight)
     return [kernel for kernel, count in _variants().items() if count != ready.get(kernel)]
 

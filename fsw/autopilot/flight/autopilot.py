@@ -41,6 +41,7 @@ from fsw.autopilot.flight.plan_exchange import (
 from fsw.autopilot.flight.restart import restarted
 from fsw.autopilot.flight.safety.accuracy_watch import AccuracyMemory, AccuracyWatch
 from fsw.autopilot.flight.safety.damage_watch import DamageWatch
+from fsw.autopilot.flight.safety.retreat import retreat_place
 from fsw.autopilot.flight.safety.safe_set import SafeSetCheck
 from fsw.autopilot.flight.safety.safety_watch import SafetyWatch
 from fsw.autopilot.flight.safety.uncertain_clearance import (
@@ -176,7 +177,10 @@ class Autopilot:
         self._horizon.warm_up(estimate)
         self._sensed.warm_up()
         self._clearance.warm_up(estimate)
-        end_effector(self.config.airframe.bodies, estimate)
+        bodies = self.config.airframe.bodies
+        end_effector(bodies, estimate)
+        body = body_of(self.config.planner.body, self.config.airframe)
+        retreat_place(SafeSet(()), estimate, body, bodies, 0.0)
 
     def analyse(self, safe_set: SafeSet) -> tuple[Finding, ...]:
         """Findings on whether this configuration can keep a safe set."""
