@@ -20,7 +20,6 @@ _LARGEST: Final = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
 
 Subject = TypeVar("Subject")
 Values = tuple[Any, ...]
-_NEVER: Final = -1
 _LATEST: Final = 1e12  # s; what is later fits no field
 
 
@@ -114,21 +113,22 @@ class Timetable(Generic[Subject]):
 
     def __init__(self, *rows: tuple[int, Callable[[Subject], bytes]]) -> None:
         """Take the interval [us] of each, and what makes it."""
-        self._rows = [(period_us, record, [_NEVER]) for period_us, record in rows]
-        self._until_us = _NEVER  # when the first of all intervals ends
+        self._rows = rows
+        self._looked_us = self._until_us = -1  # last, and until when nothing more is due
 
     def due(self, t_us: int, subject: Subject) -> bytes:
-        """Those that are due at ``t_us``, of a ``subject``, in their order; time only goes on."""
-        if t_us < self._until_us:
+        """Those that are due at ``t_us``, of a ``subject``, in their order."""
+        last_us = self._looked_us
+        if last_us <= t_us < self._until_us:
             return b""
-        found = b""
-        for period_us, record, last in self._rows:
-            interval = t_us // period_us
-            if interval != last[0]:
-                last[0] = interval
-                found += record(subject)
-        self._until_us = min((last[0] + 1) * period_us for period_us, _, last in self._rows)
-        return found
+        found = [
+            record(subject)
+            for period_us, record in self._rows
+            if t_us // period_us != last_us // period_us
+        ]
+        self._looked_us = t_us
+        self._until_us = min((t_us // period_us + 1) * period_us for period_us, _ in self._rows)
+        return b"".join(found)
 
 
 def _within_float(value: Any) -> Any:

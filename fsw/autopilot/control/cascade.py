@@ -44,9 +44,7 @@ from fsw.autopilot.control.tracking import (
 from fsw.autopilot.control.tube import TubeAround, beyond_covered
 from fsw.autopilot.geometry.rotation import rotate_back, wrap_angle
 from fsw.autopilot.geometry.vectors import add, add_scaled, clamp_magnitude, cross, subtract, three
-from fsw.autopilot.model.actuator_health import (
-    SOUND,
-)
+from fsw.autopilot.model.actuator_health import SOUND
 from fsw.autopilot.model.airframe import GRAVITY, Airframe
 from fsw.autopilot.model.arm_coordinates import ArmCoordinates, arm_coordinates
 from fsw.autopilot.model.body import Body, body_of, reaches, tool_radius

@@ -107,8 +107,8 @@ class FastLoop:
 
     def __init__(self, cascade: Cascade, model: NominalModel, tuning: EstimatorTuning) -> None:
         """Of these loops, or of those that ask PX4's; the filter has a ``tuning``."""
-        self.law, self._cascade, self._asked = cascade.law, cascade, Asked()
-        self.commands_rotors = not isinstance(cascade, Px4Loops)
+        self.law, self._probes, self._asked = cascade.law, cascade.probes, Asked()
+        self._px4 = cascade if isinstance(cascade, Px4Loops) else None
         joints, request = cascade.law.airframe.bodies.joints, self._asked.array
         laws, r = (cascade.packed, model.packed), Tick().array
         no_loops = 0, 1, NO_ZONES, cascade.probes, NO_TUBE, 1.0
@@ -119,6 +119,11 @@ class FastLoop:
         self._call = partial(compiled, *laws)
         # The filter's parts alone.
         self.filter: FilterCall = partial(self._call, r, *no_loops, self._no_frame)
+
+    @property
+    def commands_rotors(self) -> bool:
+        """Whether these are our own loops."""
+        return self._px4 is None
 
     def expected(self, r: Tick, *, explains: bool = True, judged: bool = False) -> Expected:
         """What the commands sent last make of joints and vehicle; it is good until the next call.
@@ -137,8 +142,8 @@ class FastLoop:
         tube: TubeAround = NO_TUBE,
     ) -> None:
         """Close the loops of a record; see ``close_loops``."""
-        if isinstance(self._cascade, Px4Loops):
-            self._cascade.ask(r, ticks, zones, tube)
+        if self._px4 is not None:
+            self._px4.ask(r, ticks, zones, tube)
             return
         if health is not HEALTHY or r.flags & IMPAIRED:
             note_health(r.health, health)
@@ -152,12 +157,12 @@ class FastLoop:
 
         It came at ``now_us``; ``upright`` [1] is the cosine of the tilt up to which it is calm.
         """
-        self._asked.t_us, cascade = now_us, self._cascade
-        stages = FRAME | CALM | (LOOPS if self.commands_rotors else 0)
-        loops = r.array, stages, 1, zones, cascade.probes, tube, upright
+        self._asked.t_us = now_us
+        stages = FRAME | CALM | (LOOPS if self._px4 is None else 0)
+        loops = r.array, stages, 1, zones, self._probes, tube, upright
         calm = self._call(*loops, reading, *self._no_filter) & BELIEVED != 0
-        if calm and isinstance(cascade, Px4Loops):
-            cascade.ask(r, 1, zones, tube)
+        if calm and self._px4 is not None:
+            self._px4.ask(r, 1, zones, tube)
         return calm
 
     def calm(self, r: Tick, upright: float, zones: Zones, tube: TubeAround) -> FilterCall:
@@ -166,7 +171,7 @@ class FastLoop:
         ``upright`` [1] as in ``exact``. Of our own loops.
         """
         stages = EXPECT | EXPLAINS | JUDGED | CALM | LOOPS
-        loops = r.array, stages, 1, zones, self._cascade.probes, tube, upright
+        loops = r.array, stages, 1, zones, self._probes, tube, upright
         return partial(self._call, *loops, self._no_frame)
 
     def _do(
@@ -177,5 +182,5 @@ class FastLoop:
         zones: Zones = NO_ZONES,
         tube: TubeAround = NO_TUBE,
     ) -> None:
-        loops = r.array, stages, ticks, zones, self._cascade.probes, tube, 1.0
+        loops = r.array, stages, ticks, zones, self._probes, tube, 1.0
         self._call(*loops, self._no_frame, *self._no_filter)

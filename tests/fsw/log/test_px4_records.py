@@ -32,6 +32,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.log.encoder import FULL, THIN
 from fsw.log.flight_log import FlightLog, LogSubject
+from fsw.log.packed import Timetable
 from fsw.log.px4_records import planned_rates
 from pandion.logged_ticks import LoggedTick, open_flight, ticks
 from tests.fsw.link.snapshots import SNAPSHOT, VEHICLE, outputs_at
@@ -201,6 +202,16 @@ def test_a_frame_of_which_the_samples_say_everything_takes_a_few_bytes(tmp_path:
     assert len(rows(ULog(str(path)), "tick")["timestamp"]) == 39
     found = [one.inputs for one in ticks(open_flight(path)) if isinstance(one, LoggedTick)]
     assert [repr(one) for one in found] == [repr(one) for one in given]
+
+
+def test_what_has_a_rate_is_written_on_where_time_goes_back() -> None:
+    """A first stamp that is ahead of all others is forgotten, and all that follow are earlier."""
+    table = Timetable[str]((10, str.encode), (25, lambda said: said.upper().encode()))
+    stamps = (1000, 1005, 1010, 1024, 1025, 12, 15, 20, 26)
+    assert [table.due(t_us, "a") for t_us in stamps] == [
+        *(b"aA", b"", b"a", b"a", b"A"),
+        *(b"aA", b"", b"a", b"A"),
+    ]
 
 
 def test_whatever_is_not_known_leaves_every_record_readable(tmp_path: Path) -> None:
