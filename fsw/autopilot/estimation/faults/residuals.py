@@ -101,7 +101,8 @@ _TURN_OFF_AIDED: Final = 0.15  # rad/s
 _AGILE: Final = 35.0  # rad/s^2
 _PUSHES: Final = 5.0 * 0.8 * math.sqrt(0.1 / 3.0)  # m/s^1.5
 _FORCE_OFF: Final = (2.5, 1.8, 1.5, 1.5)  # m/s^2
-_FORCE_OFF_AIDED: Final = 0.9  # m/s^2
+_FORCE_OFF_AIDED: Final = 0.9  # m/s^2; without an accelerometer nothing tells a gust from a lie
+_ACCEL_AT: Final = list(Source).index(Source.ACCELEROMETER)
 _PUSH: Final = 1.3  # m/s^2, of a disturbance (``SUR_DISTURB``) and wind (``TRK_WIND_MAX``) together
 _GYRO_OFF: Final = 0.012  # rad/s: scale, axes and bias
 _GYRO_OFF_LONG: Final = 0.004  # rad/s: bias, and what scale and axes make of turning to and fro
@@ -286,7 +287,7 @@ def look(
     kept = _take(s, 0, pose), _take(s, 1, fix), _take(s, 2, field)
     if now - s.began < _SETTLING:
         return
-    _compare(s, x.baseline, now, (pose, fix, field), kept, learns)
+    _compare(s, x, now, (pose, fix, field), kept, learns)
     _note_bias(s, x, now, 0, AA, _ACCEL_BIAS)
     _note_bias(s, x, now, 1, GG, _GYRO_BIAS)
     for k in range(COUNT):
@@ -299,7 +300,7 @@ def look(
 @compilable
 def _compare(
     s: Any,
-    baseline: Array,
+    x: Any,
     now: float,
     aids: tuple[Aid, Aid, Aid],
     kept: tuple[bool, bool, bool],
@@ -309,14 +310,16 @@ def _compare(
 
     What waits is compared with nothing: the one before it would count a second time.
     """
-    bias, lasting = three(baseline, 3), three(baseline, 6)
+    bias, lasting = three(x.baseline, 3), three(x.baseline, 6)
     (posed, fixed, fielded), (pose, fix, field) = kept, aids
     for k in range(4):
+        felt = not x.out & NO_FORCE and now - s.silent[_ACCEL_AT] >= CONTAINED[k]
+        force = _FORCE_OFF_AIDED if felt else _FORCE_OFF[k]
         _unit_and_model(s, now, k, lasting, learns)
         if posed:
-            _unit_and_pose(s, now, k, pose[4], pose[5], bias, learns)
+            _unit_and_pose(s, now, k, pose[4], pose[5], bias, force, learns)
         if fixed:
-            _unit_and_fix(s, now, k, fix[4], fix[5], learns)
+            _unit_and_fix(s, now, k, fix[4], fix[5], force, learns)
         if fielded:
             _unit_and_field(s, now, k, field[4], bias, learns)
     if posed:
@@ -567,11 +570,12 @@ def _bend(c: Array, b: Array, a: Array, column: int) -> Vec3:
 
 @compilable
 def _unit_and_pose(
-    s: Any, now: float, k: int, sigma: float, about: float, bias: Vec3, learns: bool
+    s: Any, now: float, k: int, sigma: float, about: float, bias: Vec3, force: float, learns: bool
 ) -> None:
     """How poses turn and accelerate against gyro, accelerometer and rotors.
 
-    Poses are known to ``sigma`` [m] and ``about`` [rad], the gyro's ``bias`` [rad/s, FRD].
+    Poses are known to ``sigma`` [m] and ``about`` [rad], the gyro's ``bias`` [rad/s, FRD]; rotors
+    are off by a ``force`` [m/s^2] at least.
     """
     T, last = WINDOWS[k], s.aid_count[0] - 1
     middle = _before(s, 0, last, T, 0.03)
@@ -598,14 +602,16 @@ def _unit_and_pose(
     felt, made = _bend(c, b, a, _AT + FELT2), _bend(c, b, a, _AT + MADE2)
     noise = _BEND_SIGMAS * math.sqrt(18.0) * sigma / (over * over)
     _note(s, now, AP, k, subtract(bent, felt), _ACCEL_OFF + noise)
-    _note_model(s, now, MP_FORCE, k, subtract(bent, made), _FORCE_OFF_AIDED, noise, learns)
+    _note_model(s, now, MP_FORCE, k, subtract(bent, made), force, noise, learns)
 
 
 @compilable
-def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns: bool) -> None:
+def _unit_and_fix(
+    s: Any, now: float, k: int, sigma: float, speed: float, force: float, learns: bool
+) -> None:
     """How a receiver's velocity changes against accelerometer and rotors, and its place with it.
 
-    They are known to ``sigma`` [m] and ``speed`` [m/s].
+    They are known to ``sigma`` [m] and ``speed`` [m/s]; rotors are off by a ``force`` [m/s^2].
     """
     last = s.aid_count[1] - 1
     first = _before(s, 1, last, WINDOWS[k], 0.06)
@@ -618,7 +624,7 @@ def _unit_and_fix(s: Any, now: float, k: int, sigma: float, speed: float, learns
     s.across[k] = math.hypot(change[0], change[1])
     noise = 2.5 * speed / over
     _note(s, now, AN, k, subtract(change, felt), _ACCEL_OFF + noise)
-    _note_model(s, now, MN, k, subtract(change, made), _FORCE_OFF_AIDED, noise, learns)
+    _note_model(s, now, MN, k, subtract(change, made), force, noise, learns)
     path = (0.0, 0.0, 0.0)
     for j in range(first, last):
         c, d = s.aids[1, j % _AIDS], s.aids[1, (j + 1) % _AIDS]

@@ -45,6 +45,8 @@ def hovering(
     moved_by: float = 0.0,
     pushed_by: float = 0.0,
     apart: int = 5,
+    gust: float = 0.0,
+    unit: bool = True,
 ) -> Iterator[FusionMemory]:
     """The memories of 5 s.
 
@@ -53,7 +55,8 @@ def hovering(
     ``garbage`` in their place, and they may last ``until`` [s] only; a part of the vehicle may be
     known to be ``damaged``, and its tool ``touches`` something. Poses may be ``turned_by`` an angle
     [rad, FRD] at each time [s] of that second, and ``moved_by`` so much [m]; the accelerometer is
-    ``pushed_by`` so much [m/s^2]. Poses are so many ticks ``apart``.
+    ``pushed_by`` so much [m/s^2]. Poses are so many ticks ``apart``. A ``gust`` [m/s^2] carries the
+    vehicle away; it may have had no inertial ``unit`` since poses have been good for 3 s.
     """
     memory, random = at_start(2), np.random.default_rng(3)
     for tick in range(round(5.0 / TICK)):
@@ -63,15 +66,16 @@ def hovering(
         shakes = 1e-3 * a, 1e-3 * b, 1e-3 * c
         rate = *shakes[:2], shakes[2] + (turns if wrong else 0.0)
         reading = (angle if wrong else 1e-5) * (tick % 2)
-        pushed = pushed_by if wrong else 0.0
-        samples: list[Sample] = [
-            JointSample(now, (reading, 0.0)),
-            ImuSample(now, (0.02 * d + pushed, 0.02 * e, -9.81 + 0.02 * f), rate),
-        ]
+        pushed = pushed_by + gust if wrong else 0.0
+        samples: list[Sample] = [JointSample(now, (reading, 0.0))]
+        if unit or t < POSES_UNTIL:
+            felt = 0.02 * d + pushed, 0.02 * e, -9.81 + 0.02 * f
+            samples.append(ImuSample(now, felt, rate))
         good = t < (until if poses else POSES_UNTIL)
         if tick % apart == 0 and (good or garbage):
             scatter = 1e-3 if good else 20.0
-            place = scatter * d, scatter * e, -1.5 + scatter * f
+            carried = 0.5 * gust * max(t - WRONG_FROM, 0.0) ** 2
+            place = scatter * d + carried, scatter * e, -1.5 + scatter * f
             attitude = turned(LEVEL, *shakes)
             if wrong and turned_by is not None:
                 attitude = turned(attitude, *turned_by(t - WRONG_FROM))
@@ -311,6 +315,20 @@ def test_what_a_named_accelerometer_has_taught_is_forgotten(pushed_by: float) ->
     before = memories[round(WRONG_FROM / TICK) - 1].numbers[0]["baseline"]
     assert memories[-1].verdict.wrong is Source.ACCELEROMETER
     np.testing.assert_allclose(memories[-1].numbers[0]["baseline"], before, atol=1e-3)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("gust", [1.2, -1.3])
+def test_a_gust_accuses_no_pose_where_no_accelerometer_feels_it(gust: float) -> None:
+    """A vehicle that held without one was landed for the wind; with one the rotors are named."""
+    accused = NOBODY
+    for memory in hovering(gust=gust, unit=False):
+        accused |= memory.verdict.suspects
+    assert accused is NOBODY
+    assert last(hovering(gust=gust)).verdict.explained
+    for memory in hovering(gust=2.0 * gust, unit=False):
+        accused |= memory.verdict.suspects
+    assert accused == Source.MODEL | Source.POSE
 
 
 @pytest.mark.requirement("REQ-EST-13")
