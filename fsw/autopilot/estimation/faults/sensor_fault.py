@@ -63,7 +63,7 @@ class FaultSeen(NamedTuple):
 
     fault: SensorFault
     at: float
-    before: float  # the one before it in the run; the first: the same
+    before: float  # the one before it in the run; minus infinity: it is the first
     since: float  # the first of the run
     rested: float  # from the run before to this one; infinite: there was none
 
@@ -94,17 +94,16 @@ class Health(NamedTuple):
             return SensorFault.STALE
         return self.fault if now - self.fault_at <= _SHOWN else SensorFault.NONE
 
-    def is_news(self) -> bool:
+    def is_news(self, lasts: float = 0.0) -> bool:
         """Whether the last fault, when it was seen, was one to be told.
 
-        The first one after ten seconds without is, and so is one that came back before that and
-        then lasts.
+        The first one after ten seconds without is, once it ``lasts`` [s], and so is one that came
+        back before that and then lasts.
         """
         for one in self.known:
             if one.fault is self.fault:
-                if one.rested > _QUIET:
-                    return one.at == one.since
-                return one.before - one.since < _LASTS <= one.at - one.since
+                lasts = lasts if one.rested > _QUIET else _LASTS
+                return one.before - one.since < lasts <= one.at - one.since
         return True
 
     def with_fused(
@@ -115,7 +114,7 @@ class Health(NamedTuple):
 
     def with_fault(self, fault: SensorFault, now: float) -> Health:
         """The same sensor, with a ``fault`` that was seen at ``now`` [s]."""
-        others, seen = [], FaultSeen(fault, now, now, now, math.inf)
+        others, seen = [], FaultSeen(fault, now, -math.inf, now, math.inf)
         for one in self.known:
             if one.fault is not fault:
                 others.append(one)
@@ -124,7 +123,7 @@ class Health(NamedTuple):
             elif now - one.at <= _LASTS:
                 seen = one._replace(at=now, before=one.at)
             else:
-                seen = FaultSeen(fault, now, now, now, now - one.at)
+                seen = FaultSeen(fault, now, -math.inf, now, now - one.at)
         return self._replace(fault=fault, fault_at=now, known=(*others, seen))
 
     def repeats_of(self, numbers: tuple[float, ...]) -> tuple[int, ...]:

@@ -41,6 +41,7 @@ _EVERY_TICK = (_IMU, Sensor.ENCODERS)
 _IN_USE = (SensorFault.REPEATED, SensorFault.RATE_TOO_LOW, SensorFault.DISAGREES, SensorFault.NOISY)
 _NOISY = 4.0  # times the stated variance
 _BEGUN = 1.0  # s, until scales have settled
+_SCATTERS = 0.05  # s; for less a blow may make it look so
 _SHOWN = 1.0  # s, for which another fault says more
 _SET_BACK = 0.1  # s; a clock that goes back by more has been set to another time
 _INERTIAL = Source.GYRO | Source.ACCELEROMETER
@@ -308,7 +309,7 @@ def _report_noise(memory: FusionMemory, texts: list[StatusText]) -> FusionMemory
         if scale > _NOISY and heard and not said_more:
             health = health.with_fault(SensorFault.NOISY, now)
             memory = memory.noting(health)
-            if health.is_news():
+            if health.is_news(lasts=_SCATTERS):
                 texts.append(StatusText(Severity.WARNING, sentence(sensor, SensorFault.NOISY)))
     return memory
 
