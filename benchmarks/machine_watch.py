@@ -16,6 +16,7 @@ from benchmarks.budgets import MachineNoise
 from command_line.version import version
 
 _GLANCE_S: Final = 1.0
+_VERB: Final = b"\0fsw\0"  # of ``pandion``, in the words that start it
 _SETTLED_S: Final = 5.0  # from here on memory may not grow
 _PAGE: Final = os.sysconf("SC_PAGE_SIZE")
 _TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
@@ -31,7 +32,6 @@ class Watch:
     """Watches the flight software among the descendants of this process, in a thread."""
 
     flying: Callable[[], bool]  # compiling, which comes before, is not what is watched
-    module: str = "fsw"
     resident: list[tuple[float, int]] = field(default_factory=list)  # seconds, bytes
     children_bytes: int = 0  # what its children have for themselves
     noise: MachineNoise | None = None
@@ -82,10 +82,9 @@ class Watch:
                     self.children_bytes = sum(_private(child) for child in descendants(process))
 
     def _find(self, root: int) -> int | None:
-        wanted = f"\0-m\0{self.module}\0".encode()
         for process in descendants(root):
             with contextlib.suppress(OSError):
-                if wanted in Path(f"/proc/{process}/cmdline").read_bytes():
+                if _VERB in Path(f"/proc/{process}/cmdline").read_bytes():
                     return process
         return None
 
