@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from fsw.autopilot.flight.commands.handlers import Decision, NewHeading, decide
 from fsw.autopilot.flight.modes.base import CommandContext
+from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.shapes.ball import point
 from fsw.autopilot.shapes.half_space import wall
 from fsw.autopilot.shapes.vertical_cylinder import column
@@ -44,6 +45,7 @@ from fsw.autopilot.signals import (
 from fsw.link.wire.decode_commands import _READERS
 from tests.fsw.autopilot.flight.asked import FLIGHT_MODES, ask
 from tests.fsw.autopilot.flight.contexts import STANDING, tuned_by
+from vehicles.vehicle_file import load_vehicle, vehicle_names
 
 ACCEPTED, DENIED = CommandResult.ACCEPTED, CommandResult.DENIED
 TEMPORARILY_REJECTED = CommandResult.TEMPORARILY_REJECTED
@@ -287,8 +289,8 @@ def drawn(**vehicle: Any) -> st.SearchStrategy[CommandContext]:
     )
 
 
-# One vehicle, which is many numbers and takes most of the time to draw; any in the long tests.
-situations = drawn(config=st.just(HOLDING.config))
+vehicles = st.sampled_from([flight_config(vehicle=load_vehicle(name)) for name in vehicle_names()])
+situations = drawn(config=vehicles)
 commands = st.sampled_from([ARM, TAKEOFF, LAND, SET_MODE, SHUTDOWN, 1, 999])
 Seven = tuple[float, float, float, float, float, float, float]
 params = st.tuples(*[st.floats(allow_nan=True, allow_infinity=True)] * 7)
@@ -298,18 +300,6 @@ params = st.tuples(*[st.floats(allow_nan=True, allow_infinity=True)] * 7)
 def test_whatever_arrives_is_answered_and_a_mode_can_always_follow(
     command: int, values: Seven, situation: CommandContext
 ) -> None:
-    check_answer(command, values, situation)
-
-
-@pytest.mark.long
-@given(commands, params, drawn())
-def test_whatever_arrives_is_answered_by_any_vehicle(
-    command: int, values: Seven, situation: CommandContext
-) -> None:
-    check_answer(command, values, situation)
-
-
-def check_answer(command: int, values: Seven, situation: CommandContext) -> None:
     decision = ask(situation, command, *values)
     if decision.mode in FLIGHT_MODES:
         assert decision.result == ACCEPTED
