@@ -257,12 +257,22 @@ def mean_of(x: Any, row: Array, before: Array) -> tuple[Vec3, Vec3]:
 
     The readings are ``row`` (10,) [SI] and the one ``before`` (10,) [SI], or the same.
     """
-    return _mean_of(x, row, before, 0), _mean_of(x, row, before, 3)
+    return _mean_of(x, row, before, 0), _mean_of(x, row, before, 1)
 
 
 @compilable
-def _mean_of(x: Any, row: Array, before: Array, at: int) -> Vec3:
+def _mean_of(x: Any, row: Array, before: Array, half: int) -> Vec3:
+    """The mean of one ``half`` [1], each counted from its own zero.
+
+    What is used again after readings that were lost has the bias of before, and what rotors have
+    made of its rate meanwhile says nothing of it: that runs away.
+    """
+    at, back = 3 * half, not int(row[LOST]) & (1 << half)
     a, b, bias = three(row, FORCE + at), three(before, FORCE + at), three(x.bias, at)
+    if back and x.lost & (1 << half):
+        bias = three(x.kept_bias, at)
+    if back and half and int(before[LOST]) & RATE_MADE:
+        b = a
     return (
         0.5 * (a[0] + b[0]) - bias[0],
         0.5 * (a[1] + b[1]) - bias[1],

@@ -146,15 +146,16 @@ def _model_what_is_lost(x: Any, row: Any, last: Any, lost: int, model: Vec4) -> 
 
 @compilable
 def _count_rate(x: Any, row: Any, last: Any, made: bool, reads: bool) -> None:
-    """Note whether the rate in a ``row`` is ``made``; if it ``reads``, it counts from there again.
+    """Note whether the rate in a ``row`` is ``made``; what is in doubt, and ``reads``, follows it.
 
     What rotors make runs away, and the bias with it: with a joint that hung limp by 31 rad/s. The
-    difference of both is the rate, and it neither jumps nor is turned by this.
+    difference of both is the rate, and it neither jumps nor is turned by this. What is in no doubt
+    has a zero of its own (``error_state.mean_of``).
     """
     was_made = int(last[LOST]) & RATE_MADE != 0
     if made or (was_made and not reads):
         row[LOST] += RATE_MADE
-    elif was_made:
+    elif was_made and int(row[LOST]) & NO_RATE:
         for i in range(3):
             off = row[RATE + i] - last[RATE + i]
             x.bias[3 + i] += off

@@ -20,6 +20,7 @@ from fsw.autopilot.estimation.error_state import (
     NOTHING,
     RATE,
     RATE_MADE,
+    mean_of,
 )
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.imu import BLOW, STAYS, STAYS_LONG, add_imu
@@ -221,6 +222,32 @@ def test_a_rate_that_rotors_made_leaves_no_bias_behind() -> None:
     assert abs(moved[0, 0]) > 20.0
     unit.read(rate=none)
     assert not int(unit.last[LOST]) & RATE_MADE, "held, of one that was read"
+
+
+@pytest.mark.requirement("REQ-EST-7")
+@pytest.mark.parametrize("blow", [4.0, -3.0])
+def test_a_rate_that_is_read_again_counts_from_its_own_zero_at_once(blow: float) -> None:
+    """It counted from that of the rotors' until the filter came to it, which took the delay of vio.
+
+    By then a blow of 4 rad/s, believed in time, had turned the vehicle over.
+    """
+    unit, none, model = Unit(), (float("nan"),) * 3, (300.0, 0.0, 0.0, 9.5)
+    x = unit.x
+    x.bias[3] = x.kept_bias[3] = 0.02
+    for _ in range(5):
+        unit.read(rate=none, model=model)
+    made = unit.last[RATE]
+    x.lost, x.bias[3] = NO_RATE, 0.5 * made  # the filter has come to the loss
+    unit.read(rate=(blow, 0.0, 0.0))  # on the ground what stays is believed
+    while unit.last[LOST]:
+        unit.read(rate=(blow + 0.01 * unit.random.standard_normal(), 0.0, 0.0))
+    before = x.imu[(x.end - 2) % len(x.imu)]
+    assert int(before[LOST]) & NO_RATE
+    _, (rate, _, _) = mean_of(x, unit.last, before)
+    assert rate == pytest.approx(blow - 0.02, abs=0.05)
+    assert x.bias[3] == 0.5 * made
+    _, (rate, _, _) = mean_of(x, before, before)
+    assert rate == pytest.approx(before[RATE] - 0.5 * made), "rotors' rates keep theirs"
 
 
 @pytest.mark.parametrize(("half", "at", "size"), [(NO_FORCE, FORCE, 40.0), (NO_RATE, RATE, 8.0)])
