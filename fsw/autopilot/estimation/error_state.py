@@ -47,6 +47,7 @@ TIME, FORCE, RATE, LOST, MISSED, COLUMNS = 0, 1, 4, 7, 8, 10
 NO_FORCE, NO_RATE, NOTHING = 1, 2, 3  # of LOST
 ON_TRIAL = 8
 CONTRADICTED = 32  # by more than what rotors that are off explain
+NO_HEADING = 128  # the magnetometer is named: what turns forces into the world may be wrong
 MODELLED = 4  # of LOST: where nothing is measured, it is what rotors make of the vehicle
 # Of LOST: force, or rate, of this reading is that of the rotors' model.
 FORCE_MADE, RATE_MADE = 16, 64
@@ -107,6 +108,7 @@ FILTER: Final = np.dtype(
         ("scatter", float, (4,)),
         ("leaning", float, (4, 3, ROWS)),
         ("leant_at", float),
+        ("innovated_at", float, (4,)),  # s, of the last one
         ("lost", np.int64),  # which halves of the state's own reading are of no use
         # Joints, at a time of their own (joint_filter.py), and what torques made of them since.
         ("joint_count", np.int64),  # of the vehicle

@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.error_state import (
     BG,
     DELAY,
     LAGS,
+    NO_HEADING,
     NOTHING,
     TH,
     Filter,
@@ -59,9 +60,10 @@ _GARBAGE = 20.0  # of one axis: what is as far beyond that
 _KEEPS = 0.8
 _LEANS = 8.0
 _COUNTS = 0.55
-_LEAPS = 4.5  # deviations, that no growth makes from one to the next
+_LEAPS = 4.5  # deviations, and what a force makes from one to the next: no growth makes more
 _SUM, _LAST, _LEAPT = 0, 1, 2  # what is remembered of each kind
 _MIN_SCATTER = 0.14  # a receiver knows its velocity better than it is believed, by at most that
+_EXPLAINED = NOTHING | NO_HEADING  # who may be wrong then without a force's being so
 # What is not known of a force then, for how long it has been so, and how well that is known.
 _LEANT_FORCE = 3.0  # m/s^2
 _LEANT_FOR = 0.2  # s
@@ -119,7 +121,7 @@ def judged(
             x.variance[k] *= max(x.noise_scale[scaled], 1.0)
     gate *= _DOUBTED_GATE if doubted else 1.0
     ratio = distance(x, rows) / gate
-    if scaled >= 0 and not doubted and _leans(x, scaled) and not x.suspect & NOTHING:
+    if scaled >= 0 and not doubted and _leans(x, scaled) and not x.suspect & _EXPLAINED:
         _doubt_force(x)
         for k in range(rows):
             x.residual[k] = x.innovation[part, k]
@@ -145,8 +147,11 @@ def _leans(x: Any, scaled: int) -> bool:
         return False
     memory = x.leaning[scaled]
     scatter = math.sqrt(max(x.scatter[scaled], 1.0 if scaled == POSE else _MIN_SCATTER))
-    grown, leaps = _without_leap(memory, three(x.residual, 0), _LEAPS * scatter)
-    most = _LEANS * scatter
+    # An accelerometer that is wrong shows at 10 Hz as a step of many deviations, and stays.
+    force = _LEANT_FORCE * (x.time - x.innovated_at[scaled]) if scaled == GNSS + 1 else 0.0
+    most = _LEAPS * scatter + force / x.factor[0, 0]
+    grown, leaps = _without_leap(memory, three(x.residual, 0), most)
+    x.innovated_at[scaled], most = x.time, _LEANS * scatter
     share = 1.0 / max(norm(grown) / (_COUNTS * most), 1.0)
     total = ZERO
     if not leaps:

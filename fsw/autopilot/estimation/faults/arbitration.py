@@ -24,6 +24,7 @@ from fsw.autopilot.estimation.error_state import (
     LOST,
     MODELLED,
     NO_FORCE,
+    NO_HEADING,
     NO_RATE,
     NOTHING,
     ON_TRIAL,
@@ -165,6 +166,7 @@ class Arbitration:
                 damaged=damaged,
                 sizes=tuple(evidence[0]["size"].tolist()),
                 headed=tuple(evidence[0]["headed"].tolist()),
+                unheard=tuple(evidence[0]["unheard"].tolist()),
             )
         memory = replace(memory, verdict=verdict)
         state: StateEstimate | None = found
@@ -202,6 +204,7 @@ class Arbitration:
         jumped = unit.fault is SensorFault.JUMP and now - unit.fault_at < _TRAIL
         believes = believes or (jumped and verdict.explained and not before.explained)
         x["out"], x["suspect"] = _halves(verdict.wrong), _halves(verdict.suspects)
+        x["suspect"] |= NO_HEADING if verdict.wrong & Source.COMPASS else 0
         if verdict.is_on:
             x["suspect"] |= ON_TRIAL | (CONTRADICTED if verdict.contradicts else 0)
             verdict = _widened(x.view(np.recarray)[0], verdict, self._aided(memory))

@@ -149,6 +149,8 @@ EVIDENCE: Final = np.dtype(
         ("came", float, (COUNT,)),  # s, when it was computed last
         ("ratio", float, (COUNT,)),  # the largest of all windows
         ("size", float, (COUNT,)),  # SI, of that
+        # The largest of all windows that hold a time in which somebody has said nothing of use.
+        ("unheard", float, (COUNT,)),
         # How far gyro and field have turned apart [rad], how the vehicle has accelerated across by
         # satellites, by window [m/s^2], and what such a heading makes of a residual [m/s^2].
         ("apart", float),
@@ -331,7 +333,7 @@ def _compare(
 @compilable
 def _note_largest(s: Any, now: float, k: int) -> None:
     """Keep what is largest of a residual in all windows."""
-    s.ratio[k], s.size[k] = 0.0, 0.0
+    s.ratio[k], s.size[k], s.unheard[k] = 0.0, 0.0, 0.0
     if not now - s.came[k] < _LATEST:
         return
     kind, heard = _KINDS[k], now
@@ -342,7 +344,9 @@ def _note_largest(s: Any, now: float, k: int) -> None:
         if _MASKS[k] & (1 << i):
             silent = max(silent, s.silent[i])
     for i in range(5):
-        if heard - silent >= CONTAINED[i] and s.both[k, i] > s.ratio[k]:
+        if heard - silent < CONTAINED[i]:
+            s.unheard[k] = max(s.unheard[k], s.both[k, i])
+        elif s.both[k, i] > s.ratio[k]:
             s.ratio[k], s.size[k] = s.both[k, i], s.both[k, i] * s.threshold[k, i]
             s.headed[k] = min(s.apart, 2.0) * s.across[i] if k in (AN, MN) else math.inf
 

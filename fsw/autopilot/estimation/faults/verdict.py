@@ -149,13 +149,14 @@ def judged(
     damaged: bool = False,
     sizes: tuple[float, ...] = (0.0,) * COUNT,
     headed: tuple[float, ...] = (math.inf,) * COUNT,
+    unheard: tuple[float, ...] = (0.0,) * COUNT,
 ) -> Verdict:
     """The verdict after the ``ratios`` of all residuals over their thresholds at ``now`` [s].
 
     Their ``sizes`` are in SI, and so is what a heading that is wrong makes of each at most
     (``headed``). Where nothing that is used ``holds_attitude``, gyro and magnetometer do. What is
-    ``lost`` says nothing, and is known to be of no use without this law. Of a ``damaged`` vehicle
-    it is known that the rotors' model is off.
+    ``lost`` says nothing, and is known to be of no use without this law; ``unheard`` are ratios in
+    windows with such a silence. Of a ``damaged`` vehicle it is known that the rotors' model is off.
     """
     headings = [k for k in range(COUNT) if sizes[k] <= headed[k]]
     unused = verdict.wrong | (Q if verdict.contested else NOBODY)
@@ -168,7 +169,9 @@ def judged(
     fires = [k for k in used if ratios[k] > 1.0]
     verdict = _with_return(verdict, ratios, of, now, lost)
     if not fires:
-        if any(ratios[k] > _STAYS for k in verdict.shown.intersection(used)):
+        # What is heard in short windows only, after a silence, acquits nobody.
+        seen = [max(ratios[k], unheard[k]) for k in verdict.shown.intersection(used)]
+        if max(seen, default=0.0) > _STAYS:
             verdict = verdict._replace(fired=now)
         elif verdict.is_on and now - verdict.fired > _QUIET:
             return verdict.acquitted()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from fsw.autopilot.estimation import fusion
-from fsw.autopilot.estimation.error_state import BA, BG, V
+from fsw.autopilot.estimation.error_state import BA, BG, NO_HEADING, V
 from fsw.autopilot.estimation.faults.sensor_fault import SensorFault
 from fsw.autopilot.estimation.fusion_memory import FusionMemory, at_start
 from fsw.autopilot.estimation.sensor_fusion import SensorFusion
@@ -712,6 +712,33 @@ def test_of_satellites_whose_place_jumps_a_wrong_velocity_moves_nothing(
     assert (Sensor.GNSS, SensorFault.JUMP) in wrong.found
     assert wrong.memory.numbers[0]["leant_at"] == 0.0
     np.testing.assert_allclose(wrong.error()[:6], sound.error()[:6], atol=0.06)
+
+
+@pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("off", [-1.5, 2.0, 2.5])
+def test_a_force_that_is_wrong_beside_satellites_shows_in_their_next_velocities(
+    off: float, seed: int
+) -> None:
+    """Ten a second make a step of it that stays, which counted for none: 1.7 m/s, and a wall.
+
+    Where the magnetometer is named a wrong heading explains it as well, and forces are believed.
+    """
+
+    def change(now: float, sample: Sample) -> Sample:
+        if not isinstance(sample, ImuSample) or sample.time < START + 1.5:
+            return sample
+        x, y, z = sample.acceleration
+        return replace(sample, acceleration=(x + off, y, z))
+
+    flown = Flown(run(RTK, seed, 2.3), change)
+    assert abs(flown.error()[3:6]).max() < 0.3
+    x, fusion = at_start(2), SensorFusion(RTK.tuning, 2)
+    for now, samples in run(RTK, seed, 2.3):
+        x.numbers["suspect"] = NO_HEADING
+        x, _ = fusion.step(x, [change(now, one) for one in samples], now)
+        M = x.numbers[0]["covariance"]
+        assert now < START + 1.5 or not x.started or M[BA, BA] < 1.0
 
 
 @pytest.mark.drawn(1)

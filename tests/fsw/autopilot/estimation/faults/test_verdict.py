@@ -410,6 +410,22 @@ def test_a_pose_that_turns_is_wrong_about_its_place_where_that_gains_more_than_a
 
 
 @pytest.mark.requirement("REQ-EST-13")
+@pytest.mark.parametrize(("unheard", "lasts"), [(2.9, True), (0.5, False)])
+def test_short_windows_that_are_heard_first_after_a_silence_acquit_nobody(
+    unheard: float, lasts: bool
+) -> None:
+    """One outlier of a place made all windows wait: the accelerometer was believed, and a wall."""
+    verdict, ratios, kept = Verdict(), [0.0] * sources.COUNT, [0.0] * sources.COUNT
+    for look_ in range(round(2.0 / EVERY)):
+        now = 10.0 + EVERY * look_
+        ratios[sources.AP] = 2.9 if now < 11.0 else 0.3
+        kept[sources.AP] = 0.0 if now < 11.0 else unheard
+        verdict = judged(*(verdict, tuple(ratios), now), holds_attitude=True, unheard=tuple(kept))
+        assert verdict.is_on or now > 11.0
+    assert verdict.is_on is lasts
+
+
+@pytest.mark.requirement("REQ-EST-13")
 def test_what_comes_and_goes_about_its_threshold_is_one_contradiction() -> None:
     """A frame that tilted slowly was acquitted every half second, and the vehicle never landed."""
     verdict = Verdict()
