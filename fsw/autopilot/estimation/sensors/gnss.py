@@ -28,13 +28,14 @@ from fsw.autopilot.estimation.sensors.base import (
     Ratios,
     chi_square,
 )
-from fsw.autopilot.geometry.vectors import ZERO, norm, put_three, subtract
+from fsw.autopilot.geometry.vectors import ZERO, norm, put_three, subtract, three
 from fsw.autopilot.measurements import GnssSample, Sensor
 from fsw.autopilot.signals import Vec2, Vec3
 from fsw.compiled import compilable, kernel, machine_code
 
 _FASTEST: Final = 50.0  # m/s
 _FINE: Vec3 = (1e-4, 1e-4, 1e-4)
+_MAKES = 0.5  # s: a place that is off by no more than its velocity makes meanwhile has not jumped
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +166,8 @@ def fuse_gnss(
     position_rows(x, position, position_variance, dt, 0.0)
     first = judged(x, 3, gates[0], 0, GNSS)
     velocity_rows(x, velocity, velocity_variance, dt)
-    return first, judged(x, 3, gates[1], 1, GNSS + 1, first > 1.0)
+    jumped = norm(three(x.innovation[0], 0)) > _MAKES * norm(three(x.residual, 0))
+    return first, judged(x, 3, gates[1], 1, GNSS + 1, first > 1.0 and jumped)
 
 
 @machine_code

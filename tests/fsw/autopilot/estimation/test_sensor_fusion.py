@@ -716,7 +716,7 @@ def test_of_satellites_whose_place_jumps_a_wrong_velocity_moves_nothing(
 
 @pytest.mark.requirement("REQ-EST-13")
 @pytest.mark.parametrize("seed", [2, 3])
-@pytest.mark.parametrize("off", [-1.5, 2.0, 2.5])
+@pytest.mark.parametrize("off", [-3.0, -1.5, 2.0, 2.5, 3.0])
 def test_a_force_that_is_wrong_beside_satellites_shows_in_their_next_velocities(
     off: float, seed: int
 ) -> None:
