@@ -19,7 +19,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fsw.autopilot.estimation.error_state import BA, CONTRADICTED, HEIGHT_LASTS, NO_FORCE, WITNESS
+from fsw.autopilot.estimation.error_state import (
+    BA,
+    CONTRADICTED,
+    HEIGHT_LASTS,
+    NO_FORCE,
+    NO_HEADING,
+    WITNESS,
+)
 from fsw.autopilot.estimation.faults.sources import (
     AA,
     AM,
@@ -243,7 +250,7 @@ def witness(x: Any, R: Mat3, dt: float, model: Vec4, pushed: Vec3) -> None:
         beside = f[i] + (lift if i == 2 else 0.0) - own[i]
         W[BESIDE + i] += dt * beside
         W[TURN + i] += dt * w[i]
-        if not (x.suspect or x.out):
+        if not (x.suspect & ~NO_HEADING or x.out):
             b[i] += known * (x.bias[i] - b[i])
             b[3 + i] += known * (x.bias[3 + i] - b[3 + i])
             b[6 + i] += share * (beside - b[6 + i])

@@ -733,12 +733,13 @@ def test_a_force_that_is_wrong_beside_satellites_shows_in_their_next_velocities(
 
     flown = Flown(run(RTK, seed, 2.3), change)
     assert abs(flown.error()[3:6]).max() < 0.3
-    x, fusion = at_start(2), SensorFusion(RTK.tuning, 2)
+    memory, fusion = at_start(2), SensorFusion(RTK.tuning, 2)
     for now, samples in run(RTK, seed, 2.3):
-        x.numbers["suspect"] = NO_HEADING
-        x, _ = fusion.step(x, [change(now, one) for one in samples], now)
-        M = x.numbers[0]["covariance"]
-        assert now < START + 1.5 or not x.started or M[BA, BA] < 1.0
+        memory.numbers["suspect"] = NO_HEADING
+        memory, _ = fusion.step(memory, [change(now, one) for one in samples], now)
+        M = memory.numbers[0]["covariance"]
+        assert now < START + 1.5 or M[BA, BA] < 1.0
+    assert memory.started
 
 
 @pytest.mark.drawn(1)

@@ -17,6 +17,7 @@ from fsw.autopilot.estimation.error_state import (
     FILTER,
     HEIGHT_LASTS,
     NO_FORCE,
+    NO_HEADING,
     ON_TRIAL,
 )
 from fsw.autopilot.estimation.faults import residuals, sources
@@ -420,7 +421,8 @@ def test_short_windows_that_are_heard_first_after_a_silence_acquit_nobody(
         now = 10.0 + EVERY * look_
         ratios[sources.AP] = 2.9 if now < 11.0 else 0.3
         kept[sources.AP] = 0.0 if now < 11.0 else unheard
-        verdict = judged(*(verdict, tuple(ratios), now), holds_attitude=True, unheard=tuple(kept))
+        heard, silent = tuple(ratios), tuple(kept)
+        verdict = judged(verdict, heard, now, holds_attitude=True, unheard=silent)
         assert verdict.is_on or now > 11.0
     assert verdict.is_on is lasts
 
@@ -626,6 +628,19 @@ def test_integrals_begin_anew_when_the_vehicle_stands() -> None:
     assert x.witness.any()
     residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, 0.0), NONE)  # type: ignore[arg-type]
     assert not x.witness[:4].any()
+
+
+@pytest.mark.parametrize(("suspect", "learns"), [(0, True), (NO_HEADING, True), (ON_TRIAL, False)])
+def test_what_lasts_beside_the_rotors_is_learnt_while_nobody_is_a_suspect(
+    suspect: int, learns: bool
+) -> None:
+    """A heading that is not known says nothing of wind or of a bias."""
+    x: Any = np.zeros(1, FILTER).view(np.recarray)[0]
+    R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    x.newest[:3], x.suspect = (0.4, 0.0, -G), suspect
+    for _ in range(500):
+        residuals.witness(x, R, TICK, (0.0, 0.0, 0.0, G), NONE)
+    assert bool(x.baseline[6] > 0.05) is learns
 
 
 def test_what_a_surface_pushes_is_the_rotors_model_s_as_well() -> None:
