@@ -104,11 +104,11 @@ test-long: setup ## the tests that make test leaves out to be short, and propert
 px4: setup ## fly with a real PX4, plant below and planner above (long): PX4_BUILD=folder of its SITL build
 	PX4_BUILD="$(PX4_BUILD)" $(PYTEST) -m long -s -rs tests/real_px4
 
-faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1
+faults: setup ## fly every mode with every fault, write build/faults.html (long): ONLY=motor SEED=1 DRAWN=300
 	@mkdir -p build
 	$(BIN)/pandion faults --matrix --journal build/faults.jsonl \
 		--json build/faults.json --html build/faults.html \
-		$(if $(ONLY),--only "$(ONLY)") $(if $(SEED),--seed $(SEED))
+		$(if $(ONLY),--only "$(ONLY)") $(if $(SEED),--seed $(SEED)) $(if $(DRAWN),--drawn $(DRAWN))
 
 soak: setup ## an hour in real time with random failures and a busy client: MINUTES=60 SEED=1
 	@mkdir -p build

@@ -48,6 +48,11 @@ class FaultsOptions:
     only: str | None = option(
         "--only TEXT", "of the matrix or the pairs: faults and modes with this text"
     )
+    drawn: int | None = option(
+        "--drawn N",
+        "of the matrix, N cells drawn at random with --seed, each with a seed of its own",
+        whole(1),
+    )
     list: bool = switch("--list", "name what would be flown, MODE FAULT in each line")
     seed: range = option(
         "--seed N|A:B",
@@ -72,6 +77,7 @@ class UnknownError(ValueError):
 
 _NAMES: Final = "--matrix --list names all modes and faults"
 _NEITHER: Final = f"give MODE and FAULT, --matrix, --pairs or --pair; {_NAMES}"
+_DRAWN_SEEDS: Final = 1_000_000  # seeds of drawn cells are below this
 _LIMIT_S: Final = 600.0  # of a pair's flight, which takes seconds: longer is a hang
 
 
@@ -99,6 +105,8 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
     asked = (options.matrix, options.pairs is not None, options.pair is not None, options.mode)
     if sum(map(bool, asked)) != 1:
         raise UnknownError(_NEITHER)
+    if options.drawn is not None and not options.matrix:
+        raise UnknownError("--drawn draws cells of the matrix: give --matrix with it")
     if options.only is not None and not many:
         raise UnknownError(
             "--only chooses cells of the matrix, or pairs: give --matrix or --pairs with it"
@@ -106,16 +114,7 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
     if options.pairs is not None or options.pair is not None:
         return _drawn(options)
     if options.matrix:
-        every = [
-            _cell(mode, one, seed)
-            for one in known.values()
-            for mode in one.modes
-            if options.only is None or options.only in f"{mode} {one.name}"
-            for seed in options.seed
-        ]
-        if not every:
-            raise UnknownError(f"no fault and no mode contains {options.only!r}")
-        return every
+        return _of_matrix(options, known)
     if options.mode not in SITUATIONS:
         raise UnknownError(_unknown("mode", options.mode, tuple(SITUATIONS)))
     if options.fault not in known:
@@ -126,15 +125,40 @@ def _chosen(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
     return [_cell(options.mode, expected, seed) for seed in options.seed]
 
 
+def _of_matrix(options: FaultsOptions, known: dict[str, Expected]) -> list[Cell]:
+    """All cells, or those that are drawn, which have seeds that nobody has looked at."""
+    from sitl.seeds import stream
+
+    every = [
+        (mode, one)
+        for one in known.values()
+        for mode in one.modes
+        if options.only is None or options.only in f"{mode} {one.name}"
+    ]
+    if not every:
+        raise UnknownError(f"no fault and no mode contains {options.only!r}")
+    if options.drawn is None:
+        return [_cell(mode, one, seed) for mode, one in every for seed in options.seed]
+    random = stream(_only_seed(options, "cells"), "cells")
+    chosen = random.integers((len(every), _DRAWN_SEEDS), size=(options.drawn, 2)).tolist()
+    picked = [(*every[number], seed) for number, seed in chosen]
+    return [_cell(mode, one, seed) for mode, one, seed in picked]
+
+
+def _only_seed(options: FaultsOptions, what: str) -> int:
+    if len(options.seed) != 1:
+        raise UnknownError(f"{what} are drawn from one seed: give --seed N")
+    return options.seed.start
+
+
 def _drawn(options: FaultsOptions) -> list[Cell]:
     from studies.fault_matrix.expectations import EXPECTATIONS, not_flown
     from studies.fault_matrix.pairs import draw
 
-    if len(options.seed) != 1:
-        raise UnknownError("pairs are drawn from one seed: give --seed N")
+    seed = _only_seed(options, "pairs")
     numbers = range(options.pairs or 0) if options.pair is None else (options.pair,)
     without, only = not_flown(options.expect or EXPECTATIONS), options.only or ""
-    drawn = [draw(options.seed.start, number, without) for number in numbers]
+    drawn = [draw(seed, number, without) for number in numbers]
     found: list[Cell] = [one for one in drawn if only in f"{one.mode} {one.expected.name}"]
     if not found:
         raise UnknownError(f"none of {len(drawn)} pairs contains {only!r}")
@@ -174,9 +198,8 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
     for row in rows:
         if row.differs or len(rows) == 1:
             _say(display, row, summary(row))
-            if options.pairs is not None:
-                again = row.cell.expected.name.partition(":")[0]
-                display.say(f"{'':11}again: pandion faults --{again} --seed {seed}")
+            if options.pairs is not None or options.drawn is not None:
+                display.say(f"{'':11}again: pandion faults {_again(options, row.cell)}")
     if len(rows) == 1:
         for said in rows[0].flight.texts:
             display.say(f"  {said.after_s:8.3f} s  {said.text}")
@@ -192,6 +215,14 @@ def _run(options: FaultsOptions, cells: list[Cell]) -> int:
         texts.append((options.html, page(rows, (f"Pandion {version()}, seed {seed}",))))
     all_written = written("pandion faults", *texts)
     return AS_EXPECTED if all_written and not wrong else DIFFERS
+
+
+def _again(options: FaultsOptions, cell: Cell) -> str:
+    """What flies a drawn cell alone."""
+    name = cell.expected.name
+    if options.pairs is None:
+        return f"{cell.mode} {name} --seed {cell.seed}"
+    return f"--{name.partition(':')[0]} --seed {options.seed.start}"
 
 
 def _case(row: Judged) -> Case:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -301,6 +302,8 @@ def test_a_fault_over_the_real_link_is_seen_by_the_station(tmp_path: Path) -> No
         (["--matrix", "--pairs", "3"], "give MODE and FAULT, --matrix, --pairs or --pair"),
         (["--pair", "0", "--only", "vio"], "--only chooses cells of the matrix, or pairs"),
         (["--pairs", "3", "--seed", "0:2"], "pairs are drawn from one seed"),
+        (["--matrix", "--drawn", "3", "--seed", "0:2"], "cells are drawn from one seed"),
+        (["hold", "vio-off", "--drawn", "3"], "--drawn draws cells of the matrix"),
         (["--pairs", "3", "--only", "nothing like it"], "none of 3 pairs contains"),
     ],
 )
@@ -325,6 +328,35 @@ def test_what_would_be_flown_is_named_and_nothing_flies(
     assert capsys.readouterr().out == "hold       simulator-killed\n"
     assert main(["--pairs", "3", "--list"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+def test_a_drawn_cell_has_a_seed_of_its_own_and_flies_again_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown: list[tuple[str, str, int]] = []
+
+    def hit(cell: Cell) -> FaultFlight:
+        flown.append((cell.mode, cell.expected.name, cell.seed))
+        return replace(FINE, contact="wall", ended="it hit the wall")
+
+    monkeypatch.setattr(Cell, "row", hit)
+    drawn = ["--matrix", "--only", "vio-wrong", "--drawn", "20", "--workers", "0"]
+    assert main([*drawn, "--seed", "5", "--html", str(tmp_path / "cells.html")]) == 1
+    first, said = sorted(flown), capsys.readouterr().out
+    assert len({seed for _, _, seed in first}) == 20
+    assert len({mode for mode, _, _ in first}) > 3
+    again = re.search(r"again: pandion faults (\S+) (\S+) --seed (\d+)", said)
+    assert again is not None
+    flown.clear()
+    main([*again.group(1, 2), "--seed", again.group(3)])
+    assert len(flown) == 1
+    assert flown[0] in first
+    flown.clear()
+    main([*drawn, "--seed", "5"])
+    assert sorted(flown) == first
+    flown.clear()
+    main([*drawn, "--seed", "6"])
+    assert sorted(flown) != first
 
 
 def test_a_matrix_is_resumed_from_its_journal_and_judged_anew(
