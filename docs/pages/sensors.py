@@ -25,25 +25,15 @@ TABLES: Final[dict[str, type[keys.Timing]]] = {
 
 def reference() -> str:
     """The tables in Markdown."""
-    suites = {name: (SUITES / f"{name}.toml").read_text(encoding="utf-8") for name in NAMES}
-    parts = ["### Every sensor\n", _table("timing", keys.Timing, {}, {})]
-    parts.append("Below, these have a row where a suite gives a number, and no meaning again.\n")
-    numbers = {name: tomllib.loads(text) for name, text in suites.items()}
-    notes = {name: _comments(text) for name, text in suites.items()}
+    numbers = {
+        name: tomllib.loads((SUITES / f"{name}.toml").read_text(encoding="utf-8")) for name in NAMES
+    }
+    parts = ["### Every sensor\n", _table("timing", keys.Timing, {})]
+    parts.append("Below, those that a suite gives a number are in one row.\n")
     for name, kind in TABLES.items():
         parts.append(f"### `[sensors.{name}]`\n")
         values = {suite: found[name] for suite, found in numbers.items() if name in found}
-        said = {suite: found.get(name, {}) for suite, found in notes.items()}
-        parts.append(_table(name, kind, values, said))
-    parts.append("### Sources\n")
-    cited: dict[str, list[str]] = {}
-    for name, text in suites.items():
-        for source in _sources(text):
-            cited.setdefault(source, []).append(name)
-    marks = [source.split()[0] for source in cited]
-    for source, of in sorted(cited.items(), key=lambda row: int(row[0][1 : row[0].index("]")])):
-        only = f" (`{'`, `'.join(of)}`)" if marks.count(source.split()[0]) > 1 else ""
-        parts.append(f"- {source}{only}")
+        parts.append(_table(name, kind, values))
     return "\n".join(parts) + "\n"
 
 
@@ -60,31 +50,25 @@ def inserted(page: str) -> str:
     return f"{before}{begin}{reference()}{end}{after}"
 
 
-def _table(
-    name: str,
-    kind: type[keys.Timing],
-    values: dict[str, dict[str, Any]],
-    notes: dict[str, dict[str, str]],
-) -> str:
+def _table(name: str, kind: type[keys.Timing], values: dict[str, dict[str, Any]]) -> str:
     """Every key of one sensor: its own, and those of all sensors that a suite gives."""
     rows = [f"On board in `{'`, `'.join(values)}`.\n"] if values else []
     hints, meanings = typing.get_type_hints(kind, include_extras=True), _meanings(kind)
     common = {field.name for field in dataclasses.fields(keys.Timing)}
+    timing = []
     for field in dataclasses.fields(kind):
-        given = [found.get(field.name) for found in values.values()]
-        if kind is not keys.Timing and field.name in common and not any(given):
+        given = {suite: found.get(field.name) for suite, found in values.items()}
+        value = _value(given) if values else ""
+        named = f"`{field.name}`{f' = {value}' if value else ''}"
+        if kind is not keys.Timing and field.name in common:
+            timing += [named] if any(given.values()) else []
             continue
-        repeated = kind is not keys.Timing and field.name in common
-        meaning = "" if repeated else meanings[field.name]
-        allowed = "" if repeated else _allowed(hints[field.name])
-        value = _value(dict(zip(values, given, strict=True))) if values else ""
-        source = _source([notes[suite].get(field.name, "") for suite in values])
-        line = f"- `{field.name}`"
-        line += f" ({allowed})" if allowed else ""
-        line += f" = {value}" if value else ""
-        line += f": {meaning}" if meaning else ""
-        line += f" [{source}]" if source else ""
-        rows.append(line)
+        allowed, meaning = _allowed(hints[field.name]), meanings[field.name]
+        is_given = f" = {value}" if value else ""
+        is_said = f": {meaning}" if meaning else ""
+        rows.append(f"- `{field.name}` ({allowed}){is_given}{is_said}")
+    if timing:
+        rows.insert(1, f"- {', '.join(timing)}")
     return "\n".join(rows) + "\n"
 
 
@@ -123,30 +107,3 @@ def _shown(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(f"{entry:g}" for entry in value) + "]"
     return f"{value:g}"
-
-
-def _source(said: list[str]) -> str:
-    # The head of the page says that a number without a source is our choice.
-    sources = (re.sub(r"(, |: )?our choice(: )?", "", text) for text in said)
-    return "; ".join(dict.fromkeys(text for text in sources if text))
-
-
-def _comments(text: str) -> dict[str, dict[str, str]]:
-    """What stands behind each key of a suite's file, sensor by sensor."""
-    found: dict[str, dict[str, str]] = {}
-    table = ""
-    for line in text.splitlines():
-        heading = re.match(r"\[(\w+)\]", line)
-        if heading:
-            table = heading.group(1)
-            found[table] = {}
-        noted = re.match(r"(\w+) = [^#]+# (.+)", line)
-        if noted:
-            found[table][noted.group(1)] = noted.group(2)
-    return found
-
-
-def _sources(text: str) -> list[str]:
-    """The numbered sources at the head of a suite's file, one text each."""
-    head = text.partition("\n\n")[0].replace("\n#     ", " ")
-    return re.findall(r"^# (\[\d+\] .+)$", head, re.MULTILINE)
