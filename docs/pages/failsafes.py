@@ -37,10 +37,10 @@ From `fsw/autopilot/flight/failsafe/table.py`; how it works:
 [failsafes and faults](../concepts/failsafes.md). Actions, from the mildest to the strongest:
 {actions}.
 
-Every condition is reported. *After* is the longest time from what is detected, with the time in its
-definition, to report and action. *Action* is the default ([choices](parameters.md)). A text that
-changes the mode is critical, one that terminates an emergency. Without an end, a condition ends
-when it is not so any more.
+*After* is the longest time from what is detected, with the time in its definition, to report and
+action. *Action* is the default ([choices](parameters.md)). A text that changes the mode is
+critical, one that terminates an emergency. Without an end, a condition ends when it is not so any
+more.
 
 ## Conditions
 """
@@ -48,9 +48,8 @@ when it is not so any more.
 _RULES = """\
 ## Arming checks
 
-Each check that fails is a sentence behind `not armed:`, and in the answer to
-RUN_PREARM_CHECKS. Forced arming overrides all but an invalid estimate and a flight that was
-terminated ([arming](../concepts/failsafes.md#arming)).
+Each check that fails is a sentence behind `not armed:`. Forced arming overrides all but an invalid
+estimate and a flight that was terminated ([arming](../concepts/failsafes.md#arming)).
 
 {checks}
 """
