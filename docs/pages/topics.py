@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from typing import Final
 
 from fsw.log.topics import TOPICS
@@ -35,6 +36,11 @@ def inserted(page: str) -> str:
 _STAMP: Final = "s, of the measurement, on the clock of the tick"
 # What the page says once, of every topic that has the mark.
 _MARKS: Final = {"; every tick with `LOG_PROFILE` 1": " †", "; none with exact sensors": " ‡"}
+# Units and axes that the page says once, of every field without others.
+_PLAIN: Final = re.compile(
+    r"(m|m/s(\^[234])?|m\^2(/s\^2)?|rad|rad/s(\^2)?|N|N m|s|kg)(, NED)?"
+    r"|\[w, x, y, z\](, body to NED)?"
+)
 
 
 def _when(topic: Topic) -> str:
@@ -48,10 +54,15 @@ def _topic(topic: Topic) -> str:
     """One topic; fields that follow each other with one type and note are in one line."""
     lines = [f"### {topic.name}\n", f"{topic.about} ({_when(topic)}).\n"]
     fields = [field for field in topic.fields if field.note != _STAMP]
-    for (type_, note), alike in itertools.groupby(fields, lambda f: (_type(f), f.note)):
+    for (type_, note), alike in itertools.groupby(fields, lambda f: (_type(f), _note(f))):
         names = ", ".join(f"`{field.name}`" for field in alike)
         lines.append(f"- {names} {type_}{f': {note}' if note else ''}")
     return "\n".join(lines) + "\n"
+
+
+def _note(field: Field) -> str:
+    """What is to be said of one field beyond what the page says of all."""
+    return "" if _PLAIN.fullmatch(field.note) else field.note
 
 
 def _type(field: Field) -> str:
