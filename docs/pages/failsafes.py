@@ -38,7 +38,8 @@ From `fsw/autopilot/flight/failsafe/table.py`; how it works:
 {actions}.
 
 *After* is the longest time from what is detected, with the time in its definition, to report and
-action. *Action* is the default ([choices](parameters.md)). A text that changes the mode is
+action. *Action* is the default ([choices](parameters.md)); *delayed*: after `COM_FAIL_ACT_T`
+({delay}) in hold. A text that changes the mode is
 critical, one that terminates an emergency. Without an end, a condition ends when it is not so any
 more.
 
@@ -58,13 +59,14 @@ estimate and a flight that was terminated ([arming](../concepts/failsafes.md#arm
 def reference() -> str:
     """The page, in Markdown."""
     actions = ", ".join(action.value for action in Action)
+    delay = f"{as_text(BY_NAME['COM_FAIL_ACT_T'].default)} s"
     rows = ["| condition (text) | detected | after | action | severity | ends |", "|---" * 6 + "|"]
     rows += [f"| {' | '.join(_cells(row))} |" for row in FAILSAFES]
     table = "\n".join(rows) + "\n"
     checks = ["| subject | check fails where | waiting helps |", "|---" * 3 + "|"]
     checks += [_check(check) for check in CHECKS]
     return "\n".join(
-        (_HEAD.format(actions=actions), table, _RULES.format(checks="\n".join(checks)))
+        (_HEAD.format(actions=actions, delay=delay), table, _RULES.format(checks="\n".join(checks)))
     )
 
 
@@ -105,9 +107,7 @@ def _action(row: Failsafe) -> str:
         default = dict(parameter.choices)[int(parameter.default)].lower()
         parts.append(f"{default} (`{name}` {parameter.default})")
     if row.delayed:
-        parts.append(
-            f"after `COM_FAIL_ACT_T` ({as_text(BY_NAME['COM_FAIL_ACT_T'].default)} s) in hold"
-        )
+        parts.append("delayed")
     return "; ".join(parts)
 
 
