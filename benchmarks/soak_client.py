@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from fsw.link.udp_endpoint import OpenEndpoint
+from fsw.link.endpoints import OpenEndpoint
 from messages import dialect
 
 SYSTEM, COMPONENT = 255, 190

@@ -37,7 +37,7 @@ from fsw.link.px4.link import Px4Link, open_px4, px4_addresses
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import SimLink
-from fsw.link.udp_endpoint import LinkError, parse_address
+from fsw.link.endpoints import LinkError, parse_address
 from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.outgoing import TelemetryContext
 from fsw.log.flight_log import LogSubject, vehicle_facts

@@ -18,12 +18,11 @@ from fsw.autopilot.signals import (
     StatusText,
     TickOutputs,
 )
-from fsw.link.arrivals import Arrivals
 from fsw.link.bounded_memory import BoundedRecord, RecordFrame, SentFrames, renew
 from fsw.link.endpoints import open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.outbox import Outbox, packed
-from fsw.link.peers import Peers
+from fsw.link.peers import Arrivals, Peers
 from fsw.link.services.service import Dispatch, LinkService
 from fsw.link.signing.signing import FrameTrust, Signing, set_up_signing
 from fsw.link.telemetry.link_commands import LinkCommands

@@ -34,7 +34,6 @@ from fsw.link.inbox import MAX_SAMPLES, Inbox
 from fsw.link.outbox import packed
 from fsw.link.routed_commands import RoutedCommands
 from fsw.link.sensor_clock import SensorClock
-from fsw.link.udp_endpoint import Address
 from fsw.link.vehicle_link import Pacing
 from fsw.link.wire import decode
 from fsw.link.wire.decode import Numbers
@@ -42,6 +41,7 @@ from fsw.link.wire.decode_sensors import SampleDecoder, battery_reading
 from fsw.link.wire.encode_standard import command_ack, hil_actuator_controls, vehicle_heartbeat
 from fsw.link.wire.outgoing import PX4
 from messages import dialect, message_ids, status_text
+from messages.addresses import Address
 from messages.frames import Frame, FrameWriter, split
 from messages.message_ids import ACCEPTED, AUTOPILOT, CMD_REBOOT_SHUTDOWN, SYSTEM_ID
 from messages.udp import PeerSocket

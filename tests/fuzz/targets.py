@@ -22,7 +22,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.signing.key_file import KeyFile
 from fsw.link.sim_link import SimLink
 from fsw.link.telemetry.streams import STREAMS
-from fsw.link.udp_endpoint import LinkError
+from fsw.link.endpoints import LinkError
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
 from fsw.storage import parameter_file as storage

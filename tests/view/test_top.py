@@ -12,7 +12,7 @@ import pytest
 from textual.widgets import DataTable, Input, RichLog
 
 from fsw.autopilot.model.airframe import AIRFRAME
-from fsw.link.udp_endpoint import OpenEndpoint
+from fsw.link.endpoints import OpenEndpoint
 from messages.frames import Frame, FrameWriter, split, wire_fields
 from pandion.top import main
 from tests.waiting import wait_for

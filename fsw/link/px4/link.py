@@ -49,12 +49,11 @@ from fsw.link.px4.messages import (
     shares_of,
     state_of,
 )
-from fsw.link.udp_endpoint import LinkError
 from fsw.link.vehicle_link import Pacing
 from fsw.link.wire.decode import Numbers
 from fsw.link.wire.decode_sensors import battery_reading
 from messages import message_ids, status_text
-from messages.addresses import Address, LinkAddress, parse_link_address
+from messages.addresses import Address, LinkAddress, LinkError, parse_link_address
 from messages.frames import Frame, Losses
 
 _STREAMS: Final = {  # asked for, with its period [us]

@@ -11,7 +11,7 @@ from typing import Final
 
 from command_line.bounded_json import read_json
 from command_line.folders import NoHomeError
-from fsw.link.udp_endpoint import LinkError
+from messages.addresses import LinkError
 
 _MODE: Final = 0o600
 _KEY_SIZE: Final = 32  # bytes

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from fsw.link.udp_endpoint import OpenEndpoint
+from fsw.link.endpoints import OpenEndpoint
 
 
 def _other_address_of_this_machine() -> str:
