@@ -25,6 +25,7 @@ from fsw.autopilot.control.control_metrics import ControlMetrics
 from fsw.autopilot.ports import LoopHealth, PlanningCycle
 from fsw.autopilot.tuning import Tuning
 from fsw.link.build_links import build_links
+from fsw.link.endpoints import LinkError, parse_address
 from fsw.link.events.event_service import EventService
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.ftp_service import FtpService
@@ -37,7 +38,6 @@ from fsw.link.px4.link import Px4Link, open_px4, px4_addresses
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.service import LinkService
 from fsw.link.sim_link import SimLink
-from fsw.link.endpoints import LinkError, parse_address
 from fsw.link.vehicle_link import Pacing, VehicleLink
 from fsw.link.wire.outgoing import TelemetryContext
 from fsw.log.flight_log import LogSubject, vehicle_facts
@@ -48,7 +48,7 @@ from fsw.runtime.flight_loop import START_US, Ending, FlightEnd, FlightLoop, Fli
 from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
 from fsw.runtime.process import in_a_child, settle_memory
 from fsw.runtime.program import FlightProgram
-from fsw.runtime.realtime import (
+from fsw.runtime.process import (
     TICK_PRIORITY,
     claim_real_time,
     release_real_time,
@@ -57,7 +57,7 @@ from fsw.runtime.realtime import (
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:
-    from fsw.storage.kept_file import ParameterFile
+    from fsw.storage.parameter_file import ParameterFile
 
 DONE: Final = 0  # exit code
 
@@ -189,7 +189,7 @@ class _Session:
         """
         # Imported here because they take a second, which the other refusals need not wait.
         from fsw.runtime.assembly import configured
-        from fsw.storage.kept_file import ParameterFile
+        from fsw.storage.parameter_file import ParameterFile
 
         path, record = self._options.params, directory / "parameters.params"
         try:

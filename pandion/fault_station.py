@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fsw.autopilot.signals import Mode
-from fsw.link.wire.px4_mode import MODE_BY_PX4
+from fsw.link.wire.identity import MODE_BY_PX4
 from messages import dialect
 
 _BEAT_S: Final = 0.5

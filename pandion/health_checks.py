@@ -39,7 +39,7 @@ _PORTS: Final = (  # number, who binds it, and what to do where it is taken
 _REQUIREMENT: Final = re.compile(r"([\w.-]+)\s*>=\s*([\d.]+)$")
 # In a process of its own, because what it asks for changes the process.
 _CLAIM: Final = (
-    "from fsw.runtime.realtime import TICK_PRIORITY, claim_real_time\n"
+    "from fsw.runtime.process import TICK_PRIORITY, claim_real_time\n"
     "print(*claim_real_time(TICK_PRIORITY), sep='\\n')"
 )
 

@@ -23,7 +23,7 @@ from fsw.autopilot.signals import (
 )
 from fsw.link.events.event_table import condition_of
 from fsw.link.wire import decode
-from fsw.link.wire.px4_mode import AVAILABLE_MODES
+from fsw.link.wire.identity import AVAILABLE_MODES
 from fsw.link.wire.zone_transfer import ZoneTransfer
 from messages import dialect
 from messages import message_ids as ids

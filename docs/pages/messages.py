@@ -14,7 +14,7 @@ from fsw.link.files.log_service import LogService
 from fsw.link.files.log_stream import LogStreamService
 from fsw.link.inbox import Inbox
 from fsw.link.services.parameter_service import ParameterService
-from fsw.link.services.time_service import TimeService
+from fsw.link.services.service import TimeService
 from fsw.link.telemetry.streams import AT_ONCE, ON_REQUEST, STREAMS
 from messages import dialect
 from messages import message_ids as ids

@@ -1,13 +1,15 @@
-"""The flight program as the loop sees it: a first state, a pure tick and a planner."""
+"""The flight program as the loop sees it, and what runs its tick and catches what fails there."""
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final, TypeAlias
 
+from fsw.autopilot.periods import TICK_US
 from fsw.autopilot.ports import PlanningCycle, VehicleFacts
-from fsw.autopilot.signals import TickInputs, TickOutputs
+from fsw.autopilot.signals import Severity, StatusText, TickInputs, TickOutputs
 from fsw.link.events.event_service import EventLog
 from fsw.link.services.mission_store import MissionStore
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from fsw.autopilot.flight.autopilot import Controlled
     from fsw.autopilot.flight.state import FlightState
     from fsw.storage.parameter_store import ParameterStore
+
+MAX_FAILED_TICKS: Final = 10_000 // TICK_US  # as long as the estimate may be missing
 
 Control: TypeAlias = "Callable[[FlightState, TickInputs], Controlled]"
 """A tick from a state and its inputs up to its answer."""
@@ -36,3 +40,86 @@ class FlightProgram:
     missions: MissionStore
     events: EventLog = field(default_factory=EventLog)
     numbers: Mapping[str, float] = field(default_factory=dict)  # of the configuration, by name
+
+
+class TickRunner:
+    """Keeps the state between ticks, and repeats the last command if a tick fails.
+
+    A failed tick leaves the state as it was. Repeating the last command is the safest thing known
+    for a few milliseconds. A lasting error is raised and ends the process; the rotors stop when
+    the actuators' time-out is over.
+    """
+
+    def __init__(
+        self,
+        control: Control,
+        conclude: Conclude,
+        first_state: FlightState,
+        on_error: Callable[[], None] = traceback.print_exc,
+    ) -> None:
+        """Start before the first tick; a survived error calls ``on_error`` in its handler."""
+        self._control = control
+        self._conclude = conclude
+        self._on_error = on_error
+        self._state = first_state
+        self._begun: Controlled | TickOutputs | None = None  # the outputs are of a tick that failed
+        self._last: TickOutputs | None = None
+        self._failed = 0  # in a row
+
+    def __call__(self, inputs: TickInputs) -> TickOutputs:
+        """Run one tick, both parts of it.
+
+        Raises:
+            Exception: as of :meth:`control`.
+        """
+        self.control(inputs)
+        return self.conclude()
+
+    def control(self, inputs: TickInputs) -> TickOutputs:
+        """Run a tick up to its answer.
+
+        Raises:
+            Exception: What the tick raised, if it is the first tick or ``MAX_FAILED_TICKS`` before
+                it failed.
+        """
+        try:
+            begun = self._control(self._state, inputs)
+        except Exception as error:
+            failed = self._begun = self._survived(error)
+            return failed
+        self._begun = begun
+        return begun.outputs
+
+    def conclude(self) -> TickOutputs:
+        """Run the rest of the tick.
+
+        Raises:
+            Exception: as of :meth:`control`.
+        """
+        begun, self._begun = self._begun, None
+        assert begun is not None
+        if isinstance(begun, TickOutputs):
+            return begun
+        try:
+            self._state, outputs = self._conclude(begun)
+        except Exception as error:
+            return self._survived(error)
+        self._failed = 0
+        self._last = outputs
+        return outputs
+
+    def _survived(self, error: Exception) -> TickOutputs:
+        """The outputs of a tick that failed; to be called in the handler of its ``error``."""
+        self._failed += 1
+        if self._last is None or self._failed > MAX_FAILED_TICKS:
+            raise error
+        self._on_error()
+        text = f"tick failed, {type(error).__name__}: last command repeated"
+        return replace(
+            self._last,
+            plan_request=None,
+            acks=(),
+            texts=(StatusText(Severity.CRITICAL, text),),
+            tuning_taken=None,
+            upload_taken=None,
+        )

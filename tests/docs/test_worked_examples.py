@@ -19,7 +19,7 @@ MAX_FILES = {"Add a sensor": 8}  # else 3: a sensor is in both halves and on the
 
 NEW_MODE = """
 from fsw.autopilot.flight.modes import MODES
-from fsw.link.wire.px4_mode import AVAILABLE_MODES
+from fsw.link.wire.identity import AVAILABLE_MODES
 from fsw.autopilot.signals import CommandResult, Mode
 from tests.fsw.autopilot.flight.asked import ask
 from tests.fsw.autopilot.flight.contexts import flying

@@ -18,11 +18,11 @@ from docs.pages.messages import heard
 from fsw.autopilot.model.airframe import AIRFRAME
 from fsw.autopilot.parameters.control_choice import choice_of
 from fsw.autopilot.parameters.registry import PARAMETERS
+from fsw.link.endpoints import LinkError
 from fsw.link.inbox import Inbox
 from fsw.link.signing.key_file import KeyFile
 from fsw.link.sim_link import SimLink
 from fsw.link.telemetry.streams import STREAMS
-from fsw.link.endpoints import LinkError
 from fsw.runtime.assembly import flight_software
 from fsw.runtime.clock import now_us
 from fsw.storage import parameter_file as storage

@@ -20,7 +20,7 @@ from fsw.autopilot.flight.failsafe.conditions import Action, Condition
 from fsw.autopilot.flight.failsafe.table import ROWS
 from fsw.autopilot.flight.modes import MODES
 from fsw.autopilot.signals import ArmingReport, FailsafeEvent, Severity
-from fsw.link.wire.px4_mode import custom_mode
+from fsw.link.wire.identity import custom_mode
 
 ARGUMENTS: Final = 40  # bytes of an event
 _COMPONENT: Final = 1  # of the ids: the autopilot

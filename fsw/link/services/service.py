@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, cast
 
 from fsw.autopilot.signals import CommandRequest, MessageSource
-from fsw.link.wire.decode import for_this_vehicle
-from fsw.link.wire.outgoing import ServiceOutput
+from fsw.link.wire.decode import Numbers, for_this_vehicle
+from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages.frames import Frame
+from messages.message_ids import PING, TIMESYNC
 
 Outcome = tuple[int, str]
 """MAV_RESULT of a command, and in a sentence why it is refused."""
@@ -45,6 +46,22 @@ class LinkService:
     def carry_out(self, request: CommandRequest, t_us: int, armed: bool) -> Outcome:
         """Do one of its ``commands`` at once, or begin to."""
         raise NotImplementedError
+
+
+class TimeService(LinkService):
+    """TIMESYNC and PING: answers in the vehicle's own time, with which its messages are stamped."""
+
+    message_ids = frozenset({PING, TIMESYNC})
+
+    def handle(self, frame: Frame, t_us: int) -> Sequence[Outgoing]:
+        """Answer a request; replies to other systems are ignored."""
+        if frame.message_id == TIMESYNC:
+            answered_ns, sent_ns = frame.payload_values
+            return () if answered_ns else (Outgoing(TIMESYNC, (1000 * t_us, sent_ns)),)
+        time_us, sequence, system, component = cast(Numbers, frame.payload_values)
+        if system or component:
+            return ()  # a ping with a target is an answer
+        return (Outgoing(PING, (time_us, sequence, frame.system_id, frame.component_id)),)
 
 
 _BUSY_US: Final = 100_000  # after a question or an answer; the slowest pace is 20 ms

@@ -15,8 +15,8 @@ from hashlib import sha256
 from typing import Final, cast
 
 from fsw.autopilot.signals import Severity, StatusText
-from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.endpoints import is_loopback
+from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.wire.decode import Numbers, for_this_vehicle
 from messages.addresses import Address
 from messages.frames import Frame, announcing_signature, is_signed, is_version_1

@@ -15,7 +15,7 @@ from fsw.link.services import mission_wire
 from fsw.link.wire import (
     encode_dialect,
     encode_health,
-    encode_identity,
+    identity,
     encode_place,
     encode_standard,
 )
@@ -56,7 +56,7 @@ _VITAL: Final = frozenset(
 )
 
 HEARTBEAT: Final = Stream(message_ids.HEARTBEAT, 1, 1, encode_standard.heartbeat)
-_CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, encode_identity.current_mode)
+_CURRENT_MODE = Stream(message_ids.CURRENT_MODE, 0.5, 0.5, identity.current_mode)
 _EXTENDED_STATE = Stream(message_ids.EXTENDED_SYS_STATE, 1, 5, encode_standard.extended_sys_state)
 
 STREAMS: Final = (
@@ -82,9 +82,9 @@ STREAMS: Final = (
     Stream(message_ids.ORBIT_EXECUTION_STATUS, 2, 2, encode_standard.orbit_status),
     Stream(message_ids.ODOMETRY, 0, 30, encode_place.odometry),
     Stream(message_ids.HIGHRES_IMU, 0, 50, encode_standard.highres_imu),
-    Stream(message_ids.PROTOCOL_VERSION, 0, 0, encode_identity.protocol_version),
+    Stream(message_ids.PROTOCOL_VERSION, 0, 0, identity.protocol_version),
     Stream(message_ids.GPS_GLOBAL_ORIGIN, 0, 0, encode_place.global_origin),
-    Stream(message_ids.AUTOPILOT_VERSION, 0, 0, encode_identity.autopilot_version),
+    Stream(message_ids.AUTOPILOT_VERSION, 0, 0, identity.autopilot_version),
     Stream(message_ids.ARM_JOINT_STATE, 30, 50, encode_dialect.arm_joint_state, PANDION),
     Stream(message_ids.ARM_JOINT_SETPOINT, 10, 10, encode_dialect.arm_joint_setpoint, PANDION),
     Stream(message_ids.END_EFFECTOR_TARGET, 10, 10, encode_dialect.end_effector_target, PANDION),
@@ -108,7 +108,7 @@ AT_ONCE: Final = (HEARTBEAT, _CURRENT_MODE, _EXTENDED_STATE)
 
 # Sent on request only, because they have several parts; the request's param2 chooses.
 ON_REQUEST: Final[dict[int, Answerer]] = {
-    message_ids.AVAILABLE_MODES: encode_identity.available_modes,
+    message_ids.AVAILABLE_MODES: identity.available_modes,
     message_ids.COMPONENT_METADATA: component_metadata,
     message_ids.OBSTACLE_SHAPE: encode_dialect.safe_set_shapes,
 }

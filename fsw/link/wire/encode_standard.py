@@ -23,7 +23,7 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 from fsw.link.wire.outgoing import PX4, TelemetryContext, WireValues
-from fsw.link.wire.px4_mode import custom_mode, shown_mode
+from fsw.link.wire.identity import custom_mode, shown_mode
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1

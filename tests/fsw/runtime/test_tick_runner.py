@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fsw.autopilot.signals import CommandAck, SensorFrame, TickInputs, TickOutputs
-from fsw.runtime.tick_runner import MAX_FAILED_TICKS, TickRunner
+from fsw.runtime.program import MAX_FAILED_TICKS, TickRunner
 from tests.fsw.link.snapshots import ACTUATORS, outputs_at
 from tests.whole_tick import parts_of
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fsw.link.px4.clock import Px4Clock
+from fsw.link.px4.estimate import Px4Clock
 from fsw.link.px4.messages import CompanionWriter
 from messages.frames import split
 

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from fsw.link.build_links import build_links
+from fsw.link.endpoints import LinkError
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice
 from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.signing.signing import FrameTrust, SignedTimes
-from fsw.link.endpoints import LinkError
 from messages import dialect
 from messages import message_ids as ids
 from messages.frames import FrameWriter, as_version_1, is_signed, split

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from fsw.link.telemetry.streams import ON_REQUEST, STREAMS
-from fsw.link.wire.px4_mode import AVAILABLE_MODES
+from fsw.link.wire.identity import AVAILABLE_MODES
 from messages import dialect
 from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter

@@ -20,13 +20,12 @@ from fsw.link.wire import (
     decode_setpoints,
     encode_dialect,
     encode_health,
-    encode_identity,
+    identity,
     encode_place,
     encode_standard,
     fence_items,
     mission_items,
     outgoing,
-    px4_mode,
 )
 from messages import dialect, message_ids
 from sitl.link import decode as sitl_decode
@@ -108,14 +107,14 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
         "ATTITUDE|VELOCITY_HORIZ|VELOCITY_VERT|POS_HORIZ_REL|POS_HORIZ_ABS|POS_VERT_ABS",
     ),
     (
-        encode_identity,
+        identity,
         "_CAPABILITIES",
         "MAV_PROTOCOL_CAPABILITY",
         "MISSION_FLOAT|PARAM_FLOAT|MISSION_INT|COMMAND_INT|PARAM_ENCODE_BYTEWISE|FTP|"
         "SET_ATTITUDE_TARGET|SET_POSITION_TARGET_LOCAL_NED|FLIGHT_TERMINATION|MAVLINK2|"
         "MISSION_FENCE|MISSION_RALLY",
     ),
-    (encode_identity, "_UNRELEASED", "FIRMWARE_VERSION_TYPE", "DEV"),
+    (identity, "_UNRELEASED", "FIRMWARE_VERSION_TYPE", "DEV"),
     (encode_place, "_LOCAL_NED", "MAV_FRAME", "LOCAL_NED"),
     (encode_place, "_BODY_FRD", "MAV_FRAME", "BODY_FRD"),
     (encode_place, "_MOCAP", "MAV_ESTIMATOR_TYPE", "MOCAP"),
@@ -166,7 +165,7 @@ TABLE: Final[list[tuple[ModuleType, str, str, str]]] = [
     (mission_items, "INVALID", "MAV_MISSION", "INVALID"),
     (mission_items, "INVALID_PARAM1", "MAV_MISSION", "INVALID_PARAM1"),
     (mission_items, "DENIED", "MAV_MISSION", "DENIED"),
-    (px4_mode, "_NOT_SELECTABLE", "MAV_MODE_PROPERTY", "NOT_USER_SELECTABLE"),
+    (identity, "_NOT_SELECTABLE", "MAV_MODE_PROPERTY", "NOT_USER_SELECTABLE"),
     (outgoing, "GENERIC", "MAV_AUTOPILOT", "GENERIC"),
     (outgoing, "PX4", "MAV_AUTOPILOT", "PX4"),
     (estimator_report, "NO_FIX", "GPS_FIX_TYPE", "NO_FIX"),
