@@ -17,8 +17,8 @@ from typing import Final
 from benchmarks.stops import Stops, Stretch
 from command_line.process import StopRequest
 from fsw.runtime.clock import now_us
-from fsw.runtime.rate_groups import INNER
 from fsw.runtime.process import claim_real_time
+from fsw.runtime.rate_groups import INNER
 from fsw.runtime.releases import ReleaseSchedule
 
 _PRIORITY: Final = 60  # SCHED_FIFO; the tick has 50

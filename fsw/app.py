@@ -46,14 +46,15 @@ from fsw.runtime import clock, report
 from fsw.runtime.console import Console
 from fsw.runtime.flight_loop import START_US, Ending, FlightEnd, FlightLoop, FlightRecord
 from fsw.runtime.planner_service import InlinePlanner, PlannerRecord, ProcessPlanner
-from fsw.runtime.process import in_a_child, settle_memory
-from fsw.runtime.program import FlightProgram
 from fsw.runtime.process import (
     TICK_PRIORITY,
     claim_real_time,
+    in_a_child,
     release_real_time,
     scheduler,
+    settle_memory,
 )
+from fsw.runtime.program import FlightProgram
 from fsw.runtime.timing import GroupTimer
 
 if TYPE_CHECKING:

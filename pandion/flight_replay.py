@@ -14,8 +14,7 @@ from fsw.autopilot.model.airframe import Airframe
 from fsw.log.encoder import FULL, THIN, LogEncoder
 from fsw.log.px4_records import origin_of
 from fsw.log.topics import TOPICS
-from fsw.runtime.program import FlightProgram
-from fsw.runtime.program import TickRunner
+from fsw.runtime.program import FlightProgram, TickRunner
 from messages import ulog
 from messages.ulog_reader import Record, UlogError, UlogFile, columns, split, unpacker
 from pandion.logged_ticks import Gap, LoggedTick, ticks

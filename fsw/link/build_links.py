@@ -12,8 +12,7 @@ from fsw.link.gcs_link import GcsLink, LinkSetup
 from fsw.link.ground_links import GroundLinks
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice, addresses
-from fsw.link.services.service import LinkService
-from fsw.link.services.service import TimeService
+from fsw.link.services.service import LinkService, TimeService
 from fsw.link.signing.key_file import KeyFile, NoKeyFile
 from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES

@@ -38,11 +38,10 @@ from fsw.log.run_files import RunFiles
 from fsw.runtime.clock import unix_us
 from fsw.runtime.host_watch import HostWatch
 from fsw.runtime.planner_service import PlannerRecord
-from fsw.runtime.program import FlightProgram
-from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
 from fsw.runtime.process import rank_threads
+from fsw.runtime.program import FlightProgram, TickRunner
+from fsw.runtime.rate_groups import INNER, MPC, RATE_GROUPS, Member, RateGroupRunner
 from fsw.runtime.releases import DeadlineMonitor, Release, ScheduledReleases, StepReleases
-from fsw.runtime.program import TickRunner
 from fsw.runtime.timing import GroupTimer, Histogram
 
 LINK_TIMEOUT_S: Final = 1.2  # silence that ends the flight; both processes end within 2 s

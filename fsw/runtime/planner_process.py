@@ -24,8 +24,7 @@ from typing import Any, Final, NoReturn
 
 from fsw.autopilot.ports import Clock, PlanningCycle
 from fsw.autopilot.signals import Plan, PlanFailure, PlanRequest, PlanTimings, SolverStatus
-from fsw.runtime.process import die_with_parent
-from fsw.runtime.process import PLANNER_PRIORITY, claim_real_time
+from fsw.runtime.process import PLANNER_PRIORITY, claim_real_time, die_with_parent
 
 _RESTART_DELAY_S: Final = 0.02  # the next worker might die at once as well
 _MAX_BYTES: Final = 1 << 17  # of one value; a request has about 2 kB

@@ -16,7 +16,6 @@ import pytest
 from fsw.autopilot.parameters.flight_config import flight_config
 from fsw.autopilot.parameters.param_type import field_of, value_of
 from fsw.link.files.flight_logs import MARK
-from fsw.link.files.ftp_message import Opcode
 from messages import dialect as d
 from tests.conversations.connected import PARAMETER_FILE, Connected, Message, connected
 from tests.conversations.table import Must, Turn, ack, play
@@ -161,11 +160,11 @@ def listed(vehicle: Connected, path: str) -> list[str]:
     """Its listing: entries are counted, until the answer is no more."""
     found: list[str] = []
     for number in range(1, 50):
-        vehicle.send(ftp(Opcode.LIST_DIRECTORY, path, len(found), number))
+        vehicle.send(ftp(d.MAV_FTP_OPCODE_LISTDIRECTORY, path, len(found), number))
         answer = vehicle.run(0.5, lambda m: m.get_type() == "FILE_TRANSFER_PROTOCOL")
         assert answer is not None
         payload = bytes(answer.payload)
-        if payload[3] != Opcode.ACK:
+        if payload[3] != d.MAV_FTP_OPCODE_ACK:
             return found
         found += payload[12 : 12 + payload[4]].decode("ascii").strip("\0").split("\0")
     raise AssertionError("a listing without an end")
@@ -183,9 +182,9 @@ def test_autopilot_tools_finds_the_newest_log_by_its_date(vehicle: Connected, fo
     }
     dates = sorted(files, key=lambda one: datetime.strptime(one[:-4], "%Y-%m-%d %H_%M_%S"))
     assert len(dates) == 2
-    vehicle.send(ftp(Opcode.OPEN_FILE_RO, files[dates[-1]], 0, 0))
+    vehicle.send(ftp(d.MAV_FTP_OPCODE_OPENFILERO, files[dates[-1]], 0, 0))
     assert vehicle.run(0.5, lambda m: m.get_type() == "FILE_TRANSFER_PROTOCOL").payload[3] == 128
-    vehicle.send(ftp(Opcode.BURST_READ_FILE, "", 0, 2, size=4))
+    vehicle.send(ftp(d.MAV_FTP_OPCODE_BURSTREADFILE, "", 0, 2, size=4))
     piece = vehicle.run(0.5, lambda m: m.get_type() == "FILE_TRANSFER_PROTOCOL")
     assert bytes(piece.payload[12 : 12 + piece.payload[4]]) in (b"not yet", EARLIER[:239])
 

@@ -152,7 +152,7 @@ def _mark(directory: Path) -> bytes | None:
 def _flight(directory: Path, *, present: bool = False) -> LoggedFlight | None:
     paths = [directory / name for name in NAMES]
     files = tuple(DiskFile(path) for path in paths if path.is_file() and not path.is_symlink())
-    if all(file.size() == 0 for file in files) and not present:
+    if all(file.size == 0 for file in files) and not present:
         return None  # a download of nothing never ends
     return LoggedFlight(directory.name, _begun_s(directory), files) if files else None
 

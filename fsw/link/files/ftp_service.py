@@ -14,22 +14,11 @@ from typing import Final, TypeAlias, cast
 
 from fsw.link.bounded_memory import renew
 from fsw.link.files import ftp_jobs
-from fsw.link.files.ftp_jobs import Job
-from fsw.link.files.ftp_message import (
-    MAX_DATA,
-    MAX_FILE,
-    Opcode,
-    Refusal,
-    Reply,
-    Request,
-    read,
-    refused,
-    write,
-)
+from fsw.link.files.ftp_jobs import MAX_DATA, MAX_FILE, Job, Reply, Request, refused
 from fsw.link.files.served_file import Directory, Node, OpenFile
 from fsw.link.services.service import LinkService
 from fsw.link.wire.outgoing import PackedOutgoing
-from messages import message_ids
+from messages import dialect, message_ids
 from messages.frames import Frame
 
 _FRAMES: Final = 10  # a tick: two datagrams
@@ -39,7 +28,7 @@ _MAX_SESSIONS: Final = 8
 _EXPIRY_US: Final = 30_000_000  # of a session without a read: its client has gone without a word
 _MAX_REMEMBERED: Final = 8  # clients
 _REMEMBERED_US: Final = 3_000_000  # a client has given up repeating by then
-_WRITES: Final = range(Opcode.CREATE_FILE, Opcode.RENAME + 1)
+_WRITES: Final = range(dialect.MAV_FTP_OPCODE_CREATEFILE, dialect.MAV_FTP_OPCODE_RENAME + 1)
 _NO_SESSION: Final = -1
 
 Client: TypeAlias = tuple[int, int]
@@ -73,11 +62,6 @@ class _Running:
     job: Job
     sequence: int  # of the last message
 
-    @property
-    def bursts(self) -> bool:
-        """Whether it sends piece after piece."""
-        return self.request.opcode == Opcode.BURST_READ_FILE
-
 
 class FtpService(LinkService):
     """Serves one tree of files on one link."""
@@ -90,13 +74,13 @@ class FtpService(LinkService):
         self._answered: dict[Client, _Answered] = {}
         self._jobs: dict[_Key, _Running] = {}
         self._handlers: dict[int, Callable[[Request, Client, int], Reply | None]] = {
-            Opcode.TERMINATE_SESSION: self._terminate,
-            Opcode.RESET_SESSIONS: self._reset,
-            Opcode.LIST_DIRECTORY: self._list_directory,
-            Opcode.OPEN_FILE_RO: self._open,
-            Opcode.READ_FILE: self._read,
-            Opcode.BURST_READ_FILE: self._read,
-            Opcode.CALC_FILE_CRC32: self._checksum,
+            dialect.MAV_FTP_OPCODE_TERMINATESESSION: self._terminate,
+            dialect.MAV_FTP_OPCODE_RESETSESSION: self._reset,
+            dialect.MAV_FTP_OPCODE_LISTDIRECTORY: self._list_directory,
+            dialect.MAV_FTP_OPCODE_OPENFILERO: self._open,
+            dialect.MAV_FTP_OPCODE_READFILE: self._read,
+            dialect.MAV_FTP_OPCODE_BURSTREADFILE: self._read,
+            dialect.MAV_FTP_OPCODE_CALCFILECRC: self._checksum,
         }
 
     def handle(self, frame: Frame, t_us: int) -> Sequence[PackedOutgoing]:
@@ -106,12 +90,15 @@ class FtpService(LinkService):
         before = self._answered.get(client)
         if before and before.payload == packed and t_us - before.t_us < _REMEMBERED_US:
             return [before.answer]
-        request = read(packed)
+        request = ftp_jobs.read_request(packed)
         reply = self._answer(request, client, t_us)
         if reply is None:
             return ()
         answer = _outgoing(reply, request, request.sequence + 1, client)
-        if request.opcode in (Opcode.OPEN_FILE_RO, Opcode.TERMINATE_SESSION):
+        if request.opcode in (
+            dialect.MAV_FTP_OPCODE_OPENFILERO,
+            dialect.MAV_FTP_OPCODE_TERMINATESESSION,
+        ):
             renew(self._answered, client, _Answered(packed, answer, t_us), _MAX_REMEMBERED)
         return [answer]
 
@@ -123,7 +110,8 @@ class FtpService(LinkService):
         """Go on with the bursts: after each the client asks for the next one."""
         if not self._jobs:
             return ()
-        bursts = [key for key, running in self._jobs.items() if running.bursts]
+        burst = dialect.MAV_FTP_OPCODE_BURSTREADFILE
+        bursts = [key for key, one in self._jobs.items() if one.request.opcode == burst]
         return self._go_on(bursts, _DATAGRAM_FRAMES)
 
     def _go_on(self, ready: list[_Key], frames: int) -> list[PackedOutgoing]:
@@ -145,51 +133,51 @@ class FtpService(LinkService):
 
     def _answer(self, request: Request, client: Client, t_us: int) -> Reply | None:
         """The answer; None if a job gives it."""
-        if request.damaged:
-            return refused(Refusal.INVALID_DATA_SIZE)
+        if request.size > MAX_DATA:  # it announces more than there is room for
+            return refused(dialect.MAV_FTP_ERR_INVALIDDATASIZE)
         handler = self._handlers.get(request.opcode)
         if handler is not None:
             return handler(request, client, t_us)
         if request.opcode in _WRITES:
-            return refused(Refusal.FILE_PROTECTED)
-        return refused(Refusal.UNKNOWN_COMMAND)
+            return refused(dialect.MAV_FTP_ERR_FILEPROTECTED)
+        return refused(dialect.MAV_FTP_ERR_UNKNOWNCOMMAND)
 
     def _terminate(self, request: Request, client: Client, t_us: int) -> Reply:
         if (client, request.session) not in self._sessions:
-            return refused(Refusal.INVALID_SESSION)
+            return refused(dialect.MAV_FTP_ERR_INVALIDSESSION)
         self._close((client, request.session))
-        return Reply(Opcode.ACK)
+        return Reply()
 
     def _reset(self, request: Request, client: Client, t_us: int) -> Reply:
         # Those of the client: another ground station goes on with its download.
         for key in [key for key in self._sessions if key[0] == client]:
             self._close(key)
-        return Reply(Opcode.ACK)
+        return Reply()
 
     def _list_directory(self, request: Request, client: Client, t_us: int) -> Reply:
         directory = find(self._root, request.path)
         if not isinstance(directory, Mapping):
-            return refused(Refusal.FILE_NOT_FOUND)
+            return refused(dialect.MAV_FTP_ERR_FILENOTFOUND)
         entries = listing(directory, request.offset)
         if not entries:
-            return refused(Refusal.END_OF_FILE)
-        return Reply(Opcode.ACK, offset=request.offset, data=entries)
+            return refused(dialect.MAV_FTP_ERR_EOF)
+        return Reply(entries, request.offset)
 
     def _open(self, request: Request, client: Client, t_us: int) -> Reply:
         node = find(self._root, request.path)
         if node is None or isinstance(node, Mapping):
-            return refused(Refusal.FILE_NOT_FOUND)
+            return refused(dialect.MAV_FTP_ERR_FILENOTFOUND)
         number = self._room(client, request.session, t_us)
         if number is None:
-            return refused(Refusal.NO_SESSIONS_AVAILABLE)
+            return refused(dialect.MAV_FTP_ERR_NOSESSIONSAVAILABLE)
         try:
             file = node.open()
         except OSError:
-            return refused(Refusal.FILE_NOT_FOUND)
+            return refused(dialect.MAV_FTP_ERR_FILENOTFOUND)
         # Clients read up to the size that they are told, which has 32 bits.
         size = ftp_jobs.served_size(file).to_bytes(4, "little")
         self._sessions[client, number] = _Session(file, t_us)
-        return Reply(Opcode.ACK, session=number, data=size)
+        return Reply(size, session=number)
 
     def _room(self, client: Client, wanted: int, t_us: int) -> int | None:
         """A number for a further session; None if there are as many as there may be.
@@ -221,9 +209,9 @@ class FtpService(LinkService):
     def _read(self, request: Request, client: Client, t_us: int) -> Reply | None:
         session = self._sessions.get((client, request.session))
         if session is None:
-            return refused(Refusal.INVALID_SESSION)
+            return refused(dialect.MAV_FTP_ERR_INVALIDSESSION)
         session.used_us = t_us
-        burst = request.opcode == Opcode.BURST_READ_FILE
+        burst = request.opcode == dialect.MAV_FTP_OPCODE_BURSTREADFILE
         job = (ftp_jobs.burst if burst else ftp_jobs.read)(request, session.file)
         self._start(request, client, job)
         return None
@@ -234,15 +222,15 @@ class FtpService(LinkService):
             return None  # asked again because it takes long
         node = find(self._root, request.path)
         if node is None or isinstance(node, Mapping):
-            return refused(Refusal.FILE_NOT_FOUND)
+            return refused(dialect.MAV_FTP_ERR_FILENOTFOUND)
         if len(self._jobs) >= _MAX_JOBS:
-            return refused(Refusal.FAIL)
+            return refused(dialect.MAV_FTP_ERR_FAIL)
         self._start(request, client, ftp_jobs.checksum(node))
         return None
 
     def _start(self, request: Request, client: Client, job: Job) -> None:
         """Start a job; it replaces the client's job of the same session."""
-        reads = request.opcode != Opcode.CALC_FILE_CRC32
+        reads = request.opcode != dialect.MAV_FTP_OPCODE_CALCFILECRC
         key = client, request.session if reads else _NO_SESSION
         self._stop(key)
         self._jobs[key] = _Running(client, request, job, request.sequence)
@@ -258,7 +246,7 @@ class FtpService(LinkService):
 
 
 def _outgoing(reply: Reply, request: Request, sequence: int, client: Client) -> PackedOutgoing:
-    payload = bytes((0, *client)) + write(reply, request, sequence)
+    payload = bytes((0, *client)) + ftp_jobs.write_reply(reply, request, sequence)
     return PackedOutgoing(message_ids.FILE_TRANSFER_PROTOCOL, payload)
 
 
@@ -293,7 +281,7 @@ def listing(directory: Directory, first: int) -> bytes:
         if isinstance(node, Mapping):
             entry = f"D{name}\0".encode()
         else:
-            entry = f"F{name}\t{min(node.size(), MAX_FILE)}\0".encode()
+            entry = f"F{name}\t{min(node.size, MAX_FILE)}\0".encode()
         if len(entries) + len(entry) > MAX_DATA:
             break
         entries += entry

@@ -125,7 +125,7 @@ class LogService(LinkService):
         return Outgoing(message_ids.LOG_ENTRY, (time_s, size, log_id, count, count - 1))
 
     def _list_size(self, log_id: int) -> int:
-        size = min(self._logs[log_id].log.size(), _TO_THE_END)
+        size = min(self._logs[log_id].log.size, _TO_THE_END)
         self._listed[log_id] = size
         return size
 

@@ -19,29 +19,25 @@ _READ_AHEAD: Final = 1 << 17  # bytes asked of the disk at once
 
 @dataclass(frozen=True, slots=True)
 class MemoryFile:
-    """What the program has made."""
+    """What the program has made; it is always open."""
 
     content: bytes
 
+    @property
     def size(self) -> int:
         """Bytes it has."""
         return len(self.content)
 
-    def open(self) -> OpenFile:
-        """Open it for reading."""
-        return _Bytes(self.content)
-
-
-class _Bytes:
-    def __init__(self, content: bytes) -> None:
-        self.size = len(content)
-        self._content = content
+    def open(self) -> MemoryFile:
+        """Itself."""
+        return self
 
     def read(self, offset: int, count: int) -> bytes:
-        return self._content[offset : offset + count]
+        """Some of it."""
+        return self.content[offset : offset + count]
 
     def close(self) -> None:
-        pass
+        """Nothing to give back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +54,7 @@ class DiskFile:
         """
         return self.path.stat(follow_symlinks=False)
 
+    @property
     def size(self) -> int:
         """Bytes it has now; 0 if it is gone."""
         try:
@@ -124,7 +121,7 @@ class _Descriptor:
 ServedFile = MemoryFile | DiskFile
 """Something that can be listed, and opened at the size it has now."""
 
-OpenFile = _Bytes | _Descriptor
+OpenFile = MemoryFile | _Descriptor
 """A file whose size does not change any more, whatever is appended to it.
 
 It is read inside that size; None means that the disk has not delivered yet: ask at the next tick.

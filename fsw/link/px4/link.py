@@ -33,8 +33,7 @@ from fsw.autopilot.signals import (
 from fsw.link.endpoints import Endpoint, open_endpoint
 from fsw.link.inbox import Inbox
 from fsw.link.px4.arm import ArmLink, Joints, servo_ranges
-from fsw.link.px4.estimate import ASK_US, Px4Clock
-from fsw.link.px4.estimate import Px4Estimate
+from fsw.link.px4.estimate import ASK_US, Px4Clock, Px4Estimate
 from fsw.link.px4.handover import LOST_US, Handover, Px4Seen
 from fsw.link.px4.messages import (
     ACTUATORS,

@@ -15,9 +15,9 @@ from fsw.link.services import mission_wire
 from fsw.link.wire import (
     encode_dialect,
     encode_health,
-    identity,
     encode_place,
     encode_standard,
+    identity,
 )
 from fsw.link.wire.outgoing import Outgoing, TelemetryContext, WireValues
 from messages import message_ids

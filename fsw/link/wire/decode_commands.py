@@ -38,6 +38,7 @@ from fsw.autopilot.signals import (
     SwitchMode,
     TakeOff,
 )
+from fsw.link.wire.identity import MODE_BY_PX4, MODE_BY_STANDARD
 from fsw.link.wire.mission_items import (
     GLOBAL_FRAMES,
     HOME_FRAMES,
@@ -45,7 +46,6 @@ from fsw.link.wire.mission_items import (
     USUAL_RADIUS,
     Locate,
 )
-from fsw.link.wire.identity import MODE_BY_PX4, MODE_BY_STANDARD
 from messages import dialect
 
 _FORCE: Final = 21196.0  # the value MAVLink asks for to arm or disarm against all checks

@@ -22,8 +22,8 @@ from fsw.autopilot.signals import (
     TickOutputs,
     Vec3,
 )
-from fsw.link.wire.outgoing import PX4, TelemetryContext, WireValues
 from fsw.link.wire.identity import custom_mode, shown_mode
+from fsw.link.wire.outgoing import PX4, TelemetryContext, WireValues
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1

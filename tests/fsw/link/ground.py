@@ -24,8 +24,7 @@ from fsw.link.inbox import Inbox
 from fsw.link.services.mission_service import MissionService
 from fsw.link.services.mission_store import MissionStore, Site
 from fsw.link.services.parameter_service import ParameterService
-from fsw.link.services.service import LinkService
-from fsw.link.services.service import TimeService
+from fsw.link.services.service import LinkService, TimeService
 from fsw.link.signing.key_file import KeyFile, SigningKey
 from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.streams import API_RATES, GROUND_RATES

@@ -23,8 +23,7 @@ from fsw.link.bounded_memory import SentFrames
 from fsw.link.files.flight_logs import FlightLogs
 from fsw.link.files.log_service import LogService
 from fsw.link.peers import EXPIRY_US
-from fsw.link.services.service import LinkService
-from fsw.link.services.service import TimeService
+from fsw.link.services.service import LinkService, TimeService
 from fsw.link.telemetry.streams import AT_ONCE, STREAMS
 from fsw.link.wire.outgoing import Outgoing
 from messages import dialect

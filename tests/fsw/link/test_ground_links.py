@@ -17,8 +17,7 @@ from fsw.autopilot.signals import CommandAck, MissionProgress
 from fsw.link.endpoints import LinkError, OpenEndpoint
 from fsw.link.ground_links import GroundLinks
 from fsw.link.link_choice import LinkChoice, addresses
-from fsw.link.services.service import LinkService
-from fsw.link.services.service import TimeService
+from fsw.link.services.service import LinkService, TimeService
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids as ids
 from messages.frames import Frame, FrameWriter, split

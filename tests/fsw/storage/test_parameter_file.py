@@ -16,8 +16,7 @@ from fsw.autopilot.parameters.flight_config import FlightConfig
 from fsw.autopilot.parameters.registry import BY_NAME, PARAMETERS
 from fsw.autopilot.tuning import Tuning
 from fsw.storage import parameter_file as storage
-from fsw.storage.parameter_file import ParameterFile
-from fsw.storage.parameter_file import as_params, as_parm, load, parse, save
+from fsw.storage.parameter_file import ParameterFile, as_params, as_parm, load, parse, save
 from fsw.storage.parameter_store import ParameterStore
 from tests.fsw.storage.test_parameter_store import ticks
 

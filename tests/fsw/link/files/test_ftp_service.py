@@ -15,11 +15,12 @@ from pathlib import Path
 import pytest
 
 from fsw.link.files.flight_logs import MARK, FlightLogs
-from fsw.link.files.ftp_message import MAX_DATA, Opcode, Refusal
+from fsw.link.files.ftp_jobs import MAX_DATA
 from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.served_file import Directory, DiskFile, MemoryFile
 from fsw.link.files.vehicle_files import _parameters, vehicle_files
 from fsw.link.wire.outgoing import PackedOutgoing
+from messages import dialect
 from messages import message_ids as ids
 from messages.frames import FrameWriter, split
 from tests.fsw.link.files.wire_values import values_of
@@ -44,7 +45,7 @@ class ServiceOutput:
 
     @property
     def refusal(self) -> int | None:
-        return self.data[0] if self.opcode == Opcode.NAK else None
+        return self.data[0] if self.opcode == dialect.MAV_FTP_OPCODE_NAK else None
 
 
 def decoded(outgoing: PackedOutgoing) -> ServiceOutput:
@@ -107,27 +108,31 @@ class Client:
         assert answer.requested == opcode
         assert answer.sequence == (self.sequence + 1) & 0xFFFF
         assert answer.to == (255, self.component)
-        if opcode != Opcode.OPEN_FILE_RO:
+        if opcode != dialect.MAV_FTP_OPCODE_OPENFILERO:
             assert answer.session == header.get("session", 0)
         return answer
 
     def open(self, path: str) -> tuple[int, int]:
         """(session, size)."""
-        answer = self.ask(Opcode.OPEN_FILE_RO, path.encode())
-        assert answer.opcode == Opcode.ACK
+        answer = self.ask(dialect.MAV_FTP_OPCODE_OPENFILERO, path.encode())
+        assert answer.opcode == dialect.MAV_FTP_OPCODE_ACK
         return answer.session, int.from_bytes(answer.data, "little")
 
     def names(self, path: str) -> list[str]:
         found: list[str] = []
         while True:
-            answer = self.ask(Opcode.LIST_DIRECTORY, path.encode(), offset=len(found))
-            if answer.refusal == Refusal.END_OF_FILE:
+            answer = self.ask(
+                dialect.MAV_FTP_OPCODE_LISTDIRECTORY, path.encode(), offset=len(found)
+            )
+            if answer.refusal == dialect.MAV_FTP_ERR_EOF:
                 return found
-            assert answer.opcode == Opcode.ACK
+            assert answer.opcode == dialect.MAV_FTP_OPCODE_ACK
             found += [entry.decode() for entry in answer.data.split(b"\0") if entry]
 
     def burst(self, session: int, offset: int, size: int = MAX_DATA) -> list[ServiceOutput]:
-        answers = self.send(Opcode.BURST_READ_FILE, session=session, offset=offset, size=size)
+        answers = self.send(
+            dialect.MAV_FTP_OPCODE_BURSTREADFILE, session=session, offset=offset, size=size
+        )
         while more := self.polled():
             answers += more
         return answers
@@ -160,11 +165,13 @@ def test_reading_gives_the_file(client: Client, size: int) -> None:
     session, total = client.open("/files/a")
     assert total == len(CONTENT)
     for offset in (0, 1, 5000, total - 1):
-        answer = client.ask(Opcode.READ_FILE, session=session, offset=offset, size=size)
+        answer = client.ask(
+            dialect.MAV_FTP_OPCODE_READFILE, session=session, offset=offset, size=size
+        )
         assert answer.data == CONTENT[offset : offset + size]
         assert answer.offset == offset
-    answer = client.ask(Opcode.READ_FILE, session=session, offset=total, size=size)
-    assert answer.refusal == Refusal.END_OF_FILE
+    answer = client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=session, offset=total, size=size)
+    assert answer.refusal == dialect.MAV_FTP_ERR_EOF
 
 
 @pytest.mark.parametrize("size", [0, 4, 80, MAX_DATA])
@@ -183,7 +190,7 @@ def test_bursts_give_the_file_in_pieces_as_large_as_fit(client: Client, size: in
             read += piece.data
     assert read == CONTENT
     (end,) = client.burst(session, total, size)
-    assert end.refusal == Refusal.END_OF_FILE
+    assert end.refusal == dialect.MAV_FTP_ERR_EOF
 
 
 def test_the_checksum_is_the_one_of_the_specification(client: Client) -> None:
@@ -192,17 +199,17 @@ def test_the_checksum_is_the_one_of_the_specification(client: Client) -> None:
         crc ^= byte
         for _ in range(8):
             crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
-    answer = client.ask(Opcode.CALC_FILE_CRC32, b"/files/a")
+    answer = client.ask(dialect.MAV_FTP_OPCODE_CALCFILECRC, b"/files/a")
     assert answer.data == crc.to_bytes(4, "little")
 
 
 def test_a_checksum_takes_a_little_of_many_ticks(client: Client) -> None:
     big = Client(FtpService(serve(big=bytes(1 << 20))))
-    assert big.send(Opcode.CALC_FILE_CRC32, b"big") == []
+    assert big.send(dialect.MAV_FTP_OPCODE_CALCFILECRC, b"big") == []
     ticks = 0
     while not big.polled():
         ticks += 1
-        assert big.send(Opcode.CALC_FILE_CRC32, b"big", repeat=True) == []
+        assert big.send(dialect.MAV_FTP_OPCODE_CALCFILECRC, b"big", repeat=True) == []
     assert ticks == 16
 
 
@@ -224,15 +231,23 @@ OUTSIDE = [
 
 @pytest.mark.parametrize("path", OUTSIDE)
 @pytest.mark.parametrize(
-    "opcode", [Opcode.OPEN_FILE_RO, Opcode.LIST_DIRECTORY, Opcode.CALC_FILE_CRC32]
+    "opcode",
+    [
+        dialect.MAV_FTP_OPCODE_OPENFILERO,
+        dialect.MAV_FTP_OPCODE_LISTDIRECTORY,
+        dialect.MAV_FTP_OPCODE_CALCFILECRC,
+    ],
 )
-def test_there_is_no_way_out_of_the_tree(client: Client, opcode: Opcode, path: str) -> None:
-    assert client.ask(opcode, path.encode()).refusal == Refusal.FILE_NOT_FOUND
+def test_there_is_no_way_out_of_the_tree(client: Client, opcode: int, path: str) -> None:
+    assert client.ask(opcode, path.encode()).refusal == dialect.MAV_FTP_ERR_FILENOTFOUND
 
 
 @pytest.mark.parametrize("path", [b"\xff\xfe", b"/files/\xc3\x28", b"files/a/x", b"files"])
 def test_what_is_no_file_is_not_found(client: Client, path: bytes) -> None:
-    assert client.ask(Opcode.OPEN_FILE_RO, path).refusal == Refusal.FILE_NOT_FOUND
+    assert (
+        client.ask(dialect.MAV_FTP_OPCODE_OPENFILERO, path).refusal
+        == dialect.MAV_FTP_ERR_FILENOTFOUND
+    )
 
 
 def test_a_link_in_the_place_of_a_log_is_not_followed(tmp_path: Path) -> None:
@@ -245,51 +260,65 @@ def test_a_link_in_the_place_of_a_log_is_not_followed(tmp_path: Path) -> None:
     log.unlink()
     log.symlink_to(secret)
     path = b"/logs/run/flight.tlog"
-    assert client.ask(Opcode.OPEN_FILE_RO, path).refusal == Refusal.FILE_NOT_FOUND
-    assert client.ask(Opcode.CALC_FILE_CRC32, path).refusal == Refusal.FILE_NOT_FOUND
+    assert (
+        client.ask(dialect.MAV_FTP_OPCODE_OPENFILERO, path).refusal
+        == dialect.MAV_FTP_ERR_FILENOTFOUND
+    )
+    assert (
+        client.ask(dialect.MAV_FTP_OPCODE_CALCFILECRC, path).refusal
+        == dialect.MAV_FTP_ERR_FILENOTFOUND
+    )
     log.unlink()
     os.mkfifo(log)
-    assert client.ask(Opcode.OPEN_FILE_RO, path).refusal == Refusal.FILE_NOT_FOUND
-    assert client.send(Opcode.TERMINATE_SESSION)[0].refusal == Refusal.INVALID_SESSION
+    assert (
+        client.ask(dialect.MAV_FTP_OPCODE_OPENFILERO, path).refusal
+        == dialect.MAV_FTP_ERR_FILENOTFOUND
+    )
+    assert (
+        client.send(dialect.MAV_FTP_OPCODE_TERMINATESESSION)[0].refusal
+        == dialect.MAV_FTP_ERR_INVALIDSESSION
+    )
 
 
-@pytest.mark.parametrize("opcode", range(Opcode.CREATE_FILE, Opcode.RENAME + 1))
+@pytest.mark.parametrize(
+    "opcode", range(dialect.MAV_FTP_OPCODE_CREATEFILE, dialect.MAV_FTP_OPCODE_RENAME + 1)
+)
 def test_writing_is_refused_at_once(client: Client, opcode: int) -> None:
     (answer,) = client.send(opcode, b"/files/b")
-    assert answer.refusal == Refusal.FILE_PROTECTED
+    assert answer.refusal == dialect.MAV_FTP_ERR_FILEPROTECTED
 
 
 @pytest.mark.parametrize("opcode", [0, 16, 100, 128, 129, 255])
 def test_an_unknown_request_is_refused_at_once(client: Client, opcode: int) -> None:
     (answer,) = client.send(opcode)
-    assert answer.refusal == Refusal.UNKNOWN_COMMAND
+    assert answer.refusal == dialect.MAV_FTP_ERR_UNKNOWNCOMMAND
     assert answer.requested == opcode
 
 
 def test_more_data_than_fit_are_refused(client: Client) -> None:
-    (answer,) = client.send(Opcode.OPEN_FILE_RO, b"/top", size=240)
-    assert answer.refusal == Refusal.INVALID_DATA_SIZE
+    (answer,) = client.send(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/top", size=240)
+    assert answer.refusal == dialect.MAV_FTP_ERR_INVALIDDATASIZE
 
 
 def test_a_repeated_open_opens_once_and_a_repeated_close_succeeds(client: Client) -> None:
-    first = client.send(Opcode.OPEN_FILE_RO, b"/top")
-    assert client.send(Opcode.OPEN_FILE_RO, b"/top", repeat=True) == first
-    second = client.ask(Opcode.OPEN_FILE_RO, b"/top")
+    first = client.send(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/top")
+    assert client.send(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/top", repeat=True) == first
+    second = client.ask(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/top")
     assert (first[0].session, second.session) == (0, 1)
-    closed = client.send(Opcode.TERMINATE_SESSION, session=0)
-    assert client.send(Opcode.TERMINATE_SESSION, session=0, repeat=True) == closed
-    assert closed[0].opcode == Opcode.ACK
-    again = client.ask(Opcode.TERMINATE_SESSION, session=0)
-    assert again.refusal == Refusal.INVALID_SESSION
+    closed = client.send(dialect.MAV_FTP_OPCODE_TERMINATESESSION, session=0)
+    assert client.send(dialect.MAV_FTP_OPCODE_TERMINATESESSION, session=0, repeat=True) == closed
+    assert closed[0].opcode == dialect.MAV_FTP_OPCODE_ACK
+    again = client.ask(dialect.MAV_FTP_OPCODE_TERMINATESESSION, session=0)
+    assert again.refusal == dialect.MAV_FTP_ERR_INVALIDSESSION
 
 
 def test_sessions_are_few_and_come_back_when_their_client_has_gone(client: Client) -> None:
     for number in range(8):
         assert client.open("/top")[0] == number
-    refused = client.ask(Opcode.OPEN_FILE_RO, b"/top")
-    assert refused.refusal == Refusal.NO_SESSIONS_AVAILABLE
+    refused = client.ask(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/top")
+    assert refused.refusal == dialect.MAV_FTP_ERR_NOSESSIONSAVAILABLE
     client.t_us += 29 * SECOND_US
-    client.ask(Opcode.READ_FILE, session=0, size=1)
+    client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=0, size=1)
     client.t_us += 2 * SECOND_US
     assert client.open("/top")[0] == 1
 
@@ -313,56 +342,63 @@ def test_one_client_cannot_hold_all_sessions(client: Client) -> None:
     for _ in range(8):
         client.open("/top")
     client.t_us += SECOND_US
-    client.ask(Opcode.READ_FILE, session=0, size=1)
+    client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=0, size=1)
     other = Client(client.service, component=1, t_us=client.t_us)
     other.open("/top")
-    assert client.ask(Opcode.READ_FILE, session=0, size=1).opcode == Opcode.ACK
-    gone = client.ask(Opcode.READ_FILE, session=1, size=1)
-    assert gone.refusal == Refusal.INVALID_SESSION, "the one that was used longest ago"
+    assert (
+        client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=0, size=1).opcode
+        == dialect.MAV_FTP_OPCODE_ACK
+    )
+    gone = client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=1, size=1)
+    assert gone.refusal == dialect.MAV_FTP_ERR_INVALIDSESSION, "the one that was used longest ago"
 
 
 def test_a_client_may_choose_the_number_of_its_session(client: Client) -> None:
-    (chosen,) = client.send(Opcode.OPEN_FILE_RO, b"/top", session=231)
-    (again,) = client.send(Opcode.OPEN_FILE_RO, b"/files/b", session=231)
+    (chosen,) = client.send(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/top", session=231)
+    (again,) = client.send(dialect.MAV_FTP_OPCODE_OPENFILERO, b"/files/b", session=231)
     assert (chosen.session, again.session) == (231, 0)
-    assert client.ask(Opcode.READ_FILE, session=231, size=1).data == b"t"
-    assert client.ask(Opcode.READ_FILE, session=0, size=1).data == b"b"
-    assert client.send(Opcode.LIST_DIRECTORY, b"/", session=77)[0].session == 77
-    assert client.send(Opcode.REMOVE_FILE, b"/top", session=78)[0].session == 78
+    assert client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=231, size=1).data == b"t"
+    assert client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=0, size=1).data == b"b"
+    assert client.send(dialect.MAV_FTP_OPCODE_LISTDIRECTORY, b"/", session=77)[0].session == 77
+    assert client.send(dialect.MAV_FTP_OPCODE_REMOVEFILE, b"/top", session=78)[0].session == 78
 
 
 def test_a_reset_closes_the_sessions_of_the_one_who_asks(client: Client) -> None:
     other = Client(client.service, component=230)
     mine, theirs = client.open("/top")[0], other.open("/top")[0]
-    assert client.ask(Opcode.RESET_SESSIONS).opcode == Opcode.ACK
-    lost = client.ask(Opcode.READ_FILE, session=mine, size=1)
-    assert lost.refusal == Refusal.INVALID_SESSION
-    assert other.ask(Opcode.READ_FILE, session=theirs, size=1).data == b"t"
+    assert client.ask(dialect.MAV_FTP_OPCODE_RESETSESSION).opcode == dialect.MAV_FTP_OPCODE_ACK
+    lost = client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=mine, size=1)
+    assert lost.refusal == dialect.MAV_FTP_ERR_INVALIDSESSION
+    assert other.ask(dialect.MAV_FTP_OPCODE_READFILE, session=theirs, size=1).data == b"t"
 
 
 def test_nobody_reads_or_closes_the_session_of_another(client: Client) -> None:
     session, _ = client.open("/top")
     other = Client(client.service, component=230)
-    for opcode in (Opcode.READ_FILE, Opcode.BURST_READ_FILE, Opcode.TERMINATE_SESSION):
+    for opcode in (
+        dialect.MAV_FTP_OPCODE_READFILE,
+        dialect.MAV_FTP_OPCODE_BURSTREADFILE,
+        dialect.MAV_FTP_OPCODE_TERMINATESESSION,
+    ):
         refused = other.ask(opcode, session=session, size=1)
-        assert refused.refusal == Refusal.INVALID_SESSION
-    assert client.ask(Opcode.READ_FILE, session=session, size=1).data == b"t"
+        assert refused.refusal == dialect.MAV_FTP_ERR_INVALIDSESSION
+    assert client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=session, size=1).data == b"t"
 
 
 def test_two_clients_share_the_ticks(client: Client) -> None:
     other = Client(client.service, component=230)
     sessions = [(each, each.open("/files/a")[0]) for each in (client, other)]
     for each, session in sessions:
-        each.send(Opcode.BURST_READ_FILE, session=session, size=MAX_DATA)
+        each.send(dialect.MAV_FTP_OPCODE_BURSTREADFILE, session=session, size=MAX_DATA)
     receivers = [answer.to[1] for answer in client.polled()]
     assert receivers.count(190) == receivers.count(230) == FRAMES_A_TICK // 2
 
 
 def test_a_closed_session_sends_no_more(client: Client) -> None:
     session, _ = client.open("/files/a")
-    client.send(Opcode.BURST_READ_FILE, session=session, size=MAX_DATA)
+    client.send(dialect.MAV_FTP_OPCODE_BURSTREADFILE, session=session, size=MAX_DATA)
     assert client.polled()
-    client.send(Opcode.TERMINATE_SESSION, session=session)
+    client.send(dialect.MAV_FTP_OPCODE_TERMINATESESSION, session=session)
     assert client.polled() == []
 
 
@@ -377,7 +413,7 @@ def test_a_file_has_the_size_of_its_opening_while_it_grows(tmp_path: Path) -> No
     while len(read) < size:
         read += b"".join(piece.data for piece in client.burst(session, len(read)))
     assert read == CONTENT
-    assert client.burst(session, size)[0].refusal == Refusal.END_OF_FILE
+    assert client.burst(session, size)[0].refusal == dialect.MAV_FTP_ERR_EOF
 
 
 def test_a_file_that_became_shorter_is_a_failure_and_not_silence(tmp_path: Path) -> None:
@@ -386,8 +422,8 @@ def test_a_file_that_became_shorter_is_a_failure_and_not_silence(tmp_path: Path)
     client = Client(FtpService({"file": DiskFile(path)}))
     session, _ = client.open("file")
     path.write_bytes(b"")
-    answer = client.ask(Opcode.READ_FILE, session=session, offset=100, size=10)
-    assert answer.refusal == Refusal.FAIL
+    answer = client.ask(dialect.MAV_FTP_OPCODE_READFILE, session=session, offset=100, size=10)
+    assert answer.refusal == dialect.MAV_FTP_ERR_FAIL
 
 
 def test_names_that_do_not_fit_a_message_are_left_out(tmp_path: Path) -> None:
@@ -443,10 +479,22 @@ def test_of_a_log_of_any_size_what_the_protocol_can_name_is_served(length: int) 
     (last,) = client.burst(session, served - 100)
     assert (len(last.data), last.complete) == (100, True)
     for offset in (served, LAST):
-        answer = client.ask(Opcode.READ_FILE, session=session, offset=offset, size=10)
-        assert answer.refusal == Refusal.END_OF_FILE
-    assert len(client.ask(Opcode.READ_FILE, session=session, offset=served - 3, size=9).data) == 3
-    assert client.ask(Opcode.TERMINATE_SESSION, session=session).opcode == Opcode.ACK
+        answer = client.ask(
+            dialect.MAV_FTP_OPCODE_READFILE, session=session, offset=offset, size=10
+        )
+        assert answer.refusal == dialect.MAV_FTP_ERR_EOF
+    assert (
+        len(
+            client.ask(
+                dialect.MAV_FTP_OPCODE_READFILE, session=session, offset=served - 3, size=9
+            ).data
+        )
+        == 3
+    )
+    assert (
+        client.ask(dialect.MAV_FTP_OPCODE_TERMINATESESSION, session=session).opcode
+        == dialect.MAV_FTP_OPCODE_ACK
+    )
     assert file.closed
 
 
@@ -461,7 +509,9 @@ def test_a_sparse_log_beyond_4_gib_is_read_from_the_disk_up_to_there(tmp_path: P
     assert size == LAST
     (last,) = client.burst(session, LAST - 5)
     assert (last.data, last.complete) == (b"nearl", True)
-    client.send(Opcode.BURST_READ_FILE, session=session, offset=LAST - 500, size=MAX_DATA)
+    client.send(
+        dialect.MAV_FTP_OPCODE_BURSTREADFILE, session=session, offset=LAST - 500, size=MAX_DATA
+    )
     assert sum(len(piece.data) for piece in client.polled()) == 500
 
 
@@ -527,7 +577,9 @@ def test_a_directory_of_flights_is_laid_out_once(
         (tmp_path / name / "flight.ulg").write_bytes(b"log")
     files = vehicle_files(FlightLogs(tmp_path / "c", tmp_path / "vehicle.params"))
     monkeypatch.setattr("fsw.link.files.vehicle_files._can_be_listed", None)
-    (listed,) = Client(FtpService(files)).send(Opcode.LIST_DIRECTORY, b"/logs", offset=1)
+    (listed,) = Client(FtpService(files)).send(
+        dialect.MAV_FTP_OPCODE_LISTDIRECTORY, b"/logs", offset=1
+    )
     assert listed.data == b"Db\0Dc\0"
 
 
@@ -537,5 +589,5 @@ def test_no_tick_makes_a_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     _parameters.cache_clear()
     files = vehicle_files(FlightLogs(tmp_path / "run"))
     monkeypatch.setattr("fsw.autopilot.parameters.metadata.parameter_document", None)
-    (listed,) = Client(FtpService(files)).send(Opcode.LIST_DIRECTORY, b"/")
+    (listed,) = Client(FtpService(files)).send(dialect.MAV_FTP_OPCODE_LISTDIRECTORY, b"/")
     assert b"parameters.json" in listed.data

@@ -20,10 +20,10 @@ from fsw.link.wire import (
     decode_setpoints,
     encode_dialect,
     encode_health,
-    identity,
     encode_place,
     encode_standard,
     fence_items,
+    identity,
     mission_items,
     outgoing,
 )
