@@ -8,7 +8,7 @@ nothing. What depends on the state of the vehicle is decided in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from fsw.autopilot.flight.commands.bounds import CIRCLE_RADII, MAX_SPEED, MAX_YAW
@@ -55,6 +55,8 @@ _FACINGS: Final = {float(facing): facing for facing in Facing} | {_UNCHANGED: Fa
 _SPEED_TYPES: Final = (0.0, 1.0)  # SPEED_TYPE of air and ground, which are one here
 _KEEP_SPEED, _USUAL_SPEED = -1.0, -2.0  # of DO_CHANGE_SPEED
 
+_Reader = Callable[[CommandRequest, Locate], CommandAction]
+
 
 class _InvalidError(Exception):
     """An invalid parameter."""
@@ -92,18 +94,11 @@ def _terminate(request: CommandRequest, _: Locate) -> CommandAction:
 def _set_mode(request: CommandRequest, _: Locate) -> CommandAction:
     """Without its flag parameter 2 is of no known meaning; QGroundControl and MAVSDK set it."""
     flags, main, sub = request.params[:3]
-    if not (math.isfinite(flags) and int(flags) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED):
+    if math.isnan(flags) or not (int(flags) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED):
         raise _InvalidError("mode unchanged: param1 lacks flag 1, custom mode")
     mode = MODE_BY_PX4.get((main, 0.0 if math.isnan(sub) else sub))
     if mode is None:
         raise _InvalidError(f"mode {main:g}/{sub:g} is not supported")
-    return SwitchMode(mode)
-
-
-def _set_standard_mode(request: CommandRequest, _: Locate) -> CommandAction:
-    mode = MODE_BY_STANDARD.get(request.params[0])
-    if mode is None:
-        raise _InvalidError(f"standard mode {request.params[0]:g} is not supported")
     return SwitchMode(mode)
 
 
@@ -142,7 +137,7 @@ def _orbit(request: CommandRequest, locate: Locate) -> CommandAction:
     if facing is None:
         known = "0 centre, 1 as it is, 3 tangent"
         raise _InvalidError(f"no orbit: heading {behaviour:g} is not one of {known}")
-    if math.isfinite(turns) and turns > 0.0:
+    if turns > 0.0:
         raise _InvalidError("no orbit: turns are not counted; param4 must be 0 or NaN")
     if abs(speed) < MIN_SPEED:
         raise _InvalidError(f"no orbit: {speed:g} m/s is not a valid speed")
@@ -186,21 +181,11 @@ def _change_speed(request: CommandRequest, _: Locate) -> CommandAction:
 def _set_actuator(request: CommandRequest, _: Locate) -> CommandAction:
     """The actuators of index 0 are the joints."""
     *shares, index = request.params
-    if math.isfinite(index) and index != 0.0:
+    if not math.isnan(index) and index != 0.0:
         raise _InvalidError("no such actuators: the joints are those of index 0")
-    if any(math.isinf(value) or abs(value) > 1.0 for value in shares):
+    if any(abs(value) > 1.0 for value in shares):
         raise _InvalidError("joints not moved: an actuator's range is -1 to 1")
-    return MoveJoints(tuple([_or_none(value) for value in shares]))
-
-
-def _grip(request: CommandRequest, _: Locate) -> CommandAction:
-    """There is one gripper, whatever its number."""
-    wish = request.params[1]
-    if wish == 2.0:
-        return Order.NOTHING  # to hold what it holds
-    if wish not in (0.0, 1.0):
-        raise _InvalidError(f"gripper not moved: param2 = {wish:g}; 0 releases, 1 grabs, 2 holds")
-    return Grip(closes=wish == 1.0)
+    return MoveJoints(tuple([None if math.isnan(value) else value for value in shares]))
 
 
 def _set_home(request: CommandRequest, locate: Locate) -> CommandAction:
@@ -212,17 +197,7 @@ def _set_home(request: CommandRequest, locate: Locate) -> CommandAction:
 
 
 def _start_mission(request: CommandRequest, _: Locate) -> CommandAction:
-    first, last = (value if math.isfinite(value) else 0.0 for value in request.params[:2])
-    return StartMission(first, last)
-
-
-def _pause_or_continue(request: CommandRequest, _: Locate) -> CommandAction:
-    wish = request.params[0]
-    if wish == 0.0:
-        return Order.PAUSE_MISSION
-    if wish == 1.0:
-        return Order.CONTINUE_MISSION
-    raise _InvalidError("pause/continue needs param1 = 0 or 1")
+    return StartMission(*(0.0 if math.isnan(value) else value for value in request.params[:2]))
 
 
 def _set_mission_step(request: CommandRequest, _: Locate) -> CommandAction:
@@ -237,21 +212,6 @@ def _calibrate(request: CommandRequest, _: Locate) -> CommandAction:
     raise _InvalidError("[cal] calibration failed: these sensors need none")
 
 
-def _restart(request: CommandRequest, _: Locate) -> CommandAction:
-    """Parameter 1 is what the autopilot is to do; other parameters are of other computers."""
-    wish = request.params[0]
-    if wish == 1.0:
-        return Order.RESTART
-    if wish == 0.0:
-        return Order.NOTHING
-    raise _InvalidError(f"not restarted: param1 = {wish:g}; 1 restarts, the console shuts down")
-
-
-def _test_actuator(request: CommandRequest, _: Locate) -> CommandAction:
-    reason = "rotors and joints move only in closed loop; arm and fly instead"
-    raise _InvalidError(f"no actuator test: {reason}")
-
-
 def _inject_failure(request: CommandRequest, _: Locate) -> CommandAction:
     """Unit, failure and instance; which of them there are is the simulator's to say."""
     unit, kind, instance = (0.0 if math.isnan(value) else value for value in request.params[:3])
@@ -261,8 +221,20 @@ def _inject_failure(request: CommandRequest, _: Locate) -> CommandAction:
     return InjectFailure(int(unit), int(kind), int(instance))
 
 
-def _always(action: CommandAction) -> Callable[[CommandRequest, Locate], CommandAction]:
+def _always(action: CommandAction) -> _Reader:
     return lambda *_: action
+
+
+def _choice(number: int, actions: Mapping[float, CommandAction], refused: str) -> _Reader:
+    """What parameter ``number`` [1] chooses; ``refused`` says why not, with its value."""
+
+    def read(request: CommandRequest, _: Locate) -> CommandAction:
+        wish = request.params[number - 1]
+        if wish not in actions:
+            raise _InvalidError(refused.format(wish))
+        return actions[wish]
+
+    return read
 
 
 def _height(request: CommandRequest, locate: Locate, refused: str) -> Place:
@@ -270,8 +242,6 @@ def _height(request: CommandRequest, locate: Locate, refused: str) -> Place:
     z, frame = request.params[6], request.frame
     if math.isnan(z):
         return Place()
-    if not math.isfinite(z):
-        raise _InvalidError(f"{refused}: the altitude is not finite")
     if frame is None or frame in GLOBAL_FRAMES:
         return Place(height=-locate(0.0, 0.0, z)[2])
     if frame in HOME_FRAMES:
@@ -289,7 +259,7 @@ def _north_east(
     x, y = request.params[4:6]
     if math.isnan(x) and math.isnan(y):
         return None
-    if not (math.isfinite(x) and math.isfinite(y)):
+    if math.isnan(x) or math.isnan(y):
         raise _InvalidError(f"{refused}: the place is not finite")
     if request.frame == LOCAL_NED:
         return x, y
@@ -303,11 +273,10 @@ def _place(request: CommandRequest, locate: Locate, refused: str) -> Place:
     return Place(_north_east(request, locate, refused), height.height, height.above_home)
 
 
-def _or_none(value: float) -> float | None:
-    return None if math.isnan(value) else value
-
-
-_READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = {
+_NO_TEST: Final = (
+    "no actuator test: rotors and joints move only in closed loop; arm and fly instead"
+)
+_READERS: Final[dict[int, _Reader]] = {
     dialect.MAV_CMD_NAV_LOITER_UNLIM: _always(SwitchMode(Mode.HOLD)),
     dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: _always(SwitchMode(Mode.RETURN)),
     dialect.MAV_CMD_NAV_LAND: _always(SwitchMode(Mode.LAND)),
@@ -319,18 +288,36 @@ _READERS: Final[dict[int, Callable[[CommandRequest, Locate], CommandAction]]] = 
     dialect.MAV_CMD_DO_FLIGHTTERMINATION: _terminate,
     dialect.MAV_CMD_DO_SET_ACTUATOR: _set_actuator,
     dialect.MAV_CMD_DO_REPOSITION: _reposition,
-    dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause_or_continue,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE: _choice(
+        1,
+        {0.0: Order.PAUSE_MISSION, 1.0: Order.CONTINUE_MISSION},
+        "pause/continue needs param1 = 0 or 1",
+    ),
     dialect.MAV_CMD_DO_SET_ROI_LOCATION: _look_at,
     dialect.MAV_CMD_DO_SET_ROI_NONE: _always(LookAt(None)),
     dialect.MAV_CMD_DO_SET_ROI: _look,
-    dialect.MAV_CMD_DO_MOTOR_TEST: _test_actuator,
-    dialect.MAV_CMD_DO_GRIPPER: _grip,
+    dialect.MAV_CMD_DO_MOTOR_TEST: _choice(1, {}, _NO_TEST),
+    # There is one gripper, whatever its number; it holds what it holds.
+    dialect.MAV_CMD_DO_GRIPPER: _choice(
+        2,
+        {0.0: Grip(closes=False), 1.0: Grip(closes=True), 2.0: Order.NOTHING},
+        "gripper not moved: param2 = {:g}; 0 releases, 1 grabs, 2 holds",
+    ),
     dialect.MAV_CMD_DO_SET_MISSION_CURRENT: _set_mission_step,
     dialect.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
-    dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _restart,
-    dialect.MAV_CMD_DO_SET_STANDARD_MODE: _set_standard_mode,
+    # What the autopilot is to do; other parameters are of other computers.
+    dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _choice(
+        1,
+        {0.0: Order.NOTHING, 1.0: Order.RESTART},
+        "not restarted: param1 = {:g}; 1 restarts, the console shuts down",
+    ),
+    dialect.MAV_CMD_DO_SET_STANDARD_MODE: _choice(
+        1,
+        {number: SwitchMode(mode) for number, mode in MODE_BY_STANDARD.items()},
+        "standard mode {:g} is not supported",
+    ),
     dialect.MAV_CMD_MISSION_START: _start_mission,
-    dialect.MAV_CMD_ACTUATOR_TEST: _test_actuator,
+    dialect.MAV_CMD_ACTUATOR_TEST: _choice(1, {}, _NO_TEST),
     dialect.MAV_CMD_COMPONENT_ARM_DISARM: _arm_or_disarm,
     dialect.MAV_CMD_RUN_PREARM_CHECKS: _always(Order.CHECK_ARMING),
     dialect.MAV_CMD_INJECT_FAILURE: _inject_failure,
