@@ -24,7 +24,6 @@ from fsw.arguments import FswOptions
 from fsw.autopilot.control.control_metrics import ControlMetrics
 from fsw.autopilot.ports import LoopHealth, PlanningCycle
 from fsw.autopilot.tuning import Tuning
-from fsw.link.build_links import build_links
 from fsw.link.endpoints import LinkError, parse_address
 from fsw.link.events.event_service import EventService
 from fsw.link.files.flight_logs import FlightLogs
@@ -32,6 +31,7 @@ from fsw.link.files.ftp_service import FtpService
 from fsw.link.files.log_service import LogService
 from fsw.link.files.log_stream import LogStreamService
 from fsw.link.files.vehicle_files import vehicle_files
+from fsw.link.ground_links import build_links
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import AUTOPILOTS, addresses
 from fsw.link.px4.link import Px4Link, open_px4, px4_addresses

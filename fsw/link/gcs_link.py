@@ -100,7 +100,7 @@ class GcsLink:
         self._endpoint, peer = open_endpoint(
             setup.target, clock, setup.local_port, remote=setup.remote
         )
-        self._arrivals = Arrivals(self._endpoint, self.losses)
+        self.arrivals = Arrivals(self._endpoint, self.losses)
         carried = self._endpoint.bytes_per_s
         self._line = None if carried is None else LineBudget(carried, clock)
         self.rates = StreamRates(
@@ -113,7 +113,7 @@ class GcsLink:
         self._told_slow = False
         self.talks = setup.unheard  # whether more than a heartbeat is sent
         self._unheard = setup.unheard
-        self._peers = Peers(peer)
+        self.peers = Peers(peer)
         self._inbox = inbox
         self._context = context
         self._clock = clock
@@ -132,22 +132,17 @@ class GcsLink:
     def dropped(self) -> int | None:
         """Datagrams that were not read in time and were dropped; None: the kernel's not known."""
         kernel = self._endpoint.dropped
-        return None if kernel is None else kernel + self._arrivals.dropped
+        return None if kernel is None else kernel + self.arrivals.dropped
 
     @property
     def received(self) -> int:
         """Datagrams that came since the start, those that were dropped too."""
-        return self._arrivals.read + (self._endpoint.dropped or 0)
-
-    @property
-    def peers(self) -> tuple[Address, ...]:
-        """All receivers of telemetry."""
-        return self._peers.all
+        return self.arrivals.read + (self._endpoint.dropped or 0)
 
     @property
     def is_heard(self) -> bool:
         """Whether it has a client."""
-        return self._peers.any_heard
+        return bool(self.peers.heard_us)
 
     def fileno(self) -> int:
         """The socket, to wait for."""
@@ -157,11 +152,6 @@ class GcsLink:
         """Whether a component has spoken on this link, lately where many have."""
         return (system, component) in self._speakers
 
-    @property
-    def has_frames(self) -> bool:
-        """Whether something has been read whose frames have not all been taken yet."""
-        return self._arrivals.waits
-
     def read(self, t_us: int, budget: int) -> int:
         """Take frames that are there, and answer them; returns what is left of the budget.
 
@@ -170,12 +160,12 @@ class GcsLink:
         what is answered as much as what asks.
         """
         while budget > 0:
-            self._arrivals.fetch(self._peers.all)
-            begun = self._arrivals.begin()
+            self.arrivals.fetch(self.peers.all)
+            begun = self.arrivals.begin()
             if begun is None:
                 break
             budget -= begun
-            found = self._arrivals.take()
+            found = self.arrivals.take()
             if found is None:
                 continue
             frame, raw = found
@@ -183,9 +173,9 @@ class GcsLink:
             if frame.system_id == SYSTEM_ID and raw in self._sent:
                 self.echoes += 1
             else:
-                self._take(t_us, frame, raw, self._arrivals.sender)
+                self._take(t_us, frame, raw, self.arrivals.sender)
             budget -= _FRAME_COST + self.outbox.bytes - waiting
-        if self.outbox.waiting:
+        if self.outbox.bytes:
             self._send(t_us)
         return budget
 
@@ -197,18 +187,15 @@ class GcsLink:
             self._encode(HEARTBEAT, snapshot)
             self._send(snapshot.t_us)
 
-    def is_busy(self, t_us: int) -> bool:
-        """Whether a service was asked or has answered lately: then it is to be called every tick.
-
-        Otherwise once a slot is enough, for what it says without being asked.
-        """
-        return t_us < self.dispatch.busy_until_us
-
     def serve(self, t_us: int) -> None:
-        """Let services go on with what they are sending, if it talks; see :meth:`is_busy`."""
+        """Let services go on with what they are sending, if it talks.
+
+        Every tick while one was asked or has answered lately; otherwise once a slot is enough, for
+        what it says without being asked.
+        """
         if self._line is None or self._line.has_room():
             self.dispatch.poll(t_us)
-        if self.outbox.waiting:
+        if self.outbox.bytes:
             self._send(t_us)
 
     def serve_bulk(self, t_us: int) -> bool:
@@ -235,9 +222,9 @@ class GcsLink:
         if snapshot.t_us >= self._housekeeping_us:
             self._housekeeping_us = snapshot.t_us + _HOUSEKEEPING_US
             self.outbox.add_overdue_texts(snapshot.t_us)
-            self._peers.expire(self._clock())
-            self.rates.heard_by(self._peers.heard_of)
-            self.talks = self._unheard or self._peers.any_heard
+            self.peers.expire(self._clock())
+            self.rates.heard_by(frozenset(self.peers.heard_us))
+            self.talks = self._unheard or bool(self.peers.heard_us)
             if self._line is not None:
                 self.rates.fit()
 
@@ -274,7 +261,7 @@ class GcsLink:
             "refused": asdict(self.signing.counters),
             "signed": self.signing.active,
             "unrecorded": self._received.left_out + self._told.left_out,
-            "peers": len(self.peers),
+            "peers": len(self.peers.all),
             "encode_failures": self.outbox.encode_failures,
             "service_failures": self.dispatch.failures,
             **self._endpoint.as_json(),
@@ -301,11 +288,14 @@ class GcsLink:
         self._received.add(t_us, raw)
         if trust is FrameTrust.EXEMPT:
             return  # no sign of life either: anybody could start or stop a failsafe with it
-        self._peers.heard(sender, self._clock(), version_1=is_version_1(raw))
+        self.peers.heard(sender, self._clock(), version_1=is_version_1(raw))
         self.talks = True
         renew(self._speakers, (frame.system_id, frame.component_id), None, _MAX_SPEAKERS)
         if frame.message_id == message_ids.SETUP_SIGNING:
-            self._set_up_signing(t_us, frame, sender)
+            armed = self._snapshot is not None and self._snapshot.armed
+            text = set_up_signing(self.signing, frame, sender, armed)
+            if text is not None:
+                self.outbox.add_text(text, t_us)
             return
         self._count_use(frame)
         host, port = sender
@@ -331,12 +321,6 @@ class GcsLink:
             if count or len(self.unhandled) < _MAX_UNHANDLED:
                 self.unhandled[frame.message_id] = count + 1
 
-    def _set_up_signing(self, t_us: int, frame: Frame, sender: Address) -> None:
-        armed = self._snapshot is not None and self._snapshot.armed
-        text = set_up_signing(self.signing, frame, sender, armed)
-        if text is not None:
-            self.outbox.add_text(text, t_us)
-
     def _add_answer(self, ack: CommandAck) -> None:
         self.outbox.add(AUTOPILOT, message_ids.COMMAND_ACK, command_ack(ack))
 
@@ -357,8 +341,8 @@ class GcsLink:
         for frame in frames:
             if frame[_MESSAGE_ID] not in _FILE_DATA:
                 self._told.add(t_us, frame)
-        old = self._peers.version_1
-        self._send_to([peer for peer in self._peers.all if peer not in old], frames)
+        old = self.peers.version_1
+        self._send_to([peer for peer in self.peers.all if peer not in old], frames)
         if old and not self.signing.active:
             both = ((frame, as_version_1(frame)) for frame in frames)
             self._send_to(old, [v1 or v2 for v2, v1 in both if v1 or v2 in asked_for])

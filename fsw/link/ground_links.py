@@ -1,19 +1,30 @@
-"""All links to the ground, as the loop sees them."""
+"""All links to the ground: opened as they were chosen, and as the loop sees them."""
 
 from __future__ import annotations
 
 import select
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from operator import attrgetter
 from typing import Final
 
+from command_line.folders import NoHomeError, state_folder
 from fsw.autopilot.ports import Clock, LinkLosses
 from fsw.autopilot.signals import CommandAck, FlightSnapshot, StatusText, TickOutputs
-from fsw.link.gcs_link import GcsLink
+from fsw.link.bounded_memory import RecordFrame, SentFrames
+from fsw.link.gcs_link import GcsLink, LinkSetup
+from fsw.link.inbox import Inbox
+from fsw.link.link_choice import LinkChoice, addresses
+from fsw.link.services.service import LinkService, TimeService
+from fsw.link.signing.key_file import KeyFile, NoKeyFile
+from fsw.link.signing.signing import SignedTimes, Signing
 from fsw.link.telemetry.stream_rates import SLOT_US
+from fsw.link.telemetry.streams import API_RATES, GROUND_RATES
+from fsw.link.wire.outgoing import TelemetryContext
 
+_GCS_PORT: Final = 18570  # of our own, as PX4 has it, if they are free
+_API_PORT: Final = 14580
 _READ_BYTES: Final = 4096  # of each link a slot in lockstep, of all links a tick in real time
 _UNHEARD_SLOTS: Final = 5  # between two polls of a link without a client
 # Tick of a slot on which its messages are encoded; they are sent on the next one. So neither the
@@ -76,12 +87,12 @@ class GroundLinks:
             if bulk > 0:
                 served = [link.serve_bulk(t_us) for link in self.links if link.talks]
                 bulk = bulk - 1 if any(served) else 0
-            begun = [link for link in self.links if link.has_frames]
+            begun = [link for link in self.links if link.arrivals.waits]
             at_once = bool(bulk or begun)
             came, _, _ = select.select(self.links, (), (), 0.0 if at_once else 1e-6 * left)
             if not came and not at_once:
                 break
-            ready = [link for link in self.links if link in came or link.has_frames]
+            ready = [link for link in self.links if link in came or link.arrivals.waits]
             for link in ready:
                 budget -= _ONE - link.read(t_us, _ONE)
                 bulk = max(bulk, _ONE)  # it may have asked for more
@@ -99,7 +110,7 @@ class GroundLinks:
         news = encodes or changed or texts
         for link in self.links:
             if link.talks:
-                fast, busy = link.rates.slot_us < SLOT_US, link.is_busy(t_us)
+                fast, busy = link.rates.slot_us < SLOT_US, t_us < link.dispatch.busy_until_us
                 if news or fast:
                     link.publish(outputs, changed)
                 if fast or changed or sends or steps or ((texts or busy) and not encodes):
@@ -142,3 +153,56 @@ class GroundLinks:
         """Close all sockets."""
         for link in self.links:
             link.close()
+
+
+def build_links(
+    choice: LinkChoice,
+    inbox: Inbox,
+    context: TelemetryContext,
+    clocks: tuple[Clock, Clock],
+    record: RecordFrame,
+    services: Callable[[], Sequence[LinkService]],
+    *,
+    beside: bool = False,
+) -> GroundLinks:
+    """Open the links; ``clocks`` are monotonic time and Unix time [us].
+
+    Only the ground station's link is recorded: the programs' link would repeat the same telemetry
+    under the same sequence numbers. ``services`` makes what one link serves. A planner ``beside``
+    PX4 leaves PX4 its ports.
+
+    Raises:
+        LinkError: An address is none, or a key cannot be trusted.
+    """
+    gcs, api = addresses(choice)
+    now_us, unix_us = clocks
+    remote = choice.allow_remote
+    setups = [LinkSetup("gcs", gcs, _GCS_PORT + beside, GROUND_RATES, unheard=True, remote=remote)]
+    if api is not None:
+        # Until a program speaks, a heartbeat a second is all it needs to find the vehicle.
+        setups.append(
+            LinkSetup("api", api, _API_PORT + beside, API_RATES, unheard=False, remote=remote)
+        )
+    times, sent = SignedTimes(), SentFrames()
+    links = [
+        GcsLink(
+            setup,
+            inbox,
+            context,
+            Signing(number, unix_us, _key_file(choice, setup.name), times),
+            now_us,
+            record if number == 0 else None,
+            (TimeService(), *services()),
+            sent,
+        )
+        for number, setup in enumerate(setups)
+    ]
+    return GroundLinks(links, context.facts.tick_period_us, now_us)
+
+
+def _key_file(choice: LinkChoice, link: str) -> KeyFile:
+    """Where the signing key of a link of this name is kept."""
+    try:
+        return KeyFile((choice.keys or state_folder()) / f"signing-{link}.json")
+    except NoHomeError:
+        return NoKeyFile()

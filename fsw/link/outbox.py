@@ -23,16 +23,11 @@ class Outbox:
         self.encode_failures = 0
         self._signing = signing
         self._writers = {id_: FrameWriter(SYSTEM_ID, id_) for id_ in (AUTOPILOT, PANDION)}
-        self.bytes = 0  # of the frames that wait
+        self.bytes = 0  # of the frames that wait to be sent
         self._frames: list[bytes] = []
         self._asked_for: set[bytes] = set()
         self._text_id = 0
         self._limiter = TextLimiter()
-
-    @property
-    def waiting(self) -> bool:
-        """Whether there is anything to send."""
-        return bool(self._frames)
 
     def add(self, component: int, message_id: int, values: WireValues) -> int:
         """Take one message; returns the bytes of its frame.

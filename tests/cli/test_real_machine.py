@@ -13,7 +13,7 @@ import pytest
 
 from command_line import folders, revision
 from command_line.output import print_anything
-from fsw.link.build_links import _key_file
+from fsw.link.ground_links import _key_file
 from fsw.link.link_choice import LinkChoice
 from fsw.link.signing.key_file import SigningKey
 from pandion import dialect, health_checks

@@ -46,23 +46,18 @@ class KeyTimes:
         self.newest = oldest
         self._key = key
         self._oldest = oldest
+        self.files: list[KeyFile] = []  # of the links that have the key now
         self._senders: dict[Sender, int] = {}
-        self._files: list[KeyFile] = []  # of the links that have the key now
 
     def join(self, file: KeyFile, newest: int) -> None:
         """Count a link in, whose file says the ``newest`` time that it knows of."""
         self._oldest = max(self._oldest, newest)
-        self._files.append(file)
+        self.files.append(file)
         self._note(newest)
 
     def leave(self, file: KeyFile) -> None:
         """Count a link out, which has another key from now on."""
-        self._files.remove(file)
-
-    @property
-    def in_use(self) -> bool:
-        """Whether a link has the key."""
-        return bool(self._files)
+        self.files.remove(file)
 
     def accept(self, sender: Sender, time: int, now: int) -> bool:
         """Whether a frame's time is newer than its sender's last one and not far ahead.
@@ -85,7 +80,7 @@ class KeyTimes:
     def _note(self, time: int) -> None:
         """Keep the newest time in the file of every link that has the key."""
         self.newest = max(self.newest, time)
-        for file in self._files:
+        for file in self.files:
             file.keep(self._key, self.newest)
 
 
@@ -106,7 +101,7 @@ class SignedTimes:
         """
         found = self._by_key.get(key)
         if found is None:
-            idle = [one for one, times in self._by_key.items() if not times.in_use]
+            idle = [one for one, times in self._by_key.items() if not times.files]
             for one in idle[: max(len(idle) + 1 - _MAX_KEYS, 0)]:
                 self._forgotten = max(self._forgotten, self._by_key.pop(one).newest)
             found = self._by_key[key] = KeyTimes(key, self._forgotten)

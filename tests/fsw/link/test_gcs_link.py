@@ -139,7 +139,7 @@ def test_garbage_does_not_raise_and_nothing_is_learnt_from_it(ground: Ground) ->
         ground.polled(command[:cut], stranger)
     ground.polled(command[:-1] + bytes([command[-1] ^ 1]), stranger)
     assert ground.inbox.take().commands == []
-    assert ground.link.peers == (ground.station.getsockname(),)
+    assert ground.link.peers.all == (ground.station.getsockname(),)
     assert ground.recorded == []
     assert ground.link.losses.bytes > 0
     stranger.close()
@@ -219,9 +219,9 @@ def test_peers_are_bounded_and_the_configured_one_stays(ground: Ground) -> None:
     writer = FrameWriter(255, 190)
     for other in others:
         ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
-    assert len(ground.link.peers) == 5
-    assert ground.station.getsockname() in ground.link.peers
-    assert others[-1].getsockname() in ground.link.peers
+    assert len(ground.link.peers.all) == 5
+    assert ground.station.getsockname() in ground.link.peers.all
+    assert others[-1].getsockname() in ground.link.peers.all
     for other in others:
         other.close()
 
@@ -233,13 +233,13 @@ def test_a_peer_that_speaks_is_not_pushed_out_by_newcomers(ground: Ground) -> No
     ground.polled(heartbeat, first)
     for other in others:
         ground.polled(heartbeat, other)
-        assert first.getsockname() in ground.link.peers
-    assert others[-1].getsockname() in ground.link.peers, "the newest is answered too"
+        assert first.getsockname() in ground.link.peers.all
+    assert others[-1].getsockname() in ground.link.peers.all, "the newest is answered too"
     ground.clock.pass_s(2.5)
     for speaker in (others[-1], others[1], others[-1], first):
         ground.polled(heartbeat, speaker)
     kept = {others[-1].getsockname(), others[1].getsockname(), first.getsockname()}
-    assert kept <= set(ground.link.peers), "those that are silent go first"
+    assert kept <= set(ground.link.peers.all), "those that are silent go first"
     for one in (first, *others):
         one.close()
 
@@ -270,10 +270,10 @@ def test_a_peer_that_falls_silent_is_forgotten(ground: Ground) -> None:
     ground.polled(writer.frame(ids.HEARTBEAT, *HEARTBEAT), other)
     ground.clock.pass_s(0.6 * EXPIRY_US / 1e6)
     ground.fly(500)
-    assert other.getsockname() in ground.link.peers
+    assert other.getsockname() in ground.link.peers.all
     ground.clock.pass_s(0.6 * EXPIRY_US / 1e6)
     ground.fly(500)
-    assert ground.link.peers == (ground.station.getsockname(),)
+    assert ground.link.peers.all == (ground.station.getsockname(),)
     other.close()
 
 
@@ -292,7 +292,7 @@ def test_our_own_frames_sent_back_are_dropped_and_counted(ground: Ground, versio
         ground.polled(datagram, echo)
     frames = [frame for datagram in sent for frame in split(datagram)]
     assert {frame.component_id for frame in frames} == ({1, 25} if version == 2 else {1})
-    assert echo.getsockname() not in ground.link.peers
+    assert echo.getsockname() not in ground.link.peers.all
     assert counts(ground)["echoes_dropped"] == len(frames)
     assert ground.link.accepted == before
     echo.close()

@@ -254,7 +254,7 @@ def test_a_datagram_of_many_requests_is_taken_frame_by_frame() -> None:
         links = GroundLinks([gcs.link], 2_000, wall_us)
         links.attend(0.02)
         assert service.asked == 90, "the rest waits for nobody's next datagram"
-        assert not gcs.link.has_frames
+        assert not gcs.link.arrivals.waits
 
 
 def test_what_is_answered_costs_as_much_as_what_asks() -> None:

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from fsw.link.build_links import build_links
 from fsw.link.endpoints import LinkError
+from fsw.link.ground_links import build_links
 from fsw.link.inbox import Inbox
 from fsw.link.link_choice import LinkChoice
 from fsw.link.signing.key_file import KeyFile, SigningKey
@@ -135,7 +135,7 @@ def test_presence_needs_no_signature_but_teaches_no_peer(ground: Ground) -> None
     ground.polled(unsigned(ids.HEARTBEAT, 0, 6, 8, 0, 4, 3), stranger)
     ground.polled(unsigned(ids.RADIO_STATUS, 0, 0, 1, 1, 1, 1, 1), stranger)
     assert ground.link.signing.counters.unsigned == 0
-    assert stranger.getsockname() not in ground.link.peers
+    assert stranger.getsockname() not in ground.link.peers.all
     stranger.close()
 
 
@@ -565,7 +565,7 @@ def test_a_signed_link_takes_nothing_of_mavlink_1_and_sends_none(
     ground.polled(old)
     assert ground.link.accepted == before
     assert ground.link.signing.counters.unsigned == 1
-    assert ground.link.peers == (ground.station.getsockname(),)
+    assert ground.link.peers.all == (ground.station.getsockname(),)
     ground.datagrams()
     for _ in range(100):
         ground.t_us += 2_000
