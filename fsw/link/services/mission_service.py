@@ -29,17 +29,19 @@ from fsw.link.services.mission_store import (
     MissionStore,
     Upload,
 )
-from fsw.link.services.mission_wire import (
+from fsw.link.services.service import LinkService
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.encode_standard import current_values
+from fsw.link.wire.mission_items import (
+    DENIED,
+    UNSUPPORTED,
+    BadItem,
+    MissionItem,
     Peer,
-    current_values,
-    encode_ack,
     encode_item,
     item_float,
     item_int,
 )
-from fsw.link.services.service import LinkService
-from fsw.link.wire.decode import Numbers
-from fsw.link.wire.mission_items import DENIED, UNSUPPORTED, BadItem, MissionItem
 from fsw.link.wire.outgoing import Outgoing, ServiceOutput
 from messages import message_ids as ids
 from messages.frames import Frame
@@ -92,6 +94,14 @@ class _Download:
     last_received_us: int
 
 
+class _Refused(Exception):
+    """No transfer of a type of list can begin now; its MISSION_ACK says why."""
+
+    def __init__(self, ack: Outgoing) -> None:
+        super().__init__()
+        self.ack = ack
+
+
 class MissionService(LinkService):
     """The mission protocol on one link."""
 
@@ -123,7 +133,10 @@ class MissionService(LinkService):
     def handle(self, frame: Frame, t_us: int) -> Sequence[ServiceOutput]:
         """See :class:`~fsw.link.services.service.LinkService`."""
         values, peer = cast(Numbers, frame.payload_values), (frame.system_id, frame.component_id)
-        return self._handlers[frame.message_id](values, peer, t_us)
+        try:
+            return self._handlers[frame.message_id](values, peer, t_us)
+        except _Refused as refused:
+            return (refused.ack,)
 
     def poll(self, t_us: int) -> Sequence[ServiceOutput]:
         """Request missing items again, and report the mission's progress."""
@@ -143,7 +156,7 @@ class MissionService(LinkService):
             else:
                 self._upload = None
                 missing = f"item {len(upload.items)} was not received"
-                replies.append(encode_ack(CANCELLED, upload.kind, upload.peer))
+                replies.append(_answer(CANCELLED, upload.kind, upload.peer))
                 replies.append(
                     StatusText(Severity.WARNING, f"upload aborted: {missing}; kept the old list")
                 )
@@ -168,11 +181,7 @@ class MissionService(LinkService):
         return Outgoing(ids.MISSION_ITEM_REACHED, (self._shown.reached,))
 
     def _count(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        number, count = int(values[3]), int(values[0])
-        refused = self._unavailable(number, peer, t_us)
-        if refused is not None:
-            return refused
-        kind = Kind(number)
+        count, kind = int(values[0]), self._available(int(values[3]), peer, t_us)
         self._upload = self._download = self._done = None
         if count > ROOM[kind]:
             reason = f"{count} items of {kind.name.lower()}; the limit is {ROOM[kind]}"
@@ -211,11 +220,11 @@ class MissionService(LinkService):
         """Handle an item without an upload; the acknowledgement of the last one may be lost."""
         done = self._done
         if done is not None and self._is_of(done, peer) and done.kind == number:
-            again = encode_ack(ACCEPTED, number, peer, self._store.ids[done.kind])
+            again = _answer(ACCEPTED, number, peer, self._store.ids[done.kind])
             return (again,) if seq == done.count - 1 else ()
         if self._is_of(self._upload, peer):
             return ()
-        return (encode_ack(DENIED if self._upload else ERROR, number, peer),)
+        return (_answer(DENIED if self._upload else ERROR, number, peer),)
 
     def _ask(self, upload: _Incoming, t_us: int) -> Outgoing:
         upload.asked_us = t_us
@@ -237,13 +246,11 @@ class MissionService(LinkService):
         """The acknowledgement of what the tick has decided on; it has said itself why not."""
         upload, number, peer, incoming = asked
         assert upload.result is not None
-        ack = encode_ack(upload.result, number, peer, 0)
         if self._upload is incoming:
             self._upload = None
-        if upload.result != ACCEPTED:
-            return (ack,)
-        ack = encode_ack(ACCEPTED, number, peer, upload.identity(number))
-        if incoming is None:
+        accepted = upload.result == ACCEPTED
+        ack = _answer(upload.result, number, peer, upload.identity(number) if accepted else 0)
+        if incoming is None or not accepted:
             return (ack,)
         self._done = incoming
         text = f"{incoming.kind.name.lower()} of {incoming.count} items received"
@@ -254,11 +261,7 @@ class MissionService(LinkService):
         )
 
     def _request_list(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
-        number = int(values[2])
-        refused = self._unavailable(number, peer, t_us)
-        if refused is not None:
-            return refused
-        kind = Kind(number)
+        kind = self._available(int(values[2]), peer, t_us)
         self._upload = None
         items = self._store.items[kind]
         self._download = _Download(peer, self._address, kind, items, t_us) if items else None
@@ -272,13 +275,10 @@ class MissionService(LinkService):
         seq, number = int(values[0]), int(values[3])
         download = self._download
         if download is None or not self._is_of(download, peer) or download.kind != number:
-            refused = self._unavailable(number, peer, t_us)
-            if refused is not None:
-                return refused
-            kind = Kind(number)
+            kind = self._available(number, peer, t_us)
             download = _Download(peer, self._address, kind, self._store.items[kind], t_us)
         if seq >= len(download.items):
-            return (encode_ack(INVALID_SEQUENCE, number, peer),)
+            return (_answer(INVALID_SEQUENCE, number, peer),)
         download.last_received_us = t_us
         return (encode_item(download.items[seq], seq, number, peer, as_int),)
 
@@ -292,16 +292,14 @@ class MissionService(LinkService):
 
     def _clear_all(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         number = int(values[2])
-        kinds = tuple(Kind) if number == ALL_KINDS else (number,)
-        refused = self._unavailable(kinds[0], peer, t_us)
-        if refused is not None:
-            return refused
+        first = self._available(Kind.MISSION if number == ALL_KINDS else number, peer, t_us)
+        kinds = tuple(Kind) if number == ALL_KINDS else (first,)
         self._upload = self._download = None
         try:
-            upload = self._store.offer({Kind(kind): EMPTY for kind in kinds}, self.source)
+            upload = self._store.offer(dict.fromkeys(kinds, EMPTY), self.source)
         except BadItem as wrong:
             text = f"nothing cleared: {wrong.reason}"
-            return encode_ack(wrong.result, number, peer), StatusText(Severity.WARNING, text)
+            return _answer(wrong.result, number, peer), StatusText(Severity.WARNING, text)
         self._asked.append(_Asked(upload, number, peer, None))
         return ()
 
@@ -311,25 +309,25 @@ class MissionService(LinkService):
             self._show_again = True
             return ()
         return (
-            encode_ack(INVALID_SEQUENCE, Kind.MISSION, peer),
+            _answer(INVALID_SEQUENCE, Kind.MISSION, peer),
             StatusText(Severity.WARNING, f"there is no mission item {seq}"),
         )
 
     def _partial(self, values: Numbers, peer: Peer, t_us: int) -> Sequence[ServiceOutput]:
         """A part of a list cannot be checked by itself; ground stations then send all of it."""
-        return (encode_ack(UNSUPPORTED, int(values[4]), peer),)
+        return (_answer(UNSUPPORTED, int(values[4]), peer),)
 
-    def _unavailable(self, number: int, peer: Peer, t_us: int) -> Sequence[ServiceOutput] | None:
-        """Why no transfer of this type can begin now."""
+    def _available(self, number: int, peer: Peer, t_us: int) -> Kind:
+        """The list of a MAV_MISSION_TYPE, if a transfer of it can begin now; else ``_Refused``."""
         if number not in ROOM:
-            return (encode_ack(UNSUPPORTED, number, peer),)
+            raise _Refused(_answer(UNSUPPORTED, number, peer))
         upload, download = self._upload, self._download
         if download is not None and t_us - download.last_received_us > SILENCE_US:
             download = self._download = None
         busy = upload or download
         if busy is not None and not self._is_of(busy, peer):
-            return (encode_ack(DENIED, number, peer),)
-        return None
+            raise _Refused(_answer(DENIED, number, peer))
+        return Kind(number)
 
     @property
     def _address(self) -> str:
@@ -345,4 +343,9 @@ class MissionService(LinkService):
     def _refuse(self, refused: BadItem, kind: Kind, peer: Peer) -> Sequence[ServiceOutput]:
         self._upload = None
         text = f"{kind.name.lower()} refused: {refused.reason}"
-        return (encode_ack(refused.result, kind, peer), StatusText(Severity.WARNING, text))
+        return (_answer(refused.result, kind, peer), StatusText(Severity.WARNING, text))
+
+
+def _answer(result: int, kind: int, peer: Peer, opaque_id: int = 0) -> Outgoing:
+    """MISSION_ACK; the id is that of the list which an upload has put on the vehicle."""
+    return Outgoing(ids.MISSION_ACK, (*peer, result, kind, opaque_id))

@@ -50,20 +50,6 @@ class Kind(IntEnum):
     RALLY = 2
 
 
-def _identity(items: tuple[MissionItem, ...]) -> int:
-    """Identity of a list: a checksum of the upload, as in PX4.
-
-    0 means an empty list, so no other list has it.
-    """
-    if not items:
-        return 0
-    packed = (
-        _ITEM.pack(one.command, one.frame, one.autocontinue, *one.params, one.x, one.y, one.z)
-        for one in items
-    )
-    return zlib.crc32(b"".join(packed)) or 1
-
-
 _NO_PROGRESS: Final = MissionProgress()
 _ITEM: Final = struct.Struct("<HBB4fiif")
 ALL_KINDS: Final = 255  # MAV_MISSION_TYPE_ALL
@@ -90,14 +76,22 @@ class Site:
 class Upload:
     """Lists that take the place of the old ones: the tick takes all of them, or none."""
 
-    items: Mapping[Kind, tuple[MissionItem, ...]]
+    items: Mapping[int, tuple[MissionItem, ...]]  # by MAV_MISSION_TYPE
     update: MissionUpdate
     result: int | None = None  # MAV_MISSION_RESULT; None: the tick has not decided
     remarks: tuple[str, ...] = ()  # what the operator should know of it though it is accepted
 
     def identity(self, number: int) -> int:
-        """What the list of a MAV_MISSION_TYPE is known by; 0 where it has none of that."""
-        return _identity(self.items[Kind(number)]) if number in self.items else 0
+        """What the list of a MAV_MISSION_TYPE is known by: a checksum of the upload, as in PX4.
+
+        0 where it has none of that, or an empty one, so no other list has it.
+        """
+        items = self.items.get(number, ())
+        packed = (
+            _ITEM.pack(one.command, one.frame, one.autocontinue, *one.params, one.x, one.y, one.z)
+            for one in items
+        )
+        return (zlib.crc32(b"".join(packed)) or 1) if items else 0
 
 
 class MissionStore:
@@ -105,7 +99,7 @@ class MissionStore:
 
     def __init__(self, site: Site) -> None:
         self.ids: dict[int, int] = dict.fromkeys(Kind, 0)  # see ``PlanIds``
-        self.items: dict[Kind, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
+        self.items: dict[int, tuple[MissionItem, ...]] = dict.fromkeys(Kind, ())
         self._site = site
         self._snapshot: FlightSnapshot | None = None
         self._steps: tuple[MissionStep, ...] = ()  # of the mission

@@ -11,7 +11,6 @@ from typing import Final
 
 from fsw.autopilot.signals import FlightSnapshot
 from fsw.link.files.vehicle_files import component_metadata
-from fsw.link.services import mission_wire
 from fsw.link.wire import (
     encode_dialect,
     encode_health,
@@ -71,7 +70,7 @@ STREAMS: Final = (
     Stream(message_ids.ATTITUDE_TARGET, 10, 10, encode_standard.attitude_target),
     Stream(message_ids.VFR_HUD, 4, 4, encode_place.vfr_hud),
     Stream(message_ids.ALTITUDE, 1, 2, encode_place.altitude),
-    Stream(message_ids.MISSION_CURRENT, 1, 1, mission_wire.mission_current),
+    Stream(message_ids.MISSION_CURRENT, 1, 1, encode_standard.mission_current),
     Stream(message_ids.HOME_POSITION, 0.5, 1, encode_place.home_position),
     Stream(message_ids.BATTERY_STATUS, 1, 1, encode_health.battery_status),
     Stream(message_ids.ESTIMATOR_STATUS, 1, 1, encode_health.estimator_status),

@@ -16,6 +16,8 @@ from fsw.autopilot.model.airframe import Airframe
 from fsw.autopilot.signals import (
     CommandAck,
     FlightSnapshot,
+    MissionProgress,
+    MissionState,
     Mode,
     MotionSetpoint,
     SetpointKind,
@@ -23,7 +25,7 @@ from fsw.autopilot.signals import (
     Vec3,
 )
 from fsw.link.wire.identity import custom_mode, shown_mode
-from fsw.link.wire.outgoing import PX4, TelemetryContext, WireValues
+from fsw.link.wire.outgoing import PX4, PlanIds, TelemetryContext, WireValues
 
 _ARMED: Final = 128  # MAV_MODE_FLAG
 _CUSTOM_MODE: Final = 1
@@ -51,6 +53,8 @@ _ZERO: Final[Vec3] = (0.0, 0.0, 0.0)
 _U32: Final = 0xFFFFFFFF
 _LOCKSTEP: Final = 1  # HIL_ACTUATOR_CONTROLS_FLAGS
 _CONTROLS: Final = 16  # of a HIL_ACTUATOR_CONTROLS
+_NO_MISSION: Final = 0xFFFF  # in place of a total; 0 would mean that totals are not supported
+_FLYING, _SUSPENDED = 1, 2  # mission_mode
 
 
 def heartbeat(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
@@ -165,6 +169,20 @@ def orbit_status(snapshot: FlightSnapshot, context: TelemetryContext) -> WireVal
     radius = orbit.radius if orbit.clockwise else -orbit.radius
     place = (round(1e7 * latitude), round(1e7 * longitude), altitude)
     return (snapshot.t_us, radius, *place, _GLOBAL)
+
+
+def mission_current(snapshot: FlightSnapshot, context: TelemetryContext) -> WireValues:
+    """MISSION_CURRENT of a snapshot."""
+    return current_values(snapshot.mission, snapshot.mode is Mode.MISSION, context.plan_ids)
+
+
+def current_values(progress: MissionProgress, in_mission: bool, plans: PlanIds) -> WireValues:
+    """MISSION_CURRENT."""
+    which = (plans[0], plans[1], plans[2])
+    if progress.state is MissionState.NO_MISSION:
+        return (0, _NO_MISSION, int(progress.state), _SUSPENDED, *which)
+    mode = _FLYING if in_mission else _SUSPENDED
+    return (progress.current, progress.total, int(progress.state), mode, *which)
 
 
 def vehicle_heartbeat(mode: Mode, mav_type: int, *, armed: bool) -> WireValues:

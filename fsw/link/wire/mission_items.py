@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, cast
 
 from fsw.autopilot.flight.commands.bounds import (
     MAX_FORCE,
@@ -21,7 +21,9 @@ from fsw.autopilot.flight.commands.bounds import (
     circle_problem,
 )
 from fsw.autopilot.signals import MAX_DISTANCE, MissionAction, MissionStep, Vec2, Vec3, Vec4
-from messages import dialect
+from fsw.link.wire.decode import Numbers
+from fsw.link.wire.outgoing import Outgoing
+from messages import dialect, message_ids
 
 # What leaves the way as it is, and why it is skipped.
 _NO_CAMERA: Final = "this vehicle has no camera"
@@ -55,12 +57,15 @@ INVALID: Final = 5
 INVALID_PARAM1: Final = 6  # and so on up to parameter 7
 DENIED: Final = 14
 
+_FRAME_MISSION: Final = 2  # MAV_FRAME of a command without a place
 NO_PLACE: Final = 2**31 - 1  # x or y of an item that names none, as MAVLink writes NaN there
 LONGEST_STAY: Final = MAX_STAY  # s
 WIDEST_ACCEPTANCE: Final = 10.0  # m
 USUAL_ACCEPTANCE: Final = 0.1  # m
 USUAL_RADIUS: Final = 2.0  # m, of a circle that names none
 
+Peer = tuple[int, int]
+"""System and component of a client."""
 Locate = Callable[[float, float, float], Vec3]
 """Local NED [m] of a latitude and longitude [deg] and an altitude above the sea [m]."""
 
@@ -85,6 +90,46 @@ class BadItem(Exception):
         super().__init__(reason)
         self.result = result
         self.reason = reason
+
+
+def item_int(values: Numbers) -> MissionItem:
+    """Read a MISSION_ITEM_INT."""
+    return MissionItem(
+        command=int(values[8]),
+        frame=int(values[11]),
+        params=cast(Vec4, values[0:4]),
+        x=int(values[4]),
+        y=int(values[5]),
+        z=values[6],
+        autocontinue=int(values[13]),
+    )
+
+
+def item_float(values: Numbers) -> MissionItem:
+    """Read a MISSION_ITEM, whose x and y are degrees or metres."""
+    frame = int(values[11])
+    whole = []
+    for number, value in enumerate(values[4:6]):
+        scaled = value * _scale(frame)
+        if math.isnan(scaled):
+            scaled = float(NO_PLACE)
+        if not abs(scaled) <= NO_PLACE:
+            raise BadItem(INVALID_PARAM1 + 4 + number, f"{value:g} is no place")
+        whole.append(round(scaled))
+    return item_int((*values[0:4], *whole, *values[6:]))
+
+
+def encode_item(item: MissionItem, seq: int, kind: int, peer: Peer, as_int: bool) -> Outgoing:
+    """MISSION_ITEM_INT, or MISSION_ITEM for a request in floats."""
+    x: float = item.x
+    y: float = item.y
+    if not as_int:
+        scale = _scale(item.frame)
+        x = math.nan if item.x == NO_PLACE else item.x / scale
+        y = math.nan if item.y == NO_PLACE else item.y / scale
+    tail = (seq, item.command, *peer, item.frame, 0, item.autocontinue, kind)
+    message_id = message_ids.MISSION_ITEM_INT if as_int else message_ids.MISSION_ITEM
+    return Outgoing(message_id, (*item.params, x, y, item.z, *tail))
 
 
 def command_name(command: int) -> str:
@@ -343,3 +388,9 @@ def _heading(degrees: float) -> float | None:
 
 def _bad(number: int, reason: str) -> BadItem:
     return BadItem(INVALID_PARAM1 + number - 1, reason)
+
+
+def _scale(frame: int) -> float:
+    if frame == _FRAME_MISSION:
+        return 1.0
+    return 1e4 if frame in LOCAL_FRAMES else 1e7

@@ -460,6 +460,7 @@ class Huge:
 
     file: HugeFile
 
+    @property
     def size(self) -> int:
         return self.file.size
 
