@@ -21,8 +21,7 @@ from command_line.process import (
 from command_line.revision import revision
 from command_line.run_directory import run_directory
 from fsw.arguments import FswOptions
-from fsw.autopilot.control.control_metrics import ControlMetrics
-from fsw.autopilot.ports import LoopHealth, PlanningCycle
+from fsw.autopilot.ports import PlanningCycle
 from fsw.autopilot.tuning import Tuning
 from fsw.link.endpoints import LinkError, parse_address
 from fsw.link.events.event_service import EventService
@@ -91,11 +90,7 @@ class _Session:
         keeping = self._kept_parameters(directory)  # what is of no use, as well
         program = self._load(options)
         facts = program.facts
-        record = FlightRecord(
-            mpc=PlannerRecord(GroupTimer(facts.mpc_period_us)),
-            control=ControlMetrics(),
-            health=LoopHealth(),
-        )
+        record = FlightRecord(PlannerRecord(GroupTimer(facts.mpc_period_us)))
         self._restore_parameters(keeping, program)
         # Early: a process forked now shares what was compiled, and no thread, port or log.
         settle_memory()
@@ -155,11 +150,7 @@ class _Session:
         return DONE if end.ending is Ending.SHUTDOWN and not lost else NOT_COMPLETED
 
     def _files(self, directory: Path, start_us: int, program: FlightProgram) -> RunFiles:
-        """Create the logs.
-
-        Raises:
-            CouldNotStart: They cannot be created.
-        """
+        """Create the logs; ``CouldNotStart`` where they cannot be."""
         try:
             return RunFiles(directory, start_us, _subject(self._options, program), self._warn)
         except OSError as error:
@@ -185,8 +176,7 @@ class _Session:
     def _kept_parameters(self, directory: Path) -> ParameterFile:
         """Read the parameters of the vehicle's file, and say what of it is of no use.
 
-        Raises:
-            CouldNotStart: The file cannot be read or written, or contradicts itself.
+        ``CouldNotStart`` where the file cannot be read or written, or contradicts itself.
         """
         # Imported here because they take a second, which the other refusals need not wait.
         from fsw.runtime.assembly import configured
@@ -206,8 +196,7 @@ class _Session:
     def _restore_parameters(self, keeping: ParameterFile, program: FlightProgram) -> None:
         """Let the program take them over.
 
-        Raises:
-            CouldNotStart: They cannot be written, or no flight loop can be designed with them.
+        ``CouldNotStart`` where they cannot be written, or no flight loop be designed with them.
         """
         path = self._options.params
         with _refused(path or keeping.record):

@@ -36,36 +36,27 @@ class VehicleLink(Protocol):
 
     def announce(self) -> None:
         """Tell the other side that the vehicle is there, until it sends readings."""
-        ...
 
     def wait_for_step(self) -> SensorFrame | None:
         """Wait for new readings; None when none came within the link's patience, or at the end."""
-        ...
 
     def newest(self) -> SensorFrame | None:
         """The newest readings that have come; None when none have since the last call."""
-        ...
 
     def wait(self, wait_s: float) -> bool:
         """Wait for at most ``wait_s`` [s]; whether something has come."""
-        ...
 
     def send_actuators(self, t_us: int, outputs: TickOutputs) -> None:
         """Send what the tick of ``t_us`` [us] commands."""
-        ...
 
     def queue_texts(self, texts: tuple[StatusText, ...]) -> None:
         """Send texts with the next command, where the other side takes any."""
-        ...
 
     def queue_ack(self, ack: CommandAck) -> None:
         """Acknowledge a command of the other side."""
-        ...
 
     def route(self, request: CommandRequest) -> None:
         """Pass a command on to the other side, which answers by ``routed_acks``."""
-        ...
 
     def close(self) -> None:
         """End the connection."""
-        ...

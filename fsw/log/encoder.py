@@ -196,7 +196,9 @@ class LogEncoder:
         return self._whole_tick_records.pack(t_us, frame, command)
 
     def _detail(self, snapshot: FlightSnapshot) -> bytes:
-        x, sent, ground = snapshot.estimate, snapshot.actuators, _sees_ground(snapshot)
+        x, sent, known = snapshot.estimate, snapshot.actuators, snapshot.estimator
+        # Whether a distance to the ground is measured and used.
+        ground = known is not None and bool(known.flags & ABOVE_GROUND)
         t_us, touching, payload = snapshot.t_us, snapshot.touching, snapshot.payload
         found = self._detail_records.pack(
             t_us,
@@ -303,11 +305,6 @@ def loop_timing(t_us: int, group: int, timing: GroupTiming) -> bytes:
     return _TIMING.pack(t_us, (*timing.shown, group))
 
 
-def _sees_ground(snapshot: FlightSnapshot) -> bool:
-    """Whether a distance to the ground is measured and used."""
-    return snapshot.estimator is not None and bool(snapshot.estimator.flags & ABOVE_GROUND)
-
-
 def _estimator(t_us: int, known: EstimatorReport) -> bytes:
     ratios, variance, motion = known.ratios, known.pose_covariance, known.velocity_covariance
     accuracy = (
@@ -315,6 +312,8 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
         math.sqrt(max(variance[15], variance[18])),
     )
     faults = ", ".join([f"{one.name}: {one.fault}" for one in known.sensors if one.fault])
+    # Bits of velocity, position and height that nothing has corrected: one sensor corrects all.
+    unaided = 0 if 0 <= known.unaided_us <= _UNAIDED_US else 7
     return _ESTIMATOR.pack(
         t_us,
         (
@@ -322,7 +321,7 @@ def _estimator(t_us: int, known: EstimatorReport) -> bytes:
             *(ratios.heading, ratios.velocity, ratios.place, ratios.height, ratios.above_ground),
             *(*accuracy, math.nan if known.unaided_us < 0 else 1e-6 * known.unaided_us),
             *(known.pose_delay, known.resets & _U32, known.flags, faults.encode()),
-            *(_unusable(known), _unaided(known), _refused(ratios), 0.0),
+            *(_unusable(known), unaided, _refused(ratios), 0.0),
         ),
         (*[x for name, count in topics.INNOVATIONS for x in known.innovation(name, count)],),
         (
@@ -341,11 +340,6 @@ def _unusable(known: EstimatorReport) -> int:
         flags & HEIGHT,
     )
     return sum(1 << bit for bit, well in enumerate(usable) if not well)
-
-
-def _unaided(known: EstimatorReport) -> int:
-    """The same bits of what nothing has corrected for a second; one sensor corrects all three."""
-    return 0 if 0 <= known.unaided_us <= _UNAIDED_US else 7
 
 
 def _refused(ratios: TestRatios) -> int:

@@ -72,11 +72,7 @@ def configured(
     vehicle: Vehicle | None = None,
     px4: Tuning = (),
 ) -> FlightConfig:
-    """The configuration of the start.
-
-    Raises:
-        ValueError: For an unknown name, listing the known ones.
-    """
+    """The configuration of the start; raises as :func:`flight_software` does."""
     # flight_config refuses unknown names of inner loops and solvers.
     config = flight_config(
         choice.controller,

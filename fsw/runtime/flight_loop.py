@@ -89,8 +89,8 @@ class FlightRecord:
     """What the loop measured."""
 
     mpc: PlannerRecord
-    control: ControlMetrics
-    health: LoopHealth
+    control: ControlMetrics = field(default_factory=ControlMetrics)
+    health: LoopHealth = field(default_factory=LoopHealth)
     groups: dict[str, GroupTimer] = field(default_factory=dict)  # of the loop's own groups
     stages: dict[str, Histogram] = field(default_factory=dict)  # of their members
     deadlines: DeadlineMonitor = field(default_factory=DeadlineMonitor)  # of the inner loop

@@ -100,15 +100,9 @@ class ProcessLink:
         return pickle.loads(message)
 
 
-def process_link() -> tuple[ProcessLink, ProcessLink]:
-    """Both ends of a new link."""
-    one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    return ProcessLink(one), ProcessLink(other)
-
-
 def start_fork_server(planner: PlanningCycle, clock: Clock) -> tuple[int, ProcessLink]:
     """Fork the fork server; returns its process number and our end of the link."""
-    ours, theirs = process_link()
+    ours, theirs = map(ProcessLink, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
     server = _fork(lambda: _serve(planner, clock, theirs), theirs)
     theirs.close()
     return server, ours

@@ -67,11 +67,7 @@ class TickRunner:
         self._failed = 0  # in a row
 
     def __call__(self, inputs: TickInputs) -> TickOutputs:
-        """Run one tick, both parts of it.
-
-        Raises:
-            Exception: as of :meth:`control`.
-        """
+        """Run one tick, both parts of it; raises what they raise."""
         self.control(inputs)
         return self.conclude()
 
@@ -91,11 +87,7 @@ class TickRunner:
         return begun.outputs
 
     def conclude(self) -> TickOutputs:
-        """Run the rest of the tick.
-
-        Raises:
-            Exception: as of :meth:`control`.
-        """
+        """Run the rest of the tick; raises as :meth:`control` does."""
         begun, self._begun = self._begun, None
         assert begun is not None
         if isinstance(begun, TickOutputs):

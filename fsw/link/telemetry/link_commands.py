@@ -9,7 +9,14 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from fsw.autopilot.signals import CommandAck, CommandRequest, FlightSnapshot, Severity, StatusText
+from fsw.autopilot.signals import (
+    CommandAck,
+    CommandRequest,
+    CommandResult,
+    FlightSnapshot,
+    Severity,
+    StatusText,
+)
 from fsw.link.services.service import LinkService
 from fsw.link.telemetry.stream_rates import OFF, UNKNOWN, StreamRates
 from fsw.link.telemetry.streams import messages_now
@@ -28,7 +35,6 @@ _REQUESTS: Final = {
     519: (message_ids.PROTOCOL_VERSION, True),  # REQUEST_PROTOCOL_VERSION
     520: (message_ids.AUTOPILOT_VERSION, True),  # REQUEST_AUTOPILOT_CAPABILITIES
 }
-_ACCEPTED, _TEMPORARILY_REJECTED, _DENIED, _FAILED = 0, 1, 2, 4  # MAV_RESULT
 _DECODERS: Final = {
     message_ids.COMMAND_LONG: decode.command_long,
     message_ids.COMMAND_INT: decode.command_int,
@@ -74,12 +80,15 @@ class LinkCommands:
     ) -> _Outcome | None:
         message_id, second = _whole(request.params[0]), request.params[1]
         if request.command == _GET_MESSAGE_INTERVAL:
-            return self._get_interval(message_id)
+            if message_id is None:
+                return CommandResult.DENIED, "message interval: param1 is not a message id", ()
+            values = (self._rates.interval_us(message_id), message_id & 0xFFFF)
+            return CommandResult.ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
         if request.command == _SET_MESSAGE_INTERVAL:
             return self._set_interval(message_id, _whole(second), t_us, asker)
         if request.command == _REQUEST_MESSAGE:
             if message_id is None:
-                return _DENIED, "request message: param1 is not a message id", ()
+                return CommandResult.DENIED, "request message: param1 is not a message id", ()
             return self._now(message_id, second, snapshot)
         service = self._commanded.get(request.command)
         if service is not None:
@@ -88,42 +97,52 @@ class LinkCommands:
         if request.command in _REQUESTS:  # the older commands, each of which asks for one message
             wanted, param1_is_1 = _REQUESTS[request.command]
             if param1_is_1 and request.params[0] != 1.0:
-                return _DENIED, f"command {request.command}: param1 must be 1 to request it", ()
+                return (
+                    CommandResult.DENIED,
+                    f"command {request.command}: param1 must be 1 to request it",
+                    (),
+                )
             return self._now(wanted, math.nan, snapshot)
         return None
-
-    def _get_interval(self, message_id: int | None) -> _Outcome:
-        if message_id is None:
-            return _DENIED, "message interval: param1 is not a message id", ()
-        values = (self._rates.interval_us(message_id), message_id & 0xFFFF)
-        return _ACCEPTED, "", (Outgoing(message_ids.MESSAGE_INTERVAL, values),)
 
     def _set_interval(
         self, message_id: int | None, interval: int | None, t_us: int, asker: object
     ) -> _Outcome:
         if message_id is None or interval is None:
-            return _DENIED, "message interval: param1 is a message id, param2 a time in us", ()
+            return (
+                CommandResult.DENIED,
+                "message interval: param1 is a message id, param2 a time in us",
+                (),
+            )
         if self._rates.interval_us(message_id) == UNKNOWN:
-            return _FAILED, "", ()
+            return CommandResult.FAILED, "", ()
         refusal = self._rates.set_interval(message_id, interval, t_us, asker)
         if refusal:
-            return _DENIED, refusal, ()
+            return CommandResult.DENIED, refusal, ()
         in_force = self._rates.interval_us(message_id)
         if in_force != OFF and (interval == OFF or 0 < in_force < interval):
             why = "it is vital, or others on this link listen and have not asked for less"
-            return _ACCEPTED, f"message {message_id} comes every {in_force} us: {why}", ()
-        return _ACCEPTED, "", ()
+            return (
+                CommandResult.ACCEPTED,
+                f"message {message_id} comes every {in_force} us: {why}",
+                (),
+            )
+        return CommandResult.ACCEPTED, "", ()
 
     def _now(self, message_id: int, which: float, snapshot: FlightSnapshot | None) -> _Outcome:
         if snapshot is None:
-            return _TEMPORARILY_REJECTED, "the flight software has not run a tick yet", ()
+            return (
+                CommandResult.TEMPORARILY_REJECTED,
+                "the flight software has not run a tick yet",
+                (),
+            )
         messages = messages_now(message_id, which, snapshot, self._context)
         if messages is None:
             # No text: ground stations probe for cameras, gimbals and much else at every start.
-            return _DENIED, "", ()
+            return CommandResult.DENIED, "", ()
         if not messages:
-            return _TEMPORARILY_REJECTED, f"message {message_id}: no data yet", ()
-        return _ACCEPTED, "", messages
+            return CommandResult.TEMPORARILY_REJECTED, f"message {message_id}: no data yet", ()
+        return CommandResult.ACCEPTED, "", messages
 
 
 def _whole(number: float) -> int | None:
